@@ -1,0 +1,17 @@
+"""Piecewise constant-mean-curvature surfaces: triangle meshes of patches in equilibrium."""
+
+from .curvature import curvature_error, mean_curvature, target_curvature
+from .energy import energy, gradient, hessian
+from .surface import Patch, Plane, Surface
+
+__all__ = [
+    "Patch",
+    "Plane",
+    "Surface",
+    "curvature_error",
+    "energy",
+    "gradient",
+    "hessian",
+    "mean_curvature",
+    "target_curvature",
+]

@@ -1,0 +1,47 @@
+"""The exceptions of pcmc. Every message says what was expected, what was found, where, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class PcmcError(ValueError):
+    """Base of every error that pcmc raises on purpose."""
+
+
+class SurfaceError(PcmcError):
+    """The arrays given do not describe a surface that can be solved."""
+
+
+class OptionError(PcmcError):
+    """A parameter of a function or solver is outside what it may be."""
+
+
+class FileError(PcmcError):
+    """A file cannot be read or written as the format its suffix names."""
+
+
+class MissingExtra(ImportError):
+    """A part of pcmc was asked for whose libraries are not installed."""
+
+    def __init__(self, library: str, extra: str) -> None:
+        super().__init__(
+            f"{library} is not installed; install it with: python -m pip install 'pcmc[{extra}]'"
+        )
+
+
+class FreeSurfaceWarning(UserWarning):
+    """Nothing holds the surface: translations cost no energy."""
+
+
+def unknown(what: str, found: object, known: Iterable[str]) -> str:
+    """Message for a name that is not known, with the nearest known one.
+
+    >>> unknown("method", "newtn", ["newton", "lbfgs"])
+    "unknown method 'newtn'; did you mean 'newton'? Known: newton, lbfgs"
+    """
+    names = list(known)
+    near = get_close_matches(str(found), names, n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return f"unknown {what} {found!r}; {hint}Known: {', '.join(names) or '(none)'}"

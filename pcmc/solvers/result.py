@@ -1,0 +1,86 @@
+"""What every solver returns, and what a solver may be told to do while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import pandas as pd
+
+from ..surface import Surface
+
+
+class Status(Enum):
+    """Why a solver stopped. The value is a sentence a user can act on."""
+
+    CONVERGED = "converged: the residual is below its tolerance"
+    ITERATION_LIMIT = (
+        "stopped at the iteration limit before the tolerance was met; raise the limit, or finish"
+        " with method='newton'"
+    )
+    STALLED = (
+        "stalled: no further step lowers the residual; look at the triangle quality near the"
+        " largest forces, or remesh"
+    )
+    DIVERGED = (
+        "diverged: the surface inflates without bound, which happens when no equilibrium exists;"
+        " raise the tensions or lower the pressure"
+    )
+    NON_FINITE = (
+        "stopped at a number that is not finite; the returned surface is the last finite one; use a"
+        " smaller step"
+    )
+    DEGENERATE = (
+        "stopped because triangles collapse; remesh, or let the certificate name where they do"
+    )
+    STOPPED = "stopped on request; the returned surface is the best so far"
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """The end of a solve. Every value describes exactly ``surface``.
+
+    Attributes
+    ----------
+    surface : the surface reached.
+    status : why the solver stopped; ``message`` is its sentence.
+    method : the solver's name.
+    energy : E of ``surface``, force·length.
+    iterations, evaluations : steps taken; energy or gradient evaluations made.
+    history : a row per iteration (per evaluation for ``"lbfgs"``) with at least ``evaluation``,
+        ``energy`` and ``gradient_squared`` (‖∇E‖², the paper's squared sum).
+    """
+
+    surface: Surface
+    status: Status
+    method: str
+    energy: float
+    iterations: int
+    evaluations: int
+    history: pd.DataFrame
+
+    @property
+    def converged(self) -> bool:
+        """Whether the solver met its tolerance."""
+        return self.status is Status.CONVERGED
+
+    @property
+    def message(self) -> str:
+        """A sentence that says why the solver stopped and what to do."""
+        return f"{self.method}: {self.status.value}"
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """What a callback is shown after each iteration. ``row`` is the history row just written."""
+
+    iteration: int
+    surface: Callable[[], Surface]
+    row: Mapping[str, Any]
+
+
+Callback = Callable[[Progress], None]
+"""Called after each iteration. Raise StopIteration to stop with the best surface so far; any other
+exception passes through to the caller of ``solve``."""
