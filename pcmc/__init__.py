@@ -2,6 +2,7 @@
 
 from .curvature import curvature_error, mean_curvature, target_curvature
 from .energy import energy, gradient, hessian
+from .solvers import solve
 from .surface import Patch, Plane, Surface
 
 __all__ = [
@@ -13,5 +14,6 @@ __all__ = [
     "gradient",
     "hessian",
     "mean_curvature",
+    "solve",
     "target_curvature",
 ]

@@ -1,0 +1,177 @@
+"""The paper's flow: descent with Nesterov momentum and an Armijo line search, (23)-(25)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from ..arrays import Floats
+from ..surface import Surface
+from . import options as check
+from .evaluate import Evaluator, Point, extent
+from .result import Callback, Progress, Result, Status
+
+COLUMNS = ("iteration", "evaluation", "energy", "gradient_squared", "t", "armijo_held")
+
+
+@dataclass(frozen=True)
+class NesterovOptions:
+    """What the flow may be told; the paper's values are the defaults.
+
+    Parameters
+    ----------
+    t0 : first and largest step t of each line search, length/force; the paper uses 0.005 to 0.05.
+    gamma : γ in [0, 1), the part of the last move that is kept (24a).
+    xi : ξ ≥ 0 of the Armijo test (25).
+    tau : τ in (0, 1), each trial step is τ times the last.
+    floor_power : the smallest trial step is t0 τ^floor_power; it is taken whether or not it passes.
+    momentum : False for plain descent (23), γ = 0.
+    line_search : False to take t0 always; the history still says whether it would have passed.
+    armijo : ``"printed"``, Eq. (25) as it stands, E(Q) ≤ E(Y) + ξ t ‖∇E(Q)‖², which lets E rise; or
+        ``"sufficient"``, the standard test of the source it cites, E(Q) ≤ E(Y) - ξ t ‖∇E(Y)‖². Here
+        Y = P + γ d and Q = Y - t ∇E(Y).
+    tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 or None to run all iterations.
+    iterations : the most iterations.
+    inflation : diverged when the bounding box is more than this many times its first diagonal.
+    """
+
+    t0: float = 0.01
+    gamma: float = 0.9
+    xi: float = 0.2
+    tau: float = 0.5
+    floor_power: int = 5
+    momentum: bool = True
+    line_search: bool = True
+    armijo: str = "printed"
+    tolerance: float | None = 1e-8
+    iterations: int = 1000
+    inflation: float = 10.0
+
+    def __post_init__(self) -> None:
+        check.number("t0", self.t0, above=0.0)
+        check.number("gamma", self.gamma, least=0.0, below=1.0)
+        check.number("xi", self.xi, least=0.0)
+        check.number("tau", self.tau, above=0.0, below=1.0)
+        check.whole("floor_power", self.floor_power)
+        check.flag("momentum", self.momentum)
+        check.flag("line_search", self.line_search)
+        check.choice("armijo", self.armijo, ("printed", "sufficient"))
+        if self.tolerance is not None:
+            check.number("tolerance", self.tolerance, least=0.0)
+        check.whole("iterations", self.iterations)
+        check.number("inflation", self.inflation, above=1.0)
+
+
+class Move(NamedTuple):
+    """Where the flow stands after ``iteration`` moves: the last move d, its step t, its test."""
+
+    iteration: int
+    point: Point
+    d: Floats
+    t: float
+    held: bool
+
+
+def nesterov(
+    surface: Surface, options: NesterovOptions | None = None, callback: Callback | None = None
+) -> Result:
+    """Follow the paper's flow from where the surface stands.
+
+        d ← γ d - t ∇E(P + γ d)                                       (24a)
+        P ← P + d                                                     (24b)
+
+    with the largest t of t0, t0 τ, …, t0 τ^floor_power that passes the Armijo test (25), or the
+    smallest of them. Every vertex moves in all the directions its support allows, so the triangles
+    may degrade while E falls.
+
+    Returns
+    -------
+    Result
+        ``history``: a row per iteration, row 0 the surface as given, with ``iteration``,
+        ``evaluation`` (of E and ∇E together, so far), ``energy``, ``gradient_squared``, ``t`` (NaN
+        in row 0) and ``armijo_held`` (False where the floor was taken although it failed).
+
+    Examples
+    --------
+    >>> from pcmc import Patch, Surface
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
+    >>> pyramid = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                   [Patch("roof", 1.0)], fixed=range(4))
+    >>> result = nesterov(pyramid, NesterovOptions(t0=0.1, tolerance=1e-20))
+    >>> result.converged, result.surface.vertices[4].round(6).tolist()  # 4 h / √(1 + h²) = 4 / 3
+    (True, [0.0, 0.0, 0.353553])
+    """
+    options = options or NesterovOptions()
+    evaluate = Evaluator(surface)
+    start = evaluate(surface.vertices)
+    move = Move(0, start, np.zeros_like(start.X), np.nan, True)
+    rows = [_row(move, evaluate)]
+    status = _status(move.point, options, surface.size)
+    try:
+        while status is None and move.iteration < options.iterations:
+            new = _iterate(move, evaluate, options)
+            if not new.point.finite:
+                status = Status.NON_FINITE
+                break
+            rows.append(_row(new, evaluate))
+            move = new
+            status = _status(move.point, options, surface.size)
+            if callback is not None:
+                callback(_progress(surface, move, rows[-1]))
+    except (StopIteration, KeyboardInterrupt):
+        status = status or Status.STOPPED
+    return Result(
+        surface=surface.moved(move.point.X),
+        status=status or Status.ITERATION_LIMIT,
+        method="nesterov",
+        energy=move.point.energy,
+        iterations=move.iteration,
+        evaluations=evaluate.count,
+        # An interrupt may have come between a row and its move: what is returned ends the history.
+        history=pd.DataFrame(rows[: move.iteration + 1], columns=list(COLUMNS)),
+    )
+
+
+def _iterate(move: Move, evaluate: Evaluator, options: NesterovOptions) -> Move:
+    """One iteration: look ahead along the last move, then search for t, Eqs. (24), (25)."""
+    ahead, drift = move.point, 0.0 * move.d
+    if options.momentum and move.iteration > 0:
+        drift = options.gamma * move.d
+        ahead = evaluate(move.point.X + drift)
+    for power in range(options.floor_power + 1):
+        t = options.t0 * options.tau**power
+        with np.errstate(all="ignore"):  # a move beyond the floats ends as a status, not a warning
+            d = drift - t * ahead.gradient
+            new = evaluate(move.point.X + d)
+        if options.armijo == "printed":
+            bound = ahead.energy + options.xi * t * new.squared
+        else:
+            bound = ahead.energy - options.xi * t * ahead.squared
+        held = new.energy <= bound
+        if held or not options.line_search:
+            break
+    return Move(move.iteration + 1, new, d, t, held)
+
+
+def _status(point: Point, options: NesterovOptions, size: float) -> Status | None:
+    """Why to stop here, or None."""
+    if not point.finite:
+        return Status.NON_FINITE
+    if point.squared <= (options.tolerance or 0.0):
+        return Status.CONVERGED
+    if extent(point.X) > options.inflation * size:
+        return Status.DIVERGED
+    return None
+
+
+def _row(move: Move, evaluate: Evaluator) -> tuple[Any, ...]:
+    point = move.point
+    return move.iteration, evaluate.count, point.energy, point.squared, move.t, move.held
+
+
+def _progress(surface: Surface, move: Move, row: tuple[Any, ...]) -> Progress:
+    named = dict(zip(COLUMNS, row, strict=True))
+    return Progress(move.iteration, lambda: surface.moved(move.point.X), named)
