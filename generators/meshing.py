@@ -1,0 +1,155 @@
+"""Near-equilateral triangles inside plane outlines whose vertices are given and stay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.spatial import Delaunay, cKDTree
+
+from pcmc.arrays import Bools, Floats, Ints
+from pcmc.errors import OptionError
+
+SWEEPS = 4  # more change the smallest angle by about a degree, in either direction
+CLEARANCE = 0.75  # of the spacing: where the lattice ends before an outline
+
+
+def fill(outlines: Sequence[Floats], spacing: float) -> tuple[Floats, Ints]:
+    """Interior points and faces of the region inside ``outlines``.
+
+    A triangular lattice fills the region up to a clearance from the outlines; then a few sweeps
+    move every interior point to the centroid of its star and triangulate anew (Delaunay).
+
+    Parameters
+    ----------
+    outlines : closed polygons (k,2), the outer one first, then the holes; either direction. Their
+        segments should be about as long as ``spacing``.
+    spacing : edge length.
+
+    Returns
+    -------
+    points : (i,2) the interior points.
+    faces : (f,3), counter-clockwise; numbers below Σ k are the outlines' points in the order given,
+        the others the interior points.
+
+    Raises
+    ------
+    OptionError
+        When an outline's side is not an edge of the triangulation: its segments are too long where
+        it comes near itself or another outline.
+
+    >>> square = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [2, 2], [1, 2], [0, 2], [0, 1.0]])
+    >>> points, faces = fill([square], 1.0)
+    >>> len(points), len(faces)
+    (1, 8)
+    """
+    rim = np.concatenate(outlines)
+    sides = _sides([len(outline) for outline in outlines])
+    region = _Region(rim, sides)
+    points = _lattice(rim, spacing)
+    points = points[region.contains(points)]
+    points = points[_distance(points, rim, sides) > CLEARANCE * spacing]
+    for _ in range(SWEEPS):
+        faces = region.triangulate(points)
+        points = _centred(np.concatenate([rim, points]), faces)[len(rim) :]
+    faces = region.triangulate(points)
+    _require_sides(faces, sides, rim)
+    return points, faces
+
+
+class _Region:
+    """The inside of the outlines, as the triangles of their own Delaunay triangulation."""
+
+    def __init__(self, rim: Floats, sides: Ints) -> None:
+        self.rim = rim
+        self.coarse: Any = Delaunay(rim)
+        centroids = rim[self.coarse.simplices].mean(axis=1)
+        self.inside = np.append(_crossings(centroids, rim, sides) % 2 == 1, False)
+
+    def contains(self, points: Floats) -> Bools:
+        """(k,) bool."""
+        return self.inside[self.coarse.find_simplex(points)]
+
+    def triangulate(self, points: Floats) -> Ints:
+        """Counter-clockwise Delaunay faces of rim and points that lie inside."""
+        both = np.concatenate([self.rim, points])
+        faces = Delaunay(both).simplices.astype(np.int64)
+        corner, u, v = both[faces[:, 0]], both[faces[:, 1]], both[faces[:, 2]]
+        turn = _cross(u - corner, v - corner)
+        faces[turn < 0] = faces[turn < 0][:, ::-1]
+        return faces[self.contains(both[faces].mean(axis=1))]
+
+
+def _sides(lengths: Sequence[int]) -> Ints:
+    """(k,2) numbers of the ends of every side of closed polygons stored one after the other."""
+    start = np.repeat(np.cumsum(lengths) - lengths, lengths)
+    number = np.arange(sum(lengths))
+    return np.stack([number, start + (number - start + 1) % np.repeat(lengths, lengths)], axis=1)
+
+
+def _lattice(rim: Floats, spacing: float) -> Floats:
+    """Points of a triangular lattice, symmetric about the middle of the box around the rim."""
+    middle = 0.5 * (rim.min(axis=0) + rim.max(axis=0))
+    half = 0.5 * np.ptp(rim, axis=0)
+    step = np.array([spacing, 0.5 * np.sqrt(3.0) * spacing])
+    i, j = (np.arange(-k, k + 1) for k in np.ceil(half / step).astype(int) + 1)
+    x, y = np.meshgrid(i, j, indexing="ij")
+    points = np.stack([x + 0.5 * (y % 2), y], axis=-1).reshape(-1, 2) * step
+    return middle + points
+
+
+def _crossings(points: Floats, rim: Floats, sides: Ints) -> Ints:
+    """How many sides a ray to the right from each point meets: odd inside."""
+    counts = np.zeros(len(points), dtype=np.int64)
+    for part in np.array_split(np.arange(len(points)), 1 + len(points) * len(sides) // 10**7):
+        x, y = points[part].T[:, :, None]
+        (ax, ay), (bx, by) = rim[sides[:, 0]].T, rim[sides[:, 1]].T
+        spans = (ay > y) != (by > y)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            right = x < ax + (y - ay) * (bx - ax) / (by - ay)
+        counts[part] = np.count_nonzero(spans & right, axis=1)
+    return counts
+
+
+def _distance(points: Floats, rim: Floats, sides: Ints) -> Floats:
+    """(k,) distance to the nearest of the two sides at the nearest rim vertex."""
+    nearest = cKDTree(rim).query(points)[1]
+    at = np.argsort(sides.T.ravel(), kind="stable").reshape(-1, 2) % len(sides)
+    distance = np.full(len(points), np.inf)
+    for side in at[nearest].T:
+        start, end = rim[sides[side, 0]], rim[sides[side, 1]]
+        along = end - start
+        share = ((points - start) * along).sum(axis=1) / (along**2).sum(axis=1)
+        foot = start + np.clip(share, 0.0, 1.0)[:, None] * along
+        distance = np.minimum(distance, np.linalg.norm(points - foot, axis=1))
+    return distance
+
+
+def _cross(u: Floats, v: Floats) -> Floats:
+    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+
+
+def _centred(points: Floats, faces: Ints) -> Floats:
+    """Every point moved to the area-weighted mean of the centroids of its triangles."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    area = 0.5 * np.abs(_cross(b - a, c - a))
+    shape = (len(points), len(faces))
+    face = np.repeat(np.arange(len(faces)), 3)
+    star = coo_array((np.repeat(area, 3), (faces.ravel(), face)), shape=shape).tocsr()
+    weight = np.maximum(star.sum(axis=1), np.finfo(float).tiny)
+    return (star @ ((a + b + c) / 3.0)) / weight[:, None]
+
+
+def _require_sides(faces: Ints, sides: Ints, rim: Floats) -> None:
+    n = int(faces.max()) + 1
+    pairs = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    wanted = np.sort(sides, axis=1)
+    lost = np.flatnonzero(~np.isin(wanted @ [n, 1], pairs @ [n, 1]))
+    if len(lost):
+        point = rim[sides[lost[0], 0]].round(6).tolist()
+        raise OptionError(
+            f"the outline's side at {point} is no edge of the triangulation ({len(lost)} such"
+            " sides): its segments are too long there; use a smaller edge length"
+        )
