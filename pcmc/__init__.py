@@ -2,6 +2,7 @@
 
 from .curvature import curvature_error, mean_curvature, target_curvature
 from .energy import energy, gradient, hessian
+from .io import read, write
 from .solvers import solve
 from .surface import Patch, Plane, Surface
 
@@ -14,6 +15,8 @@ __all__ = [
     "gradient",
     "hessian",
     "mean_curvature",
+    "read",
     "solve",
     "target_curvature",
+    "write",
 ]

@@ -22,6 +22,14 @@ class FileError(PcmcError):
     """A file cannot be read or written as the format its suffix names."""
 
 
+class FileWarning(UserWarning):
+    """A file was read or written, but not everything in it could be kept as it was."""
+
+
+class SweepError(PcmcError):
+    """The executor, scheduler or workers of a sweep failed; the cases stored before are safe."""
+
+
 class MissingExtra(ImportError):
     """A part of pcmc was asked for whose libraries are not installed."""
 

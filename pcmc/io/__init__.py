@@ -1,0 +1,139 @@
+"""Surfaces from files and to files, by suffix."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..arrays import Floats
+from ..errors import FileError, FileWarning, PcmcError, unknown
+from ..files import whole
+from ..surface import Plane, Surface
+from .contents import Contents, to_surface, without_unused
+
+FORMATS = {
+    ".fe": "evolver",
+    ".dmp": "evolver",
+}
+"""Suffix and the module here that reads and writes it."""
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    tensions: Mapping[str, float] | float | None = None,
+    pressures: Mapping[str, float] | float | None = None,
+    fixed: npt.ArrayLike | str | None = None,
+    on_plane: npt.ArrayLike | None = None,
+    plane: Plane | None = None,
+) -> Surface:
+    """The Surface in a file, read as its suffix says.
+
+    Parameters
+    ----------
+    path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
+    tensions, pressures : by patch name, or one number for all, in place of the file's. Formats that
+        carry neither give 1 for both.
+    fixed, on_plane : as in Surface, in place of the file's; ``fixed="boundary"`` holds all boundary
+        vertices, and is what happens where the format carries no supports.
+    plane : Π in place of the file's, or the plane z = 0 where it has none.
+
+    Warns
+    -----
+    FileWarning : once, saying what was changed (polygons cut into triangles, unused vertices left
+        out, ...).
+
+    Raises
+    ------
+    FileError : in one line, naming file and line or element, for a file that is missing, cut off,
+        not of its suffix's format, or not a surface.
+    MissingExtra : when the format needs a library that is not installed.
+    """
+    contents = load(path)
+    try:
+        surface = to_surface(contents, tensions, pressures, fixed, on_plane, plane)
+    except PcmcError as error:
+        raise type(error)(f"{os.fspath(path)}: {error}") from None
+    if contents.notes:
+        warnings.warn(f"{os.fspath(path)}: {'; '.join(contents.notes)}", FileWarning, stacklevel=2)
+    return surface
+
+
+def load(path: str | os.PathLike[str]) -> Contents:
+    """All that a file holds, scalars and certificate too; see Contents. Errors as in ``read``."""
+    path = Path(path)
+    module = _module(path)
+    try:
+        with path.open("rb"):
+            pass
+        contents = module.read(path)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except UnicodeDecodeError as error:
+        raise FileError(
+            f"{path}: byte {error.start} is not text; is it a {path.suffix} file?"
+        ) from None
+    except PcmcError as error:
+        text = str(error)
+        raise FileError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+    return without_unused(contents)
+
+
+def write(
+    path: str | os.PathLike[str],
+    surface: Surface,
+    *,
+    scalars: Mapping[str, Floats] | None = None,
+    certificate: Mapping[str, Any] | None = None,
+) -> None:
+    """Write a surface as the suffix says; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
+    scalars : (n,) or (m,) arrays by name (curvature, error, ...), kept where the format can.
+    certificate : values by name, kept where the format can.
+
+    Warns
+    -----
+    FileWarning : once, naming what the format cannot carry.
+    """
+    path = Path(path)
+    module = _module(path)
+    scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
+    lost = [name for name in scalars if not getattr(module, "SCALARS", False)]
+    if certificate is not None and not getattr(module, "CERTIFICATE", False):
+        lost.append("certificate")
+    try:
+        with whole(path) as temporary:
+            module.write(temporary, surface, scalars=scalars, certificate=certificate or {})
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written ({error.strerror or error})") from None
+    if lost:
+        text = f"{path}: a {path.suffix} file cannot carry {', '.join(lost)}; left out"
+        warnings.warn(text, FileWarning, stacklevel=2)
+
+
+def _module(path: Path) -> ModuleType:
+    suffix = path.suffix.lower()
+    if suffix not in FORMATS:
+        raise FileError(f"{path}: {unknown('suffix', suffix, FORMATS)}")
+    return import_module(f".{FORMATS[suffix]}", __name__)
+
+
+def _scalar(surface: Surface, name: str, value: npt.ArrayLike) -> Floats:
+    array = np.asarray(value, dtype=float)
+    if array.shape not in ((surface.n,), (surface.m,)):
+        raise FileError(
+            f"scalars[{name!r}]: expected shape ({surface.n},) for vertices or ({surface.m},) for"
+            f" faces, found {array.shape}"
+        )
+    return array

@@ -1,0 +1,379 @@
+"""Surface Evolver datafiles (.fe): the same discrete energy in another program.
+
+A patch's tension is its faces' ``tension``; the patches of one pressure p ≠ 0 are one body with
+``pressure p``; fixed vertices are ``fixed``, sliding ones lie on ``constraint 1``, the plane Π.
+Evolver measures volumes from the origin (``symmetric_content``: det/6 per face, Eq. 10b), so the
+coordinates are relative to the point of Π, and a comment says where that is. Then the program's
+``total_energy`` is E of Eq. (20).
+
+Read are datafiles of this kind, those that the program's ``dump`` writes, and others whose sections
+list elements by number. A body with a prescribed volume counts with its Lagrange multiplier as the
+pressure.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..arrays import Floats, Ints
+from ..errors import FileError
+from ..surface import Patch, Plane, Surface
+from .contents import FIXED, FREE, SLIDING, Contents, support_of
+from .expressions import constant, linear
+from .polygons import triangulate
+from .text import rows
+
+SUFFIXES = (".fe", ".dmp")
+
+HEADER = """\
+// Piecewise constant-mean-curvature surface, written by pcmc.
+// total_energy is E = sum tension * area - sum pressure * volume, volumes seen from the origin.
+// origin {origin}
+{patches}
+SPACE_DIMENSION 3
+SYMMETRIC_CONTENT
+DEFINE FACET ATTRIBUTE patch INTEGER
+
+CONSTRAINT 1
+FORMULA: {formula} = 0
+"""
+
+
+def write(path: Path, surface: Surface, **_: Any) -> None:
+    """The datafile of a surface."""
+    support, tag = support_of(surface), np.array(["", " constraint 1", " fixed"])
+    edges = surface.topology.edges + 1
+    patches = list(enumerate(surface.patches, 1))
+    face_tag = np.array([f" tension {p.tension!r} patch {k}" for k, p in patches])
+    X = surface.vertices - np.array(surface.plane.point)
+    header = HEADER.format(
+        origin=" ".join(map(repr, surface.plane.point)),
+        patches="\n".join(f"// patch {k} {p.name}" for k, p in patches),
+        formula=_formula(surface.plane.normal),
+    )
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(header)
+        file.write("\nVERTICES\n")
+        file.write(rows("%d %r %r %r%s\n", _count(X), *X.T, tag[support]))
+        file.write("\nEDGES\n")
+        file.write(rows("%d %d %d%s\n", _count(edges), *edges.T, tag[_edge_support(surface)]))
+        file.write("\nFACES\n")
+        sides = _signed_edges(surface)
+        file.write(
+            rows("%d %d %d %d%s\n", _count(sides), *sides.T, face_tag[surface.patch_of_face])
+        )
+        file.write("\nBODIES\n" + _bodies(surface) + "\nREAD\n")
+
+
+def _count(rows: Ints | Floats) -> Ints:
+    return np.arange(1, len(rows) + 1)
+
+
+def _edge_support(surface: Surface) -> Ints:
+    """(e,) support of boundary edges with held ends, which the program gives to vertices put there."""
+    topo, support = surface.topology, support_of(surface)
+    along = support[topo.edges].min(axis=1)
+    off_plane = np.abs(surface.plane.height(surface.vertices)) > 1e-9 * surface.size
+    along[(along == SLIDING) & off_plane[topo.edges].any(axis=1)] = FREE
+    return np.where(topo.boundary_edge, along, FREE)
+
+
+def _signed_edges(surface: Surface) -> Ints:
+    """(m,3) edges around each face, numbered from 1, negative where run from head to tail."""
+    F = surface.faces[:, [0, 1, 2, 0]]
+    forward = F[:, :-1] < F[:, 1:]
+    return (surface.topology.edge_of_face[:, [2, 0, 1]] + 1) * np.where(forward, 1, -1)
+
+
+def _formula(normal: tuple[float, float, float]) -> str:
+    parts = zip(normal, "xyz", strict=True)
+    return " + ".join(c if a == 1.0 else f"({a!r})*{c}" for a, c in parts if a != 0.0)
+
+
+def _bodies(surface: Surface) -> str:
+    text = ""
+    of_face = surface.pressures[surface.patch_of_face]
+    for body, pressure in enumerate(np.unique(of_face[of_face != 0.0]), 1):
+        members = (np.flatnonzero(of_face == pressure) + 1).astype(str)
+        lines = [" ".join(members[k : k + 15]) for k in range(0, len(members), 15)]
+        text += f"{body} " + " \\\n  ".join(lines) + f" pressure {float(pressure)!r}\n"
+    return text
+
+
+# Reading
+
+
+def read(path: Path, **_: Any) -> Contents:
+    """The mesh, tensions, pressures and supports of a datafile; errors name the line."""
+    file = _open(path)
+    top = file.section("top")
+    known = _parameters(top)
+    ids, X, support, constraint = _vertices(file, known)
+    faces = _faces(file, ids)
+    F, source, notes = triangulate(X, faces.corners, faces.counts)
+    pressure, more = _pressures(file, faces.ids, known)
+    patch_of_face, patches = _patches(file, faces.rest, pressure, known)
+    given = re.search(r"^// origin (\S+) (\S+) (\S+)$", file.header, re.M)
+    origin = np.array([float(c) for c in given.groups()]) if given else np.zeros(3)
+    plane = _plane(file, constraint, origin, known)
+    return Contents(
+        X + origin, F, patch_of_face[source], patches, support, plane, notes=(*notes, *more)
+    )
+
+
+@dataclass(frozen=True)
+class _Section:
+    """A part of the file. A form feed stands for a line end that does not end an element."""
+
+    path: Path
+    name: str
+    text: str
+    first_line: int
+
+    def error(self, text: str, row: int | None = None, offset: int = 0) -> FileError:
+        """An error at the given element (counting from 0), or at an offset into the text."""
+        if row is not None:
+            starts = [m.start() for m in re.finditer(r"^[^\S\n]*\S", self.text, re.M)]
+            offset = starts[min(row, len(starts) - 1)]
+        before = self.text[:offset]
+        line = self.first_line + before.count("\n") + before.count("\f")
+        return FileError(f"{self.path}: line {line}: {text}")
+
+    def elements(self, pattern: str, what: str) -> list[tuple[str, ...]]:
+        """Groups of the pattern for each line that is not blank."""
+        found = re.findall(rf"^[^\S\n]*{pattern}$", self.text, re.M)
+        lines = re.findall(r"^[^\S\n]*\S[^\n]*$", self.text, re.M)
+        if len(found) != len(lines):
+            one = re.compile(rf"[^\S\n]*{pattern}")
+            row = next(k for k, line in enumerate(lines) if not one.fullmatch(line))
+            raise self.error(f"expected {what}, found {' '.join(lines[row].split())[:60]!r}", row)
+        return found
+
+
+@dataclass(frozen=True)
+class _File:
+    path: Path
+    header: str
+    sections: Mapping[str, _Section]
+
+    def section(self, name: str) -> _Section:
+        if name not in self.sections:
+            known = ", ".join(k for k in self.sections if k != "top") or "none"
+            raise FileError(
+                f"{self.path}: no {name} section (found: {known}); the file is cut off or is not a"
+                " Surface Evolver datafile"
+            )
+        return self.sections[name]
+
+
+def _open(path: Path) -> _File:
+    text = path.read_text(encoding="utf-8")
+    bare = re.sub(r"/\*.*?\*/", lambda m: "\f" * m[0].count("\n") + " ", text, flags=re.S)
+    bare = re.sub(r"//[^\n]*", "", bare)
+    bare = re.sub(r"\\[^\S\n]*\n", "\f", bare)
+    heads = list(
+        re.finditer(r"^[^\S\n]*(vertices|edges|faces|facets|bodies|read)\b", bare, re.I | re.M)
+    )
+    starts = [0, *(h.end() for h in heads)]
+    ends = [*(h.start() for h in heads), len(bare)]
+    names = ["top", *("faces" if h[1].lower() == "facets" else h[1].lower() for h in heads)]
+    sections: dict[str, _Section] = {}
+    for name, start, end in zip(names, starts, ends, strict=True):
+        line = 1 + bare[:start].count("\n") + bare[:start].count("\f")
+        sections.setdefault(name, _Section(path, name, bare[start:end], line))
+        if name == "read":
+            break  # what follows are commands
+    header = re.split(r"^[^\S\n]*vertices\b", text, maxsplit=1, flags=re.I | re.M)[0]
+    return _File(path, header, sections)
+
+
+UNREADABLE = (
+    "string", "quadratic", "lagrange", "simplex_representation", "torus", "torus_filled",
+    "symmetry_group", "#include", "#define",
+)  # fmt: skip
+
+
+def _parameters(top: _Section) -> dict[str, float]:
+    """Named constants of the top section, which coordinates and tensions may use."""
+    for word in UNREADABLE:
+        hit = re.search(rf"^[^\S\n]*{word}\b", top.text, re.I | re.M)
+        if hit:
+            raise top.error(
+                f"{word} is not supported; load the file in the program, `dump` it, and read that",
+                offset=hit.start(),
+            )
+    known = {"pi": math.pi}
+    for hit in re.finditer(r"^[^\S\n]*parameter\s+(\w+)\s*=\s*([^\n]+)", top.text, re.I | re.M):
+        known[hit[1].lower()] = constant(hit[2], known, partial(top.error, offset=hit.start()))
+    return known
+
+
+def _vertices(file: _File, known: Mapping[str, float]) -> tuple[Ints, Floats, Ints, Ints]:
+    """Ids, positions, support, and the number of the constraint each vertex lies on (0: none)."""
+    section = file.section("vertices")
+    what = "a vertex number and three coordinates"
+    found = section.elements(r"(\d+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)([^\n]*)", what)
+    columns = list(zip(*found, strict=True)) or [()] * 5
+    X = np.empty((len(found), 3))
+    for d in range(3):
+        X[:, d] = _numbers(columns[1 + d], known, section)
+    code, kinds = pd.factorize(np.array(columns[4], dtype=object))
+    support, constraint = np.zeros(len(kinds), dtype=np.int8), np.zeros(len(kinds), dtype=int)
+    for k, rest in enumerate(kinds):
+        row = int(np.argmax(code == k))
+        words = rest.lower()
+        if re.search(r"\bboundary\b", words):
+            raise section.error("a vertex on a parametric boundary is not supported", row)
+        listed = re.search(r"\bconstraints?((?:\s+\d+)+)", words)
+        numbers = [int(w) for w in listed[1].split()] if listed else []
+        support[k] = FIXED if re.search(r"\bfixed\b", words) else SLIDING if numbers else FREE
+        if support[k] == SLIDING:
+            if len(numbers) > 1:
+                raise section.error("a free vertex on two constraints is not supported", row)
+            constraint[k] = numbers[0]
+    return np.array(columns[0], dtype=np.int64), X, support[code], constraint[code]
+
+
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    ids: Ints
+    corners: Ints  # vertices of face after face
+    counts: Ints  # corners of each face
+    rest: list[str]  # what follows the edges on each face's line
+
+
+def _faces(file: _File, vertex_ids: Ints) -> _Faces:
+    edges, faces = file.section("edges"), file.section("faces")
+    what = "an edge number and two vertices"
+    listed = edges.elements(r"(\d+)[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)[^\n]*", what)
+    numbers = np.array(listed, dtype=np.int64).reshape(-1, 3)
+    ends = np.stack([_places(vertex_ids, numbers[:, k], edges, "vertex") for k in (1, 2)], axis=1)
+    found = faces.elements(r"(\d+)((?:[^\S\n]+-?\d+)+)([^\n]*)", "a face number and its edges")
+    counts = np.array([len(f[1].split()) for f in found], dtype=np.int64)
+    signed = np.array(" ".join(f[1] for f in found).split(), dtype=np.int64)
+    row = np.repeat(np.arange(len(found)), counts)
+    place = _places(numbers[:, 0], np.abs(signed), faces, "edge", row)
+    tail = np.where(signed > 0, ends[place, 0], ends[place, 1])
+    head = np.where(signed > 0, ends[place, 1], ends[place, 0])
+    last = np.cumsum(counts) - 1
+    following = np.arange(1, len(signed) + 1)
+    following[last] = last - counts + 1
+    open_at = np.flatnonzero(head != tail[following])
+    if len(open_at):
+        text = "the edges of the face do not follow each other head to tail"
+        raise faces.error(text, row[open_at[0]])
+    ids = np.array([f[0] for f in found], dtype=np.int64)
+    return _Faces(ids, tail, counts, [f[2] for f in found])
+
+
+def _places(ids: Ints, wanted: Ints, section: _Section, what: str, row: Ints | None = None) -> Ints:
+    """Where each wanted id stands among the ids."""
+    order = np.argsort(ids, kind="stable")
+    place = order[np.minimum(np.searchsorted(ids, wanted, sorter=order), len(ids) - 1)]
+    bad = np.flatnonzero(ids[place] != wanted)
+    if len(bad):
+        at = int(bad[0] if row is None else row[bad[0]])
+        raise section.error(f"there is no {what} {wanted[bad[0]]}", at)
+    return place
+
+
+def _pressures(
+    file: _File, face_ids: Ints, known: Mapping[str, float]
+) -> tuple[Floats, tuple[str, ...]]:
+    """(m,) pressure along each face's normal: the sum over the bodies on its two sides."""
+    pressure = np.zeros(len(face_ids))
+    if "bodies" not in file.sections:
+        return pressure, ("the file has no bodies, so no patch is under pressure",)
+    section, guessed = file.section("bodies"), []
+    listed = section.elements(r"(\d+)((?:[^\S\n]+-?\d+)*)([^\n]*)", "a body number and its faces")
+    for row, (number, members, rest) in enumerate(listed):
+        signed = np.array(members.split(), dtype=np.int64)
+        place = _places(face_ids, np.abs(signed), section, "face", np.full(len(signed), row))
+        given = re.search(r"\b(?:pressure|lagrange_multiplier)\s+(\S+)", rest, re.I)
+        if given is None:
+            guessed.append(number)
+        p = 1.0 if given is None else float(_numbers((given[1],), known, section, row)[0])
+        np.add.at(pressure, place, np.sign(signed) * p)
+    note = f"body {', '.join(guessed)} has no pressure in the file; 1 was taken"
+    return pressure, (note,) if guessed else ()
+
+
+def _patches(
+    file: _File, rest: list[str], pressure: Floats, known: Mapping[str, float]
+) -> tuple[Ints, tuple[Patch, ...]]:
+    """Faces of the same patch number, tension and pressure are a patch."""
+    section = file.section("faces")
+    code, kinds = pd.factorize(np.array(rest, dtype=object))
+    number, tension = np.zeros(len(kinds)), np.ones(len(kinds))
+    for k, words in enumerate(kinds):
+        row = int(np.argmax(code == k))
+        for target, key in ((number, "patch"), (tension, "tension|density")):
+            given = re.search(rf"\b(?:{key})\s+(\S+)", words, re.I)
+            if given:
+                target[k] = _numbers((given[1],), known, section, row)[0]
+    rows_, of_face = np.unique(
+        np.stack([number[code], tension[code], pressure], axis=1), axis=0, return_inverse=True
+    )
+    names = dict(re.findall(r"^// patch (\d+) ([^\n]+)$", file.header, re.M))
+    once = len(np.unique(rows_[:, 0])) == len(rows_)
+    patches = [
+        Patch(names.get(str(int(a)), f"patch {k}") if once else f"patch {k}", t, p)
+        for k, (a, t, p) in enumerate(rows_, 1)
+    ]
+    return of_face.ravel(), tuple(patches)
+
+
+def _plane(
+    file: _File, constraint: Ints, origin: Floats, known: Mapping[str, float]
+) -> Plane | None:
+    """Π: the one constraint that sliding vertices lie on, as seen from the file's origin."""
+    top = file.section("top")
+    used = np.unique(constraint[constraint > 0])
+    if len(used) > 1:
+        raise top.error(
+            f"sliding vertices lie on constraints {', '.join(map(str, used))}; only one plane can"
+            " carry them"
+        )
+    wanted = int(used[0]) if len(used) else 1
+    pattern = rf"^[^\S\n]*constraint\s+{wanted}\b[^\n]*\s+(?:formula|function)\s*:?\s*([^\n]+)"
+    hit = re.search(pattern, top.text, re.I | re.M)
+    if hit is None and not len(used):
+        return None
+    if hit is None:
+        raise top.error(f"constraint {wanted} has no formula here")
+    left, _, right = hit[1].partition("=")
+
+    def fail(text: str) -> FileError:
+        return top.error(f"constraint {wanted} is not a plane: {text}", offset=hit.start(1))
+
+    formula = linear(left, known, fail) - linear(right or "0", known, fail)
+    normal = formula[1:]
+    if not normal.any():
+        raise fail(f"{hit[1].strip()!r} names no coordinate")
+    point = origin - formula[0] * normal / (normal @ normal)
+    return Plane(tuple(point), tuple(normal))
+
+
+def _numbers(
+    words: tuple[str, ...], known: Mapping[str, float], section: _Section, row: int | None = None
+) -> Floats:
+    """Floats from words: numbers, or expressions of numbers and parameters."""
+    try:
+        return np.array(words, dtype=np.float64)
+    except ValueError:
+        code, kinds = pd.factorize(np.array(words, dtype=object))
+
+    def value(k: int) -> float:
+        at = int(np.argmax(code == k)) if row is None else row
+        return constant(kinds[k], known, lambda text: section.error(text, at))
+
+    return np.array([value(k) for k in range(len(kinds))])[code]

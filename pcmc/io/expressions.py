@@ -1,0 +1,72 @@
+"""Constant and linear expressions, as they stand in datafiles: "sqrt(2)/2", "z - 0.5*x"."""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import FileError
+
+Fail = Callable[[str], FileError]
+
+
+def constant(expression: str, known: Mapping[str, float], fail: Fail) -> float:
+    """Value of an expression of numbers and known names (lower case).
+
+    >>> constant("2*(h - 1)^2", {"h": 4.0}, FileError)
+    18.0
+    """
+    value = linear(expression, known, fail)
+    if value[1:].any():
+        raise fail(f"expected a number, found {expression.strip()!r}")
+    return float(value[0])
+
+
+def linear(expression: str, known: Mapping[str, float], fail: Fail) -> Floats:
+    """(4,) constant and coefficients of x, y, z of an expression that is linear in them.
+
+    >>> linear("z - 0.5*(x + 1)", {}, FileError).tolist()
+    [-0.5, -0.5, 0.0, 1.0]
+    """
+    source = expression.strip().replace("^", "**")
+    try:
+        return _term(ast.parse(source, mode="eval").body, known)
+    except (SyntaxError, ValueError, ZeroDivisionError, OverflowError, RecursionError) as error:
+        raise fail(f"{expression.strip()[:60]!r} ({error.args[0]})") from None
+
+
+SUM: Mapping[type, Callable[[Any, Any], Any]] = {ast.Add: operator.add, ast.Sub: operator.sub}
+AXES = {"x": 1, "y": 2, "z": 3, "x1": 1, "x2": 2, "x3": 3}
+
+
+def _term(node: ast.expr, known: Mapping[str, float]) -> Floats:
+    match node:
+        case ast.Constant(value=int() | float() as number):
+            return float(number) * np.eye(4)[0]
+        case ast.Name(id=name) if name.lower() in AXES:
+            return np.eye(4)[AXES[name.lower()]]
+        case ast.Name(id=name) if name.lower() in known:
+            return known[name.lower()] * np.eye(4)[0]
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=inner):
+            return _term(inner, known) * (-1.0 if isinstance(sign, ast.USub) else 1.0)
+        case ast.BinOp(left=left, op=op, right=right):
+            a, b = _term(left, known), _term(right, known)
+            if type(op) in SUM:
+                return SUM[type(op)](a, b)
+            if isinstance(op, ast.Mult) and not (a[1:].any() and b[1:].any()):
+                return a[0] * b if not a[1:].any() else b[0] * a
+            if isinstance(op, ast.Div) and not b[1:].any():
+                return a / b[0]
+            if isinstance(op, ast.Pow) and not (a[1:].any() or b[1:].any()):
+                return a[0] ** b[0] * np.eye(4)[0]
+        case ast.Call(func=ast.Name(id="sqrt"), args=[inner]):
+            value = _term(inner, known)
+            if not value[1:].any() and value[0] >= 0.0:
+                return math.sqrt(value[0]) * np.eye(4)[0]
+    raise ValueError(f"{ast.unparse(node)!r} is not a number, a parameter or linear in x, y, z")

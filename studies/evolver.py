@@ -1,0 +1,120 @@
+"""Surface Evolver as the reference: the same surface, the same questions, its answers.
+
+The program (Debian package ``evolver-nox``) reads the datafile that ``pcmc.write`` makes.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import pcmc
+from pcmc.arrays import Floats
+from pcmc.energy import apply_supports
+
+PROGRAM = "evolver"
+
+
+class EvolverError(RuntimeError):
+    """The program is absent, took too long, or did not answer."""
+
+
+def available() -> bool:
+    """Whether the program is installed."""
+    return shutil.which(PROGRAM) is not None
+
+
+def run(surface: pcmc.Surface, commands: str, timeout: float = 600.0) -> str:
+    """What the program prints for commands (one or more lines) given on the surface."""
+    with tempfile.TemporaryDirectory() as folder:
+        datafile = Path(folder) / "surface.fe"
+        pcmc.write(datafile, surface)
+        with datafile.open("a") as file:
+            file.write(f"\nautodisplay off\n{commands}\nquit\nquit\n")
+        try:
+            done = subprocess.run(
+                [PROGRAM, "-x", str(datafile)], stdin=subprocess.DEVNULL, capture_output=True,
+                text=True, timeout=timeout, cwd=folder, check=False,
+            )  # fmt: skip
+        except FileNotFoundError:
+            raise EvolverError(f"{PROGRAM} is not installed (Debian: evolver-nox)") from None
+        except subprocess.TimeoutExpired:
+            raise EvolverError(f"{PROGRAM} did not finish within {timeout:g} s") from None
+    if "ERROR" in done.stderr or "syntax error" in done.stderr:
+        said = re.findall(r"^.*(?:ERROR|syntax error).*$", done.stderr, re.M)
+        raise EvolverError(f"{PROGRAM}: {'; '.join(said)}")
+    return done.stdout
+
+
+def energy(surface: pcmc.Surface, commands: str = "") -> float:
+    """The program's ``total_energy``, E of Eq. (20), after the commands, if any."""
+    out = run(surface, commands + '\nprintf "E %.17g\\n", total_energy')
+    return float(_answers(out, "E", 1)[-1, 0])
+
+
+def gradient(surface: pcmc.Surface) -> Floats:
+    """∇E (n,3) as the program has it, the supports applied as in ``pcmc.gradient``.
+
+    The vertex attribute ``__force`` holds -∂E/∂x of all terms, before supports; it is filled by an
+    iteration, and ``m 0`` makes that iteration move nothing. ``convert_to_quantities`` matters when
+    patches differ in pressure: without it the forces are not the derivative of ``total_energy``.
+    """
+    out = run(
+        surface,
+        "convert_to_quantities\ndefine vertex attribute __force real[3]\nm 0\ng 1\n"
+        'foreach vertex vv do printf "F %.17g %.17g %.17g\\n",'
+        " vv.__force[1], vv.__force[2], vv.__force[3]",
+    )
+    return apply_supports(surface, -_answers(out, "F", 3))
+
+
+def positions(surface: pcmc.Surface, commands: str) -> Floats:
+    """(n,3) vertices after the commands, which must keep the mesh."""
+    out = run(surface, commands + '\nforeach vertex vv do printf "X %.17g %.17g %.17g\\n", x, y, z')
+    return _answers(out, "X", 3) + np.array(surface.plane.point)
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Counts of eigenvalues of the Hessian below, at and above the probe."""
+
+    negative: int
+    zero: int
+    positive: int
+
+
+def inertia(surface: pcmc.Surface, probe: float = 0.0, normal: bool = True) -> Inertia:
+    """The program's ``eigenprobe``; with ``normal`` each free vertex moves along its normal only.
+
+    At junctions and points, where the vertex has no single normal, all directions are free.
+    """
+    out = run(surface, f"hessian_normal {'on' if normal else 'off'}\neigenprobe {probe!r}")
+    found = re.search(r"Eigencounts:\s*(\d+)\s*<,\s*(\d+)\s*==,\s*(\d+)\s*>", out)
+    if found is None:
+        raise EvolverError(f"{PROGRAM} gave no eigenvalue counts: {' '.join(out.split())[-200:]}")
+    return Inertia(*map(int, found.groups()))
+
+
+def seconds(surface: pcmc.Surface, commands: str, before: str = "", repeat: int = 1) -> Floats:
+    """(repeat,) processor seconds of the commands, by the program's own clock.
+
+    ``before`` runs first, untimed. Reading the file is not counted.
+    """
+    timed = f'clock_was := clock\n{commands}\nprintf "T %.17g\\n", clock - clock_was\n'
+    out = run(surface, "clock_was := 0.0\n" + before + "\n" + timed * repeat, timeout=3600.0)
+    return _answers(out, "T", 1)[:, 0]
+
+
+def _answers(out: str, key: str, columns: int) -> Floats:
+    """(k,columns) numbers of the lines that start with the key."""
+    text = " ".join(re.findall(rf"^(?:Enter command: )?{key}((?: \S+){{{columns}}})$", out, re.M))
+    numbers = np.array(text.split(), dtype=float).reshape(-1, columns)
+    if not len(numbers):
+        raise EvolverError(f"{PROGRAM} did not answer: {' '.join(out.split())[-200:]}")
+    return numbers

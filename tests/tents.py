@@ -1,0 +1,34 @@
+"""A small surface that has everything a file must carry."""
+
+import numpy as np
+
+from pcmc import Patch, Plane, Surface
+
+
+def tent(names=("west side", "east", "wall"), pressures=(1.0, 0.5, 0.5), tilted=True) -> Surface:
+    """Two slopes and a wall of two rows on a tilted Π away from the origin, jittered.
+
+    All three tensions differ, 6 vertices are fixed and 2 slide. The wall carries the difference of
+    the pressures on its two sides, so that they balance along the ridge.
+    """
+    X = [[0, 0, 0], [0, 4, 0], [0, 1, 1], [0, 3, 1], [0, 1, 0], [0, 3, 0],
+         [-1, 0, 0], [-1, 4, 0], [1, 0, 0], [1, 4, 0]]  # fmt: skip
+    west = [[0, 2, 6], [2, 3, 6], [3, 7, 6], [3, 1, 7]]
+    east = [[0, 8, 2], [2, 8, 3], [3, 8, 9], [3, 9, 1]]
+    wall = [[0, 4, 2], [4, 5, 2], [5, 3, 2], [5, 1, 3]]
+    jitter = np.random.default_rng(5).normal(scale=0.1, size=(10, 3)) * [1, 1, 0]
+    X = np.array(X, dtype=float) + jitter
+    plane = Plane()
+    if tilted:
+        axis = np.array([2.0, -1.0, 3.0]) / np.sqrt(14.0)
+        angle = 0.7
+        K = np.cross(np.eye(3), axis)
+        rotation = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+        point = np.array([3.0, -2.0, 1.5])
+        X = X @ rotation.T + point
+        plane = Plane(tuple(point), tuple(rotation[:, 2]))
+    return Surface(
+        X, west + east + wall, [0] * 4 + [1] * 4 + [2] * 4,
+        [Patch(*p) for p in zip(names, (3.0, 2.1, 0.7), pressures, strict=True)],
+        fixed=[0, 1, 6, 7, 8, 9], on_plane=[4, 5], plane=plane,
+    )  # fmt: skip
