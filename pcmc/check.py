@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -63,7 +63,7 @@ def face_array(faces: npt.ArrayLike, n: int) -> Ints:
 
 def patch_array(patch_of_face: npt.ArrayLike, m: int, patches: Sequence[Any]) -> Ints:
     """(m,) int32 indices into ``patches``, every patch used, names unique."""
-    names = [getattr(p, "name", None) for p in patches]
+    names = [getattr(p, "name", None) for p in patches] if isinstance(patches, Iterable) else []
     if not names or None in names:
         raise SurfaceError(f"patches: expected a sequence of Patch, found {patches!r}")
     double = [name for place, name in enumerate(names) if name in names[:place]]
@@ -183,10 +183,11 @@ def _integers(values: npt.ArrayLike, what: str) -> Ints:
     found = _array(values, what, None)
     if not np.issubdtype(found.dtype, np.integer):
         as_float = _array(found, what, np.float64)
-        bad = np.flatnonzero(as_float.ravel() != np.floor(as_float.ravel()))
+        flat = as_float.ravel()
+        bad = np.flatnonzero((flat != np.floor(flat)) | (np.abs(flat) > 2**53))
         if len(bad):
             raise SurfaceError(
-                f"{what}: expected whole numbers, found {as_float.ravel()[bad[0]]} at place {bad[0]}"
+                f"{what}: expected whole numbers, found {flat[bad[0]]} at place {bad[0]}"
             )
         found = as_float.astype(np.int64)
     return found.astype(np.int64)

@@ -40,7 +40,13 @@ class Patch:
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", str(self.name))
         for key in ("tension", "pressure"):
-            object.__setattr__(self, key, float(getattr(self, key)))
+            value = getattr(self, key)
+            try:
+                object.__setattr__(self, key, float(value))
+            except (TypeError, ValueError):
+                raise SurfaceError(
+                    f"patch {self.name!r}: {key} must be a number, found {value!r}"
+                ) from None
         if not (math.isfinite(self.tension) and self.tension >= 0.0):
             raise SurfaceError(
                 f"patch {self.name!r}: tension must be a finite number ≥ 0, found {self.tension};"
@@ -134,6 +140,8 @@ class Surface:
     plane: Plane = Plane()
 
     def __post_init__(self) -> None:
+        if not isinstance(self.plane, Plane):
+            raise SurfaceError(f"plane: expected a Plane, found {self.plane!r}")
         X = check.positions(self.vertices)
         F = check.face_array(self.faces, len(X))
         patch = check.patch_array(self.patch_of_face, len(F), self.patches)
