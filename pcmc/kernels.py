@@ -23,6 +23,7 @@ import numba
 import numpy as np
 
 from .arrays import Floats, Ints
+from .errors import OptionError
 
 BLOCK = 32_768  # below this many triangles a second thread costs more than it gains
 
@@ -162,7 +163,19 @@ def area_vectors(X, F):
 
 
 def threads() -> int:
-    """Threads used on large meshes: the processors this process may run on, at most eight."""
+    """Threads used on large meshes: the processors this process may run on, at most eight.
+
+    The environment variable PCMC_THREADS sets another number, as sweeps do for their workers.
+
+    Raises
+    ------
+    OptionError : PCMC_THREADS is not a whole number ≥ 1.
+    """
+    wish = os.environ.get("PCMC_THREADS", "")
+    if wish:
+        if not wish.isdecimal() or int(wish) < 1:
+            raise OptionError(f"PCMC_THREADS: expected a whole number ≥ 1, found {wish!r}")
+        return int(wish)
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return max(1, min(8, usable or 1))
 
