@@ -10,8 +10,8 @@ from pcmc.arrays import Bools, Ints
 def strips(line_vertices: Ints, segments: Ints, mirrored: Bools | None = None) -> Ints:
     """Triangles (f,3) that fill the gaps between consecutive lines of vertices.
 
-    Line i has ``segments[i] + 1`` vertices, and the gap to the next line gets a triangle per segment
-    of either line, in the order of the segments' midpoints. A line of 0 segments is a single vertex.
+    Line i has ``segments[i] + 1`` vertices, and the gap to the next line gets a triangle per
+    segment of either line, in the order of their midpoints. A line of 0 segments is one vertex.
     Faces are counter-clockwise where lines run upwards and the next line lies to the right.
 
     Parameters

@@ -26,8 +26,8 @@ def two_squares(
 ) -> Surface:
     """Two squares side by side on Π (z = 0) and the wall under the side they share (x = 0).
 
-    The outline is fixed, the wall's foot slides on Π. The initial height is ``height`` in the middle
-    of the junction and falls as z = height (1 - (x/side)²)(1 - (2y/side)²) to 0 at the outline.
+    The outline is fixed, the wall's foot slides on Π. The initial height is ``height`` in the
+    middle of the junction and falls to 0 at the outline: height (1 - (x/side)²)(1 - (2y/side)²).
 
     Parameters
     ----------
