@@ -1,17 +1,25 @@
 """The paper's examples and the closed forms, as Surfaces to start from."""
 
+from .double_bubble import double_bubble, double_bubble_exact
 from .four_fans import four_fans
 from .joined_caps import joined_caps, joined_caps_exact
+from .sphere import sphere, sphere_exact
 from .spherical_cap import spherical_cap, spherical_cap_exact
+from .three_patches import three_patches
 from .two_caps import two_caps
 from .two_squares import two_squares
 
 __all__ = [
+    "double_bubble",
+    "double_bubble_exact",
     "four_fans",
     "joined_caps",
     "joined_caps_exact",
+    "sphere",
+    "sphere_exact",
     "spherical_cap",
     "spherical_cap_exact",
+    "three_patches",
     "two_caps",
     "two_squares",
 ]

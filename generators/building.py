@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from pcmc import Patch, Surface
 from pcmc.arrays import Floats, Ints
+from pcmc.errors import FreeSurfaceWarning
 
 from .strips import numbered, strips
 
@@ -89,6 +91,12 @@ class Builder:
         mirrored = np.arange(len(rows) - 1) >= (len(rows) - 1) / 2
         self.faces(strips(numbers, rows, mirrored), patch)
         return numbers[level == 0]
+
+    def closed_surface(self, patches: Sequence[Patch]) -> Surface:
+        """The Surface made of everything added, held nowhere: meant for closed surfaces alone."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FreeSurfaceWarning)
+            return self.surface(patches)
 
     def surface(self, patches: Sequence[Patch], fixed: Any = (), on_plane: Any = ()) -> Surface:
         """The Surface made of everything added; Π is z = 0."""

@@ -20,6 +20,7 @@ def fans(
     count: int,
     rings: int,
     *,
+    name: str,
     alpha: float,
     alpha_aux: float,
     radius: float,
@@ -34,6 +35,7 @@ def fans(
 
     Parameters
     ----------
+    name : the patches are called by it and a number, the walls "wall 1" and so on.
     rings : rings of triangles from the centre to the rim; radius/rings is the length of an edge.
     mesh : "rings", ring k with k segments in each fan; "even", with as many as make them about as
         long as the rings are wide; "lattice", a triangular lattice fitted into the fan.
@@ -67,7 +69,7 @@ def fans(
         builder.wall(count + i, line, builder.positions(line) * [1.0, 1.0, 0.0], spacing, axis)
         for i, line in enumerate(ridges)
     ]
-    patches = [Patch(f"fan {i + 1}", alpha) for i in range(count)]
+    patches = [Patch(f"{name} {i + 1}", alpha) for i in range(count)]
     patches += [Patch(f"wall {i + 1}", alpha_aux, pressure=0.0) for i in range(count)]
     return builder.surface(patches, fixed=np.concatenate(rim), on_plane=np.concatenate(foot))
 

@@ -37,6 +37,7 @@ def four_fans(
     return fans(
         4,
         rings,
+        name="fan",
         alpha=alpha,
         alpha_aux=alpha_aux,
         radius=radius,

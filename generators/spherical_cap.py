@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Patch, Surface
-from pcmc.arrays import Floats, Ints
 from pcmc.errors import OptionError
 
 from .building import Builder
 from .exact import Exact, Sphere
 from .options import positive
-from .strips import numbered, strips
+from .rosette import cap_directions, rosette
 
 
 def spherical_cap(
@@ -50,12 +49,12 @@ def spherical_cap(
     ball = (radius**2 + dome**2) / (2.0 * dome)
     opening = 2.0 * np.arctan2(dome, radius)  # from the pole to the rim, seen from the centre
     rings = max(2, round(radius / edge_length))
-    directions, faces = cap(opening, _six_per_ring(rings))
-    points = ball * directions + [0.0, 0.0, dome - ball]
+    net = rosette(6 * np.arange(1, rings + 1))
+    points = ball * cap_directions(net, opening) + [0.0, 0.0, dome - ball]
     rim = np.arange(len(points) - 6 * rings, len(points))
     points[rim, 2] = 0.0
     mesh = Builder()
-    mesh.faces(mesh.points(points)[faces], 0)
+    mesh.faces(mesh.points(points)[net.faces], 0)
     return mesh.surface([Patch("cap", alpha)], fixed=rim)
 
 
@@ -79,31 +78,3 @@ def spherical_cap_exact(*, radius: float = 1.0, alpha: float = 0.6) -> Exact:
     volume = np.pi * h**2 * (6.0 * alpha - h) / 3.0
     ball = Sphere((0.0, 0.0, h - 2.0 * alpha), 2.0 * alpha)
     return Exact(alpha * area - volume, area, volume, h, {"cap": ball})
-
-
-def cap(opening: float, segments: Ints) -> tuple[Floats, Ints]:
-    """Directions (k,3) and faces of a cap about +z, in rings of equal width from pole to rim.
-
-    Parameters
-    ----------
-    opening : angle between the pole and the rim, seen from the centre.
-    segments : (r,) segments of each ring; the last ring's vertices come last.
-
-    >>> directions, faces = cap(np.pi / 2, np.array([6, 12]))
-    >>> len(directions), len(faces), directions[0].tolist()
-    (19, 24, [0.0, 0.0, 1.0])
-    """
-    rings = len(segments)
-    ring, step = numbered(segments)
-    theta = opening * (1 + ring) / rings
-    phi = 2.0 * np.pi * step / segments[ring]
-    around = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], 1)
-    first = 1 + np.cumsum(segments) - segments
-    line, step = numbered(segments + 1)
-    closed = first[line] + step % segments[line]
-    faces = strips(np.append(0, closed), np.append(0, segments))
-    return np.concatenate([[[0.0, 0.0, 1.0]], around]), faces
-
-
-def _six_per_ring(rings: int) -> Ints:
-    return 6 * np.arange(1, rings + 1)
