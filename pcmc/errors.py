@@ -26,6 +26,10 @@ class FileWarning(UserWarning):
     """A file was read or written, but not everything in it could be kept as it was."""
 
 
+class PlanError(PcmcError):
+    """The lines of a plan do not divide it into patches."""
+
+
 class SweepError(PcmcError):
     """The executor, scheduler or workers of a sweep failed; the cases stored before are safe."""
 
