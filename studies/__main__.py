@@ -1,0 +1,105 @@
+"""``python -m studies list | run NAME ... | reproduce | benchmark | readme``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from pcmc.errors import MissingExtra, PcmcError
+
+from .registry import STUDIES, chosen, of_the_paper
+from .study import STEPS, Study
+
+HOME = Path(__file__).resolve().parent.parent
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """The exit code: 0 all went well, 1 a study failed, 2 a wrong command, 130 Ctrl-C."""
+    asked = _parser().parse_args(words)
+    try:
+        return int(asked.act(asked))
+    except (PcmcError, MissingExtra) as error:
+        print(f"studies: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("studies: stopped; the files written so far are whole", file=sys.stderr)
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m studies", description=__doc__)
+    acts = parser.add_subparsers(required=True, metavar="COMMAND")
+    act = acts.add_parser("list", help="the studies, a line each")
+    act.set_defaults(act=_list)
+    act = acts.add_parser("run", help="run the studies named, e.g. run example1 example2")
+    act.add_argument("names", nargs="+", metavar="NAME")
+    act.add_argument("--steps", nargs="+", choices=STEPS, default=list(STEPS))
+    _running(act)
+    act.set_defaults(act=lambda asked: _run(chosen(asked.names), asked, asked.steps))
+    act = acts.add_parser("reproduce", help="every study of the paper, then the comparison")
+    _running(act)
+    act.set_defaults(act=lambda asked: _run(of_the_paper(), asked, STEPS))
+    act = acts.add_parser("benchmark", help="how fast it is on this machine")
+    act.set_defaults(act=_benchmark)
+    act = acts.add_parser("readme", help="bring the README's tables up to date with results/")
+    act.set_defaults(act=_readme)
+    return parser
+
+
+def _running(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--short", action="store_true", help="least work; in a folder of its own")
+    parser.add_argument("--results", type=Path, help="where to write (default: results/)")
+    parser.add_argument("--workers", type=int, default=2, help="studies at the same time")
+
+
+def _list(asked: argparse.Namespace) -> int:
+    width = max(map(len, STUDIES))
+    for study in STUDIES.values():
+        print(f"{study.name:{width}}  {study.about}")
+    return 0
+
+
+def _run(studies: Sequence[Study], asked: argparse.Namespace, steps: Sequence[str]) -> int:
+    try:
+        from rich.console import Console
+    except ImportError:
+        raise MissingExtra("rich", "cli") from None
+    from .report import show, show_outcomes, write_comparison
+    from .runner import run_all
+
+    start = time.perf_counter()
+    results = asked.results or (_scratch() if asked.short else HOME / "results")
+    console = Console()
+    outcomes = run_all(
+        studies, results, console, workers=asked.workers, short=asked.short, steps=steps
+    )
+    tables = write_comparison(results)
+    show_outcomes(outcomes, console)
+    show(*tables, console)
+    console.print(f"{time.perf_counter() - start:.1f} s; written to {results}")
+    return 1 if any(outcome.error for outcome in outcomes) else 0
+
+
+def _benchmark(asked: argparse.Namespace) -> int:
+    from .benchmark import main as benchmark
+
+    return benchmark()
+
+
+def _readme(asked: argparse.Namespace) -> int:
+    from .report import write_readme
+
+    write_readme(HOME / "README.md", HOME / "results")
+    return 0
+
+
+def _scratch() -> Path:
+    return Path(tempfile.mkdtemp(prefix="pcmc-studies-"))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

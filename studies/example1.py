@@ -1,0 +1,169 @@
+"""Example 1, Sec. 4.1: two square patches. Figs. 6 to 10."""
+
+from __future__ import annotations
+
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from generators import two_squares
+from pcmc import Surface
+
+from .flow import Case, curvature_table, junction_top, run_cases, turn
+from .folder import Folder
+from .study import Study
+
+T0, T0_HISTORIES, ITERATIONS = 0.005, 0.05, 300
+WALLS = (0.0, 1.0, 2.0, 3.0)  # Fig. 7b to 7e
+COARSE, FINE = 4, 8
+VARIANTS = {  # Fig. 10: the lines and their names
+    "proposed": (True, True),
+    "no-line-search": (True, False),
+    "no-momentum": (False, True),
+    "neither": (False, False),
+}
+
+
+def cases() -> list[Case]:
+    """Fig. 7's four walls on both meshes with both Armijo tests, and Fig. 10's four variants."""
+    listed = []
+    for n, diagonals, wall, armijo in [
+        *((COARSE, "symmetric", wall, "printed") for wall in WALLS),
+        *((FINE, "symmetric", wall, "printed") for wall in WALLS),
+        *((COARSE, "parallel", wall, "printed") for wall in WALLS),
+        *((COARSE, "symmetric", wall, "sufficient") for wall in WALLS),
+        (FINE, "parallel", 2.0, "printed"),
+    ]:
+        name = f"wall{wall:g}-n{n}-{diagonals}-{armijo}"
+        options = {"t0": T0, "iterations": ITERATIONS, "armijo": armijo}
+        listed.append(_case(name, n, diagonals, wall, options))
+    for armijo in ("printed", "sufficient"):
+        for variant, (momentum, line_search) in VARIANTS.items():
+            switches = {"momentum": momentum, "line_search": line_search, "armijo": armijo}
+            options = {"t0": T0_HISTORIES, "iterations": ITERATIONS, **switches}
+            listed.append(_case(f"fig10-{variant}-{armijo}", COARSE, "symmetric", 2.0, options))
+    return listed
+
+
+def _case(name: str, n: int, diagonals: str, wall: float, options: dict[str, Any]) -> Case:
+    build = partial(two_squares, n, alpha_aux=wall, diagonals=diagonals)
+    return Case(name, build, options, {"n": n, "diagonals": diagonals, "alpha_aux": wall})
+
+
+def data(folder: Folder, short: bool) -> None:
+    """Solve every case."""
+    run_cases(folder, cases(), short=short)
+
+
+def table(folder: Folder) -> dict[str, float]:
+    """``curvature``, ``junction`` and ``fig10`` tables, and the numbers for the comparison."""
+    meshes = {case.name: folder.read_mesh(case.name) for case in cases()}
+    shapes = {
+        name: stages["final"] for name, stages in meshes.items() if not name.startswith("fig10")
+    }
+    start = meshes[_main(2.0)]["initial"]
+    folder.write_table("curvature", curvature_table({"initial": start} | shapes))
+    junction = pd.DataFrame([{"case": name, **_junction(s)} for name, s in shapes.items()])
+    folder.write_table("junction", junction)
+    fig10 = _fig10(folder.read_table("histories"))
+    folder.write_table("fig10", fig10)
+    records = folder.read_table("records").set_index("case")
+    return _given(start) | _shape_numbers(junction.set_index("case"), records) | _numbers10(fig10)
+
+
+def _given(start: Surface) -> dict[str, float]:
+    """What the paper tells of the initial shape, taken from ours."""
+    roof = start.patch_faces([0])
+    X = start.vertices[np.unique(start.faces[roof])]
+    across = np.unique(X[:, 0].round(9))
+    return {
+        "target": start.patches[0].target_curvature,
+        "alpha": start.patches[0].tension,
+        "side": float(np.ptp(X[:, 0])),
+        "squares": len(across) - 1,
+        "square": float(np.diff(across).max()),
+        "height": float(start.vertices[junction_top(start), 2]),
+        "t0": T0,
+    }
+
+
+def _junction(surface: Surface) -> dict[str, float]:
+    """The junction's middle: its height, the turn of the tangent there, and what balance asks."""
+    middle = junction_top(surface)
+    ratio = surface.tensions[2] / (2.0 * surface.tensions[0])
+    return {
+        "alpha_aux": surface.tensions[2],
+        "height": float(surface.vertices[middle, 2]),
+        "turn": turn(surface, middle, ("left", "right")),
+        "turn_of_balance": float(2.0 * np.degrees(np.arcsin(ratio))),
+    }
+
+
+def _shape_numbers(junction: pd.DataFrame, records: pd.DataFrame) -> dict[str, float]:
+    found = {}
+    for wall in WALLS:
+        found[f"turn_{wall:g}"] = junction.turn[_main(wall)]
+        found[f"height_{wall:g}"] = junction.height[_main(wall)]
+        found[f"gradient_squared_{wall:g}"] = records.gradient_squared[_main(wall)]
+    for method in ("cotangent", "variational"):
+        for name, n in (("coarse", COARSE), ("fine", FINE)):
+            found[f"largest_{method}_{name}"] = records[f"largest_error_{method}"][_main(2.0, n)]
+            found[f"mean_{method}_{name}"] = records[f"mean_error_{method}"][_main(2.0, n)]
+    other = [junction.turn[f"wall{wall:g}-n{COARSE}-parallel-printed"] for wall in WALLS]
+    found["least_turn_step_parallel"] = min(b - a for a, b in pairwise(other))
+    return found
+
+
+def _fig10(histories: pd.DataFrame) -> pd.DataFrame:
+    """For each line of Fig. 10: E at a few iterations, its fall in the second half, its rises."""
+    rows = []
+    for name, history in histories[histories.case.str.startswith("fig10")].groupby("case"):
+        E = history.energy.to_numpy()
+        up = np.maximum(np.diff(E), 0.0)
+        half = len(E) // 2
+        rows.append(
+            {
+                "case": name,
+                "energy_30": E[min(30, len(E) - 1)],
+                "energy_half": E[half],
+                "energy_end": E[-1],
+                "fall_in_second_half": E[half] - E[-1],
+                "rises": int(np.count_nonzero(up > 1e-12 * abs(E[0]))),
+                "total_rise": up.sum(),
+                "forced_steps": int((~history.armijo_held.astype(bool)).sum()),
+                "gradient_squared_end": history.gradient_squared.iloc[-1],
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _numbers10(fig10: pd.DataFrame) -> dict[str, float]:
+    lines = fig10.set_index("case")
+    return {
+        f"fig10_{variant.replace('-', '_')}_{key}": lines[key][f"fig10-{variant}-printed"]
+        for variant in VARIANTS
+        for key in ("energy_30", "energy_end", "fall_in_second_half", "total_rise", "forced_steps")
+    }
+
+
+def _main(wall: float, n: int = COARSE) -> str:
+    """The case the paper shows."""
+    return f"wall{wall:g}-n{n}-symmetric-printed"
+
+
+def figure(folder: Folder) -> None:
+    """Figs. 6 to 10."""
+
+
+STUDY = Study(
+    "example1",
+    "two square patches: walls of four tensions, coarse and fine, momentum and line search",
+    data,
+    table,
+    figure,
+    parameters={"t0": T0, "t0_histories": T0_HISTORIES, "iterations": ITERATIONS, "walls": WALLS},
+    seconds=20,
+)

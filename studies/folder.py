@@ -1,0 +1,122 @@
+"""Where a study writes: tables, meshes and figures, each file whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from io import BytesIO, StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pcmc import Patch, Plane, Surface
+from pcmc.errors import FileError
+from pcmc.files import whole
+
+FLOATS = "%.10g"  # enough to compare with what is printed, few enough to read
+
+
+@dataclass(frozen=True)
+class Folder:
+    """The folder ``path`` of one study.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as temporary:
+    ...     folder = Folder(Path(temporary) / "study")
+    ...     folder.write_table("numbers", pd.DataFrame({"x": [1.5]}))
+    ...     folder.read_table("numbers").x.tolist()
+    [1.5]
+    """
+
+    path: Path
+
+    def write_table(self, name: str, frame: pd.DataFrame) -> None:
+        """``name.csv``, a line per row of the frame, without index; the same bytes each time."""
+        text = StringIO()
+        frame.to_csv(text, index=False, float_format=FLOATS, lineterminator="\n")
+        write_bytes(self.path / f"{name}.csv", text.getvalue().encode())
+
+    def read_table(self, name: str) -> pd.DataFrame:
+        """What ``write_table`` wrote under this name."""
+        path = self._existing(f"{name}.csv")
+        return pd.read_csv(path)
+
+    def write_mesh(self, name: str, stages: Mapping[str, Surface]) -> None:
+        """``name.npz``: one surface at several stages of its motion, exactly.
+
+        The first stage must be a sound mesh; the others may have collapsed triangles.
+        """
+        first = next(iter(stages.values()))
+        data = BytesIO()
+        np.savez_compressed(
+            data,
+            faces=first.faces,
+            patch_of_face=first.patch_of_face,
+            patches=json.dumps([(p.name, p.tension, p.pressure) for p in first.patches]),
+            fixed=first.fixed,
+            on_plane=first.on_plane,
+            plane=np.array([first.plane.point, first.plane.normal]),
+            stages=np.array(list(stages)),
+            vertices=np.array([surface.vertices for surface in stages.values()]),
+        )
+        write_bytes(self.path / f"{name}.npz", data.getvalue())
+
+    def read_mesh(self, name: str) -> dict[str, Surface]:
+        """The stages that ``write_mesh`` wrote under this name."""
+        with np.load(self._existing(f"{name}.npz")) as data:
+            plane = Plane(*data["plane"].tolist())
+            stages, vertices = data["stages"].tolist(), data["vertices"]
+            first = Surface(
+                vertices[0], data["faces"], data["patch_of_face"],
+                tuple(Patch(*patch) for patch in json.loads(str(data["patches"]))),
+                fixed=data["fixed"], on_plane=data["on_plane"], plane=plane,
+            )  # fmt: skip
+        return {stage: first.moved(X) for stage, X in zip(stages, vertices, strict=True)}
+
+    def figure(self, name: str) -> Path:
+        """Where the figure ``name`` goes: a PNG in this folder."""
+        self.path.mkdir(parents=True, exist_ok=True)
+        return self.path / f"{name}.png"
+
+    def mesh_hashes(self) -> dict[str, str]:
+        """16 hexadecimal digits of each mesh's faces and positions, by mesh and stage."""
+        return {
+            f"{path.stem} {stage}": mesh_hash(surface)
+            for path in sorted(self.path.glob("*.npz"))
+            for stage, surface in self.read_mesh(path.stem).items()
+        }
+
+    def _existing(self, name: str) -> Path:
+        path = self.path / name
+        if not path.is_file():
+            raise FileError(
+                f"{path} does not exist; run the step that writes it:"
+                f" python -m studies run {self.path.name}"
+            )
+        return path
+
+
+def mesh_hash(surface: Surface) -> str:
+    """16 hexadecimal digits that change with any position, face or patch."""
+    digest = hashlib.sha256()
+    for array, kind in (
+        (surface.vertices, "<f8"), (surface.faces, "<i8"), (surface.patch_of_face, "<i8"),
+    ):  # fmt: skip
+        digest.update(np.ascontiguousarray(array, dtype=kind).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file so that at every instant the old or the new one is there, whole."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def write_json(path: Path, values: Any) -> None:
+    """A readable JSON file."""
+    write_bytes(path, (json.dumps(values, indent=2, ensure_ascii=False) + "\n").encode())

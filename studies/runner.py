@@ -1,0 +1,137 @@
+"""Several studies side by side, each in a process of its own, with a progress bar."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+from .study import STEPS, Study
+
+# One thread a worker: two workers share two cores, and sums come out in the same order every time.
+THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a study ended: ``error`` is empty when all went well, or its last words."""
+
+    study: str
+    seconds: float
+    error: str = ""
+
+
+def run_all(
+    studies: Sequence[Study],
+    results: Path,
+    console: Console,
+    *,
+    workers: int = 2,
+    short: bool = False,
+    steps: Sequence[str] = STEPS,
+) -> list[Outcome]:
+    """Run the studies, longest first, ``workers`` at a time; the outcomes in the order given.
+
+    A study that fails is an outcome with an error, and the others go on. Ctrl-C ends the processes
+    under way and comes out as KeyboardInterrupt; whole files only are left behind.
+    """
+    extra = ["--results", str(results), "--steps", *steps, *(["--short"] if short else [])]
+    outcomes: dict[str, Outcome] = {}
+    with _progress(console) as progress, ThreadPoolExecutor(workers) as pool:
+        crew = Crew(progress, steps, len(studies))
+        futures = [
+            pool.submit(crew.run, study.name, extra)
+            for study in sorted(studies, key=lambda study: -study.seconds)
+        ]
+        try:
+            for future in as_completed(futures):
+                outcome = future.result()
+                outcomes[outcome.study] = outcome
+                if outcome.error:
+                    console.print(f"[red]{outcome.study} failed:[/red]", outcome.error, markup=True)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            crew.stop()
+            raise
+    return [outcomes[study.name] for study in studies]
+
+
+@dataclass
+class Crew:
+    """The processes under way, and the bar that shows what they do."""
+
+    progress: Progress
+    steps: Sequence[str]
+    studies: int
+    doing: dict[str, str] = field(default_factory=dict)
+    processes: dict[str, subprocess.Popen[str]] = field(default_factory=dict)
+    finished: int = 0
+    stopped: bool = False
+
+    def __post_init__(self) -> None:
+        self.task = self.progress.add_task("", total=self.studies * len(self.steps))
+
+    def run(self, name: str, extra: Sequence[str]) -> Outcome:
+        """Run one study to its end in a process."""
+        start = time.perf_counter()
+        command = [sys.executable, "-m", "studies.worker", name, *extra]
+        environment = os.environ | dict.fromkeys(THREADS, "1")
+        with tempfile.TemporaryFile("w+") as words:
+            process = subprocess.Popen(
+                command, stdout=subprocess.PIPE, stderr=words, text=True, env=environment
+            )
+            self.processes[name] = process
+            if self.stopped:
+                process.terminate()
+            assert process.stdout is not None
+            for line in process.stdout:
+                self.show(name, line.strip())
+            code = process.wait()
+            words.seek(0)
+            error = "" if code == 0 else _last_words(words.read(), code)
+        del self.processes[name]
+        self.finished += 1
+        self.show(name, None)
+        return Outcome(name, time.perf_counter() - start, error)
+
+    def show(self, name: str, step: str | None) -> None:
+        """Tell the bar that a study has come to a step, or to its end."""
+        if step is None:
+            self.doing.pop(name, None)
+        elif step in self.steps:
+            self.doing[name] = step
+        doing = dict(self.doing)
+        taken = sum(self.steps.index(step) for step in doing.values())
+        self.progress.update(
+            self.task,
+            completed=self.finished * len(self.steps) + taken,
+            description=", ".join(f"{study} ({step})" for study, step in sorted(doing.items())),
+        )
+
+    def stop(self) -> None:
+        """End every process under way."""
+        self.stopped = True
+        for process in list(self.processes.values()):
+            process.terminate()
+
+
+def _progress(console: Console) -> Progress:
+    return Progress(
+        BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TextColumn("{task.description}"),
+        console=console,
+    )  # fmt: skip
+
+
+def _last_words(text: str, code: int) -> str:
+    """What a failed process said at its end."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    return lines[-1] if lines else f"it ended with code {code} and said nothing"
