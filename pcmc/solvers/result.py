@@ -25,8 +25,8 @@ class Status(Enum):
         " largest forces, or remesh"
     )
     DIVERGED = (
-        "diverged: the surface inflates without bound, which happens when no equilibrium exists;"
-        " raise the tensions or lower the pressure"
+        "diverged: the surface inflates without bound, which happens when no equilibrium exists or"
+        " the step is too long; raise the tensions, lower the pressure or take a smaller step"
     )
     NON_FINITE = (
         "stopped at a number that is not finite; the returned surface is the last finite one; use a"
