@@ -1,5 +1,7 @@
 """The paper's flow: its update written a second time, its line search, and every way it ends."""
 
+import sys
+
 import numpy as np
 import pytest
 from shapes import cap, octahedron, pyramid, shaken, three_patches
@@ -31,6 +33,20 @@ def by_the_book(surface, t0, xi, iterations, momentum, line_search, armijo):
         d, P = Q.vertices - P, Q.vertices
         rows.append((energy(Q), (gradient(Q) ** 2).sum(), t, held))
     return P, rows
+
+
+@pytest.mark.parametrize("armijo", ["printed", "sufficient"])
+@pytest.mark.parametrize("height", [0.05, 0.1, 0.2])
+def test_the_line_search_is_the_papers(height, armijo):
+    """One vertex and long steps, with the paper's ξ: the gradient changes much along each step."""
+    surface = pyramid(height=height)
+    options = {"t0": 2.0, "xi": 0.2, "iterations": 6, "momentum": True}
+    options |= {"line_search": True, "armijo": armijo}
+    _, rows = by_the_book(surface, **options)
+    history = solve(surface, "nesterov", tolerance=0, **options).history.iloc[1:]
+    assert history.t.tolist() == [t for _, _, t, _ in rows]
+    assert history.armijo_held.tolist() == [held for _, _, _, held in rows]
+    assert history.t.nunique() > 1
 
 
 @pytest.mark.parametrize("armijo", ["printed", "sufficient"])
@@ -229,6 +245,34 @@ def test_an_interrupt_between_callbacks_stops_it_too(monkeypatch):
     assert len(result.history) == result.iterations + 1
     assert result.energy == result.history.energy.iloc[-1]
     assert result.energy == energy_and_gradient(result.surface)[0]
+
+
+def test_an_interrupt_at_any_line_leaves_a_true_result():
+    """Ctrl-C may come between any two lines of the flow: history and surface must still agree."""
+    surface, ended = three_patches(), 0
+    for stop in range(4, 60):
+        lines = iter(range(stop))
+
+        def trace(frame, event, _, lines=lines):
+            if event == "line" and next(lines, None) is None:
+                sys.settrace(None)
+                raise KeyboardInterrupt
+            return trace if frame.f_code is nesterov.__code__ else None
+
+        before = sys.gettrace()
+        sys.settrace(trace)
+        try:
+            result = nesterov(surface, NesterovOptions(iterations=100))
+        except KeyboardInterrupt:
+            continue  # before the first point was measured there is nothing to return
+        finally:
+            sys.settrace(before)
+        ended += 1
+        assert result.status is Status.STOPPED
+        assert len(result.history) == result.iterations + 1
+        assert result.energy == result.history.energy.iloc[-1]
+        assert result.energy == energy_and_gradient(result.surface)[0]
+    assert ended > 40
 
 
 def test_other_exceptions_of_a_callback_pass_through():

@@ -86,13 +86,6 @@ class Coordinates:
         return self.unit * np.concatenate([gradient[self.free].ravel(), along.ravel()])
 
 
-class Stop(Exception):
-    """Ends NLopt's run from within the objective, with the status to report."""
-
-    def __init__(self, status: Status) -> None:
-        self.status = status
-
-
 class Objective:
     """What NLopt calls: measures, records, and keeps the best point for the end."""
 
@@ -102,6 +95,7 @@ class Objective:
         self.evaluate = Evaluator(surface)
         self.rows: list[tuple[Any, ...]] = []
         self.best: Point | None = None
+        self.status: Status | None = None
         self.raised: BaseException | None = None
         self.halt: Callable[[], object] = lambda: None
 
@@ -110,12 +104,14 @@ class Objective:
 
         NLopt may call again after it was told to stop, and must not see an exception then.
         """
-        if self.raised is not None:
-            return math.nan
-        try:
-            point = self.visit(self.coordinates.positions(s))
-        except BaseException as error:
-            self.raised = error
+        if self.status is None and self.raised is None:
+            try:
+                point = self.visit(self.coordinates.positions(s))
+            except (StopIteration, KeyboardInterrupt):
+                self.status = self.status or Status.STOPPED
+            except BaseException as error:
+                self.raised = error
+        if self.status is not None or self.raised is not None:
             self.halt()
             return math.nan
         if out.size:
@@ -123,7 +119,7 @@ class Objective:
         return point.energy
 
     def visit(self, X: Floats) -> Point:
-        """Measure and record one point; Stop when it is the last."""
+        """Measure and record one point, and set the status if it is the last."""
         point = self.evaluate(X)
         converged = point.squared <= (self.options.tolerance or 0.0)
         if point.finite or not self.rows:
@@ -131,14 +127,16 @@ class Objective:
             if self.best is None or converged or _better(point, self.best):
                 self.best = point
         if not point.finite:
-            raise Stop(Status.NON_FINITE)
-        if self.callback is not None:
+            self.status = Status.NON_FINITE
+        elif converged:
+            self.status = Status.CONVERGED
+        elif extent(X) > self.options.inflation * self.surface.size:
+            self.status = Status.DIVERGED
+        elif self.evaluate.count >= self.options.evaluations:  # NLopt's own limit waits for a step
+            self.status = Status.ITERATION_LIMIT
+        if self.callback is not None and point.finite:
             named = dict(zip(COLUMNS, self.rows[-1], strict=True))
             self.callback(Progress(len(self.rows), lambda: self.surface.moved(X), named))
-        if converged:
-            raise Stop(Status.CONVERGED)
-        if extent(X) > self.options.inflation * self.surface.size:
-            raise Stop(Status.DIVERGED)
         return point
 
 
@@ -170,10 +168,8 @@ def lbfgs(
     objective = Objective(surface, options or LbfgsOptions(), callback)
     status = _run(objective)
     best, rows = objective.best, objective.rows
-    if best is None:  # interrupted before the first point was measured
-        best = objective.evaluate(surface.vertices)
-    if not rows or rows[-1][1:] != (best.energy, best.squared):
-        best = objective.evaluate(best.X)
+    if best is None or rows[-1][1:] != (best.energy, best.squared):
+        best = objective.evaluate(surface.vertices if best is None else best.X)
         rows.append((objective.evaluate.count, best.energy, best.squared))
     return Result(
         surface=surface.moved(best.X),
@@ -188,36 +184,27 @@ def lbfgs(
 
 def _run(objective: Objective) -> Status:
     """Hand the objective to NLopt; why it stopped, in our words."""
-    options, unknowns = objective.options, objective.coordinates.count
+    unknowns = objective.coordinates.count
     if unknowns == 0:
         return Status.CONVERGED
     optimizer = nlopt.opt(nlopt.LD_LBFGS, unknowns)
     optimizer.set_min_objective(objective)
-    optimizer.set_maxeval(options.evaluations)
-    optimizer.set_vector_storage(options.memory)
+    optimizer.set_vector_storage(objective.options.memory)
     objective.halt = optimizer.force_stop
     try:
         optimizer.optimize(np.zeros(unknowns))
     except KeyboardInterrupt:
         return Status.STOPPED
     except Exception:  # NLopt's failures are not of one family and have no words; its code decides
-        if objective.raised is None and optimizer.last_optimize_result() > 0:
+        if objective.status is objective.raised is None and optimizer.last_optimize_result() > 0:
             raise
     finally:
-        objective.halt = lambda: None  # each held the other where no garbage collector looks
-    if objective.raised is not None:
-        return _status(objective.raised)
-    limit = optimizer.last_optimize_result() == nlopt.MAXEVAL_REACHED
-    return Status.ITERATION_LIMIT if limit else Status.STALLED
-
-
-def _status(raised: BaseException) -> Status:
-    """The status that ended the run; an exception of the callback's own is raised again."""
-    if isinstance(raised, Stop):
-        return raised.status
-    if isinstance(raised, StopIteration | KeyboardInterrupt):
-        return Status.STOPPED
-    raise raised
+        # NLopt holds the objective where no garbage collector looks: leave no way back to it.
+        objective.halt = lambda: None
+        raised, objective.raised = objective.raised, None
+    if raised is not None:
+        raise raised
+    return objective.status or Status.STALLED
 
 
 def _better(new: Point, best: Point) -> bool:
