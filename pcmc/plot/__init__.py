@@ -1,0 +1,9 @@
+"""Pictures of surfaces (pyvista) and of curves (matplotlib); needs the extra ``plot``, no display.
+
+Every function writes a PNG when given a path, and returns the picture as an (h,w,3) array of bytes.
+"""
+
+from .curves import convergence, heatmap, histories, lines
+from .pictures import draw, panel, vectors
+
+__all__ = ["convergence", "draw", "heatmap", "histories", "lines", "panel", "vectors"]

@@ -1,0 +1,74 @@
+"""Numbers as colours, and the scale that says which."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import MissingExtra, OptionError, unknown
+from .figure import INK, SMALL
+
+
+@dataclass(frozen=True)
+class ColorScale:
+    """A colour map between two values."""
+
+    low: float
+    high: float
+    cmap: Any
+
+    def rgb(self, values: Floats) -> Floats:
+        """(k,3) colours, NaN where the value is."""
+        span = self.high - self.low
+        colors = self.cmap((values - self.low) / span if span > 0.0 else 0.5 + 0.0 * values)[:, :3]
+        colors[np.isnan(values)] = np.nan
+        return colors
+
+    def bar(self, figure: Any, above: float, height: float, label: str) -> None:
+        """The scale at the foot of a figure, ``above`` pixels from its lower edge."""
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import Normalize
+
+        axes = figure.add_axes((0.25, (above + 56.0) / height, 0.5, 14.0 / height))
+        bar = figure.colorbar(
+            ScalarMappable(Normalize(self.low, self.high), self.cmap), cax=axes,
+            orientation="horizontal",
+        )  # fmt: skip
+        bar.outline.set(linewidth=0.5)
+        bar.ax.tick_params(labelsize=SMALL, width=0.5, length=2.0, pad=1.5, colors=INK)
+        bar.ax.locator_params(nbins=5)
+        bar.formatter.set_powerlimits((-3, 4))
+        bar.ax.xaxis.get_offset_text().set(size=SMALL)
+        bar.set_label(label, size=SMALL, color=INK, labelpad=2.0)
+
+
+def color_scale(
+    values: Sequence[Floats | None], limits: tuple[float, float] | None, cmap: str | None
+) -> ColorScale | None:
+    """The scale for all the values together, or None when there are none."""
+    try:
+        from matplotlib import colormaps
+    except ImportError:
+        raise MissingExtra("matplotlib", "plot") from None
+    if all(v is None for v in values):
+        return None
+    every = np.concatenate([v for v in values if v is not None])
+    known = every[np.isfinite(every)]
+    least, most = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    signed = least < 0.0 < most
+    if limits is not None:
+        low, high = (float(v) for v in limits)
+        if not (np.isfinite([low, high]).all() and low < high):
+            raise OptionError(f"limits: expected two finite numbers, low < high, found {limits!r}")
+    elif signed:
+        low, high = -max(-least, most), max(-least, most)
+    else:
+        low, high = least, most
+    name = cmap or ("RdBu_r" if signed else "viridis")
+    if name not in colormaps:
+        raise OptionError(unknown("cmap", name, sorted(colormaps)))
+    return ColorScale(low, high, colormaps[name])

@@ -1,0 +1,137 @@
+"""Two painters of a Scene. pyvista where the system can open an OpenGL window off screen, else
+matplotlib, triangle over triangle from back to front."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import MissingExtra, OptionError, unknown
+from .scene import Scene
+
+RENDERERS = ("auto", "pyvista", "matplotlib")
+SAMPLES = 2  # pixels painted for each pixel shown, in each direction
+DOT = 5.0  # pixels across
+
+
+def paint(
+    scene: Scene, low: Floats, scale: float, size: tuple[int, int], renderer: str = "auto"
+) -> Floats:
+    """(h,w,3) bytes: the scene with picture coordinates ``low`` at the lower left corner.
+
+    ``scale`` is pixels per unit of length, ``size`` (w, h) in pixels.
+    """
+    if renderer not in RENDERERS:
+        raise OptionError(unknown("renderer", renderer, RENDERERS))
+    if renderer == "pyvista" or (renderer == "auto" and opengl()):
+        return _with_pyvista(scene, low, scale, size)
+    return _with_matplotlib(scene, low, scale, size)
+
+
+@cache
+def opengl() -> bool:
+    """Whether VTK can draw here. A child tries it: without a driver VTK ends the process."""
+    _pyvista()
+    probe = (
+        "import vtkmodules.vtkRenderingOpenGL2\n"
+        "from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow\n"
+        "w = vtkRenderWindow(); w.SetOffScreenRendering(1); w.SetSize(8, 8)\n"
+        "w.AddRenderer(vtkRenderer()); w.Render()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, check=False)
+    return done.returncode == 0
+
+
+def _pyvista() -> Any:
+    try:
+        import pyvista
+    except ImportError:
+        raise MissingExtra("pyvista", "plot") from None
+    return pyvista
+
+
+def _with_pyvista(scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> Floats:
+    pyvista = _pyvista()
+    width, height = size[0] * SAMPLES, size[1] * SAMPLES
+    with pyvista.vtk_verbosity("off"):
+        plotter = pyvista.Plotter(off_screen=True, window_size=(width, height), lighting="none")
+        plotter.set_background("white")
+        t = len(scene.corners)
+        cells = np.arange(3 * t).reshape(-1, 3)
+        mesh = pyvista.PolyData.from_regular_faces(scene.corners.reshape(-1, 3), cells)
+        mesh["rgb"] = np.round(scene.colors.reshape(-1, 3) * 255.0).astype(np.uint8)
+        plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=False)
+        for line_width in np.unique(scene.widths):
+            chosen = scene.widths == line_width
+            ends = scene.segments[chosen].reshape(-1, 3)
+            lines = pyvista.line_segments_from_points(ends)
+            lines.cell_data["rgb"] = np.round(scene.shades[chosen] * 255.0).astype(np.uint8)
+            plotter.add_mesh(
+                lines, scalars="rgb", rgb=True, lighting=False, line_width=SAMPLES * line_width
+            )
+        if len(scene.dots):
+            dots = pyvista.PolyData(scene.dots)
+            dots["rgb"] = np.round(scene.dot_colors * 255.0).astype(np.uint8)
+            plotter.add_mesh(
+                dots, scalars="rgb", rgb=True, lighting=False, style="points",
+                render_points_as_spheres=True, point_size=SAMPLES * DOT,
+            )  # fmt: skip
+        _aim(plotter, scene, low, scale, size)
+        image = plotter.screenshot(return_img=True)
+        plotter.close()
+    blocks = image[..., :3].reshape(size[1], SAMPLES, size[0], SAMPLES, 3).astype(float)
+    return np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
+
+
+def _aim(plotter: Any, scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> None:
+    axes, depth = scene.view.axes, scene.view.depth(scene.corners.reshape(-1, 3))
+    centre = low + np.array(size) / (2.0 * scale)
+    near, far = depth.max(), depth.min()
+    reach = max(near - far, np.array(size).max() / scale)
+    focus = centre @ axes[:2] + near * axes[2]
+    camera = plotter.camera
+    camera.position = focus + reach * axes[2]
+    camera.focal_point = focus
+    camera.up = axes[1]
+    camera.parallel_projection = True
+    camera.parallel_scale = size[1] / (2.0 * scale)
+    camera.clipping_range = (0.5 * reach, reach + (near - far) + 0.5 * reach)
+
+
+def _with_matplotlib(scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> Floats:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import PolyCollection
+    from matplotlib.figure import Figure
+
+    project = scene.view.project
+    circle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    disc = np.stack([np.cos(circle), np.sin(circle)], axis=1) * DOT / (2.0 * scale)
+    shapes = [
+        *project(scene.corners),
+        *project(scene.segments),
+        *(project(scene.dots)[:, None] + disc),
+    ]
+    fills = np.concatenate([scene.colors.mean(axis=1), scene.shades, scene.dot_colors])
+    thin = np.full(len(scene.corners), 0.4)
+    widths = np.concatenate([thin, scene.widths, np.zeros(len(scene.dots))])
+    order = scene.order
+    figure = Figure(figsize=(size[0] / 72.0, size[1] / 72.0), dpi=72.0 * SAMPLES)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set_xlim(low[0], low[0] + size[0] / scale)
+    axes.set_ylim(low[1], low[1] + size[1] / scale)
+    axes.add_collection(PolyCollection(
+        [shapes[k] for k in order], facecolors=fills[order], edgecolors=fills[order],
+        linewidths=widths[order], closed=True, joinstyle="round",
+    ))  # fmt: skip
+    canvas.draw()
+    image = np.asarray(canvas.buffer_rgba())[..., :3]
+    image = image[: size[1] * SAMPLES, : size[0] * SAMPLES]
+    blocks = image.reshape(size[1], SAMPLES, size[0], SAMPLES, 3).astype(float)
+    return np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)

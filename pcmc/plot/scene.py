@@ -1,0 +1,251 @@
+"""A surface as coloured triangles, lines and dots, seen from somewhere: all but the painting.
+
+Projection is parallel throughout, so lengths can be compared between pictures and text can be
+placed on the vertices. Light and colour are settled here, and so the same whatever paints.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..errors import OptionError, unknown
+from ..surface import Surface
+
+# Paul Tol's "light" scheme, told apart with every kind of colour blindness.
+SHEETS = ("#77AADD", "#EE8866", "#44BB99", "#EEDD88", "#FFAABB")
+WALLS = ("#DDDDDD", "#BBCC33", "#99DDFF", "#AAAA00")
+NO_VALUE = "#D9D9D9"
+FIXED_DOT, SLIDING_DOT = "#C8102E", "#1F4FBF"
+LINE = "#303030"
+
+VIEWS = {"diagonal": (-60.0, 28.0), "elevation": (-90.0, 0.0), "plan": (-90.0, 90.0)}
+CELLS_UP_TO = 20_000  # triangles; above, a vertex's own cell is smaller than a pixel or two
+LIFT = 2e-3  # of the size: lines and dots stand this much before the surface they lie on
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Where from: unit vectors to the right, upwards and towards the viewer, as rows of (3,3)."""
+
+    axes: Floats
+
+    def project(self, points: Floats) -> Floats:
+        """(…,2) picture coordinates in units of length."""
+        return points @ self.axes[:2].T
+
+    def depth(self, points: Floats) -> Floats:
+        """(…) distance towards the viewer."""
+        return points @ self.axes[2]
+
+
+def view_of(surface: Surface, view: str | tuple[float, float]) -> View:
+    """From a name or (azimuth, elevation) in degrees; the normal of Π is up.
+
+    Azimuth turns about the normal, from the first of x, y, z that is not along it; -90 looks along
+    +y when Π is horizontal.
+    """
+    if isinstance(view, str):
+        if view not in VIEWS:
+            raise OptionError(unknown("view", view, VIEWS))
+        view = VIEWS[view]
+    azimuth, elevation = (math.radians(a) for a in view)
+    up = np.array(surface.plane.normal)
+    first = next(e for e in np.eye(3) if abs(e @ up) < 0.9)
+    first = first - (first @ up) * up
+    first /= np.linalg.norm(first)
+    second = np.cross(up, first)
+    away = math.cos(azimuth) * first + math.sin(azimuth) * second
+    towards = math.cos(elevation) * away + math.sin(elevation) * up
+    right = np.cross(up, away)
+    return View(np.stack([right, np.cross(towards, right), towards]))
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What to paint.
+
+    Attributes
+    ----------
+    corners : (t,3,3) triangles; colors : (t,3,3) RGB of their corners, 0..1.
+    segments : (s,2,3); widths (s,), in pixels; shades (s,3) RGB.
+    dots : (d,3); dot_colors (d,3) RGB.
+    order : (t + s + d,) indices into triangles, then segments, then dots, farthest first: a
+        triangle is as near as its middle, what lies on triangles as near as the nearest of them.
+    """
+
+    view: View
+    corners: Floats
+    colors: Floats
+    segments: Floats
+    widths: Floats
+    shades: Floats
+    dots: Floats
+    dot_colors: Floats
+    order: Ints
+
+
+def rgb(color: str) -> Floats:
+    """(3,) 0..1 of "#RRGGBB"."""
+    return np.array([int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5)])
+
+
+def patch_colors(surface: Surface) -> Floats:
+    """(k,3) RGB: one palette for sheets under pressure, another for walls."""
+    result, sheets, walls = [], 0, 0
+    for patch in surface.patches:
+        if patch.auxiliary:
+            result.append(rgb(WALLS[walls % len(WALLS)]))
+            walls += 1
+        else:
+            result.append(rgb(SHEETS[sheets % len(SHEETS)]))
+            sheets += 1
+    return np.array(result)
+
+
+def scene(
+    surface: Surface,
+    view: View,
+    values: Floats | None,
+    *,
+    supports: bool,
+    edges: bool,
+    patches: Sequence[str] | None = None,
+) -> Scene:
+    """``values`` is None for patch colours, or RGB (n,3) or (m,3), NaN where there is none.
+
+    ``edges`` draws the mesh, ``patches`` only those named.
+    """
+    shown = np.ones(surface.m, dtype=bool)
+    if patches is not None:
+        shown = surface.patch_faces([surface.patch_index(name) for name in patches])
+    F = surface.faces[shown]
+    P = surface.vertices[F]
+    near = view.depth(P).mean(axis=1)
+    light = _light(
+        _normals(surface, smooth=not edges)[shown], view, 0.45 if values is None else 0.22
+    )
+    if values is None:
+        base = patch_colors(surface)[surface.patch_of_face[shown]]
+    elif len(values) == surface.m and surface.m != surface.n:
+        base = np.where(np.isnan(values), rgb(NO_VALUE), values)[shown]
+    else:
+        base = _mean_known(values, F)
+    colors, triangles_near = base[:, None] * light[..., None], near
+    if values is not None and len(values) == surface.n and len(F) <= CELLS_UP_TO:
+        known = np.where(np.isnan(values), rgb(NO_VALUE), values)
+        P, colors = _cells(P, known[F], light)
+        triangles_near = np.tile(near, 6)
+    chosen, ends, widths, shades = _segments(surface, view, edges, shown)
+    held, points, kinds = _dots(surface, view, supports, F)
+    depth = [
+        triangles_near,
+        _nearest(surface, shown, near)[chosen],
+        _nearest_vertex(surface, F, near)[held],
+    ]
+    return Scene(
+        view, P, np.clip(colors, 0.0, 1.0), ends, widths, shades, points, kinds,
+        np.argsort(np.concatenate(depth), kind="stable"),
+    )  # fmt: skip
+
+
+def _nearest(surface: Surface, shown: Bools, near: Floats) -> Floats:
+    """(e,) depth of the nearest shown face at each edge."""
+    result = np.full(len(surface.topology.edges), -np.inf)
+    np.maximum.at(result, surface.topology.edge_of_face[shown].ravel(), np.repeat(near, 3))
+    return result
+
+
+def _nearest_vertex(surface: Surface, faces: Ints, near: Floats) -> Floats:
+    """(n,) depth of the nearest of the faces at each vertex."""
+    result = np.full(surface.n, -np.inf)
+    np.maximum.at(result, faces.ravel(), np.repeat(near, 3))
+    return result
+
+
+def _light(normals: Floats, view: View, strength: float) -> Floats:
+    """(…) brightness of a matt sheet seen from either side, lit from above the viewer's left."""
+    seen = normals @ view.axes.T
+    seen = seen * np.where(seen[..., 2:] < 0.0, -1.0, 1.0)
+    source = np.array([-0.35, 0.50, 0.79])
+    lambert = np.maximum(seen @ (source / np.linalg.norm(source)), 0.0)
+    return 1.03 - strength * (1.0 - lambert)
+
+
+def _normals(surface: Surface, smooth: bool) -> Floats:
+    """(m,3,3) unit normals at the corners: the face's, or the mean at the vertex in its patch."""
+    X, F = surface.vertices, surface.faces
+    area = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]])
+    if smooth:
+        key = surface.patch_of_face[:, None].astype(np.int64) * surface.n + F
+        corner, inverse = np.unique(key, return_inverse=True)
+        inverse = inverse.ravel()
+        total = np.stack(
+            [np.bincount(inverse, np.repeat(area[:, d], 3), len(corner)) for d in range(3)], axis=1
+        )
+        normal = total[inverse].reshape(-1, 3, 3)
+    else:
+        normal = np.repeat(area[:, None], 3, axis=1)
+    length = np.linalg.norm(normal, axis=2, keepdims=True)
+    return normal / np.where(length > 0.0, length, 1.0)
+
+
+def _cells(P: Floats, known: Floats, light: Floats) -> tuple[Floats, Floats]:
+    """Each triangle in six, two around each corner in the corner's colour.
+
+    So no colour shows that no vertex has.
+    """
+    middle, bright = P.mean(axis=1), light.mean(axis=1)
+    corners, colors = [], []
+    for k in range(3):
+        for other in ((k + 1) % 3, (k + 2) % 3):
+            half, half_light = (P[:, k] + P[:, other]) / 2, (light[:, k] + light[:, other]) / 2
+            corners.append(np.stack([P[:, k], half, middle], axis=1))
+            shade = np.stack([light[:, k], half_light, bright], axis=1)
+            colors.append(known[:, k, None] * shade[..., None])
+    return np.concatenate(corners), np.concatenate(colors)
+
+
+def _mean_known(values: Floats, faces: Ints) -> Floats:
+    """(m,3) mean of the corners' colours that exist."""
+    corner = values[faces]
+    there = ~np.isnan(corner[..., :1])
+    count = there.sum(axis=1)
+    total = np.where(there, corner, 0.0).sum(axis=1)
+    return np.where(count > 0, total / np.maximum(count, 1), rgb(NO_VALUE))
+
+
+def _segments(
+    surface: Surface, view: View, edges: bool, shown: Bools
+) -> tuple[Ints, Floats, Floats, Floats]:
+    """Indices of the edges to draw, their ends, widths and colours."""
+    topo = surface.topology
+    curve = topo.curve_edge
+    there = np.zeros(len(curve), dtype=bool)
+    there[topo.edge_of_face[shown]] = True
+    chosen = np.flatnonzero(there & (curve | edges))
+    ends = surface.vertices[topo.edges[chosen]] + LIFT * surface.size * view.axes[2]
+    heavy = curve[chosen]
+    shades = np.where(heavy[:, None], rgb(LINE), rgb("#585858"))
+    return chosen, ends, np.where(heavy, 1.6, 0.6), shades
+
+
+def _dots(surface: Surface, view: View, supports: bool, faces: Ints) -> tuple[Ints, Floats, Floats]:
+    """Indices of the supported vertices to draw, where, and their colours."""
+    there = np.zeros(surface.n, dtype=bool)
+    there[faces] = supports
+    held = np.flatnonzero(there & (surface.fixed | surface.on_plane))
+    points = surface.vertices[held] + 3 * LIFT * surface.size * view.axes[2]
+    colors = np.where(surface.fixed[held][:, None], rgb(FIXED_DOT), rgb(SLIDING_DOT))
+    return held, points, colors
+
+
+def mean_edge(surface: Surface) -> float:
+    """Mean edge length, from at most ten thousand faces."""
+    step = max(1, surface.m // 10_000)
+    P = surface.vertices[surface.faces[::step]]
+    return float(np.linalg.norm(P - np.roll(P, 1, axis=1), axis=2).mean())

@@ -1,0 +1,280 @@
+"""Pictures show what they should, where they should, whatever paints them, and twice the same."""
+
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from tents import tent
+
+import pcmc
+from generators import two_squares
+from pcmc import plot
+from pcmc.errors import FileError, MissingExtra, OptionError
+from pcmc.plot import raster
+from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, WALLS, patch_colors, rgb, view_of
+
+RENDERERS = [
+    pytest.param("matplotlib"),
+    pytest.param(
+        "pyvista",
+        marks=pytest.mark.skipif(not raster.opengl(), reason="the system has no OpenGL"),
+    ),
+]
+
+
+def near(image, color, tolerance=0.12):
+    """(h,w) pixels close to an RGB colour."""
+    return (np.abs(image / 255.0 - color) < tolerance).all(axis=2)
+
+
+def flat_square(z=0.0, wall=False):
+    """A unit square on Π, or one that stands on it."""
+    X = np.array([[0, 0, z], [1, 0, z], [1, 1, z], [0, 1, z]], dtype=float)
+    return pcmc.Surface(
+        X,
+        [[0, 1, 2], [0, 2, 3]],
+        [0, 0],
+        [pcmc.Patch("a", 1.0, 0.0 if wall else 1.0)],
+        fixed=range(4),
+    )
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_lengths_are_to_scale(renderer):
+    image = plot.draw(
+        flat_square(), view="plan", width=420, supports=False, edges=False, renderer=renderer
+    )
+    assert image.shape == (420, 420, 3)
+    covered = (image < 250).any(axis=2)
+    rows, columns = np.flatnonzero(covered.any(axis=1)), np.flatnonzero(covered.any(axis=0))
+    assert np.ptp(rows) == pytest.approx(400, abs=3)  # 10 pixels of margin on each side
+    assert np.ptp(columns) == pytest.approx(400, abs=3)
+    assert covered[30:-30, 30:-30].all()
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_patches_and_supports_are_where_they_should_be(renderer):
+    surface = two_squares(4)
+    left, right, _ = patch_colors(surface)
+    image = plot.draw(surface, view="plan", width=600, renderer=renderer, supports=False)
+    blue, orange = near(image, left, 0.2), near(image, right, 0.2)
+    assert np.flatnonzero(blue.any(axis=0)).max() <= 302
+    assert np.flatnonzero(orange.any(axis=0)).min() >= 298
+    assert blue.mean() > 0.3
+    assert orange.mean() > 0.3
+    image = plot.draw(surface, view=(-90.0, -20.0), width=600, renderer=renderer)
+    assert near(image, rgb(FIXED_DOT)).sum() > 50
+    assert near(image, rgb(SLIDING_DOT)).sum() > 20
+    image = plot.draw(surface, view=(-90.0, -20.0), width=600, renderer=renderer, supports=False)
+    assert not near(image, rgb(FIXED_DOT)).any()
+    assert not near(image, rgb(SLIDING_DOT)).any()
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_what_is_behind_is_hidden(renderer):
+    surface = two_squares(4)
+    wall = rgb(WALLS[0])
+    above = plot.draw(surface, view="plan", width=500, supports=False, renderer=renderer)
+    assert near(above, wall, 0.05).mean() < 0.002
+    alone = plot.draw(
+        surface, view=(0.0, 0.0), patches=["wall"], width=500, supports=False, renderer=renderer
+    )
+    grey = np.ptp(alone.astype(int), axis=2) < 10
+    assert (grey & (alone[..., 0] < 245)).mean() > 0.3
+
+
+@pytest.mark.skipif(not raster.opengl(), reason="the system has no OpenGL")
+@pytest.mark.parametrize("view", ["diagonal", "elevation", "plan", (20.0, -35.0)])
+def test_both_painters_agree(view):
+    surface = two_squares(6)
+    H = pcmc.mean_curvature(surface)
+    one, two = (
+        plot.draw(surface, view=view, width=500, scalars=H, renderer=r).astype(float)
+        for r in ("pyvista", "matplotlib")
+    )
+    assert one.shape == two.shape
+    assert np.abs(one - two).mean() < 5.0  # of 255; lines differ by fractions of a pixel
+
+
+def test_same_picture_same_bytes(tmp_path):
+    surface = tent()
+    for name in ("a.png", "b.png"):
+        plot.draw(surface, tmp_path / name, numbers=pcmc.mean_curvature(surface), legend=True)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
+
+
+def test_pictures_stay_small(tmp_path):
+    surface = two_squares(24)
+    plot.draw(surface, tmp_path / "a.png", scalars=pcmc.mean_curvature(surface), label="H")
+    assert (tmp_path / "a.png").stat().st_size < 150_000
+
+
+def test_up_is_the_normal_of_the_plane():
+    surface = tent()
+    view = view_of(surface, "elevation")
+    np.testing.assert_allclose(view.axes @ view.axes.T, np.eye(3), atol=1e-14)
+    assert np.linalg.det(view.axes) == pytest.approx(1.0)
+    np.testing.assert_allclose(view.axes[1], surface.plane.normal, atol=1e-14)
+    height = view.project(surface.vertices - surface.plane.point)[:, 1]
+    np.testing.assert_allclose(height, surface.plane.height(surface.vertices), atol=1e-13)
+
+
+def test_scalars_take_their_colours_and_nothing_is_grey():
+    surface = two_squares(4)
+    values = np.full(surface.n, np.nan)
+    inner = surface.topology.interior & (surface.vertices[:, 0] < 0)
+    values[inner] = 1.0
+    options = {"view": "plan", "width": 500, "supports": False, "cmap": "viridis"}
+    image = plot.draw(surface, scalars=values, limits=(0.0, 1.0), **options)[:250]
+    yellow = near(image, rgb("#FDE725"), 0.2)
+    assert yellow[:, :250].mean() > 0.3
+    assert not yellow[:, 255:].any()
+    by_face = (surface.patch_of_face == 1).astype(float)
+    image = plot.draw(surface, scalars=by_face, limits=(0.0, 1.0), **options)[:250]
+    assert near(image, rgb("#FDE725"), 0.2)[:, 255:].mean() > 0.6
+    constant = plot.draw(surface, scalars=np.ones(surface.n), **options)
+    nothing = plot.draw(surface, scalars=np.full(surface.n, np.nan), **options)
+    assert constant.shape == nothing.shape
+
+
+def test_signed_values_get_a_symmetric_scale():
+    from pcmc.plot.colors import color_scale
+
+    scale = color_scale([np.array([-1.0, np.nan, 3.0]), None], None, None)
+    assert (scale.low, scale.high, scale.cmap.name) == (-3.0, 3.0, "RdBu_r")
+    assert np.isnan(scale.rgb(np.array([np.nan]))).all()
+    scale = color_scale([np.array([1.0, 3.0])], None, None)
+    assert (scale.low, scale.high, scale.cmap.name) == (1.0, 3.0, "viridis")
+    assert color_scale([None], None, None) is None
+
+
+def test_panel_has_one_scale_of_length_or_fills():
+    small, large = flat_square(), flat_square().moved(4.0 * flat_square().vertices)
+    options = {"views": "plan", "width": 800, "supports": False, "titles": ["small", "large"]}
+
+    def widths(image):
+        halves = (image[:, :400], image[:, 400:])
+        return [np.ptp(np.flatnonzero((h[60:] < 240).any(axis=(0, 2)))) for h in halves]
+
+    one, four = widths(plot.panel([small, large], **options))
+    assert four == pytest.approx(4 * one, rel=0.05)
+    one, four = widths(plot.panel([small, large], one_scale=False, **options))
+    assert four == pytest.approx(one, abs=2)
+    assert plot.panel([small] * 5, views=["plan"] * 5, columns=5, width=800).shape[0] < 200
+
+
+def test_vectors_point_and_are_thinned():
+    surface = two_squares(4)
+    field = np.zeros((surface.n, 3))
+    plain = plot.vectors(surface, field, view="elevation")
+    field[surface.topology.interior] = [0.0, 0.0, 1.0]
+    image = plot.vectors(surface, field, view="elevation", label="force", title="up")
+    assert image.shape[0] > plain.shape[0]
+    assert near(image, rgb("#B2182B")).sum() > 200
+    many = two_squares(40)
+    assert plot.vectors(many, pcmc.gradient(many), most=50).shape[1] == 900
+
+
+def test_curves(tmp_path):
+    steps = np.arange(50)
+    frame = pd.DataFrame({"evaluation": 2 * steps, "energy": -1.0 + 0.9**steps})
+    frame["gradient_squared"] = 0.5**steps
+    frame.loc[10, "energy"] = np.nan
+    frames = {"with": frame, "without": frame[:20]}
+    for name, options in {
+        "energy.png": {},
+        "forces.png": {"y": "gradient_squared", "x": "evaluation", "label": "‖∇E‖²"},
+    }.items():
+        image = plot.histories(frames, tmp_path / name, **options)
+        assert near(image, rgb("#0072B2")).any()
+        assert near(image, rgb("#D55E00")).any()
+    h = np.array([1.0, 0.5, 0.25, 0.125])
+    plot.convergence({"E": (h, 0.3 * h**2), "x": (h, [0.1, 0.02, np.nan, 0.0])}, tmp_path / "c.png")
+    table = np.array([[1.0, 10.0, np.nan], [-1.0, 1e-3, 1e3]])
+    plot.heatmap(
+        [1, 2, 4], [1, 3], {"a": table, "b": table}, tmp_path / "h.png", log=True, label="m",
+        marks={"a": np.isnan(table)}, xlabel="α", ylabel="β",
+    )  # fmt: skip
+    assert len(list(tmp_path.iterdir())) == 4
+    assert all(p.stat().st_size > 5000 for p in tmp_path.iterdir())
+
+
+def test_convergence_shows_the_slope(monkeypatch):
+    labels = []
+    monkeypatch.setattr(
+        plot.curves, "_key", lambda axes, _: labels.extend(axes.get_legend_handles_labels()[1])
+    )
+    h = np.array([1.0, 0.5, 0.25])
+    plot.convergence({"E": (h, 0.3 * h**2)})
+    assert labels == ["E: slope 2.00"]
+
+
+BAD = {
+    "unknown view 'diagnal'; did you mean 'diagonal'": lambda s: plot.draw(s, view="diagnal"),
+    "unknown renderer": lambda s: plot.draw(s, renderer="povray"),
+    "unknown cmap 'virdis'; did you mean 'viridis'": lambda s: plot.draw(
+        s, scalars=np.zeros(s.n), cmap="virdis"
+    ),
+    "limits": lambda s: plot.draw(s, scalars=np.zeros(s.n), limits=(1.0, 1.0)),
+    r"scalars: expected shape \(10,\) or \(12,\), found \(3,\)": lambda s: plot.draw(
+        s, scalars=[1, 2, 3]
+    ),
+    r"numbers: expected shape \(10,\), found \(12,\)": lambda s: plot.draw(
+        s, numbers=np.zeros(s.m)
+    ),
+    "unknown patch 'wal'; did you mean 'wall'": lambda s: plot.draw(s, patches=["wal"]),
+    "at least one surface": lambda s: plot.panel([]),
+    "titles: expected 2": lambda s: plot.panel([s, s], titles=["one"]),
+    "views: expected 2": lambda s: plot.panel([s, s], views=["plan"]),
+    r"field: expected finite numbers of shape \(10, 3\)": lambda s: plot.vectors(s, np.zeros(10)),
+    "history 'a': unknown column 'enrgy'; did you mean 'energy'": lambda s: plot.histories(
+        {"a": pd.DataFrame({"energy": [1.0]})}, y="enrgy"
+    ),
+    "unknown scale": lambda s: plot.lines({"a": ([1], [1])}, xscale="cubic"),
+    "curve 'a': expected x and y of one length": lambda s: plot.lines({"a": ([1, 2], [1])}),
+    r"tables\['a'\]: expected shape \(1, 2\)": lambda s: plot.heatmap([1, 2], [1], {"a": [[1]]}),
+    "at least one table": lambda s: plot.heatmap([1], [1], {}),
+    "unknown table 'b'": lambda s: plot.heatmap([1], [1], {"a": [[1]]}, marks={"b": [[True]]}),
+    "unknown cmap": lambda s: plot.heatmap([1], [1], {"a": [[1]]}, cmap="no"),
+}
+
+
+@pytest.mark.parametrize("message", BAD)
+def test_bad_input_is_named(message):
+    with pytest.raises(OptionError, match=message):
+        BAD[message](tent())
+
+
+def test_bad_paths_leave_nothing(tmp_path):
+    with pytest.raises(FileError, match=r"end the name with \.png"):
+        plot.draw(flat_square(), tmp_path / "a.pdf")
+    with pytest.raises(FileError, match="cannot be written"):
+        plot.draw(flat_square(), tmp_path / "no folder" / "a.png")
+    assert not list(tmp_path.iterdir())
+
+
+def test_missing_libraries_are_named(monkeypatch):
+    raster.opengl.cache_clear()
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(MissingExtra, match=r"pyvista is not installed.*pcmc\[plot\]"):
+        plot.draw(flat_square())
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
+    with pytest.raises(MissingExtra, match="matplotlib is not installed"):
+        plot.lines({})
+
+
+def test_without_opengl_matplotlib_paints(monkeypatch):
+    monkeypatch.setattr(raster, "opengl", lambda: False)
+    monkeypatch.setattr(raster, "_with_pyvista", lambda *_: pytest.fail("asked for OpenGL"))
+    assert plot.draw(flat_square(), width=300).shape[1] == 300
+
+
+@pytest.mark.slow
+def test_a_million_triangles_are_drawn(tmp_path):
+    surface = two_squares(460)
+    assert surface.m > 900_000
+    plot.draw(surface, tmp_path / "a.png", scalars=pcmc.mean_curvature(surface), label="H")
+    assert 10_000 < (tmp_path / "a.png").stat().st_size < 150_000
