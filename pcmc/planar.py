@@ -130,7 +130,7 @@ def _check(points: Floats, segments: Ints, edge_length: float) -> None:
 def _spacing(points: Floats, segments: Ints, edge_length: float) -> Floats:
     """(k,) the length wanted near each given point: its shortest segment, or the goal."""
     length = np.linalg.norm(points[segments[:, 1]] - points[segments[:, 0]], axis=1)
-    spacing = np.full(len(points), edge_length)
+    spacing = np.full(len(points), float(edge_length))
     np.minimum.at(spacing, segments.ravel(), np.repeat(length, 2))
     return spacing
 
@@ -142,7 +142,7 @@ def _lattice(points: Floats, segments: Ints, h: float) -> Floats:
     i, j = (np.arange(-k, k + 1) for k in np.ceil(0.5 * np.ptp(points, axis=0) / step).astype(int))
     column, row = (a.ravel() for a in np.meshgrid(i, j, indexing="ij"))
     lattice = middle + step * np.stack([column + 0.5 * (row % 2), row], axis=1)
-    return lattice[_clear(lattice, points, segments, np.full(len(points), h))]
+    return lattice[_clear(lattice, points, segments, np.full(len(points), float(h)))]
 
 
 def _clear(candidates: Floats, points: Floats, segments: Ints, clearance: Floats) -> Bools:

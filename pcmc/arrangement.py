@@ -1,0 +1,388 @@
+"""How the lines of a plan meet: checked, cut at their meetings, and divided into edges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from .arrays import Bools, Floats, Ints
+from .curves import Curve
+from .errors import MissingExtra, PlanError
+
+try:
+    import shapely
+except ImportError:
+    raise MissingExtra("shapely", "plan") from None
+
+SNAP = 0.01  # of the edge length: lines that miss each other by less are taken to meet
+
+
+class Kind(IntEnum):
+    """What a line is. Where lines meet, the first kind among them says where the point is."""
+
+    OUTLINE = 0
+    HOLE = 1
+    SUPPORT = 2
+    DIVIDER = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A named curve of a plan, in the coordinates of Π (two along it, and the height)."""
+
+    name: str
+    kind: Kind
+    curve: Curve
+
+    @property
+    def bounds(self) -> bool:
+        """Whether the line is part of the plan's boundary."""
+        return self.kind in (Kind.OUTLINE, Kind.HOLE)
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Vertices (k,) along a line from one meeting or corner to the next; closed: first = last."""
+
+    line: int
+    vertices: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Arrangement:
+    """Points, edges and chains of all lines.
+
+    Attributes
+    ----------
+    points : (n,2) coordinates on Π.
+    heights : (n,) above Π; NaN where only dividers pass, whose height is free.
+    chains : every line's chains, in order along it.
+    spots : (p,) the vertex of each point that was asked for.
+    """
+
+    points: Floats
+    heights: Floats
+    chains: tuple[Chain, ...]
+    spots: Ints
+
+    @property
+    def segments(self) -> Ints:
+        """(s,2) the edges of all chains."""
+        return np.concatenate(
+            [np.stack([c.vertices[:-1], c.vertices[1:]], axis=1) for c in self.chains]
+        )
+
+
+def arrange(
+    lines: Sequence[Line],
+    edge_length: float,
+    spots: Floats | None = None,
+    stops: Floats | None = None,
+) -> Arrangement:
+    """Cut the lines where they meet and at their corners, and divide them into edges.
+
+    Parameters
+    ----------
+    lines : the outline first; then holes, dividers, supports, in any order.
+    edge_length : near which the edges are; shorter where corners or meetings are close together.
+    spots : (p,3) points to be vertices; on a line where one passes, else by themselves.
+    stops : (q,2) further points at which lines that pass there are cut.
+
+    Raises
+    ------
+    PlanError
+        Naming the line: open or self-crossing outlines and holes, a hole that is not inside the
+        outline, lines that run along each other, a divider that ends nowhere or is all outside.
+    """
+    drawn = [Drawn(line) for line in lines]
+    snap = SNAP * edge_length
+    for one in drawn:
+        _check_line(one)
+    _check_holes(drawn)
+    meetings = _Meetings()
+    for number, one in enumerate(drawn):
+        last = float(len(one.curve.pieces))
+        ends = [] if one.curve.closed else [0.0, last]
+        for t in [*ends, *one.curve.corners.tolist()]:
+            meetings.add([(number, t)])
+    _find_crossings(drawn, meetings)
+    _find_ends(drawn, meetings, snap)
+    spots = np.zeros((0, 3)) if spots is None else spots
+    passing = [_passing(drawn, xy, snap) for xy in spots[:, :2]]
+    for xy in np.zeros((0, 2)) if stops is None else stops:
+        meetings.add(_passing(drawn, xy, snap))
+    first_spot = len(meetings.line)
+    alone = [place for place, found in enumerate(passing) if not found]
+    for found in passing:
+        meetings.add(found)
+    node, points, heights = _nodes(drawn, meetings, snap)
+    chains, points, heights = _chains(drawn, meetings, node, points, heights, edge_length)
+    chains = _kept(drawn, chains, points, edge_length)
+    vertex = np.empty(len(spots), dtype=np.int64)
+    vertex[alone] = len(points) + np.arange(len(alone))
+    cursor = first_spot
+    for place, found in enumerate(passing):
+        if found:
+            vertex[place] = node[cursor]
+            cursor += len(found)
+    points = np.concatenate([points, spots[alone, :2]])
+    heights = np.concatenate([heights, spots[alone, 2]])
+    return _compact(Arrangement(points, heights, tuple(chains), vertex))
+
+
+def hole_points(drawn: Arrangement, lines: Sequence[Line]) -> list[tuple[float, float]]:
+    """A point inside each hole, as its edges enclose it."""
+    found = []
+    for number, line in enumerate(lines):
+        if line.kind is Kind.HOLE:
+            rim = np.concatenate([c.vertices[:-1] for c in drawn.chains if c.line == number])
+            inside = shapely.Polygon(drawn.points[rim]).representative_point()
+            found.append((inside.x, inside.y))
+    return found
+
+
+class Drawn:
+    """A line with its dense drawing on Π."""
+
+    def __init__(self, line: Line) -> None:
+        self.line, self.curve = line, line.curve
+        self.name, self.kind = line.name, line.kind
+        self.xy = self.curve.at(self.curve.dense)[:, :2]
+        steps = np.linalg.norm(np.diff(self.xy, axis=0), axis=1)
+        if not steps.any():
+            raise PlanError(f"{self.name} has no length on the plane")
+        self.reach = np.concatenate([[0.0], np.cumsum(steps)])
+        self.shape: Any = shapely.LineString(self.xy)
+
+    def nearest(self, xy: Floats) -> tuple[float, float]:
+        """The parameter of the curve's point nearest to xy, and its distance."""
+        t = float(np.interp(self.shape.project(shapely.Point(xy)), self.reach, self.curve.dense))
+        width, last = 2.0 / 64.0, float(len(self.curve.pieces))
+        for _ in range(8):  # each round narrows the bracket 16 times
+            trial = np.clip(t + width * np.linspace(-1.0, 1.0, 33), 0.0, last)
+            distance = np.linalg.norm(self.curve.at(trial)[:, :2] - xy, axis=1)
+            best = int(np.argmin(distance))
+            t, width = float(trial[best]), width / 16.0
+        return t, float(distance[best])
+
+
+@dataclass
+class _Meetings:
+    """Places on lines that become vertices, and which of them are one vertex."""
+
+    line: list[int] = field(default_factory=list)
+    t: list[float] = field(default_factory=list)
+    same: list[tuple[int, int]] = field(default_factory=list)
+
+    def add(self, places: Sequence[tuple[int, float]]) -> None:
+        first = len(self.line)
+        for line, t in places:
+            self.same.append((first, len(self.line)))
+            self.line.append(line)
+            self.t.append(t)
+
+
+def _at(xy: Floats) -> str:
+    return f"({xy[0]:.6g}, {xy[1]:.6g})"
+
+
+def _check_line(one: Drawn) -> None:
+    if one.line.bounds and not one.curve.closed:
+        gap = float(np.linalg.norm(one.xy[-1] - one.xy[0]))
+        raise PlanError(
+            f"{one.name} is open: it starts at {_at(one.xy[0])} and ends at {_at(one.xy[-1])},"
+            f" {gap:.3g} apart; close it"
+        )
+    if not one.shape.is_simple:
+        pieces = shapely.get_parts(shapely.node(one.shape))
+        ends = np.concatenate([np.array(p.coords)[[0, -1]] for p in pieces])
+        where, count = np.unique(ends.round(9), axis=0, return_counts=True)
+        raise PlanError(f"{one.name} crosses itself at {_at(where[np.argmax(count)])}")
+
+
+def _check_holes(drawn: Sequence[Drawn]) -> None:
+    outline = shapely.Polygon(drawn[0].xy)
+    holes = [(one, shapely.Polygon(one.xy)) for one in drawn if one.kind is Kind.HOLE]
+    for place, (one, area) in enumerate(holes):
+        if not outline.contains_properly(area):
+            where = "crosses or touches" if outline.intersects(area) else "lies outside"
+            raise PlanError(f"{one.name} {where} the outline; a hole must lie inside it")
+        for other, other_area in holes[:place]:
+            if area.intersects(other_area):
+                raise PlanError(f"{other.name} and {one.name} touch or overlap; join them into one")
+
+
+def _find_crossings(drawn: Sequence[Drawn], meetings: _Meetings) -> None:
+    for j, two in enumerate(drawn):
+        for i, one in enumerate(drawn[:j]):
+            if one.line.bounds and two.line.bounds:
+                continue
+            for part in shapely.get_parts(one.shape.intersection(two.shape)):
+                if part.is_empty:
+                    continue
+                if part.geom_type != "Point":
+                    start, end = np.array(part.coords)[[0, -1]]
+                    raise PlanError(
+                        f"{two.name} runs along {one.name} from {_at(start)} to {_at(end)}; leave"
+                        " that part out of one of them"
+                    )
+                xy = np.array(part.coords)[0]
+                meetings.add([(i, one.nearest(xy)[0]), (j, two.nearest(xy)[0])])
+
+
+def _find_ends(drawn: Sequence[Drawn], meetings: _Meetings, snap: float) -> None:
+    """Dividers end on other lines, or beyond the plan's boundary; supports may end anywhere."""
+    contains = _inside(drawn)
+    for number, one in enumerate(drawn):
+        if one.curve.closed or one.line.bounds:
+            continue
+        for t in (0.0, float(len(one.curve.pieces))):
+            xy = one.curve.at(t)[0, :2]
+            found = _passing(drawn, xy, snap, leave_out=number)
+            if one.kind is Kind.DIVIDER and not found and contains(xy):
+                gaps = [(other.nearest(xy)[1], other) for other in drawn if other is not one]
+                gap, other = min(gaps, key=lambda pair: pair[0])
+                raise PlanError(
+                    f"{one.name} ends at {_at(xy)} without reaching another line; {other.name} is"
+                    f" nearest, {gap:.3g} away: extend the divider to it"
+                )
+            meetings.add([(number, t), *found])
+
+
+def _inside(drawn: Sequence[Drawn]) -> Callable[[Floats], bool]:
+    """Whether a point is inside the outline and outside all holes."""
+    area = shapely.Polygon(drawn[0].xy)
+    for one in drawn:
+        if one.kind is Kind.HOLE:
+            area = area.difference(shapely.Polygon(one.xy))
+    return lambda xy: bool(shapely.contains_xy(area, *xy))
+
+
+def _passing(
+    drawn: Sequence[Drawn], xy: Floats, snap: float, leave_out: int = -1
+) -> list[tuple[int, float]]:
+    """Lines that pass a point, with the parameter there."""
+    near = [(number, *one.nearest(xy)) for number, one in enumerate(drawn) if number != leave_out]
+    return [(number, t) for number, t, distance in near if distance <= snap]
+
+
+def _nodes(drawn: Sequence[Drawn], meetings: _Meetings, snap: float) -> tuple[Ints, Floats, Floats]:
+    """The node of each meeting; position and height of the nodes."""
+    line, t = np.array(meetings.line, dtype=np.int64), np.array(meetings.t)
+    if not len(line):
+        return line, np.zeros((0, 2)), np.zeros(0)
+    where = np.concatenate([drawn[i].curve.at(t[k]) for k, i in enumerate(line)])
+    near = cKDTree(where[:, :2]).query_pairs(snap, output_type="ndarray")
+    pairs = np.concatenate([near, np.array(meetings.same, dtype=np.int64)])
+    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(line), len(line)))
+    count, node = connected_components(graph, directed=False)
+    kind = np.array([drawn[i].kind for i in line])
+    order = np.lexsort((np.arange(len(line)), kind, node))
+    leader = order[np.searchsorted(node[order], np.arange(count))]
+    heights = np.where(kind[leader] == Kind.DIVIDER, np.nan, where[leader, 2])
+    return node, where[leader, :2], heights
+
+
+def _chains(
+    drawn: Sequence[Drawn],
+    meetings: _Meetings,
+    node: Ints,
+    points: Floats,
+    heights: Floats,
+    edge_length: float,
+) -> tuple[list[Chain], Floats, Floats]:
+    """Each line's chains from node to node, with new points along them."""
+    line, t = np.array(meetings.line, dtype=np.int64), np.array(meetings.t)
+    chains: list[Chain] = []
+    new, new_heights, n = [points], [heights], len(points)
+    direct: set[tuple[int, int]] = set()
+    for number, one in enumerate(drawn):
+        stops = _stops(t[line == number], node[line == number], one.curve)
+        if not stops:  # a closed line that meets nothing
+            start = one.curve.at([0.0])[0]
+            new.append(start[None, :2])
+            new_heights.append(_heights(one, start[None]))
+            stops, n = [(0.0, n), (float(len(one.curve.pieces)), n)], n + 1
+        for (low, first), (high, last) in pairwise(stops):
+            inner = one.curve.between(low, high, edge_length)
+            ends = (min(first, last), max(first, last))
+            if not len(inner) and ends in direct:  # the chord of a bend already drawn
+                inner = one.curve.between(low, high, one.curve.length / 1e6)
+                inner = inner[[len(inner) // 2]]
+            if not len(inner):
+                direct.add(ends)
+            where = one.curve.at(inner) if len(inner) else np.zeros((0, 3))
+            new.append(where[:, :2])
+            new_heights.append(_heights(one, where))
+            chains.append(Chain(number, np.array([first, *range(n, n + len(where)), last])))
+            n += len(where)
+    return chains, np.concatenate(new), np.concatenate(new_heights)
+
+
+def _stops(t: Floats, node: Ints, curve: Curve) -> list[tuple[float, int]]:
+    """Nodes along a line in order, no two in a row the same; a closed line comes back."""
+    order = np.lexsort((node, t))
+    stops = [(float(t[k]), int(node[k])) for k in order]
+    stops = [stop for k, stop in enumerate(stops) if k == 0 or stop[1] != stops[k - 1][1]]
+    if curve.closed and stops:
+        if len(stops) > 1 and stops[0][1] == stops[-1][1]:
+            stops.pop()
+        stops.append((stops[0][0] + len(curve.pieces), stops[0][1]))
+    return stops
+
+
+def _heights(one: Drawn, where: Floats) -> Floats:
+    return np.full(len(where), np.nan) if one.kind is Kind.DIVIDER else where[:, 2]
+
+
+def _kept(
+    drawn: Sequence[Drawn], chains: list[Chain], points: Floats, edge_length: float
+) -> list[Chain]:
+    """The chains without what passes outside the plan or through its holes."""
+    contains = _inside(drawn)
+    kept = []
+    for chain in chains:
+        place = len(chain.vertices) // 2
+        middle = points[chain.vertices[place - 1 : place + 1]].mean(axis=0)
+        if drawn[chain.line].line.bounds or contains(middle):
+            kept.append(chain)
+    gone = set(range(len(drawn))) - {chain.line for chain in kept}
+    if gone:
+        raise PlanError(f"{drawn[min(gone)].name} lies outside the plan, or in a hole")
+    _check_chords(drawn, kept, points, edge_length)
+    return kept
+
+
+def _check_chords(
+    drawn: Sequence[Drawn], chains: Sequence[Chain], points: Floats, edge_length: float
+) -> None:
+    """Straight edges instead of bends must not make lines cross."""
+    ends = np.concatenate([np.stack([c.vertices[:-1], c.vertices[1:]], axis=1) for c in chains])
+    owner = np.repeat([c.line for c in chains], [len(c.vertices) - 1 for c in chains])
+    edges = shapely.linestrings(points[ends])
+    i, j = shapely.STRtree(edges).query(edges, predicate="crosses")
+    if len(i):
+        first, second = owner[i[0]], owner[j[0]]
+        raise PlanError(
+            f"with edges of length {edge_length:g}, {drawn[first].name} and {drawn[second].name}"
+            f" cross near {_at(points[ends[i[0]]].mean(axis=0))}; use a smaller edge_length"
+        )
+
+
+def _compact(a: Arrangement) -> Arrangement:
+    """Without points that only dropped chains used."""
+    used: Bools = np.zeros(len(a.points), dtype=bool)
+    for chain in a.chains:
+        used[chain.vertices] = True
+    used[a.spots] = True
+    number = np.cumsum(used) - 1
+    chains = tuple(Chain(chain.line, number[chain.vertices]) for chain in a.chains)
+    return Arrangement(a.points[used], a.heights[used], chains, number[a.spots])

@@ -1,0 +1,184 @@
+"""Drafting: the mesh, heights, walls and supports of a Plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .arrangement import SNAP, Arrangement, Drawn, Kind, Line, arrange, hole_points
+from .arrays import Bools, Floats, Ints
+from .curves import Curve, to_local, to_space
+from .errors import PlanError
+from .lift import dome, spanned
+from .plan import EDGES, Area, Plan
+from .planar import PlanarMesh, locate, signed_areas, triangulate
+from .surface import Patch, Surface
+from .walls import Standing, WallTop, stand
+
+
+def surface(plan: Plan) -> Surface:
+    """The mesh of the plan at its initial height, with its walls and supports."""
+    lines, on_edge = _lines(plan)
+    spots = np.array([to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)])
+    stops = np.concatenate(
+        [np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in on_edge)]
+    )
+    drawn = arrange(lines, plan.edge_length, spots.reshape(-1, 3), stops)
+    mesh = triangulate(drawn.points, drawn.segments, plan.edge_length, hole_points(drawn, lines))
+    fixed, sliding = _supports(plan, drawn, lines, on_edge, len(mesh.points))
+    if not (fixed | sliding).any():
+        raise PlanError("nothing holds the roof; fix an edge or give supports")
+    base, height = _heights(plan, drawn, mesh, fixed | sliding)
+    patches, patch_of_face = _patches(plan, mesh)
+    X = to_space(np.column_stack([mesh.points, height]), plan.plane)
+    walls, wall_patches = _walls(plan, drawn, lines, X, base, fixed)
+    return Surface(
+        np.concatenate([X, walls.vertices]),
+        np.concatenate([mesh.triangles, walls.faces]),
+        np.concatenate([patch_of_face, walls.label + len(patches)]),
+        (*patches, *wall_patches),
+        np.concatenate([fixed, walls.fixed]),
+        np.concatenate([sliding, walls.sliding]),
+        plan.plane,
+    )
+
+
+def _lines(plan: Plan) -> tuple[list[Line], list[Curve]]:
+    """The lines to draw, in the coordinates of Π, and the supports that lie on the boundary."""
+    lines = [Line("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
+    lines += [Line(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
+    boundary = [Drawn(line) for line in lines]
+    lines += [
+        Line(f"divider {d.name!r}", Kind.DIVIDER, d.curve.local(plan.plane)) for d in plan.dividers
+    ]
+    on_edge, snap = [], SNAP * plan.edge_length
+    for number, support in enumerate(plan.supports, start=1):
+        if isinstance(support, Curve):
+            local = support.local(plan.plane)
+            if all(
+                any(b.nearest(xy)[1] <= snap for b in boundary)
+                for xy in local.at(local.dense)[:, :2]
+            ):
+                on_edge.append(local)
+            else:
+                lines.append(Line(f"support {number}", Kind.SUPPORT, local))
+    return lines, on_edge
+
+
+def _supports(
+    plan: Plan, drawn: Arrangement, lines: Sequence[Line], on_edge: Sequence[Curve], n: int
+) -> tuple[Bools, Bools]:
+    """(n,) fixed and sliding vertices."""
+    edge = {line.name: hole.edge for line, hole in zip(lines[1:], plan.holes, strict=False)}
+    masks = {kind: np.zeros(n, dtype=bool) for kind in EDGES}
+    boundary = np.zeros(n, dtype=bool)
+    for chain in drawn.chains:
+        line = lines[chain.line]
+        if line.kind is Kind.SUPPORT:
+            masks["fixed"][chain.vertices] = True
+        elif line.bounds:
+            held = plan.edge if line.kind is Kind.OUTLINE else edge[line.name]
+            masks[held][chain.vertices] = True
+            boundary[chain.vertices] = True
+    for support in on_edge:
+        strip = Drawn(Line("support", Kind.SUPPORT, support))
+        for vertex in np.flatnonzero(boundary):
+            if strip.nearest(drawn.points[vertex])[1] <= SNAP * plan.edge_length:
+                masks["fixed"][vertex] = True
+    masks["fixed"][drawn.spots] = True
+    return masks["fixed"], masks["sliding"] & ~masks["fixed"]
+
+
+def _heights(
+    plan: Plan, drawn: Arrangement, mesh: PlanarMesh, held: Bools
+) -> tuple[Floats, Floats]:
+    """(n,) the heights that the boundary spans, and those of the initial surface."""
+    given = np.full(len(mesh.points), np.nan)
+    given[: len(drawn.heights)] = drawn.heights
+    base = spanned(mesh.points, mesh.triangles, given)
+    return base, base + dome(mesh.points, mesh.triangles, held, plan.rise)
+
+
+def _patches(plan: Plan, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
+    """The plan's patches and the patch of each triangle."""
+    count = int(mesh.region.max()) + 1
+    area = signed_areas(mesh.points, mesh.triangles)
+    weight = np.bincount(mesh.region, area, count)
+    middle = mesh.points[mesh.triangles].mean(axis=1)
+    centroid = np.stack(
+        [np.bincount(mesh.region, area * m, count) / weight for m in middle.T], axis=1
+    )
+    areas = plan.patches
+    if not areas:
+        assert plan.tension is not None
+        areas = tuple(Area(f"patch {k + 1}", plan.tension) for k in range(count))
+    located = [a for a in areas if a.at is not None]
+    if not located:
+        if len(areas) != count:
+            raise PlanError(
+                f"the dividers cut the plan into {count} parts, but {len(areas)} patches are named"
+                f" ({', '.join(a.name for a in areas)}); name as many, or say which is where (at=)"
+            )
+        owner: Ints = np.argsort(np.lexsort(centroid.round(6).T[::-1]))
+    elif len(located) < len(areas):
+        missing = next(a.name for a in areas if a.at is None)
+        raise PlanError(f"patch {missing!r} has no at=; give it to all patches or to none")
+    else:
+        owner = _located(areas, mesh, count, centroid)
+    patches = [Patch(a.name, a.tension, a.pressure) for a in areas]
+    return patches, owner[mesh.region]
+
+
+def _located(areas: Sequence[Area], mesh: PlanarMesh, count: int, centroid: Floats) -> Ints:
+    """(count,) the area that each part of the plan belongs to."""
+    owner = np.full(count, -1)
+    for number, one in enumerate(areas):
+        points = np.atleast_2d(np.array(one.at, dtype=float))
+        for point, triangle in zip(points, locate(mesh, points), strict=True):
+            if triangle < 0:
+                raise PlanError(
+                    f"patch {one.name!r}: its point {point.tolist()} is not inside the plan"
+                )
+            part = mesh.region[triangle]
+            if owner[part] not in (-1, number):
+                raise PlanError(
+                    f"patches {areas[owner[part]].name!r} and {one.name!r} are at the same part of"
+                    f" the plan (around {centroid[part].round(3).tolist()}): no divider is between"
+                )
+            owner[part] = number
+    bare = np.flatnonzero(owner < 0)
+    if len(bare):
+        raise PlanError(
+            f"the part of the plan around {centroid[bare[0]].round(3).tolist()} has no patch"
+            f" ({len(bare)} such parts); add one with at= inside it"
+        )
+    return owner
+
+
+def _walls(
+    plan: Plan, drawn: Arrangement, lines: Sequence[Line], X: Floats, base: Floats, fixed: Bools
+) -> tuple[Standing, list[Patch]]:
+    first = 1 + len(plan.holes)
+    walled = [d for d in plan.dividers if d.wall is not None]
+    floor, level = np.zeros(len(X)), np.zeros(len(X), dtype=bool)
+    tops = []
+    for chain in drawn.chains:
+        if lines[chain.line].kind is not Kind.DIVIDER:
+            continue
+        divider = plan.dividers[chain.line - first]
+        if divider.wall is None:
+            continue
+        if divider.bottom == "sloped":
+            floor[chain.vertices] = base[chain.vertices]
+        else:
+            level[chain.vertices] = True
+        tops.append(WallTop(chain.vertices, walled.index(divider), divider.bottom != "sliding"))
+    mixed = np.flatnonzero(level & (floor != 0.0))
+    if len(mixed):
+        raise PlanError(
+            f"at {drawn.points[mixed[0]].round(6).tolist()} a wall with a sloped bottom meets one"
+            " whose bottom is on the plane; give both the same bottom"
+        )
+    walls = stand(X, tops, plan.edge_length, plan.plane, fixed, floor)
+    return walls, [Patch(d.name, d.wall, pressure=0.0) for d in walled]

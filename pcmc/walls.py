@@ -1,0 +1,295 @@
+"""Walls: auxiliary patches that stand under the borders between patches and reach down to Π."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Bools, Floats, Ints
+from .curves import to_local, to_space
+from .errors import OptionError, SurfaceError, unknown
+from .planar import triangulate
+from .quality import edge_lengths
+from .surface import Patch, Plane, Surface
+from .topology import Curve
+
+BOTTOMS = ("sliding", "held")
+
+
+@dataclass(frozen=True, eq=False)
+class WallTop:
+    """The upper edge of a wall.
+
+    Attributes
+    ----------
+    vertices : (k,) int, vertices along it; first = last if it is closed.
+    label : of the wall's faces.
+    held : whether its bottom is fixed; else it slides on Π.
+    """
+
+    vertices: Ints
+    label: int
+    held: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """What walls add to a mesh: vertices after its own, faces with a label each, supports."""
+
+    vertices: Floats
+    faces: Ints
+    label: Ints
+    fixed: Bools
+    sliding: Bools
+
+
+def add_walls(
+    surface: Surface,
+    tension: float | Mapping[tuple[str, str], float] = 1.0,
+    bottom: str = "sliding",
+    edge_length: float | None = None,
+) -> Surface:
+    """Put a wall, down to Π, under every border between two patches that has none.
+
+    The walls share a vertical line where borders meet, and have rows as fine as the mesh. The wall
+    under the border of "a" and "b" is the patch "wall-a-b".
+
+    Parameters
+    ----------
+    tension : of all walls, force/length; or by pair of patch names, for those borders only.
+    bottom : "sliding" on Π, or "held" there in all directions.
+    edge_length : of the walls' triangles; by default the mean length of the borders' edges.
+
+    Raises
+    ------
+    OptionError
+        For a pair of names without a border, or an unknown ``bottom``.
+    SurfaceError
+        Where a border does not lie above Π, so that there is no room for a wall.
+
+    >>> from pcmc.plan import Divider, Plan
+    >>> seam = Divider([[2, 0], [2, 2]], wall=None)
+    >>> rectangle = [[0, 0], [4, 0], [4, 2], [0, 2]]
+    >>> bare = Plan(rectangle, [seam], edge_length=0.5, tension=2.0).surface()
+    >>> [p.name for p in add_walls(bare).patches]
+    ['patch 1', 'patch 2', 'wall-patch 1-patch 2']
+    """
+    if bottom not in BOTTOMS:
+        raise OptionError(unknown("bottom", bottom, BOTTOMS))
+    names = [p.name for p in surface.patches]
+    borders = [c for c in surface.topology.junctions if len(set(c.sheets)) == len(c.sheets) == 2]
+    pair_of = [(names[c.sheets[0]], names[c.sheets[1]]) for c in borders]
+    chosen = _tensions(tension, set(pair_of))
+    walled = [(c, pair) for c, pair in zip(borders, pair_of, strict=True) if pair in chosen]
+    if not walled:
+        return surface
+    label, patches = _labels([c for c, _ in walled], [pair for _, pair in walled], chosen)
+    tops = [
+        WallTop(_directed(surface, c), label[place], bottom == "held")
+        for place, (c, _) in enumerate(walled)
+    ]
+    if edge_length is None:
+        seam = surface.topology.seam_edge
+        edge_length = float(edge_lengths(surface)[seam].mean())
+    walls = stand(surface.vertices, tops, edge_length, surface.plane, surface.fixed)
+    return Surface(
+        np.concatenate([surface.vertices, walls.vertices]),
+        np.concatenate([surface.faces, walls.faces]),
+        np.concatenate([surface.patch_of_face, walls.label + len(names)]),
+        (*surface.patches, *patches),
+        np.concatenate([surface.fixed, walls.fixed]),
+        np.concatenate([surface.on_plane, walls.sliding]),
+        surface.plane,
+    )
+
+
+def stand(
+    vertices: Floats,
+    tops: Sequence[WallTop],
+    edge_length: float,
+    plane: Plane,
+    fixed: Bools,
+    floor: Floats | None = None,
+) -> Standing:
+    """The walls under the given upper edges.
+
+    A wall is developed into the plane (length along its foot, height), meshed there with its upper
+    edge kept, and stood up again. Its ends are vertical lines, shared by all walls that end there;
+    where the end already lies on the floor, the line is that vertex alone. A line under a fixed
+    vertex is fixed, all others are free above their foot.
+
+    Parameters
+    ----------
+    vertices : (n,3) of the mesh, in space.
+    fixed : (n,) bool, its fixed vertices.
+    floor : (n,) the height above Π at which a wall ends below each vertex; 0 by default.
+
+    Raises
+    ------
+    SurfaceError
+        Where an upper edge does not lie above the floor.
+    """
+    local = to_local(vertices, plane)
+    floor = np.zeros(len(vertices)) if floor is None else floor
+    tolerance = 1e-9 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    builder = _Builder(local, floor, fixed, edge_length, tolerance)
+    for top in tops:
+        builder.check(top)
+        builder.add_wall(top)
+    new = np.array(builder.new).reshape(-1, 3)
+    faces = np.concatenate(builder.faces) if builder.faces else np.zeros((0, 3), dtype=np.int64)
+    label = np.concatenate(builder.labels) if builder.labels else np.zeros(0, dtype=np.int64)
+    held, sliding = (np.zeros(len(new), dtype=bool) for _ in range(2))
+    held[sorted(builder.fixed_new)] = True
+    sliding[sorted(builder.sliding_new)] = True
+    return Standing(to_space(new, plane), faces, label, held, sliding & ~held)
+
+
+class _Builder:
+    """Walls so far, in the coordinates of Π: new vertices are numbered after the mesh's own."""
+
+    def __init__(
+        self, local: Floats, floor: Floats, fixed: Bools, edge_length: float, tolerance: float
+    ) -> None:
+        self.local, self.floor, self.fixed = local, floor, fixed
+        self.edge_length, self.tolerance = edge_length, tolerance
+        self.new: list[Floats] = []
+        self.faces: list[Ints] = []
+        self.labels: list[Ints] = []
+        self.fixed_new: set[int] = set()
+        self.sliding_new: set[int] = set()
+        self.lines: dict[int, list[int]] = {}
+
+    def check(self, top: WallTop) -> None:
+        height = self.local[top.vertices, 2] - self.floor[top.vertices]
+        inner = np.ones(len(height), dtype=bool)
+        inner[[0, -1]] = False
+        inner |= (height <= self.tolerance).all()
+        bad = np.flatnonzero((height < -self.tolerance) | (inner & (height <= self.tolerance)))
+        if len(bad):
+            vertex = top.vertices[bad[0]]
+            raise SurfaceError(
+                f"no room for a wall under vertex {vertex}: it lies {height[bad[0]]:.3g} above the"
+                f" wall's bottom ({len(bad)} such vertices); raise it, or lower the plane"
+            )
+
+    def line(self, vertex: int, held: bool) -> list[int]:
+        """Vertices of the vertical line under a vertex, from the foot up to the vertex itself."""
+        if vertex not in self.lines:
+            x, y, top = self.local[vertex]
+            bottom = self.floor[vertex]
+            rows = (
+                0
+                if top - bottom <= self.tolerance
+                else max(1, round((top - bottom) / self.edge_length))
+            )
+            first = len(self.new)
+            self.new += [np.array([x, y, bottom + (top - bottom) * k / rows]) for k in range(rows)]
+            self.lines[vertex] = [*(len(self.local) + first + np.arange(rows)), vertex]
+            if self.fixed[vertex]:
+                self.fixed_new |= set(range(first, first + rows))
+        ids = self.lines[vertex]
+        if len(ids) > 1:
+            (self.fixed_new if held else self.sliding_new).add(ids[0] - len(self.local))
+        return ids
+
+    def add_wall(self, top: WallTop) -> None:
+        chain = top.vertices
+        along = self._along(chain)
+        left, right = self.line(int(chain[0]), top.held), self.line(int(chain[-1]), top.held)
+        foot = self._foot(chain[1:-1], top.held)
+        # counter-clockwise from the left foot; a line without rows is the chain's end itself
+        start, end = left[:-1], right[:-1]
+        ids = np.array([*start[:1], *foot, *end, *chain[::-1], *start[:0:-1]], dtype=np.int64)
+        sides = [np.zeros(len(start[:1])), np.full(len(end), along[-1]), np.zeros(len(start[1:]))]
+        s = np.concatenate([sides[0], along[1:-1], sides[1], along[::-1], sides[2]])
+        height = np.array([self._position(i)[2] for i in ids])
+        ring = np.arange(len(ids))
+        mesh = triangulate(
+            np.stack([s, height], axis=1),
+            np.stack([ring, np.roll(ring, -1)], axis=1),
+            self.edge_length,
+        )
+        inner = mesh.points[len(ids) :]
+        first = len(self.local) + len(self.new)
+        ground_xy = np.stack(
+            [np.interp(inner[:, 0], along, self.local[chain, k]) for k in (0, 1)], axis=1
+        )
+        self.new += list(np.column_stack([ground_xy, inner[:, 1]]))
+        number = np.concatenate([ids, first + np.arange(len(inner))])
+        self.faces.append(number[mesh.triangles])
+        self.labels.append(np.full(len(mesh.triangles), top.label))
+
+    def _along(self, chain: Ints) -> Floats:
+        steps = np.linalg.norm(np.diff(self.local[chain, :2], axis=0), axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    def _foot(self, vertices: Ints, held: bool) -> Ints:
+        first = len(self.new)
+        places = np.column_stack([self.local[vertices, :2], self.floor[vertices]])
+        self.new += list(places)
+        added = range(first, len(self.new))
+        (self.fixed_new if held else self.sliding_new).update(added)
+        return len(self.local) + np.array(added, dtype=np.int64)
+
+    def _position(self, vertex: int) -> Floats:
+        n = len(self.local)
+        return self.local[vertex] if vertex < n else self.new[vertex - n]
+
+
+def _labels(
+    borders: Sequence[Curve],
+    pairs: Sequence[tuple[str, str]],
+    tension: Mapping[tuple[str, str], float],
+) -> tuple[list[int], list[Patch]]:
+    """A label for each border, and the labels' patches: one for each pair of names.
+
+    Where a pair's borders cross (four quarters, a and b in turn), each border is a patch of its
+    own: a patch must not have four faces at an edge.
+    """
+    label, names = [], []
+    for place, pair in enumerate(pairs):
+        ends = [
+            b.vertices[[0, -1]]
+            for b, p in zip(borders, pairs, strict=True)
+            if p == pair and not b.closed
+        ]
+        crossing = bool(ends) and np.bincount(np.concatenate(ends)).max() > 2
+        name = (pair, place if crossing else -1)
+        if name not in names:
+            names.append(name)
+        label.append(names.index(name))
+    patches = []
+    for pair, number in names:
+        alike = [n for p, n in names if p == pair]
+        suffix = "" if number < 0 else f"-{alike.index(number) + 1}"
+        patches.append(Patch(f"wall-{pair[0]}-{pair[1]}{suffix}", tension[pair], pressure=0.0))
+    return label, patches
+
+
+def _directed(surface: Surface, border: Curve) -> Ints:
+    """The border's vertices, its first patch to the left; first = last if closed."""
+    chain = border.vertices
+    if border.closed:
+        chain = np.append(chain, chain[:1])
+    own = surface.faces[surface.patch_of_face == border.sheets[0]]
+    along = (own == chain[0]) & (own[:, [1, 2, 0]] == chain[1])
+    return chain if along.any() else chain[::-1]
+
+
+def _tensions(
+    tension: float | Mapping[tuple[str, str], float], borders: set[tuple[str, str]]
+) -> dict[tuple[str, str], float]:
+    """The tension of each border's wall, by its pair of names."""
+    if not isinstance(tension, Mapping):
+        return dict.fromkeys(borders, float(tension))
+    found = {}
+    for (a, b), value in tension.items():
+        pair = (a, b) if (a, b) in borders else (b, a)
+        if pair not in borders:
+            known = [f"{p}-{q}" for p, q in sorted(borders)]
+            raise OptionError(unknown("border", f"{a}-{b}", known))
+        found[pair] = float(value)
+    return found
