@@ -1,0 +1,314 @@
+"""Remeshing, by MMG, that keeps patches, junction curves, boundaries and supports."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .arrays import Bools, Floats, Ints
+from .errors import MissingExtra, OptionError, SurfaceError
+from .quality import edge_lengths
+from .refine import held_midpoints, refine
+from .surface import Surface
+
+CHORD = 0.1  # of the edge length
+MOST = 20_000_000  # triangles; more are taken for a slip in the edge length
+PASSES = 3  # of MMG at most, each on the result of the one before; a patch takes its best
+GOOD_ANGLE = 25.0  # degrees; no further pass is made when all angles reach it
+LEAST_ANGLE = 20.0  # degrees; a patch that stays below it ...
+WORSE = 0.8  # ... and below this share of its old smallest angle keeps its old triangles, cut
+BLUNT = 25.0  # degrees; the second angle of a triangle that fills a sharp corner well
+
+
+def remesh(
+    surface: Surface,
+    edge_length: float,
+    *,
+    near_curves: float | None = None,
+    growth: float = 1.2,
+    chord: float | None = None,
+) -> Surface:
+    """The same surface with triangles near a wanted edge length.
+
+    Patches, tensions, the plane and all names stay. Boundaries, junctions and seams stay where they
+    are to rounding: their vertices are kept, and new ones are put on the straight edges between
+    them, with the same support as their edge. (So along curves the mesh gets finer, never coarser.)
+    Vertices held inside a patch stay. Everywhere else MMG puts new vertices on a smooth
+    approximation of the surface: solve again afterwards.
+
+    Parameters
+    ----------
+    edge_length : of the triangles, length.
+    near_curves : edge length at junctions and boundaries, if it is to be shorter there; it grows
+        with the distance.
+    growth : ratio of the lengths of neighbouring edges where they grow, > 1.
+    chord : largest distance between the triangles and the smooth surface, length; where the surface
+        is strongly curved, edges get shorter to keep it. By default a tenth of ``edge_length``.
+
+    Raises
+    ------
+    MissingExtra
+        Without the library mmgpy.
+    OptionError
+        For lengths that are not positive, or that would make more than 20 million triangles.
+    SurfaceError
+        When MMG gives up, or does not keep a curve.
+
+    Examples
+    --------
+    >>> from pcmc.plan import Plan
+    >>> dome = Plan([[0, 0], [4, 0], [4, 3], [0, 3]], tension=2.0, edge_length=1.0).surface()
+    >>> fine = remesh(dome, 0.5)
+    >>> fine.m > 2 * dome.m, fine.patches == dome.patches
+    (True, True)
+    """
+    _check(surface, edge_length, near_curves, growth, chord)
+    old = _cut_curves(surface, edge_length if near_curves is None else near_curves)
+    candidates = []
+    mesh = old
+    for _ in range(PASSES):
+        size = _sizes(mesh, edge_length, near_curves, growth)
+        mesh = _by_mmg(mesh, size, growth, CHORD * edge_length if chord is None else chord)
+        candidates.append(mesh)
+        if _angles(mesh.X, mesh.F).min() >= GOOD_ANGLE:
+            break
+    return _assembled(surface, old, candidates)
+
+
+@dataclass(frozen=True, eq=False)
+class _Mesh:
+    """Vertices, faces with a patch each, the edges (c,2) of curves, and supports.
+
+    ``source`` (n,) tells which vertex of the mesh before MMG each one is, or -1.
+    """
+
+    X: Floats
+    F: Ints
+    patch: Ints
+    curves: Ints
+    fixed: Bools
+    sliding: Bools
+    source: Ints
+
+
+def _check(
+    surface: Surface, edge_length: float, near: float | None, growth: float, chord: float | None
+) -> None:
+    for name, value in (("edge_length", edge_length), ("near_curves", near), ("chord", chord)):
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise OptionError(f"{name} must be a finite number > 0, found {value}")
+    if not (math.isfinite(growth) and growth > 1.0):
+        raise OptionError(f"growth must be a finite number > 1, found {growth}")
+    sides = surface.vertices[surface.faces[:, 1:]] - surface.vertices[surface.faces[:, :1]]
+    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum()
+    count = area / (math.sqrt(3.0) / 4.0 * edge_length**2)
+    if count > MOST:
+        raise OptionError(
+            f"edge_length={edge_length:g} would make about {count:.2g} triangles; at most {MOST}"
+            " are allowed"
+        )
+
+
+def _curve_edges(surface: Surface) -> Bools:
+    """(e,) the edges that must stay: curves, and edges held inside a patch."""
+    fixed, sliding = held_midpoints(surface)
+    return surface.topology.curve_edge | fixed | sliding
+
+
+def _cut_curves(surface: Surface, length: float) -> _Mesh:
+    """The mesh with new vertices on its curves, at most about ``length`` apart."""
+    counts = _pieces(surface, length)
+    while (
+        len(counts) and np.median(counts) >= 2.0
+    ):  # 1→4 keeps the triangles' shape, cutting single edges does not
+        surface = refine(surface)
+        counts = _pieces(surface, length)
+    topo, stay = surface.topology, _curve_edges(surface)
+    fixed_edge, sliding_edge = held_midpoints(surface)
+    mesh = _Mesh(
+        surface.vertices, surface.faces, surface.patch_of_face, topo.edges[stay],
+        surface.fixed, surface.on_plane, np.arange(surface.n),
+    )  # fmt: skip
+    support = np.stack([fixed_edge[stay], sliding_edge[stay]], axis=1)
+    while (counts > 1).any():
+        mesh, counts, support = _cut_once(mesh, counts, support)
+    return mesh
+
+
+def _pieces(surface: Surface, length: float) -> Ints:
+    """(c,) into how many pieces each curve edge is to be cut."""
+    lengths = edge_lengths(surface)[_curve_edges(surface)]
+    return np.maximum(1, np.rint(lengths / length)).astype(np.int64)
+
+
+def _cut_once(mesh: _Mesh, counts: Ints, support: Bools) -> tuple[_Mesh, Ints, Bools]:
+    """Every curve edge that is to be cut, cut in two, with its triangles."""
+    cut = counts > 1
+    ends, pieces = mesh.curves[cut], counts[cut]
+    first = pieces // 2
+    share = (first / pieces)[:, None]
+    start, end = mesh.X[ends[:, 0]], mesh.X[ends[:, 1]]
+    number = len(mesh.X) + np.arange(len(ends))
+    F, patch = _cut_triangles(mesh.F, mesh.patch, ends, number, len(mesh.X))
+    curves = np.concatenate(
+        [mesh.curves[~cut], np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)]
+    )
+    new = _Mesh(
+        np.concatenate([mesh.X, start + share * (end - start)]), F, patch, curves,
+        np.concatenate([mesh.fixed, support[cut, 0]]),
+        np.concatenate([mesh.sliding, support[cut, 1]]),
+        np.arange(len(mesh.X) + len(ends)),
+    )  # fmt: skip
+    counts = np.concatenate([counts[~cut], first, pieces - first])
+    return new, counts, np.concatenate([support[~cut], support[cut], support[cut]])
+
+
+def _cut_triangles(F: Ints, patch: Ints, ends: Ints, number: Ints, n: int) -> tuple[Ints, Ints]:
+    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four."""
+    key = ends.min(axis=1).astype(np.int64) * n + ends.max(axis=1)
+    order = np.argsort(key)
+    side = F[:, [[1, 2], [2, 0], [0, 1]]].astype(np.int64)
+    wanted = side.min(axis=2) * n + side.max(axis=2)
+    place = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
+    middle = np.where(key[order][place] == wanted, number[order][place], -1)
+    count = (middle >= 0).sum(axis=1)
+    # turn each triangle so that its cut sides come first: opposite corners 0, then 0 and 1
+    turn = np.argmax(middle >= 0, axis=1)
+    turn = np.where((count == 2) & (middle[:, 0] >= 0) & (middle[:, 2] >= 0), 2, turn)
+    roll = (np.arange(3) + turn[:, None]) % 3
+    a, b, c = np.take_along_axis(F.astype(np.int64), roll, axis=1).T
+    p, q, r = np.take_along_axis(middle, roll, axis=1).T  # on the sides opposite a, b, c
+    templates = {
+        0: [(a, b, c)],
+        1: [(a, b, p), (a, p, c)],
+        2: [(c, q, p), (q, a, p), (a, b, p)],
+        3: [(a, r, q), (b, p, r), (c, q, p), (p, q, r)],
+    }
+    faces, owner = [], []
+    for cuts, corners in templates.items():
+        chosen = np.flatnonzero(count == cuts)
+        faces.append(np.stack([np.stack(t, axis=1)[chosen] for t in corners], 1).reshape(-1, 3))
+        owner.append(np.repeat(patch[chosen], len(corners)))
+    return np.concatenate(faces), np.concatenate(owner)
+
+
+def _sizes(mesh: _Mesh, edge_length: float, near: float | None, growth: float) -> Floats:
+    """(n,) the edge length wanted at each vertex."""
+    size = np.full(len(mesh.X), float(edge_length))
+    if near is not None and len(mesh.curves):
+        distance = cKDTree(mesh.X[np.unique(mesh.curves)]).query(mesh.X)[0]
+        size = np.minimum(size, near + (growth - 1.0) * distance)
+    return size
+
+
+def _by_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> _Mesh:
+    """The mesh after MMG, with the same curves."""
+    try:
+        from mmgpy import MmgMeshS
+    except ImportError:
+        raise MissingExtra("mmgpy", "remesh") from None
+    held = np.flatnonzero(mesh.fixed | mesh.sliding)
+    kept = np.unique(np.concatenate([mesh.curves.ravel(), held]))
+    reference = np.zeros(len(mesh.X), dtype=np.int64)
+    reference[kept] = 1 + np.arange(len(kept))
+    tool: Any = MmgMeshS()
+    tool.set_mesh_size(vertices=len(mesh.X), triangles=len(mesh.F), edges=len(mesh.curves))
+    tool.set_vertices(np.ascontiguousarray(mesh.X), reference)
+    tool.set_triangles(mesh.F.astype(np.int32), mesh.patch.astype(np.int64) + 1)
+    tool.set_edges(mesh.curves.astype(np.int32), np.ones(len(mesh.curves), dtype=np.int64))
+    tool.set_required_edges(np.arange(len(mesh.curves), dtype=np.int32))
+    tool.set_required_vertices(kept.astype(np.int32))
+    tool.set_required_triangles(_corners_to_keep(mesh).astype(np.int32))
+    tool["metric"] = size[:, None]
+    try:
+        tool.remesh(
+            hmin=0.3 * float(size.min()), hmax=1.3 * float(size.max()), hausd=chord, hgrad=growth,
+            angle=0, verbose=-1,
+        )  # fmt: skip
+    except RuntimeError as error:
+        raise SurfaceError(
+            f"the remesher gave up ({error}); repair degenerate triangles first, or choose another"
+            " edge length"
+        ) from None
+    X, reference = tool.get_vertices_with_refs()
+    F, patch = tool.get_triangles_with_refs()
+    place = np.append(-1, kept)[reference]
+    known = place >= 0
+    X[known] = mesh.X[place[known]]  # MMG scales the mesh, which changes the last digits
+    number = np.full(len(mesh.X), -1)
+    number[place[known]] = np.flatnonzero(known)
+    curves = number[mesh.curves]
+    _check_kept(mesh, curves, F, len(X))
+    return _Mesh(
+        X, F.astype(np.int64), patch - 1, curves,
+        known & mesh.fixed[place], known & mesh.sliding[place],
+        np.where(known, mesh.source[place], -1),
+    )  # fmt: skip
+
+
+def _corners_to_keep(mesh: _Mesh) -> Ints:
+    """Triangles between curves that are as good as their corner allows: MMG would split them."""
+    on_curve = np.zeros(len(mesh.X), dtype=bool)
+    on_curve[mesh.curves] = True
+    between = np.flatnonzero(on_curve[mesh.F].all(axis=1))
+    second = np.sort(_angles(mesh.X, mesh.F[between]), axis=1)[:, 1]
+    return between[second >= BLUNT]
+
+
+def _check_kept(before: _Mesh, curves: Ints, F: Ints, n: int) -> None:
+    """Every curve edge must still be an edge of triangles."""
+    side = F[:, [[1, 2], [2, 0], [0, 1]]].astype(np.int64)
+    found = side.min(axis=2) * n + side.max(axis=2)
+    lost = (curves < 0).any(axis=1)
+    lost |= ~np.isin(curves.min(axis=1) * n + curves.max(axis=1), found)
+    if lost.any():
+        raise SurfaceError(
+            f"the remesher lost {lost.sum()} edges of curves, the first at"
+            f" {before.X[before.curves[np.argmax(lost), 0]].tolist()}; choose a smaller edge length"
+        )
+
+
+def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Surface:
+    """A Surface of the best triangles for each patch: they fit, because the curves are the same."""
+    meshes = [old, *candidates]
+    angle = np.array([_patch_angles(mesh, len(surface.patches)) for mesh in meshes])
+    best = 1 + np.argmax(np.minimum(angle[1:], GOOD_ANGLE), axis=0)
+    reached = angle[best, np.arange(len(best))]
+    best[(reached < LEAST_ANGLE) & (reached < WORSE * angle[0])] = 0
+    first = np.cumsum([0, *(len(mesh.X) for mesh in meshes)])
+    faces, patch = [], []
+    for number, mesh in enumerate(meshes):
+        chosen = best[mesh.patch] == number
+        vertex = np.where(mesh.source >= 0, mesh.source, first[number] + np.arange(len(mesh.X)))
+        faces.append(vertex[mesh.F[chosen]])
+        patch.append(mesh.patch[chosen])
+    used, inverse = np.unique(np.concatenate(faces), return_inverse=True)
+    return Surface(
+        np.concatenate([mesh.X for mesh in meshes])[used],
+        inverse.reshape(-1, 3),
+        np.concatenate(patch),
+        surface.patches,
+        np.concatenate([mesh.fixed for mesh in meshes])[used],
+        np.concatenate([mesh.sliding for mesh in meshes])[used],
+        surface.plane,
+    )
+
+
+def _patch_angles(mesh: _Mesh, count: int) -> Floats:
+    """(count,) the smallest angle in each patch, degrees."""
+    smallest = np.full(count, 180.0)
+    np.minimum.at(smallest, mesh.patch, _angles(mesh.X, mesh.F).min(axis=1))
+    return smallest
+
+
+def _angles(X: Floats, F: Ints) -> Floats:
+    """(m,3) angles, degrees."""
+    a, b = X[F[:, [1, 2, 0]]] - X[F], X[F[:, [2, 0, 1]]] - X[F]
+    cosine = np.einsum("fij,fij->fi", a, b)
+    sine = np.linalg.norm(np.cross(a, b), axis=2)
+    return np.degrees(np.arctan2(sine, cosine))
