@@ -1,0 +1,62 @@
+"""A progress bar for a sweep: cases done, their verdicts, time left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from ..errors import MissingExtra
+from .engine import Progress
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+@contextmanager
+def bar(console: Console | None = None) -> Iterator[Callable[[Progress], None]]:
+    """An ``on_record`` that draws a bar: ``with bar() as draw: run(sweep, on_record=draw)``.
+
+    Parameters
+    ----------
+    console : where to draw; default the terminal.
+
+    Raises
+    ------
+    MissingExtra : rich is not installed.
+    """
+    try:
+        from rich import progress as rich
+    except ImportError:
+        raise MissingExtra("rich", "cli") from None
+    columns: tuple[Any, ...] = (
+        rich.BarColumn(),
+        rich.MofNCompleteColumn(),
+        rich.TextColumn("{task.fields[left]} left"),
+        rich.TextColumn("{task.description}", markup=False),
+    )
+    with rich.Progress(*columns, console=console) as drawn:
+        task = drawn.add_task("", total=None, left="?")
+
+        def draw(state: Progress) -> None:
+            counts = sorted(state.counts.items(), key=lambda item: (-item[1], item[0]))
+            drawn.update(
+                task,
+                total=state.total,
+                completed=state.done,
+                left=clock(state.seconds_left),
+                description=" · ".join(f"{verdict} {count}" for verdict, count in counts),
+            )
+
+        yield draw
+
+
+def clock(seconds: float) -> str:
+    """Hours, minutes and seconds.
+
+    >>> clock(3725.4), clock(8)
+    ('1:02:05', '0:08')
+    """
+    minutes, second = divmod(round(seconds), 60)
+    hours, minute = divmod(minutes, 60)
+    return f"{hours}:{minute:02}:{second:02}" if hours else f"{minute}:{second:02}"

@@ -1,0 +1,148 @@
+"""The process a case runs in: takes cases from its standard input, answers on its standard output.
+
+``isolate`` starts this file as a script. It needs the standard library alone, so that a worker is
+ready in some hundredths of a second and its death costs no more; ``grid`` borrows its helpers.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import importlib
+import importlib.metadata
+import os
+import pickle
+import platform
+import sys
+import time
+import traceback
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from typing import Any, BinaryIO
+
+WORDS = ("status", "verdict", "message")  # keys of a case's answer that hold text about the case
+
+
+def resolve(case: str) -> Callable[..., Any]:
+    """The function that ``"package.module:function"`` names.
+
+    >>> resolve("math:hypot")(3.0, 4.0)
+    5.0
+    """
+    module, _, name = case.partition(":")
+    found: Any = importlib.import_module(module)
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found  # type: ignore[no-any-return]
+
+
+def scalar(value: object) -> bool | int | float | str | None:
+    """The plain Python value of a number, text, truth value or None; a TypeError for all else.
+
+    >>> import numpy as np
+    >>> scalar(np.float64(0.1)), scalar(np.int32(3)), scalar(np.bool_(True))
+    (0.1, 3, True)
+    """
+    if getattr(value, "shape", None) == () and hasattr(value, "item"):
+        value = value.item()
+    if value is None or isinstance(value, bool):
+        return value
+    for kind in (int, float, str):
+        if isinstance(value, kind):
+            return kind(value)  # subclasses print themselves in ways of their own
+    raise TypeError(f"expected a number, a text, a truth value or None, found {value!r:.80}")
+
+
+def answer(values: object, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Sort what a case returned into status, verdict, message and numbers.
+
+    >>> answer({"verdict": "stable", "energy": 1.5}, {"alpha": 0.6})
+    {'status': 'finished', 'verdict': 'stable', 'message': '', 'numbers': {'energy': 1.5}}
+    """
+    if not isinstance(values, Mapping):
+        raise TypeError(f"a case returns a mapping of names to numbers, found {values!r:.80}")
+    fields: dict[str, Any] = {"status": "finished", "verdict": "", "message": "", "numbers": {}}
+    for name, value in values.items():
+        if not isinstance(name, str) or name in parameters or name == "case":
+            raise TypeError(f"a case may not call a number {name!r}: a parameter has that name")
+        try:
+            plain = scalar(value)
+        except TypeError as error:
+            raise TypeError(f"{name!r} of a case's answer: {error}") from None
+        if name in WORDS:
+            fields[name] = "" if plain is None else str(plain)
+        else:
+            fields["numbers"][name] = plain
+    return fields
+
+
+def run(
+    function: Callable[..., Any], parameters: Mapping[str, Any], time_limit: float | None
+) -> dict[str, Any]:
+    """Run one case; the outcome without its provenance. The process exits at the time limit."""
+    started, begin, extra = datetime.now(UTC), time.perf_counter(), {}
+    if time_limit is not None:
+        # a watchdog of C: it works while compiled code holds the interpreter or the parent is dead
+        faulthandler.dump_traceback_later(time_limit, exit=True)
+    try:
+        fields = answer(function(**parameters), parameters)
+    except (Exception, SystemExit) as error:
+        text = "".join(traceback.format_exception_only(error)).strip()
+        fields = {"status": "raised", "verdict": "", "message": text, "numbers": {}}
+        extra = {"output": traceback.format_exc()}
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+    fields["wall_time"] = time.perf_counter() - begin
+    fields["provenance"] = {"started": started.isoformat(timespec="milliseconds"), **extra}
+    return fields
+
+
+def provenance() -> dict[str, Any]:
+    """Where this process runs and with what."""
+    told: dict[str, Any] = {"host": platform.node(), "pid": os.getpid()}
+    told["python"] = platform.python_version()
+    for package in ("pcmc", "numpy", "scipy", "numba"):
+        told[package] = version(package)
+    return told
+
+
+def version(package: str) -> str:
+    """The installed version of a package, or ``"not installed"``."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def _reply(stream: BinaryIO, message: object) -> None:
+    stream.write(pickle.dumps(message))
+    stream.flush()
+
+
+def main() -> None:
+    """Answer cases until the other side closes."""
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)  # what a case prints must not get between the answers
+    sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
+    faulthandler.enable()
+    try:
+        path, case = pickle.load(requests)
+        sys.path[:] = path
+        try:
+            function = resolve(case)
+        except Exception:
+            _reply(answers, ("failed", traceback.format_exc(limit=-3)))
+            return
+        about = provenance()
+        _reply(answers, ("ready", None))
+        while True:
+            parameters, time_limit = pickle.load(requests)
+            outcome = run(function, parameters, time_limit)
+            outcome["provenance"] |= about
+            _reply(answers, outcome)
+    except (EOFError, BrokenPipeError):
+        os._exit(0)  # nobody is left to answer to
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,233 @@
+"""Run the cases of a sweep that are not stored yet, on any executor; return the table of all."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+import uuid
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, Executor, Future
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import Any
+
+import pandas as pd
+
+from ..errors import OptionError, SweepError
+from .executors import open_pool
+from .grid import Sweep
+from .isolate import run_case
+from .store import Record, open_store
+from .table import table
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What ``on_record`` is shown after each case.
+
+    Attributes
+    ----------
+    record : the case just stored.
+    done, total : cases stored, cases in all.
+    counts : how many cases have each verdict (the status, where a case gave no verdict).
+    seconds_left : estimate from the pace of this run.
+    """
+
+    record: Record
+    done: int
+    total: int
+    counts: dict[str, int]
+    seconds_left: float
+
+
+def run(
+    sweep: Sweep,
+    store: str | os.PathLike[str] | None = None,
+    *,
+    executor: Executor | None = None,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    time_limit: float | None = 600.0,
+    retry_failed: bool = False,
+    on_record: Callable[[Progress], object] | None = None,
+) -> pd.DataFrame:
+    """Run every case of the sweep that its store does not hold yet.
+
+    Each case runs on one thread in a child process of the worker it is given to. A case that
+    raises, exceeds the time limit or kills its process becomes a row that says so; the others
+    go on.
+
+    Parameters
+    ----------
+    sweep : the cases.
+    store : file that each record is forced to as soon as it is there. Run the same sweep with the
+        same file again after a crash, and it goes on from there. None: keep records in memory only.
+    executor : where to run; left open at the end. Default: ``workers`` local processes.
+    scheduler : address of a Dask scheduler whose workers run the cases: ``"tcp://127.0.0.1:8786"``.
+    workers : local processes; default one for each processor.
+    time_limit : seconds a case may take; None for no limit.
+    retry_failed : run stored cases that failed once more.
+    on_record : called after each stored case. Raise StopIteration to stop as Ctrl-C does; any other
+        exception passes through.
+
+    Returns
+    -------
+    DataFrame : one row per case (see ``table``). After Ctrl-C, which ends the workers at once,
+        only the cases stored so far: fewer rows than ``len(sweep)``.
+
+    Raises
+    ------
+    OptionError, FileError, SweepError, MissingExtra : before any case is run, for bad options, a
+        store of another sweep or version, a scheduler that does not answer, no ``distributed``.
+    FileError : a record cannot be written. SweepError : the executor broke or a worker cannot load
+        the case. All cases stored before stay stored.
+
+    Examples
+    --------
+    >>> halves = Sweep("pcmc.sweep.examples:ratio", {"over": [1, 2, 3]}, {"under": 2})
+    >>> run(halves, workers=1)[["over", "status", "value"]]
+          over    status  value
+    case
+    0        1  finished    0.5
+    1        2  finished    1.0
+    2        3  finished    1.5
+    """
+    _check_options(executor, scheduler, workers, time_limit)
+    with ExitStack() as stack:
+        kept = None if store is None else stack.enter_context(open_store(store, sweep))
+        records = {} if kept is None else dict(kept.records)
+        todo = {
+            number: parameters
+            for number, parameters in enumerate(sweep)
+            if number not in records or (retry_failed and records[number].failed)
+        }
+        if todo:
+            team, finished = uuid.uuid4().hex, SimpleQueue[Future[dict[str, Any]] | None]()
+            stack.enter_context(_interrupts(lambda: finished.put(None)))
+            pool = stack.enter_context(open_pool(team, executor, scheduler, workers))
+            pending = stack.enter_context(
+                _submitted(pool, team, sweep.case, todo, time_limit, finished)
+            )
+            progress = _progress(records, todo, len(sweep))
+            while pending and (future := _next(finished)) is not None:
+                number = pending.pop(future)
+                record = Record(number, todo[number], **_outcome(future))
+                if kept is not None:
+                    kept.append(record)
+                records[number] = record
+                try:
+                    if on_record is not None:
+                        on_record(progress(record))
+                except StopIteration:
+                    break
+    return table(records.values())
+
+
+def _check_options(
+    executor: Executor | None,
+    scheduler: str | None,
+    workers: int | None,
+    time_limit: float | None,
+) -> None:
+    given = {"executor": executor, "scheduler": scheduler, "workers": workers}
+    names = [name for name, value in given.items() if value is not None]
+    if len(names) > 1:
+        raise OptionError(f"{' and '.join(names)} exclude each other; give one of them")
+    if workers is not None and workers < 1:
+        raise OptionError(f"workers must be at least 1, found {workers}")
+    if time_limit is not None and not time_limit > 0.0:
+        raise OptionError(f"time_limit must be positive seconds or None, found {time_limit}")
+
+
+def _progress(
+    records: dict[int, Record], todo: dict[int, Any], total: int
+) -> Callable[[Record], Progress]:
+    """A function that counts each new record in and tells how far the sweep is."""
+    counts = Counter(r.verdict or r.status for n, r in records.items() if n not in todo)
+    before, begin = total - len(todo), time.perf_counter()
+
+    def count(record: Record) -> Progress:
+        counts[record.verdict or record.status] += 1
+        done = counts.total()
+        pace = (time.perf_counter() - begin) / (done - before)
+        return Progress(record, done, total, dict(counts), pace * (total - done))
+
+    return count
+
+
+@contextmanager
+def _submitted(
+    pool: Executor,
+    team: str,
+    case: str,
+    todo: dict[int, dict[str, Any]],
+    time_limit: float | None,
+    finished: SimpleQueue[Any],
+) -> Iterator[dict[Future[dict[str, Any]], int]]:
+    """Give all cases to the pool; futures come out of ``finished``; those left are cancelled."""
+    pending: dict[Future[dict[str, Any]], int] = {}
+    try:
+        for number, parameters in todo.items():
+            try:
+                future = pool.submit(run_case, team, case, parameters, time_limit)
+            except RuntimeError as error:  # shut down, or broken
+                raise SweepError(
+                    f"the executor takes no cases ({error}); give a new one"
+                ) from error
+            pending[future] = number
+            future.add_done_callback(finished.put)
+        yield pending
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+def _next(finished: SimpleQueue[Any]) -> Future[dict[str, Any]] | None:
+    """The next finished future, or None to stop."""
+    while True:
+        with suppress(Empty):  # Windows tells of Ctrl-C only between waits
+            future: Future[dict[str, Any]] | None = finished.get(timeout=1.0)
+            return future
+
+
+def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any]:
+    """What a case came to; SweepError if the executor, not the case, failed."""
+    try:
+        return future.result()
+    except SweepError:
+        raise
+    except (Exception, CancelledError) as error:
+        text = f"{type(error).__name__}: {error}".removesuffix(": ")
+        if type(error).__name__ == "KilledWorker":  # Dask's, after some tries on several workers
+            return {
+                "status": "killed",
+                "verdict": "",
+                "message": "ended its Dask worker, several times",
+                "numbers": {},
+                "wall_time": float("nan"),
+                "provenance": {"output": text},
+            }
+        raise SweepError(
+            f"the executor failed ({text}); the cases stored so far are safe: run the same sweep"
+            " again to go on from there"
+        ) from error
+
+
+@contextmanager
+def _interrupts(stop: Callable[[], None]) -> Iterator[None]:
+    """Have Ctrl-C call ``stop`` instead of raising in the middle of a write."""
+    if (
+        threading.current_thread() is not threading.main_thread()
+        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    ):
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda *_: stop())
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -1,0 +1,88 @@
+"""Where the cases of a sweep run: local processes, a given executor, or a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from ..errors import MissingExtra, OptionError, SweepError
+from .child import version
+from .isolate import retire
+
+OWN_VERSION = version("pcmc")
+CONNECT = 10.0  # seconds a scheduler has to answer, and then to show a worker
+
+
+@contextmanager
+def open_pool(
+    team: str, executor: Executor | None, scheduler: str | None, workers: int | None
+) -> Iterator[Executor]:
+    """The executor to use; at the end the sweep's child processes are ended."""
+    if scheduler is not None:
+        with _cluster(team, scheduler) as pool:
+            yield pool
+    elif executor is not None:
+        try:
+            yield executor
+        finally:
+            retire(team)
+    else:
+        pool = ThreadPoolExecutor(workers or _processors())
+        try:
+            yield pool
+        finally:
+            retire(team)
+            pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _cluster(team: str, address: str) -> Iterator[Executor]:
+    """An executor on the workers of a Dask scheduler, each with the same version of pcmc."""
+    if not re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^/]+:\d+/?", address):
+        raise OptionError(f"scheduler: expected 'tcp://host:8786', found {address!r}")
+    try:
+        from distributed import Client
+    except ImportError:
+        raise MissingExtra("distributed", "distributed") from None
+    try:
+        client = Client(address, timeout=CONNECT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise SweepError(
+            f"no Dask scheduler answers at {address!r} ({error}); start one with: dask scheduler"
+        ) from error
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=CONNECT)
+        except TimeoutError as error:
+            raise SweepError(
+                f"the Dask scheduler at {address!r} has no workers; start one with:"
+                f" dask worker {address}"
+            ) from error
+        _same_version(client)
+        try:
+            yield client.get_executor(pure=False)
+        finally:
+            if client.status == "running":
+                with suppress(Exception):  # workers that have gone took their children along
+                    client.run(retire, team, on_error="ignore")
+
+
+def _same_version(client: Any) -> None:
+    """Refuse a cluster whose workers have no pcmc, or another version of it."""
+    for worker, found in client.run(version, "pcmc", on_error="return").items():
+        if found != OWN_VERSION:
+            raise SweepError(
+                f"the Dask worker {worker} has pcmc {found}, this is pcmc {OWN_VERSION}; install"
+                " the same version there"
+            )
+
+
+def _processors() -> int:
+    """The processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,175 @@
+"""A declared grid of parameters and the function that is run at each of its points."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import itertools
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..errors import OptionError, unknown
+from .child import WORDS, resolve, scalar
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A case function and what it is run at: every combination of the grid's values.
+
+    Cases are numbered from 0 in the order of ``itertools.product``: the last axis runs fastest.
+
+    Parameters
+    ----------
+    case : the function, as ``"package.module:function"`` or itself (then it must be importable by
+        name: defined in a module, not in a notebook, a script or another function). It takes the
+        parameters as keywords and returns a mapping of names to numbers, texts, truth values or
+        None; ``"status"``, ``"verdict"`` and ``"message"`` in it are words about the case.
+    grid : for each varied parameter the sequence of its values: numbers, texts, truth values, None,
+        or lists and dicts of them.
+    fixed : parameters that are the same in every case.
+
+    Raises
+    ------
+    OptionError : a function that cannot be found, a parameter it does not take or lacks, an empty
+        grid, a value that cannot be written to a file or occurs twice.
+
+    Examples
+    --------
+    >>> sweep = Sweep("math:ldexp", grid={})
+    Traceback (most recent call last):
+    pcmc.errors.OptionError: the grid is empty; give at least one parameter a list of values
+    >>> sweep = Sweep("fractions:Fraction", {"numerator": [1, 2], "denominator": [3, 5]})
+    >>> len(sweep), list(sweep)[1]
+    (4, {'numerator': 1, 'denominator': 5})
+    """
+
+    case: str
+    grid: Mapping[str, Sequence[Any]]
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+
+    def __init__(
+        self,
+        case: str | Callable[..., Any],
+        grid: Mapping[str, Sequence[Any]],
+        fixed: Mapping[str, Any] | None = None,
+    ) -> None:
+        object.__setattr__(self, "case", case if isinstance(case, str) else _path(case))
+        object.__setattr__(self, "grid", {name: _axis(name, grid[name]) for name in grid})
+        fixed = {name: _plain(value, name) for name, value in (fixed or {}).items()}
+        object.__setattr__(self, "fixed", fixed)
+        if not self.grid:
+            raise OptionError("the grid is empty; give at least one parameter a list of values")
+        for name in self.grid:
+            if name in fixed:
+                raise OptionError(f"{name!r} is in the grid and among the fixed; keep one")
+        self._check_against(_function(self.case))
+
+    def _check_against(self, function: Callable[..., Any]) -> None:
+        """Refuse parameters that the function does not take, before any case is run."""
+        names = [*self.grid, *self.fixed]
+        for name in names:
+            if name == "case" or name in WORDS:
+                raise OptionError(f"a parameter may not be called {name!r}: a column has that name")
+        try:
+            taken = inspect.signature(function).parameters
+        except (TypeError, ValueError):
+            raise OptionError(f"{self.case!r} does not say which parameters it takes") from None
+        kinds = {p.kind for p in taken.values()}
+        named = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+        keywords = [name for name, p in taken.items() if p.kind in named]
+        for name in names:
+            if name not in keywords and inspect.Parameter.VAR_KEYWORD not in kinds:
+                raise OptionError(f"{unknown('parameter', name, keywords)} (of {self.case})")
+        for name in keywords:
+            if taken[name].default is inspect.Parameter.empty and name not in names:
+                raise OptionError(f"{self.case} needs the parameter {name!r}, which has no value")
+        check = getattr(function, "check", None)
+        if check is not None:
+            for parameters in self:
+                check(**parameters)
+
+    def __len__(self) -> int:
+        return math.prod(len(values) for values in self.grid.values())
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """The parameters of each case, in order."""
+        for values in itertools.product(*self.grid.values()):
+            yield dict(zip(self.grid, values, strict=True)) | dict(self.fixed)
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of the case's name, the grid with its order, and the fixed parameters."""
+        told = [self.case, list(self.grid.items()), sorted(self.fixed.items())]
+        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+
+
+def checked(check: Callable[..., object]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Decorator: ``check(**parameters)`` refuses a bad case of the function before any case is run.
+
+    For functions whose own signature does not tell which parameters are good, as ``**arguments``.
+    """
+
+    def mark(function: Callable[..., Any]) -> Callable[..., Any]:
+        function.check = check  # type: ignore[attr-defined]
+        return function
+
+    return mark
+
+
+def _function(case: str) -> Callable[..., Any]:
+    try:
+        function = resolve(case)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise OptionError(
+            f"the case {case!r} cannot be found ({error}); expected 'package.module:function'"
+        ) from error
+    if not callable(function):
+        raise OptionError(f"the case {case!r} is not a function but {function!r:.60}")
+    return function
+
+
+def _path(function: Callable[..., Any]) -> str:
+    module = getattr(function, "__module__", None)
+    name = getattr(function, "__qualname__", "<unnamed>")
+    if module in (None, "__main__") or "<" in name:
+        raise OptionError(
+            f"the case function {name!r} cannot be imported by a worker; put it at the top level of"
+            " a module (a file of its own) and import it from there"
+        )
+    return f"{module}:{name}"
+
+
+def _axis(name: str, values: object) -> list[Any]:
+    if isinstance(values, str | bytes | Mapping) or not hasattr(values, "__iter__"):
+        raise OptionError(
+            f"grid[{name!r}] must be a list of values, found {values!r:.60}; a single value belongs"
+            " to fixed"
+        )
+    axis = [_plain(value, f"{name}[{i}]") for i, value in enumerate(values)]
+    if not axis:
+        raise OptionError(f"grid[{name!r}] is empty; give it at least one value")
+    seen: dict[str, int] = {}
+    for i, value in enumerate(axis):
+        first = seen.setdefault(json.dumps(value, sort_keys=True), i)
+        if first != i:
+            raise OptionError(f"grid[{name!r}] has the value {value!r} twice, at {first} and {i}")
+    return axis
+
+
+def _plain(value: object, where: str) -> Any:
+    """The value as plain lists, dicts and scalars, which a file gives back unchanged."""
+    if isinstance(value, Mapping):
+        if not all(isinstance(key, str) for key in value):
+            raise OptionError(f"parameter {where}: keys must be texts, found {list(value)!r:.60}")
+        return {key: _plain(item, f"{where}[{key!r}]") for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray) and np.ndim(value):
+        return [_plain(item, f"{where}[{i}]") for i, item in enumerate(value)]
+    try:
+        return scalar(value)
+    except TypeError as error:
+        raise OptionError(f"parameter {where}: {error}") from None
