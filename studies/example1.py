@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 
 from generators import two_squares
-from pcmc import Surface
+from pcmc import Surface, curvature_error, mean_curvature
 
+from .example import energy_history
 from .flow import Case, curvature_table, junction_top, run_cases, turn
 from .folder import Folder
 from .study import Study
@@ -142,7 +143,8 @@ def _fig10(histories: pd.DataFrame) -> pd.DataFrame:
 
 def _numbers10(fig10: pd.DataFrame) -> dict[str, float]:
     lines = fig10.set_index("case")
-    return {
+    rise = lines.total_rise["fig10-proposed-sufficient"]
+    return {"fig10_sufficient_total_rise": rise} | {
         f"fig10_{variant.replace('-', '_')}_{key}": lines[key][f"fig10-{variant}-printed"]
         for variant in VARIANTS
         for key in ("energy_30", "energy_end", "fall_in_second_half", "total_rise", "forced_steps")
@@ -156,6 +158,25 @@ def _main(wall: float, n: int = COARSE) -> str:
 
 def figure(folder: Folder) -> None:
     """Figs. 6 to 10."""
+    from pcmc.plot import draw, panel
+
+    meshes = {wall: folder.read_mesh(_main(wall)) for wall in WALLS}
+    start, end = meshes[2.0]["initial"], meshes[2.0]["final"]
+    draw(start, folder.figure("fig06"), numbers=mean_curvature(start), legend=True)
+    panel(
+        [start, *(stages["final"] for stages in meshes.values())], folder.figure("fig07"),
+        views="elevation", columns=2,
+        titles=["initial shape", *(f"α of the wall = {wall:g}" for wall in WALLS)],
+    )  # fmt: skip
+    draw(end, folder.figure("fig08"), numbers=mean_curvature(end), legend=True)
+    pair = [end, folder.read_mesh(_main(2.0, FINE))["final"]]
+    panel(
+        pair, folder.figure("fig09"), views="plan", titles=["(a) coarse mesh", "(b) fine mesh"],
+        scalars=[100.0 * curvature_error(s) for s in pair], label="error, %",
+    )  # fmt: skip
+    for test, name in (("printed", "fig10"), ("sufficient", "fig10-sufficient")):
+        lines = {v.replace("-", " "): f"fig10-{v}-{test}" for v in VARIANTS}
+        energy_history(folder, lines, name)
 
 
 STUDY = Study(

@@ -10,7 +10,7 @@ import pandas as pd
 from generators import two_caps
 from pcmc import Surface, mean_curvature
 
-from .example import numbers, shapes
+from .example import gradient_history, numbers, shapes
 from .flow import Case, curvature_table, run_cases
 from .folder import Folder
 from .study import Study
@@ -86,6 +86,7 @@ def _patch(stages: dict[str, Surface], name: str) -> dict[str, float | str]:
 def figure(folder: Folder) -> None:
     """Figs. 11 to 15."""
     shapes(folder, "main", {"initial": ("fig11", "fig12"), "final": ("fig13", "fig14")}, "fig15")
+    gradient_history(folder, {"the paper's flow": "main", "L-BFGS": "lbfgs"}, "methods")
 
 
 STUDY = Study(

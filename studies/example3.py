@@ -10,7 +10,7 @@ import pandas as pd
 from generators import four_fans
 from pcmc import Surface
 
-from .example import numbers, shapes
+from .example import gradient_history, numbers, shapes
 from .flow import Case, curvature_table, run_cases
 from .folder import Folder
 from .study import Study
@@ -99,6 +99,7 @@ def _misfit(ridges: pd.DataFrame, mesh: str, *, ellipse: bool = True) -> float:
 def figure(folder: Folder) -> None:
     """Figs. 17 to 21."""
     shapes(folder, "main", {"initial": ("fig17", "fig18"), "final": ("fig19", "fig20")}, "fig21")
+    gradient_history(folder, {"the paper's flow": "main", "L-BFGS": "lbfgs"}, "methods")
 
 
 STUDY = Study(

@@ -115,12 +115,17 @@ def describe(surface: Surface) -> dict[str, Any]:
 
 
 def ending(result: Any) -> dict[str, Any]:
-    """How a run of the flow ended, with the steps taken although the line search's test failed."""
+    """How a run ended, where ‖∇E‖² was least on its way, and the steps that were forced.
+
+    A step is forced when it is taken although it fails the line search's test.
+    """
     surface, history = result.surface, result.history
     return {
         "status": result.status.name.lower(),
         "energy": result.energy,
         "gradient_squared": float(history.gradient_squared.iloc[-1]),
+        "least_gradient_squared": float(history.gradient_squared.min()),
+        "at_row": int(history.gradient_squared.to_numpy().argmin()),
         "evaluations": result.evaluations,
         "forced_steps": forced_steps(history),
         "energy_rises": rises(history.energy),

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from generators import four_fans, two_caps, two_squares
+from generators import bezier_hall, four_fans, two_caps, two_squares
 from pcmc import Surface, gradient, solve
 from pcmc.arrays import Bools
 from pcmc.quality import triangle_quality
@@ -46,6 +46,8 @@ def cases() -> list[Case]:
         for rings in (4, 5, 6, 7, 8, 9, 10, 12, 14):
             build = partial(four_fans, rings, mesh=mesh)
             listed.append(_case("example3", mesh, 20.0 / rings, build, 0.01))
+    for h in (12.0, 10.0, 9.0, 8.0, 7.0, 6.0, 5.0, 4.0):
+        listed.append(_case("example4", "hall", h, partial(bezier_hall, h), 0.005))
     return listed
 
 
@@ -121,7 +123,8 @@ def table(folder: Folder) -> dict[str, float]:
     shares = [f"share {group}" for group in GROUPS]
     columns = [
         "example", "family", "edge_length", "triangles", "initial_gradient_squared",
-        "gradient_squared", "printed", "meets", "largest_error_cotangent", *shares,
+        "gradient_squared", "least_gradient_squared", "at_row", "printed", "meets",
+        "largest_error_cotangent", *shares,
         "largest_share", "largest_to_corner", "largest_quality", "minimum_quality",
     ]  # fmt: skip
     folder.write_table("nearest", order.groupby(["example", "family"]).head(3)[columns])
@@ -137,7 +140,22 @@ def table(folder: Folder) -> dict[str, float]:
 
 
 def figure(folder: Folder) -> None:
-    """Final ‖∇E‖² against edge length, a line per family."""
+    """For each example the final ‖∇E‖² against edge length, a line per family."""
+    from pcmc.plot import lines
+
+    records = folder.read_table("records")
+    for example, mine in records.groupby("example"):
+        curves = {
+            str(family): (rows.edge_length.to_numpy(), rows.gradient_squared.to_numpy())
+            for family, rows in mine.sort_values("edge_length").groupby("family")
+        }
+        if example in PRINTED:
+            ends = np.array([mine.edge_length.min(), mine.edge_length.max()])
+            curves["printed"] = (ends, np.full(2, PRINTED[str(example)]))
+        lines(
+            curves, folder.figure(str(example)), x="edge length", y="‖∇E‖² at the last iteration",
+            xscale="log", yscale="log", markers=True,
+        )  # fmt: skip
 
 
 STUDY = Study(

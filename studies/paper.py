@@ -84,9 +84,10 @@ class Finding:
 
     @property
     def sentence(self) -> str:
-        """The claim, and what we find, in words."""
+        """The claim without its example, and what we find, in words."""
+        says = self.claim.says.partition(": ")[2] or self.claim.says
         bound = self.claim.relation if self.claim.relation != "=" else ""
-        return f"{self.claim.says}: {self.ours:.4g}, paper {bound}{self.paper:.5g}"
+        return f"{says}: {self.ours:.4g}, paper {bound}{self.paper:.5g}"
 
 
 @cache
@@ -135,9 +136,11 @@ def label(figure: Figure, findings: Sequence[Finding]) -> tuple[str, str]:
     near, one that is not needed fails, or the figure holds something that the text does not tell.
     """
     mine = [f for f in findings if figure.number in f.claim.figures]
+    if all(f.verdict == MISSING for f in mine):
+        return NOT, f"nothing is measured for it; run the study {figure.study}"
     failed = [f for f in mine if f.verdict in (DIFFERS, MISSING) and f.claim.needed]
-    if failed or not mine:
-        return NOT, _reason(failed) if mine else "nothing is measured for it"
+    if failed:
+        return NOT, _reason(failed)
     conditions = [f for f in mine if f.verdict != HOLDS]
     if conditions or figure.unknown:
         return CONDITIONAL, "; ".join(filter(None, (_reason(conditions), figure.unknown)))

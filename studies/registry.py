@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 from pcmc.errors import OptionError, unknown
 
-from . import alpha_grid, example1, example2, example3, mesh_search
+from . import alpha_grid, equilibria, example1, example2, example3, example4, mesh_search
 from .study import Study
 
-MODULES = (example1, example2, example3, alpha_grid, mesh_search)
+MODULES = (example1, example2, example3, example4, alpha_grid, mesh_search, equilibria)
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 
 

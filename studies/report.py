@@ -28,14 +28,14 @@ def write_comparison(results: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def show(comparison: pd.DataFrame, figures: pd.DataFrame, console: Console) -> None:
-    """Both tables on the screen."""
-    table = Table("what the paper says", "where", "paper", "ours", "difference", "verdict")
-    for row in _cells(comparison):
-        table.add_row(*row[:-1], _coloured(row[-1]))
-    console.print(table)
+    """Both tables on the screen, the comparison last."""
     table = Table("figure", "what it shows", "label", "reason")
     for number, shows, name, reason in _figure_cells(figures):
         table.add_row(number, shows, _coloured(name), reason)
+    console.print(table)
+    table = Table("what the paper says", "where", "paper", "ours", "difference", "verdict")
+    for row in _cells(comparison):
+        table.add_row(*row[:-1], _coloured(row[-1]))
     console.print(table)
 
 

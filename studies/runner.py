@@ -18,7 +18,15 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from .study import STEPS, Study
 
 # One thread a worker: two workers share two cores, and sums come out in the same order every time.
-THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+THREADS = (
+    "PCMC_THREADS",
+    "NUMBA_NUM_THREADS",
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+)
+
+WORKER = (sys.executable, "-m", "studies.worker")
 
 
 @dataclass(frozen=True)
@@ -38,6 +46,7 @@ def run_all(
     workers: int = 2,
     short: bool = False,
     steps: Sequence[str] = STEPS,
+    worker: Sequence[str] = WORKER,
 ) -> list[Outcome]:
     """Run the studies, longest first, ``workers`` at a time; the outcomes in the order given.
 
@@ -47,7 +56,7 @@ def run_all(
     extra = ["--results", str(results), "--steps", *steps, *(["--short"] if short else [])]
     outcomes: dict[str, Outcome] = {}
     with _progress(console) as progress, ThreadPoolExecutor(workers) as pool:
-        crew = Crew(progress, steps, len(studies))
+        crew = Crew(progress, steps, len(studies), worker)
         futures = [
             pool.submit(crew.run, study.name, extra)
             for study in sorted(studies, key=lambda study: -study.seconds)
@@ -72,8 +81,9 @@ class Crew:
     progress: Progress
     steps: Sequence[str]
     studies: int
+    worker: Sequence[str]
     doing: dict[str, str] = field(default_factory=dict)
-    processes: dict[str, subprocess.Popen[str]] = field(default_factory=dict)
+    processes: set[subprocess.Popen[str]] = field(default_factory=set)
     finished: int = 0
     stopped: bool = False
 
@@ -83,22 +93,21 @@ class Crew:
     def run(self, name: str, extra: Sequence[str]) -> Outcome:
         """Run one study to its end in a process."""
         start = time.perf_counter()
-        command = [sys.executable, "-m", "studies.worker", name, *extra]
+        command = [*self.worker, name, *extra]
         environment = os.environ | dict.fromkeys(THREADS, "1")
         with tempfile.TemporaryFile("w+") as words:
-            process = subprocess.Popen(
+            with subprocess.Popen(
                 command, stdout=subprocess.PIPE, stderr=words, text=True, env=environment
-            )
-            self.processes[name] = process
-            if self.stopped:
-                process.terminate()
-            assert process.stdout is not None
-            for line in process.stdout:
-                self.show(name, line.strip())
-            code = process.wait()
+            ) as process:
+                self.processes.add(process)
+                if self.stopped:
+                    process.terminate()
+                assert process.stdout is not None
+                for line in process.stdout:
+                    self.show(name, line.strip())
             words.seek(0)
-            error = "" if code == 0 else _last_words(words.read(), code)
-        del self.processes[name]
+            error = "" if process.returncode == 0 else _last_words(words.read(), process.returncode)
+        self.processes.discard(process)
         self.finished += 1
         self.show(name, None)
         return Outcome(name, time.perf_counter() - start, error)
@@ -120,7 +129,7 @@ class Crew:
     def stop(self) -> None:
         """End every process under way."""
         self.stopped = True
-        for process in list(self.processes.values()):
+        for process in list(self.processes):
             process.terminate()
 
 

@@ -1,0 +1,331 @@
+"""The studies: whole files, rules of comparison, studies that fail, and the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from rich.console import Console
+
+from generators import two_caps, two_squares
+from pcmc.energy import energy_and_gradient
+from pcmc.errors import FileError, OptionError
+from studies.__main__ import main
+from studies.benchmark import numpy_energy_and_gradient
+from studies.flow import turn
+from studies.folder import Folder, mesh_hash
+from studies.mesh_search import GROUPS, groups, holders
+from studies.paper import (
+    CONDITIONAL,
+    NOT,
+    REPRODUCED,
+    Claim,
+    Figure,
+    compare,
+    judge,
+    label,
+    paper,
+    read_measured,
+)
+from studies.registry import STUDIES, chosen
+from studies.report import with_block
+from studies.runner import run_all
+from studies.study import Study, perform
+from studies.worker import main as work
+
+HOME = Path(__file__).resolve().parent.parent
+RESULTS = HOME / "results"
+
+
+# ------------------------------------------------------------------------------------ folder
+
+
+def test_table_comes_back_and_has_the_same_bytes_twice(tmp_path):
+    frame = pd.DataFrame({"name": ["a", "b"], "x": [1 / 3, math.nan]})
+    for name in ("one", "two"):
+        Folder(tmp_path).write_table(name, frame)
+    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
+    back = Folder(tmp_path).read_table("one")
+    assert back.name.tolist() == ["a", "b"]
+    assert back.x[0] == pytest.approx(1 / 3, abs=1e-10)
+    assert math.isnan(back.x[1])
+
+
+def test_mesh_comes_back_with_a_stage_that_has_collapsed(tmp_path):
+    start = two_squares(3, alpha_aux=0.0)
+    flat = start.vertices.copy()
+    flat[:, 2] = 0.0
+    Folder(tmp_path).write_mesh("m", {"initial": start, "final": start.moved(flat)})
+    back = Folder(tmp_path).read_mesh("m")
+    assert list(back) == ["initial", "final"]
+    assert np.array_equal(back["final"].vertices, flat)
+    for name in ("faces", "patch_of_face", "fixed", "on_plane"):
+        assert np.array_equal(getattr(back["initial"], name), getattr(start, name))
+    assert back["initial"].patches == start.patches
+    assert back["initial"].plane == start.plane
+    hashes = Folder(tmp_path).mesh_hashes()
+    assert hashes == {"m initial": mesh_hash(start), "m final": mesh_hash(start.moved(flat))}
+    assert len(set(hashes.values())) == 2
+
+
+def test_missing_file_says_which_study_writes_it(tmp_path):
+    with pytest.raises(FileError, match=r"python -m studies run example9"):
+        Folder(tmp_path / "example9").read_table("records")
+
+
+# ------------------------------------------------------------------------------ comparison
+
+
+@pytest.mark.parametrize(
+    ("relation", "ours", "verdict"),
+    [
+        ("=", 2.04, "reproduced"), ("=", 2.3, "near"), ("=", 3.0, "differs"),
+        ("<", 1.99, "reproduced"), ("<", 2.0, "near"), ("<", 9.0, "differs"),
+        (">", 2.01, "reproduced"), (">", 0.1, "differs"), ("=", math.nan, "not measured"),
+    ],
+)  # fmt: skip
+def test_verdict_of_a_printed_number(relation, ours, verdict):
+    claim = Claim("a", "Sec. 1", "s.a", 2.0, relation, tolerance=0.05, near=0.2)
+    assert judge(claim, {"s.a": ours}).verdict == verdict
+
+
+def test_claim_between_two_of_our_numbers():
+    claim = Claim("smaller", "Sec. 1", "s.fine", "s.coarse", "<")
+    assert judge(claim, {"s.fine": 1.0, "s.coarse": 2.0}).verdict == "reproduced"
+    assert judge(claim, {"s.fine": 2.0, "s.coarse": 1.0}).verdict == "differs"
+    assert judge(claim, {"s.fine": 2.0}).verdict == "not measured"
+
+
+def test_label_of_a_figure_follows_from_its_claims():
+    needed = Claim("Ex. 1: needed", "Sec. 1", "s.a", 1.0, tolerance=0.1, near=0.5, figures=("1",))
+    extra = Claim("Ex. 1: extra", "Sec. 1", "s.b", 1.0, figures=("1",), needed=False)
+    figure = Figure("1", "a shape", "s")
+
+    def labelled(a, b, unknown=""):
+        findings = [judge(claim, {"s.a": a, "s.b": b}) for claim in (needed, extra)]
+        return label(Figure("1", "a shape", "s", unknown), findings)
+
+    assert labelled(1.0, 1.0) == (REPRODUCED, "")
+    assert labelled(1.0, 1.0, "its scale") == (CONDITIONAL, "its scale")
+    assert labelled(1.0, 2.0) == (CONDITIONAL, "extra: 2, paper 1")
+    assert labelled(1.4, 1.0) == (CONDITIONAL, "needed: 1.4, paper 1")
+    assert labelled(9.0, 1.0) == (NOT, "needed: 9, paper 1")
+    assert label(figure, [])[0] == NOT
+
+
+def test_every_figure_of_the_examples_rests_on_claims_of_a_study_that_exists():
+    claims, figures = paper()
+    assert [f.number for f in figures] == [str(k) for k in range(6, 26)]
+    for figure in figures:
+        assert figure.study in STUDIES
+        assert any(figure.number in claim.figures for claim in claims), figure
+    for claim in claims:
+        for key in (claim.ours, claim.paper):
+            assert not isinstance(key, str) or key.split(".")[0] in STUDIES
+
+
+def test_paper_file_with_a_wrong_relation_or_key_is_refused(tmp_path):
+    entry = (
+        '[[figure]]\nnumber="1"\nshows="x"\nstudy="s"\n[[claim]]\nsays="a"\nwhere="b"\nours="s.c"\n'
+    )
+    bad = tmp_path / "bad.toml"
+    for line, found in (
+        ('paper=1\nrelation="~"', "relation must be"),
+        ('paper=1\nfigures=["7"]', "names figure 7"),
+        ("paper=1\nnearly=3", "nearly"),
+    ):
+        bad.write_text(entry + line)
+        paper.cache_clear()
+        with pytest.raises(FileError, match=found):
+            paper(bad)
+
+
+def test_comparison_in_results_is_what_the_measured_numbers_give(tmp_path):
+    comparison, figures = compare(read_measured(RESULTS))
+    for name, table in (("comparison", comparison), ("figures", figures)):
+        Folder(tmp_path).write_table(name, table)
+        new, kept = ((f / f"{name}.csv").read_text() for f in (tmp_path, RESULTS))
+        assert new == kept, "run: python -m studies reproduce"
+    assert not (comparison.verdict == "not measured").any()
+
+
+def test_results_are_small():
+    files = [path for path in RESULTS.rglob("*") if path.is_file()]
+    assert sum(path.stat().st_size for path in files) < 30e6
+    assert max(path.stat().st_size for path in files if path.suffix == ".png") <= 150_000
+
+
+# ------------------------------------------------------------------------------------ steps
+
+
+def _study(name="tiny", fail=""):
+    def data(folder, short):
+        if fail == "data":
+            raise OptionError("no data")
+        folder.write_table("records", pd.DataFrame({"x": [1.0 if short else 2.0]}))
+
+    def table(folder):
+        return {"x": folder.read_table("records").x[0]}
+
+    return Study(name, "a test", data, table, lambda folder: None, parameters={"a": 1})
+
+
+def test_steps_are_taken_in_order_and_the_provenance_is_apart_from_the_numbers(tmp_path):
+    steps = []
+    perform(_study(), tmp_path, announce=steps.append)
+    assert steps == ["data", "table", "figure"]
+    assert read_measured(tmp_path) == {"tiny.x": 2.0}
+    provenance = json.loads((tmp_path / "tiny" / "provenance.json").read_text())
+    assert provenance["parameters"] == {"a": 1}
+    assert {"python", "numpy", "numba"} <= set(provenance["versions"])
+    assert set(provenance["seconds"]) == set(steps)
+
+
+def test_a_study_that_fails_leaves_no_numbers_of_an_earlier_run(tmp_path):
+    perform(_study(), tmp_path)
+    with pytest.raises(OptionError):
+        perform(_study(fail="data"), tmp_path)
+    assert read_measured(tmp_path) == {}
+
+
+def test_table_alone_uses_the_records_that_are_there(tmp_path):
+    perform(_study(), tmp_path, short=True)
+    perform(_study(fail="data"), tmp_path, steps=["table"])
+    assert read_measured(tmp_path) == {"tiny.x": 1.0}
+
+
+WORKER = """
+import sys, time
+name = sys.argv[1]
+print("data", flush=True)
+if name == "error": sys.exit("the mesh is gone")
+if name == "crash": import os; os.abort()
+if name == "sleep": time.sleep(60)
+print("table", flush=True)
+"""
+
+
+def _run(tmp_path, names):
+    script = tmp_path / "worker.py"
+    script.write_text(WORKER)
+    studies = [_study(name) for name in names]
+    quiet = Console(quiet=True)
+    return run_all(studies, tmp_path, quiet, worker=(sys.executable, str(script)))
+
+
+def test_a_failing_or_crashing_study_is_an_outcome_and_the_others_go_on(tmp_path):
+    outcomes = _run(tmp_path, ["error", "good", "crash", "fine"])
+    assert [o.study for o in outcomes] == ["error", "good", "crash", "fine"]
+    assert outcomes[0].error == "the mesh is gone"
+    assert "code" in outcomes[2].error or "abort" in outcomes[2].error.lower()
+    assert outcomes[1].error == outcomes[3].error == ""
+
+
+def test_interrupt_ends_the_processes_under_way(tmp_path):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, 0.5)
+    start = time.perf_counter()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            _run(tmp_path, ["sleep", "sleep", "sleep"])
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert time.perf_counter() - start < 20.0
+
+
+# ------------------------------------------------------------------------------ command line
+
+
+def test_list_names_every_study(capsys):
+    assert main(["list"]) == 0
+    listed = capsys.readouterr().out
+    assert all(name in listed for name in STUDIES)
+
+
+def test_unknown_study_is_answered_with_the_nearest(capsys):
+    assert main(["run", "exampel1"]) == 2
+    assert "did you mean 'example1'" in capsys.readouterr().err
+    with pytest.raises(OptionError, match="unknown study"):
+        chosen(["nothing"])
+
+
+def test_worker_says_in_one_line_what_it_lacks(tmp_path, capsys):
+    assert work(["example1", "--results", str(tmp_path), "--steps", "table"]) == 1
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_the_same_run_twice_gives_the_same_bytes_in_every_table(tmp_path):
+    for name in ("one", "two"):
+        for study in chosen(["example1", "alpha_grid"]):
+            perform(study, tmp_path / name, short=True, steps=["data", "table"])
+    tables = sorted(p.relative_to(tmp_path / "one") for p in (tmp_path / "one").rglob("*.csv"))
+    assert len(tables) > 5
+    for table in tables:
+        assert (tmp_path / "one" / table).read_bytes() == (tmp_path / "two" / table).read_bytes()
+
+
+@pytest.mark.slow
+def test_command_runs_from_anywhere_and_ends_with_the_comparison(tmp_path):
+    command = [sys.executable, "-m", "studies", "run", "example3", "--short", "--results"]
+    environment = os.environ | {"PYTHONPATH": str(HOME), "COLUMNS": "200"}
+    done = subprocess.run(
+        [*command, str(tmp_path / "r")], cwd=tmp_path, env=environment, text=True,
+        capture_output=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "what the paper says" in done.stdout
+    assert (tmp_path / "r" / "comparison.csv").is_file()
+    assert (tmp_path / "r" / "example3" / "fig19.png").stat().st_size > 1000
+    left = [p.name for p in (tmp_path / "r").rglob("*") if p.name.startswith(".")]
+    assert left == []
+
+
+# ------------------------------------------------------------------- what the studies measure
+
+
+@pytest.mark.parametrize("surface", [two_squares(5), two_caps(1.2)], ids=["squares", "caps"])
+def test_numpy_yardstick_agrees_with_the_compiled_loop(surface):
+    mine, theirs = numpy_energy_and_gradient(surface), energy_and_gradient(surface)
+    assert mine[0] == pytest.approx(theirs[0], rel=1e-13)
+    assert np.allclose(mine[1], theirs[1], atol=1e-13 * np.abs(theirs[1]).max())
+
+
+def test_turn_between_two_flat_sheets_is_their_angle():
+    surface = two_squares(4, height=1.0)
+    X = surface.vertices.copy()
+    X[:, 2] *= 0.0
+    roof = np.unique(surface.faces[surface.patch_faces([0, 1])])
+    X[roof, 2] = 1.0 + np.abs(X[roof, 0]) * math.tan(math.radians(20.0))
+    middle = int(np.argmin(np.linalg.norm(X - [0.0, 0.0, 1.0], axis=1)))
+    assert turn(surface.moved(X), middle, ("left", "right")) == pytest.approx(40.0)
+    X[roof, 2] = 1.0 - np.abs(X[roof, 0]) * math.tan(math.radians(20.0))
+    assert turn(surface.moved(X), middle, ("left", "right")) == pytest.approx(-40.0)
+
+
+def test_every_vertex_that_can_move_is_in_one_group_and_the_shares_add_to_one():
+    surface = two_caps(1.2)
+    masks = groups(surface)
+    assert tuple(masks) == GROUPS
+    assert np.array_equal(sum(m.astype(int) for m in masks.values()), (~surface.fixed).astype(int))
+    shares = holders(surface)
+    assert sum(shares[f"share {g}"] for g in GROUPS) == pytest.approx(1.0)
+
+
+def test_template_keeps_what_is_around_the_markers():
+    text = "before\n<!-- comparison: begin -->old<!-- comparison: end -->\nafter"
+    assert with_block(text, "NEW") == "before\nNEW\nafter"
+    with pytest.raises(FileError, match="markers"):
+        with_block("no markers", "NEW")
