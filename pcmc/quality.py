@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import Floats
+from .arrays import Floats, Ints
+from .energy import apply_supports
 from .surface import Surface
+from .topology import CURVE, POINT
 
 
-def triangle_quality(X: Floats, F: Floats) -> Floats:
+def triangle_quality(X: Floats, F: Ints) -> Floats:
     """q = 4√3 area / Σ edge² (m,), 1 for an equilateral triangle, 0 for a degenerate one.
 
     >>> triangle_quality(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])).round(6)
@@ -32,3 +34,33 @@ def edge_lengths(surface: Surface) -> Floats:
     """(e,) length of each edge, in the order of ``surface.topology.edges``."""
     start, end = surface.topology.edges.T
     return np.linalg.norm(surface.vertices[end] - surface.vertices[start], axis=1)
+
+
+def redistribution(
+    surface: Surface, X: Floats, curve_edges: Ints, kind: Ints, step: float = 0.5
+) -> Floats:
+    """Move (n,3) of each vertex towards a better-shaped star, before any projection.
+
+    Inside a sheet towards the area-weighted mean of its triangles' centroids, on a curve towards the
+    middle of its two neighbours along the curve, at a point not at all; fixed vertices stay and
+    sliding ones keep to Π.
+    """
+    F = surface.faces
+    corners = X[F]
+    area = 0.5 * np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    weighted = np.zeros_like(X)
+    total = np.zeros(len(X))
+    for corner in range(3):
+        np.add.at(total, F[:, corner], area)
+        np.add.at(weighted, F[:, corner], area[:, None] * corners.mean(axis=1))
+    move = np.where(
+        total[:, None] > 0.0, weighted / np.where(total > 0, total, 1.0)[:, None] - X, 0
+    )
+    middle = np.zeros_like(X)
+    np.add.at(middle, curve_edges[:, 0], 0.5 * X[curve_edges[:, 1]])
+    np.add.at(middle, curve_edges[:, 1], 0.5 * X[curve_edges[:, 0]])
+    move[kind == CURVE] = (middle - X)[kind == CURVE]
+    move[kind == POINT] = 0.0
+    return apply_supports(surface, step * move)

@@ -1,0 +1,248 @@
+"""Walls that pinch: where a junction comes down to Π the wall's height vanishes and it rests there.
+
+A wall of tension α_w and height z over a length s costs α_w |z| s: not differentiable at z = 0. The
+junction rests on Π where the upward pull of the sheets on it is at most α_w per length, and stands off
+where the forces balance. While it rests, the wall below has no area: its vertices coincide with the
+junction vertex above them (their *owner*), and its triangles are left out. So a pinched wall is seen from
+the positions alone, and a surface with one needs no extra state.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .arrays import Bools, Floats, Ints
+from .energy import energy_and_gradient
+from .motion import MotionSpace
+from .surface import Surface
+from .topology import topology
+
+SNAP = 1e-3  # of a crest edge: a vertex this near to hanging straight below a crest vertex does
+RESTING = 1e-12  # height, relative to the size, at which a junction counts as resting on Π
+
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """The walls that can pinch, those whose lower edge slides on Π, and how they hang from their crest.
+
+    The crest is the junction above such a wall. A wall vertex hangs below the crest edge (i, j), at
+    the fraction λ along it and the fraction ρ of the height there: 0 on Π, 1 at the crest.
+
+    Attributes
+    ----------
+    hanging : (w,) vertices of such walls below the crest.
+    ends : (w,2) crest vertices i, j that each hangs from.
+    along, share : (w,) λ and ρ.
+    can_rest : (n,) bool, free crest vertices.
+    anchored : (n,) bool, fixed crest vertices on Π, where a wall ends in a corner.
+    edges : (k,2) crest edges.
+    tension : (k,) tension of the wall below each of those edges.
+    side : (n,) +1 or -1, the side of Π a vertex stands on.
+    pinchable : (patches,) bool, the patches that are such walls.
+    """
+
+    hanging: Ints
+    ends: Ints
+    along: Floats
+    share: Floats
+    can_rest: Bools
+    anchored: Bools
+    edges: Ints
+    tension: Floats
+    side: Floats
+    pinchable: Bools
+
+
+def walls(surface: Surface) -> Walls:
+    """The walls of a surface that can pinch, and how each vertex hangs from the crest."""
+    n = surface.n
+    height = surface.plane.height(surface.vertices)
+    outer = np.zeros(n, dtype=bool)
+    outer[surface.faces[surface.pressures[surface.patch_of_face] != 0.0]] = True
+    pinchable = np.zeros(len(surface.patches), dtype=bool)
+    hanging, edges, tension = [], [np.empty((0, 2), dtype=np.int64)], [np.empty(0)]
+    for index, patch in enumerate(surface.patches):
+        faces = surface.faces[surface.patch_of_face == index]
+        members = np.unique(faces)
+        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        crest = np.unique(sides[outer[sides].all(axis=1)], axis=0)
+        if patch.pressure != 0.0 or not surface.on_plane[members].any() or not len(crest):
+            continue
+        pinchable[index] = True
+        below = members[~outer[members]]
+        hanging.append((below, *_hang(surface, below, crest)))
+        edges.append(crest)
+        tension.append(np.full(len(crest), patch.tension))
+    crest = np.concatenate(edges)
+    above = np.zeros(n, dtype=bool)
+    above[crest] = True
+    low = np.abs(height) <= RESTING * surface.size
+    below, ends, along, share = _joined(hanging)
+    return Walls(
+        hanging=below,
+        ends=ends,
+        along=along,
+        share=share,
+        can_rest=above & ~surface.fixed & ~surface.on_plane,
+        anchored=above & surface.fixed & low,
+        edges=crest,
+        tension=np.concatenate(tension),
+        side=np.where(height < 0.0, -1.0, 1.0),
+        pinchable=pinchable,
+    )
+
+
+def hung(surface: Surface, below: Walls, X: Floats, space: MotionSpace | None = None) -> Floats:
+    """X (n,3) with every hanging vertex brought below its place on the crest.
+
+    With the motion space given, only along the wall: what the vertex stands off across it stays.
+    """
+    if not len(below.hanging):
+        return X
+    i, j = below.ends.T
+    along = below.along[:, None]
+    place = (1.0 - along) * X[i] + along * X[j]
+    lift = (below.share - 1.0) * surface.plane.height(place)
+    place += lift[:, None] * np.array(surface.plane.normal)
+    change = np.zeros_like(X)
+    change[below.hanging] = place - X[below.hanging]
+    if space is not None:
+        change -= space.project(change)
+    change[surface.fixed] = 0.0
+    return X + change
+
+
+def resting(surface: Surface, below: Walls) -> Bools:
+    """(n,) junction vertices that rest on Π, seen from the positions."""
+    height = surface.plane.height(surface.vertices)
+    return below.can_rest & (np.abs(height) <= RESTING * surface.size)
+
+
+def pinched(surface: Surface, below: Walls, rests: Bools) -> Surface:
+    """The surface whose wall is gone below the resting vertices, which slide on Π.
+
+    It has the same vertex array; vertices of the vanished wall belong to no face.
+    """
+    if not rests.any():
+        return surface
+    X = surface.vertices.copy()
+    X[rests] -= surface.plane.height(X[rests])[:, None] * np.array(surface.plane.normal)
+    group = _merged(surface.n, below, rests)
+    X = X[group]
+    F = group[surface.faces]
+    apart = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
+    keep = apart & ~(_down(surface, below, rests)[F].all(axis=1) & _of_walls(surface))
+    F, patch = np.ascontiguousarray(F[keep]), np.ascontiguousarray(surface.patch_of_face[keep])
+    return surface._with(
+        vertices=X, faces=F, patch_of_face=patch, topology=topology(F, patch, surface.n),
+        on_plane=surface.on_plane | rests,
+    )  # fmt: skip
+
+
+def creases(below: Walls, rests: Bools) -> Ints:
+    """(k,2) junction edges that lie on Π, both ends at rest or in a corner."""
+    down = rests | below.anchored
+    return below.edges[down[below.edges].all(axis=1)]
+
+
+def pull_and_capacity(surface: Surface, below: Walls, rests: Bools) -> tuple[Floats, Floats]:
+    """Upward pull (n,) on each resting vertex of a pinched surface and what the wall can take, force.
+
+    The pull is the force of the sheets away from Π. Lifting the vertex by dz makes a wall of area
+    ½ ℓ dz under each crest edge there, standing or not, so the capacity is ½ Σ α_w ℓ; the vertex
+    rests while pull ≤ capacity.
+    """
+    force = -energy_and_gradient(surface, supports=False)[1]
+    pull = np.where(rests, below.side * (force @ np.array(surface.plane.normal)), 0.0)
+    ends = surface.vertices[below.edges]
+    half = 0.5 * below.tension * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    capacity = np.zeros(surface.n)
+    np.add.at(capacity, below.edges[:, 0], half)
+    np.add.at(capacity, below.edges[:, 1], half)
+    return pull, np.where(rests, capacity, 0.0)
+
+
+def lifted(surface: Surface, below: Walls, free: Bools, fraction: float = 0.05) -> Surface:
+    """The full surface with the given resting vertices raised off Π by a fraction of their spacing.
+
+    The wall below comes back hanging from them.
+    """
+    ends = surface.vertices[below.edges]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    spacing = np.full(surface.n, np.inf)
+    np.minimum.at(spacing, below.edges[:, 0], lengths)
+    np.minimum.at(spacing, below.edges[:, 1], lengths)
+    X = surface.vertices.copy()
+    X[free] += (fraction * spacing[free] * below.side[free])[:, None] * np.array(
+        surface.plane.normal
+    )
+    back = free[below.ends].any(axis=1)
+    place = hung(surface, below, X)
+    X[below.hanging[back]] = place[below.hanging[back]]
+    return surface.moved(X)
+
+
+def settled(surface: Surface, below: Walls, rests: Bools, X: Floats) -> Floats:
+    """X (n,3) with the vertices of vanished walls brought to their place on the resting junction."""
+    i, j = below.ends.T
+    gone = (rests | below.anchored)[below.ends].all(axis=1)
+    along = below.along[gone, None]
+    X = X.copy()
+    X[below.hanging[gone]] = (1.0 - along) * X[i[gone]] + along * X[j[gone]]
+    return X[_merged(surface.n, below, rests)]
+
+
+def _hang(surface: Surface, below: Ints, crest: Ints) -> tuple[Ints, Floats, Floats]:
+    """Crest edge ends (w,2), λ and ρ of wall vertices, by nearness seen along the normal of Π."""
+    height = surface.plane.height(surface.vertices)
+    flat = surface.vertices - height[:, None] * np.array(surface.plane.normal)
+    start, side = flat[crest[:, 0]], flat[crest[:, 1]] - flat[crest[:, 0]]
+    length = np.einsum("ij,ij->i", side, side)
+    near = cKDTree(start + 0.5 * side).query(flat[below], k=min(4, len(crest)))[1]
+    near = near.reshape(len(below), -1)
+    along = np.einsum("wkj,wkj->wk", flat[below][:, None] - start[near], side[near])
+    along = np.clip(along / np.where(length > 0.0, length, 1.0)[near], 0.0, 1.0)
+    foot = start[near] + along[:, :, None] * side[near]
+    best = np.linalg.norm(flat[below][:, None] - foot, axis=2).argmin(axis=1)
+    row = np.arange(len(below))
+    along = along[row, best]
+    along = np.where(along < SNAP, 0.0, np.where(along > 1.0 - SNAP, 1.0, along))
+    ends = crest[near[row, best]]
+    above = (1.0 - along) * height[ends[:, 0]] + along * height[ends[:, 1]]
+    share = np.divide(height[below], above, out=np.zeros(len(below)), where=above != 0.0)
+    return ends, along, np.clip(share, 0.0, 1.0)
+
+
+def _joined(parts: list[tuple[Ints, Ints, Floats, Floats]]) -> tuple[Ints, Ints, Floats, Floats]:
+    """One list of hanging vertices; one that two walls share hangs from the first."""
+    if not parts:
+        return np.empty(0, dtype=int), np.empty((0, 2), dtype=int), np.empty(0), np.empty(0)
+    vertex, ends, along, share = (np.concatenate(column) for column in zip(*parts, strict=True))
+    first = np.unique(vertex, return_index=True)[1]
+    return vertex[first], ends[first], along[first], share[first]
+
+
+def _merged(n: int, below: Walls, rests: Bools) -> Ints:
+    """(n,) the vertex each one coincides with: hanging straight below a resting one, or itself."""
+    group = np.arange(n, dtype=np.int32)
+    for end, at in ((0, 0.0), (1, 1.0)):
+        owner = below.ends[:, end]
+        straight = (below.along == at) & rests[owner]
+        group[below.hanging[straight]] = owner[straight]
+    return group
+
+
+def _down(surface: Surface, below: Walls, rests: Bools) -> Bools:
+    """(n,) vertices that lie on Π: resting, in a corner, or hanging from such or by nothing."""
+    down = rests | below.anchored
+    i, j = below.ends.T
+    low_i, low_j = down[i] | (below.along == 1.0), down[j] | (below.along == 0.0)
+    down[below.hanging] = (low_i & low_j) | (below.share == 0.0)
+    return down
+
+
+def _of_walls(surface: Surface) -> Bools:
+    return surface.pressures[surface.patch_of_face] == 0.0

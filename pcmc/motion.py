@@ -1,0 +1,196 @@
+"""The motion space: at each vertex the directions in which moving it changes the shape.
+
+- inside a sheet: the unit vertex normal (the normalised vector area);
+- on a curve where sheets meet or end: the plane perpendicular to the curve;
+- at a point where such curves meet: all three directions;
+- always within what the support allows: nothing where fixed, along Π where sliding.
+
+The remaining directions only slide vertices along the shape and belong to mesh quality. Faces without
+tension and pressure exert no force: they are left out, and a vertex of such faces alone has no motion.
+A P-CMC surface is Bᵀ∇E = 0, with B the basis of this space.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from . import kernels
+from .arrays import Bools, Floats, Ints
+from .surface import Surface
+from .topology import CURVE, POINT, SHEET, Topology, curve_tangents, topology, vertex_kind
+
+PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What stays the same while the vertices move: the pulling faces and what each vertex lies on.
+
+    Attributes
+    ----------
+    active : (m,) bool, faces with a tension or a pressure.
+    faces, patch_of_face : the active faces alone.
+    curve_edges : (k,2) edges where active sheets meet, end, or change tension or pressure.
+    kind : (n,) SHEET, CURVE or POINT in that sense.
+    idle : (n,) vertices of no active face.
+    """
+
+    active: Bools
+    faces: Ints
+    patch_of_face: Ints
+    topology: Topology
+    curve_edges: Ints
+    kind: Ints
+    idle: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class MotionSpace:
+    """Orthonormal basis of the motion space at each vertex.
+
+    Attributes
+    ----------
+    basis : (n,3,3) float; basis[v, c] for c < dimension[v] are unit vectors, the rest zero.
+    dimension : (n,) int, 0 to 3.
+    """
+
+    basis: Floats
+    dimension: Ints
+
+    @cached_property
+    def start(self) -> Ints:
+        """(n+1,) first unknown of each vertex; the last entry is their number."""
+        return np.concatenate([[0], np.cumsum(self.dimension)]).astype(np.int64)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self.start[-1])
+
+    def pull(self, vectors: Floats) -> Floats:
+        """Bᵀ v (size,): the components of vectors (n,3) along the basis."""
+        return _pull(self.basis, self.dimension, self.start, vectors)
+
+    def push(self, components: Floats) -> Floats:
+        """B s (n,3): the vectors that have these components (size,)."""
+        return _push(self.basis, self.dimension, self.start, components)
+
+    def project(self, vectors: Floats) -> Floats:
+        """B Bᵀ v (n,3): the part of the vectors that changes the shape."""
+        return self.push(self.pull(vectors))
+
+
+def structure(surface: Surface, creases: Ints | None = None) -> Structure:
+    """The pulling faces of a surface and what its vertices lie on.
+
+    ``creases`` (k,2) are edges that count as curves whatever meets there: a junction that rests on Π
+    is held by it and may be sharp.
+
+    Two sheets of equal tension and pressure that meet with no pulling wall between them are one
+    smooth sheet: their common curve can slide along it freely and carries no motion of its own.
+    """
+    pulls = (surface.tensions != 0.0) | (surface.pressures != 0.0)
+    active = pulls[surface.patch_of_face]
+    faces = np.ascontiguousarray(surface.faces[active])
+    patch = np.ascontiguousarray(surface.patch_of_face[active])
+    kinds = np.unique(np.stack([surface.tensions, surface.pressures]), axis=1, return_inverse=True)
+    topo = topology(faces, np.asarray(kinds[1]).ravel()[patch].astype(np.int32), surface.n)
+    is_curve = topo.curve_edge
+    if creases is not None and len(creases):
+        key = topo.edges.astype(np.int64) @ [surface.n, 1]
+        is_curve = is_curve | np.isin(
+            key, np.sort(creases, axis=1).astype(np.int64) @ [surface.n, 1]
+        )
+    curve_edges = topo.edges[is_curve]
+    idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
+    return Structure(
+        active, faces, patch, topo, curve_edges, vertex_kind(curve_edges, surface.n), idle
+    )
+
+
+def motion_space(surface: Surface, frame: Structure, X: Floats) -> MotionSpace:
+    """Basis of the motion space of the surface with its vertices at X (n,3)."""
+    n = surface.n
+    basis = np.zeros((n, 3, 3))
+    dimension = np.zeros(n, dtype=np.int64)
+    moving = ~(surface.fixed | frame.idle)
+
+    sheet = moving & (frame.kind == SHEET)
+    vector = kernels.area_vectors(X, frame.faces)[0][sheet]
+    length = np.linalg.norm(vector, axis=1)
+    basis[sheet, 0] = vector / np.where(length > 0.0, length, 1.0)[:, None]
+    dimension[sheet] = length > 0.0
+
+    curve = moving & (frame.kind == CURVE)
+    tangent = curve_tangents(X, frame.curve_edges)
+    straight = np.einsum("ij,ij->i", tangent, tangent) > 0.5
+    ring = np.flatnonzero(curve & straight)
+    basis[ring, 0], basis[ring, 1] = perpendicular(tangent[ring])
+    dimension[ring] = 2
+
+    point = np.flatnonzero(moving & ((frame.kind == POINT) | (curve & ~straight)))
+    basis[point] = np.eye(3)
+    dimension[point] = 3
+
+    sliding = np.flatnonzero(moving & surface.on_plane)
+    if len(sliding):
+        _within_plane(np.array(surface.plane.normal), tangent, sliding, basis, dimension)
+    return MotionSpace(basis, dimension)
+
+
+def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors (k,3) that complete each unit direction (k,3) to a right-handed frame."""
+    axis = np.eye(3)[np.abs(directions).argmin(axis=1)]
+    first = np.cross(directions, axis)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return first, np.cross(directions, first)
+
+
+def _within_plane(
+    normal: Floats, tangent: Floats, sliding: Ints, basis: Floats, dimension: Ints
+) -> None:
+    """Cut the basis at sliding vertices down to directions along Π, in place."""
+    first, second = perpendicular(normal[None])
+    for size in (1, 2, 3):
+        chosen = sliding[dimension[sliding] == size]
+        if not len(chosen):
+            continue
+        old = basis[chosen].copy()
+        basis[chosen] = 0.0
+        if size == 1:
+            along = old[:, 0] - (old[:, 0] @ normal)[:, None] * normal
+            length = np.linalg.norm(along, axis=1)
+            keep = length > PARALLEL
+            basis[chosen[keep], 0] = along[keep] / length[keep, None]
+            dimension[chosen] = keep
+            continue
+        across = np.cross(normal, tangent[chosen])
+        length = np.linalg.norm(across, axis=1)
+        single = (length > PARALLEL) & (size == 2)
+        basis[chosen[single], 0] = across[single] / length[single, None]
+        basis[chosen[~single], 0], basis[chosen[~single], 1] = first[0], second[0]
+        dimension[chosen] = np.where(single, 1, 2)
+
+
+@kernels.compiled
+def _pull(basis, dimension, start, vectors):  # type: ignore[no-untyped-def]
+    out = np.empty(start[-1])
+    for v in range(len(dimension)):
+        for c in range(dimension[v]):
+            b = basis[v, c]
+            out[start[v] + c] = b[0] * vectors[v, 0] + b[1] * vectors[v, 1] + b[2] * vectors[v, 2]
+    return out
+
+
+@kernels.compiled
+def _push(basis, dimension, start, components):  # type: ignore[no-untyped-def]
+    out = np.zeros((len(dimension), 3))
+    for v in range(len(dimension)):
+        for c in range(dimension[v]):
+            s = components[start[v] + c]
+            for d in range(3):
+                out[v, d] += s * basis[v, c, d]
+    return out
