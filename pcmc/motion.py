@@ -141,6 +141,14 @@ def motion_space(surface: Surface, frame: Structure, X: Floats) -> MotionSpace:
     return MotionSpace(basis, dimension)
 
 
+def force_scale(surface: Surface, frame: Structure, X: Floats) -> float:
+    """The norm of the single triangles' tension forces ½ α |e|, which cancel at rest, force."""
+    sides = X[frame.faces[:, [1, 2, 0]]] - X[frame.faces]
+    pull = 0.5 * surface.tensions[frame.patch_of_face] * np.linalg.norm(sides, axis=2).T
+    return float(np.linalg.norm(pull)) or 1.0
+
+
+
 def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
     """Two unit vectors (k,3) that complete each unit direction (k,3) to a right-handed frame."""
     axis = np.eye(3)[np.abs(directions).argmin(axis=1)]

@@ -32,7 +32,7 @@ from ..descent import Smoother
 from ..energy import energy_and_gradient, energy_at
 from ..factor import Factor, Factoriser, SingularMatrix, factoriser
 from ..modes import lowest, negatives_without, stiffness
-from ..motion import MotionSpace, Structure, motion_space, structure
+from ..motion import MotionSpace, Structure, force_scale, motion_space, structure
 from ..quality import redistribution, triangle_quality
 from ..refine import prolongation, refine
 from ..rigid import rigid_modes, rigid_motions
@@ -487,10 +487,3 @@ def _normals(X: Floats, F: Ints) -> Floats:
 def residual_vectors(surface: Surface, frame: Structure, X: Floats) -> Floats:
     """B Bᵀ ∇E (n,3) with the frames and the gradient at X."""
     return motion_space(surface, frame, X).project(energy_and_gradient(surface, X)[1])
-
-
-def force_scale(surface: Surface, frame: Structure, X: Floats) -> float:
-    """The norm of the single triangles' tension forces ½ α |e|, which cancel at rest, force."""
-    sides = X[frame.faces[:, [1, 2, 0]]] - X[frame.faces]
-    pull = 0.5 * surface.tensions[frame.patch_of_face] * np.linalg.norm(sides, axis=2).T
-    return float(np.linalg.norm(pull)) or 1.0

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import Any
 
 import pandas as pd
 
+from ..certificate import Certificate, certify
 from ..surface import Surface
 
 
@@ -65,6 +67,11 @@ class Result:
     def converged(self) -> bool:
         """Whether the solver met its tolerance."""
         return self.status is Status.CONVERGED
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """What the surface reached is: residual, curvature error, stability, verdict."""
+        return certify(self.surface, status=self.status.name)
 
     @property
     def message(self) -> str:
