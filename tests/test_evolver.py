@@ -5,7 +5,7 @@ import pytest
 from tents import tent
 
 import pcmc
-from generators import two_squares
+from generators import four_fans, two_caps, two_squares
 from pcmc.energy import apply_supports
 from studies import evolver
 
@@ -23,6 +23,8 @@ SURFACES = {
     "walls under pressure": lambda: tent(pressures=(1.0, -0.4, 0.3)),
     "one pressure": lambda: tent(pressures=(1.0, 1.0, 0.0), tilted=False),
     "two squares": lambda: shaken(two_squares(4)),
+    "two caps": lambda: shaken(two_caps()),
+    "four fans": lambda: shaken(four_fans()),
 }
 
 

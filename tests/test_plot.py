@@ -11,8 +11,9 @@ import pcmc
 from generators import two_squares
 from pcmc import plot
 from pcmc.errors import FileError, MissingExtra, OptionError
+from pcmc.palette import WALLS, patch_colors, rgb
 from pcmc.plot import raster
-from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, WALLS, patch_colors, rgb, view_of
+from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
 
 RENDERERS = [
     pytest.param("matplotlib"),

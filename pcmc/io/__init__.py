@@ -17,11 +17,20 @@ from ..arrays import Floats
 from ..errors import FileError, FileWarning, PcmcError, unknown
 from ..files import whole
 from ..surface import Plane, Surface
-from .contents import Contents, to_surface, without_unused
+from .contents import Contents, merged, to_surface, without_unused
 
 FORMATS = {
+    ".pcmc": "native",
     ".fe": "evolver",
     ".dmp": "evolver",
+    ".obj": "obj",
+    ".ply": "ply",
+    ".stl": "stl",
+    ".vtp": "vtk",
+    ".vtu": "vtk",
+    ".glb": "gltf",
+    ".gltf": "gltf",
+    ".3dm": "rhino",
 }
 """Suffix and the module here that reads and writes it."""
 
@@ -82,9 +91,9 @@ def load(path: str | os.PathLike[str]) -> Contents:
             f"{path}: byte {error.start} is not text; is it a {path.suffix} file?"
         ) from None
     except PcmcError as error:
-        text = str(error)
-        raise FileError(text if text.startswith(str(path)) else f"{path}: {text}") from None
-    return without_unused(contents)
+        raise _located(path, error) from None
+    contents = without_unused(contents)
+    return merged(contents) if getattr(module, "MERGE", False) else contents
 
 
 def write(
@@ -108,8 +117,12 @@ def write(
     """
     path = Path(path)
     module = _module(path)
+    broken = [p.name for p in surface.patches if "\n" in p.name or "\r" in p.name]
+    if broken:
+        raise FileError(f"{path}: the patch name {broken[0]!r} has a line break in it; rename it")
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
-    lost = [name for name in scalars if not getattr(module, "SCALARS", False)]
+    kept = (getattr(module, "SCALARS", False), getattr(module, "FACE_SCALARS", True))
+    lost = [k for k, v in scalars.items() if not (kept[0] and (kept[1] or len(v) == surface.n))]
     if certificate is not None and not getattr(module, "CERTIFICATE", False):
         lost.append("certificate")
     try:
@@ -117,9 +130,17 @@ def write(
             module.write(temporary, surface, scalars=scalars, certificate=certificate or {})
     except OSError as error:
         raise FileError(f"{path}: cannot be written ({error.strerror or error})") from None
+    except PcmcError as error:
+        raise _located(path, error) from None
     if lost:
         text = f"{path}: a {path.suffix} file cannot carry {', '.join(lost)}; left out"
         warnings.warn(text, FileWarning, stacklevel=2)
+
+
+def _located(path: Path, error: PcmcError) -> FileError:
+    """The error with the file's name in front."""
+    text = str(error)
+    return FileError(text if text.startswith(str(path)) else f"{path}: {text}")
 
 
 def _module(path: Path) -> ModuleType:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,12 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import check
-from ..arrays import Floats, Ints
-from ..errors import OptionError, unknown
+from ..arrays import Bools, Floats, Ints
+from ..errors import FileError, OptionError, unknown
 from ..surface import Patch, Plane, Surface
 from ..topology import topology
+from .merge import coincident
 
 FREE, SLIDING, FIXED = 0, 1, 2
+ROUNDING = 1e-6  # of the size: what a format may round by
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +70,23 @@ def without_unused(contents: Contents) -> Contents:
     )
 
 
+def merged(contents: Contents) -> Contents:
+    """The same with vertices at one place made one, as patches that were written apart need."""
+    keep, place = coincident(contents.vertices)
+    if len(keep) == len(contents.vertices):
+        return contents
+    support = None
+    if contents.support is not None:
+        support = np.zeros(len(keep), dtype=np.int8)
+        np.maximum.at(support, place, contents.support)
+    n = len(contents.vertices)
+    scalars = {k: v[keep] if len(v) == n else v for k, v in contents.scalars.items()}
+    return replace(
+        contents, vertices=contents.vertices[keep], faces=place[contents.faces], support=support,
+        scalars=scalars,
+    )  # fmt: skip
+
+
 def to_surface(
     contents: Contents,
     tensions: Mapping[str, float] | float | None = None,
@@ -93,11 +113,18 @@ def to_surface(
     if fixed is None and support is None:
         held = held & ~sliding
     patches = _changed(contents.patches, "tension", tensions)
+    plane = plane or contents.plane or Plane()
     return Surface(
-        contents.vertices, contents.faces, contents.patch_of_face,
-        _changed(patches, "pressure", pressures), held, sliding,
-        plane or contents.plane or Plane(),
+        _on(plane, contents.vertices, sliding & ~held), contents.faces, contents.patch_of_face,
+        _changed(patches, "pressure", pressures), held, sliding, plane,
     )  # fmt: skip
+
+
+def _on(plane: Plane, X: Floats, sliding: Bools) -> Floats:
+    """Sliding vertices that single precision or few digits put beside the plane, back onto it."""
+    height, size = plane.height(X), float(np.linalg.norm(np.ptp(X, axis=0)))
+    near = sliding & (np.abs(height) < ROUNDING * size) & (np.abs(height) > 1e-12 * size)
+    return X - np.where(near, height, 0.0)[:, None] * np.array(plane.normal) if near.any() else X
 
 
 def _changed(
@@ -112,3 +139,51 @@ def _changed(
         if name not in names:
             raise OptionError(unknown("patch", name, names))
     return tuple(replace(p, **{key: values.get(p.name, getattr(p, key))}) for p in patches)
+
+
+# What formats of plain meshes carry besides the mesh, as one line of text
+
+
+def description(surface: Surface) -> str:
+    """Patches, plane and counts as JSON, for the comment or metadata of a format that has one."""
+    point, normal = surface.plane.point, surface.plane.normal
+    return json.dumps({
+        "patches": [[p.name, p.tension, p.pressure] for p in surface.patches],
+        "plane": [point, normal],
+        "counts": [surface.n, surface.m],
+    })  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Description:
+    """The same read back: patches by name, the plane, numbers of vertices and faces."""
+
+    patches: Mapping[str, Patch] = field(default_factory=dict)
+    plane: Plane | None = None
+    counts: tuple[int, int] | None = None
+
+    def named(self, names: Sequence[str]) -> tuple[Patch, ...]:
+        """Patches of these names, as described, or with tension and pressure 1."""
+        return tuple(self.patches.get(name, Patch(name, 1.0)) for name in names)
+
+    def check_counts(self, vertices: int, faces: int) -> None:
+        """An error when the file has lost some of what was written."""
+        if self.counts is not None and self.counts != (vertices, faces):
+            raise FileError(
+                f"cut off or changed: {self.counts[0]} vertices and {self.counts[1]} faces were"
+                f" written, {vertices} and {faces} found"
+            )
+
+
+def described(text: str | None) -> Description:
+    """The description in a text, or an empty one for no text."""
+    if text is None:
+        return Description()
+    try:
+        found = json.loads(text)
+        patches = [Patch(*p) for p in found["patches"]]
+        plane = Plane(*(tuple(v) for v in found["plane"]))
+        counts = (int(found["counts"][0]), int(found["counts"][1]))
+    except (ValueError, KeyError, TypeError, IndexError):
+        raise FileError(f"its pcmc description is damaged: {text[:60]!r}") from None
+    return Description({p.name: p for p in patches}, plane, counts)

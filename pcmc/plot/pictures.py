@@ -13,11 +13,12 @@ import numpy.typing as npt
 
 from ..arrays import Bools, Floats
 from ..errors import OptionError
+from ..palette import patch_colors
 from ..surface import Surface
 from .colors import color_scale
 from .figure import DPI, INK, SMALL, TEXT, Image, finish, new
 from .raster import paint
-from .scene import View, mean_edge, patch_colors, scene, view_of
+from .scene import View, mean_edge, scene, view_of
 
 Path = str | os.PathLike[str]
 ViewName = str | tuple[float, float]

@@ -14,11 +14,9 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import OptionError, unknown
+from ..palette import patch_colors, rgb
 from ..surface import Surface
 
-# Paul Tol's "light" scheme, told apart with every kind of colour blindness.
-SHEETS = ("#77AADD", "#EE8866", "#44BB99", "#EEDD88", "#FFAABB")
-WALLS = ("#DDDDDD", "#BBCC33", "#99DDFF", "#AAAA00")
 NO_VALUE = "#D9D9D9"
 FIXED_DOT, SLIDING_DOT = "#C8102E", "#1F4FBF"
 LINE = "#303030"
@@ -87,24 +85,6 @@ class Scene:
     dots: Floats
     dot_colors: Floats
     order: Ints
-
-
-def rgb(color: str) -> Floats:
-    """(3,) 0..1 of "#RRGGBB"."""
-    return np.array([int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5)])
-
-
-def patch_colors(surface: Surface) -> Floats:
-    """(k,3) RGB: one palette for sheets under pressure, another for walls."""
-    result, sheets, walls = [], 0, 0
-    for patch in surface.patches:
-        if patch.auxiliary:
-            result.append(rgb(WALLS[walls % len(WALLS)]))
-            walls += 1
-        else:
-            result.append(rgb(SHEETS[sheets % len(SHEETS)]))
-            sheets += 1
-    return np.array(result)
 
 
 def scene(

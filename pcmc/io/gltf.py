@@ -1,0 +1,70 @@
+"""glTF 2.0 (.glb, .gltf in one file): a mesh per patch, in single precision.
+
+glTF's y axis points up and ours is z: coordinates are turned on the way out and back. Supports and
+scalars at vertices are attributes of the vertices, tensions, pressures and plane metadata of the scene.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..palette import patch_colors
+from ..surface import Surface
+from .contents import Contents, described, description, support_of
+from .library import library, reading
+from .scenes import from_meshes
+
+SCALARS = MERGE = True
+FACE_SCALARS = False
+SUPPORT = "_SUPPORT"
+
+
+def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any) -> None:
+    """One file, buffers within."""
+    trimesh = library("trimesh")
+    data = {SUPPORT: support_of(surface).astype(np.float32)}
+    for name, values in scalars.items():
+        if len(values) == surface.n:
+            data["_" + re.sub(r"\W+", "_", name)] = values.astype(np.float32)
+    turned = surface.vertices[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
+    scene = trimesh.Scene()
+    for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
+        faces = surface.faces[surface.patch_of_face == k]
+        used, local = np.unique(faces, return_inverse=True)
+        mesh = trimesh.Trimesh(turned[used], local.reshape(-1, 3), process=False)
+        mesh.vertex_attributes.update({key: values[used] for key, values in data.items()})
+        material = trimesh.visual.material.PBRMaterial(
+            name=patch.name, baseColorFactor=[*color, 1.0], metallicFactor=0.0,
+            roughnessFactor=0.9, doubleSided=True,
+        )  # fmt: skip
+        mesh.visual = trimesh.visual.TextureVisuals(material=material)
+        scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name)
+    scene.metadata["pcmc"] = description(surface)
+    if path.suffix.lower() == ".glb":
+        path.write_bytes(trimesh.exchange.gltf.export_glb(scene, include_normals=True))
+    else:
+        files = trimesh.exchange.gltf.export_gltf(scene, embed_buffers=True, include_normals=True)
+        path.write_bytes(files["model.gltf"])
+
+
+def read(path: Path) -> Contents:
+    """Meshes as patches, by the names of their nodes."""
+    trimesh = library("trimesh")
+    with reading("glTF"):
+        scene = trimesh.load_scene(path, process=False)
+    told = scene.metadata.get("pcmc")
+    found = from_meshes(scene, path.stem, described(told))
+    X = found.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
+    scalars = {k[1:]: v for k, v in found.scalars.items() if k.startswith("_") and k != SUPPORT}
+    support = found.scalars.get(SUPPORT)
+    return replace(
+        found, vertices=X, scalars=scalars,
+        support=None if support is None else np.round(support).astype(np.int8),
+    )  # fmt: skip

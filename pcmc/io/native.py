@@ -1,0 +1,75 @@
+"""The native format (.pcmc): everything there is to a surface, to the last bit.
+
+A zip archive of NumPy arrays (an .npz) that ``numpy.load`` opens: ``vertices``, ``faces``,
+``patch_of_face``, ``support``, one ``scalar <name>`` per scalar, and ``meta``, a JSON text with the
+format's version, the patches, the plane and the certificate.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import FileError
+from ..surface import Surface
+from .contents import Contents, described, description, support_of
+from .library import reading
+
+VERSION = 1
+SCALARS = CERTIFICATE = True
+FORMAT = "pcmc surface"
+
+
+def write(
+    path: Path, surface: Surface, scalars: Mapping[str, Floats], certificate: Mapping[str, Any]
+) -> None:
+    """The archive; the same surface gives the same bytes."""
+    meta = {
+        "format": FORMAT,
+        "version": VERSION,
+        "description": description(surface),
+        "certificate": dict(certificate),
+    }
+    arrays: dict[str, Any] = {f"scalar {name}": value for name, value in scalars.items()}
+    with path.open("wb") as file:
+        np.savez_compressed(
+            file, meta=np.array(json.dumps(meta, default=_plain)), vertices=surface.vertices,
+            faces=surface.faces, patch_of_face=surface.patch_of_face,
+            support=support_of(surface), **arrays,
+        )  # fmt: skip
+
+
+def read(path: Path) -> Contents:
+    """All of it."""
+    with reading("pcmc"), path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+        meta = json.loads(str(arrays.pop("meta")))
+        if meta["format"] != FORMAT:
+            raise FileError(f"expected the format {FORMAT!r}, found {meta['format']!r}")
+        if meta["version"] > VERSION:
+            raise FileError(
+                f"written by a newer pcmc (format {meta['version']}, this one reads up to"
+                f" {VERSION}); update pcmc"
+            )
+        told = described(meta["description"])
+        return Contents(
+            arrays.pop("vertices"), arrays.pop("faces"), arrays.pop("patch_of_face"),
+            tuple(told.patches.values()), arrays.pop("support"), told.plane,
+            scalars={name.removeprefix("scalar "): value for name, value in arrays.items()},
+            certificate=meta["certificate"],
+        )  # fmt: skip
+
+
+def _plain(value: Any) -> Any:
+    """What JSON can hold of a certificate's values."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Enum):
+        return value.value
+    raise FileError(f"certificate: a {type(value).__name__} cannot be written; give plain values")

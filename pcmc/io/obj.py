@@ -1,0 +1,136 @@
+"""Wavefront OBJ (.obj), text. A group is a patch; supports are the points of groups "fixed" and
+"sliding"; tensions, pressures and plane are a comment."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import FileError
+from ..surface import Surface
+from .contents import FIXED, FREE, SLIDING, Contents, described, description, support_of
+from .polygons import triangulate
+from .text import rows
+
+MERGE = True
+MARK = "# pcmc "
+HELD = {"fixed": FIXED, "sliding": SLIDING}
+VERTEX = re.compile(r"^[^\S\n]*v[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\n]*$", re.M)
+FACE = re.compile(r"^[^\S\n]*f[^\S\n]+([^\n]+)$", re.M)
+POINT = re.compile(r"^[^\S\n]*p[^\S\n]+([\d \t]+)$", re.M)
+
+
+def write(path: Path, surface: Surface, **_: Any) -> None:
+    """Vertices as they print exactly, supports, then the faces group by group."""
+    support = support_of(surface)
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(f"{MARK}{description(surface)}\n")
+        file.write(rows("v %r %r %r\n", *surface.vertices.T))
+        for name, kind in HELD.items():
+            held = np.flatnonzero(support == kind) + 1
+            if len(held):
+                file.write(f"g {name}\n" + rows("p %d\n", held))
+        for k, patch in enumerate(surface.patches):
+            file.write(f"g {patch.name}\n")
+            file.write(rows("f %d %d %d\n", *(surface.faces[surface.patch_of_face == k].T + 1)))
+
+
+def read(path: Path) -> Contents:
+    """Groups (``g``, else ``o``, else ``usemtl``) as patches."""
+    text = re.sub(r"\\[^\S\n]*\n", " \f", path.read_text(encoding="utf-8"))
+    told = re.search(rf"^{MARK}(.*)$", text, re.M)
+    about = described(told[1] if told else None)
+    X = _vertices(text)
+    key = next((k for k in ("g", "o", "usemtl") if re.search(rf"^[^\S\n]*{k}\s", text, re.M)), "g")
+    names: list[str] = []
+    corners, counts, groups = [], [], []
+    support = np.full(len(X), FREE, dtype=np.int8)
+    for name, part, offset in _parts(text, key, path.stem):
+        count, corner = _faces(text, part, offset, len(X))
+        if len(count):
+            names += [] if name in names else [name]
+            counts.append(count)
+            corners.append(corner)
+            groups.append(np.full(len(count), names.index(name)))
+        if name in HELD:
+            points = np.array(" ".join(POINT.findall(part)).split(), dtype=np.int64)
+            _within(points, len(X), text, offset)
+            support[points - 1] = HELD[name]
+    if not names:
+        raise FileError("it holds no faces")
+    F, source, notes = triangulate(X, np.concatenate(corners), np.concatenate(counts))
+    about.check_counts(len(X), len(F))
+    known = told is not None or bool(support.any())
+    return Contents(
+        X, F, np.concatenate(groups)[source], about.named(names), support if known else None,
+        about.plane, notes=notes,
+    )  # fmt: skip
+
+
+def _vertices(text: str) -> Floats:
+    found = VERTEX.findall(text)
+    lines = len(re.findall(r"^[^\S\n]*v(?=\s)", text, re.M))
+    try:
+        if len(found) == lines:
+            return np.array(found, dtype=np.float64).reshape(-1, 3)
+    except ValueError:
+        pass
+    for line in re.finditer(r"^[^\S\n]*v(?=\s)[^\n]*$", text, re.M):
+        try:
+            [float(c) for c in line[0].split()[1:4]][2]
+        except (ValueError, IndexError):
+            raise _error(text, line.start(), "expected three coordinates", line[0]) from None
+    raise FileError("its vertices cannot be read")
+
+
+def _parts(text: str, key: str, default: str) -> Iterator[tuple[str, str, int]]:
+    """Name, text and offset of each stretch between statements of the key."""
+    heads = list(re.finditer(rf"^[^\S\n]*{key}(?:[^\S\n]+([^\n]*))?$", text, re.M))
+    starts = [0, *(h.end() for h in heads)]
+    ends = [*(h.start() for h in heads), len(text)]
+    names = [default, *((h[1] or default).strip() for h in heads)]
+    for name, start, end in zip(names, starts, ends, strict=True):
+        yield name, text[start:end], start
+
+
+def _faces(text: str, part: str, offset: int, n: int) -> tuple[Ints, Ints]:
+    """Corners per face, and the vertex index at each."""
+    found = FACE.findall(part)
+    bare = re.sub(r"/[^\s]*", "", "\n".join(found)).split("\n") if found else []
+    counts = np.array([len(face.split()) for face in bare], dtype=np.int64)
+    try:
+        corner = np.array(" ".join(bare).split(), dtype=np.int64)
+    except ValueError:
+        at = next(m for m in FACE.finditer(part) if not re.fullmatch(r"[-\d/\s]+", m[1]))
+        raise _error(text, offset + at.start(), "expected vertex numbers", at[0]) from None
+    if (corner < 0).any():  # counted back from the vertices seen so far
+        seen = np.array([m.start() for m in VERTEX.finditer(text)])
+        at_face = np.array([offset + m.start() for m in FACE.finditer(part)])
+        before = np.repeat(np.searchsorted(seen, at_face), counts)
+        corner = np.where(corner < 0, before + corner + 1, corner)
+    bad = np.flatnonzero((corner < 1) | (corner > n))
+    short = np.flatnonzero(counts < 3)
+    if len(bad) or len(short):
+        face = int(
+            np.searchsorted(np.cumsum(counts), bad[0], side="right") if len(bad) else short[0]
+        )
+        line = list(FACE.finditer(part))[face]
+        wrong = f"names a vertex outside 1..{n}" if len(bad) else "has fewer than three corners"
+        raise _error(text, offset + line.start(), f"the face {wrong}", line[0])
+    return counts, corner - 1
+
+
+def _within(points: Ints, n: int, text: str, offset: int) -> None:
+    if len(points) and not (points.min() >= 1 and points.max() <= n):
+        raise _error(text, offset + 1, f"a point here is outside 1..{n}", "p")
+
+
+def _error(text: str, offset: int, wrong: str, found: str) -> FileError:
+    before = text[:offset]
+    line = 1 + before.count("\n") + before.count("\f")
+    return FileError(f"line {line}: {wrong}, found {' '.join(found.split())[:60]!r}")

@@ -1,0 +1,242 @@
+"""Stanford PLY (.ply), written binary in double precision, read in any form.
+
+Faces carry ``patch``, vertices ``support`` (0 free, 1 sliding, 2 fixed) and both the scalars, as
+properties; names, tensions, pressures and plane are a comment. Own code, because the libraries at hand
+lose one or another of: double precision, properties of faces, polygons of different sizes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import FileError
+from ..surface import Surface
+from .cells import from_polygons
+from .contents import Contents, described, description, support_of
+
+SCALARS = MERGE = True
+MARK = "comment pcmc "
+RESERVED = ("x", "y", "z", "support", "patch", "vertex_indices")
+TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
+    "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
+    "int64": "i8", "uint64": "u8", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+}  # fmt: skip
+NAMES = {"u1": "uchar", "i4": "int", "f8": "double"}
+
+
+def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any) -> None:
+    """Little-endian binary."""
+    vertex = {c: surface.vertices[:, d].astype("<f8") for d, c in enumerate("xyz")}
+    vertex["support"] = support_of(surface).astype("u1")
+    face = {"patch": surface.patch_of_face.astype("<i4")}
+    for name, values in scalars.items():
+        key = re.sub(r"\s+", "_", name)
+        if key in RESERVED:
+            raise FileError(f"scalars: the name {name!r} is taken in a .ply file; rename it")
+        (vertex if len(values) == surface.n else face)[key] = np.asarray(values, dtype="<f8")
+    header = [
+        "ply", "format binary_little_endian 1.0", f"{MARK}{description(surface)}",
+        f"element vertex {surface.n}", *_announced(vertex),
+        f"element face {surface.m}", "property list uchar int vertex_indices", *_announced(face),
+        "end_header\n",
+    ]  # fmt: skip
+    three = {"corners": np.full(surface.m, 3, dtype="u1")}
+    corners = {f"corner {k}": surface.faces[:, k].astype("<i4") for k in range(3)}
+    with path.open("wb") as file:
+        file.write("\n".join(header).encode())
+        file.write(_table(vertex).tobytes())
+        file.write(_table({**three, **corners, **face}).tobytes())
+
+
+def _announced(columns: Mapping[str, Any]) -> list[str]:
+    return [f"property {NAMES[v.dtype.str[1:]]} {k}" for k, v in columns.items()]
+
+
+def _table(columns: Mapping[str, Any]) -> Any:
+    size = len(next(iter(columns.values())))
+    table = np.empty(size, dtype=[(k, v.dtype.str) for k, v in columns.items()])
+    for name, values in columns.items():
+        table[name] = values
+    return table
+
+
+# Reading
+
+
+@dataclass(frozen=True)
+class _Element:
+    """What the header announces: single properties before and after at most one list."""
+
+    name: str
+    size: int
+    before: list[tuple[str, str]]
+    items: tuple[str, str, str] | None  # name, type of the count, type of the items
+    after: list[tuple[str, str]]
+
+    def row(self, count: int) -> list[tuple[str, str, tuple[int, ...]]]:
+        """dtype of a row whose list has ``count`` items."""
+        row: list[tuple[str, str, tuple[int, ...]]] = [
+            (name, kind, ()) for name, kind in self.before
+        ]
+        if self.items is not None:
+            name, of_count, of_items = self.items
+            row += [(f"{name} count", of_count, ()), (name, of_items, (count,))]
+        return row + [(name, kind, ()) for name, kind in self.after]
+
+
+def read(path: Path) -> Contents:
+    """Binary or text, with triangles, quads or polygons."""
+    data = path.read_bytes()
+    header, form, start = _header(data)
+    told = re.search(rf"^{MARK}(.*)$", header, re.M)
+    elements = _elements(header, {"binary_big_endian": ">"}.get(form, "<"))
+    if form == "ascii":
+        try:
+            body = np.array(data[start:].split(), dtype=np.float64)
+        except ValueError as error:
+            raise FileError(f"its body is not all numbers ({error})") from None
+        elements = [_as_numbers(e) for e in elements]
+        data, start = body.tobytes(), 0
+    tables: dict[str, dict[str, Any]] = {}
+    for element in elements:
+        tables[element.name], start = _rows(element, data, start)
+        if element.name == "face":
+            break
+    vertex, face = tables["vertex"], tables["face"]
+    X = np.stack([np.asarray(vertex.pop(c, None), dtype=np.float64) for c in "xyz"], axis=1)
+    key = next((k for k in ("vertex_indices", "vertex_index") if k in face), None)
+    if key is None:
+        raise FileError("its faces list no vertex_indices")
+    corners, counts = face.pop(key), face.pop(f"{key} count")
+    about = described(told[1] if told else None)
+    return from_polygons(X, corners, counts, vertex, face, about, path.stem)
+
+
+def _header(data: bytes) -> tuple[str, str, int]:
+    """Header, "ascii" or "binary_..._endian", and where the body starts."""
+    end = re.search(rb"end_header[^\S\n]*\n", data[: 1 << 20])
+    if not data.startswith(b"ply") or end is None:
+        raise FileError("not a PLY file, or cut off within its header")
+    header = data[: end.start()].decode("utf-8", "replace").replace("\r", "")
+    form = re.search(r"^format (ascii|binary_little_endian|binary_big_endian) ", header, re.M)
+    if form is None:
+        raise FileError("its header has no format that is known")
+    return header, form[1], end.end()
+
+
+def _elements(header: str, order: str) -> list[_Element]:
+    elements: list[_Element] = []
+    for number, line in enumerate(header.split("\n"), 1):
+        words = line.split()
+        try:
+            match words:
+                case ["element", name, count]:
+                    elements.append(_Element(name, int(count), [], None, []))
+                case ["property", "list", of_count, of_items, name]:
+                    last = elements.pop()
+                    if last.items is not None:
+                        raise FileError(f"line {number}: a second list in one element is not read")
+                    items = (name, order + TYPES[of_count], order + TYPES[of_items])
+                    elements.append(_Element(last.name, last.size, last.before, items, []))
+                case ["property", kind, name]:
+                    last = elements[-1]
+                    single = last.before if last.items is None else last.after
+                    single.append((name, order + TYPES[kind]))
+        except FileError:
+            raise
+        except (KeyError, IndexError, ValueError):
+            raise FileError(f"line {number}: cannot be understood: {line[:60]!r}") from None
+    names = [e.name for e in elements]
+    if "vertex" not in names or "face" not in names[names.index("vertex") :]:
+        raise FileError(
+            f"its header announces no vertices and faces, but {', '.join(names) or '-'}"
+        )
+    missing = set("xyz") - {name for name, _ in elements[names.index("vertex")].before}
+    if missing:
+        raise FileError(f"its vertices have no property {min(missing)}")
+    return elements
+
+
+def _as_numbers(element: _Element) -> _Element:
+    """The same with every number a double, as the words of a text become."""
+    before, after = (
+        [(name, "<f8") for name, _ in part] for part in (element.before, element.after)
+    )
+    items = None if element.items is None else (element.items[0], "<f8", "<f8")
+    return _Element(element.name, element.size, before, items, after)
+
+
+def _rows(element: _Element, data: bytes, start: int) -> tuple[dict[str, Any], int]:
+    """Columns of an element that starts at a byte, a list's items one after the other; and its end."""
+    counts: Ints = np.zeros(element.size, dtype=np.int64)
+    offsets: Ints | None = None
+    if element.items is not None and element.size:
+        counts, offsets = _list_counts(element, data, start)
+    kinds = np.unique(counts)
+    if len(kinds) <= 1:
+        dtype = np.dtype(element.row(int(kinds[0]) if len(kinds) else 0))
+        _enough(element, data, start + element.size * dtype.itemsize)
+        table = np.frombuffer(data, dtype, element.size, start)
+        columns = {name: table[name].ravel() for name in dtype.names or ()}
+        return columns, start + element.size * dtype.itemsize
+    assert offsets is not None
+    _enough(element, data, int(offsets[-1]))
+    return _mixed(element, np.frombuffer(data, np.uint8), counts, offsets), int(offsets[-1])
+
+
+def _list_counts(element: _Element, data: bytes, start: int) -> tuple[Ints, Ints | None]:
+    """Items in each row's list; where lists differ, also where each row starts and the last ends."""
+    base = np.dtype(element.row(0))
+    name, of_count, of_items = element.items  # type: ignore[misc]
+    at = base.fields[f"{name} count"][1]  # type: ignore[index]
+    item = np.dtype(of_items).itemsize
+
+    def count_at(offset: int) -> int:
+        _enough(element, data, offset + base.itemsize)
+        return int(np.frombuffer(data, of_count, 1, offset + at)[0])
+
+    first = count_at(start)
+    row = base.itemsize + first * item
+    if first >= 0 and start + element.size * row <= len(data):
+        table = np.frombuffer(data, np.dtype(element.row(first)), element.size, start)
+        if (table[f"{name} count"] == first).all():
+            return np.full(element.size, first), None
+    counts, offsets = np.empty(element.size, np.int64), np.empty(element.size + 1, np.int64)
+    for k in range(element.size):  # each row says only where the next one starts
+        offsets[k], counts[k] = start, count_at(start)
+        if counts[k] < 0:
+            raise FileError(f"{element.name} {k} lists {counts[k]} items")
+        start += base.itemsize + int(counts[k]) * item
+    offsets[-1] = start
+    return counts, offsets
+
+
+def _mixed(element: _Element, data: Any, counts: Ints, offsets: Ints) -> dict[str, Any]:
+    """Columns of rows of different lengths, read together by length."""
+    name = element.items[0]  # type: ignore[index]
+    columns: dict[str, Any] = {}
+    ends = np.cumsum(counts)
+    for count in np.unique(counts):
+        dtype = np.dtype(element.row(int(count)))
+        chosen = np.flatnonzero(counts == count)
+        table = data[offsets[chosen][:, None] + np.arange(dtype.itemsize)].view(dtype).ravel()
+        for key in dtype.names or ():
+            size = ends[-1] if key == name else element.size
+            place = (ends[chosen] - count)[:, None] + np.arange(count) if key == name else chosen
+            columns.setdefault(key, np.zeros(size, dtype[key].base))[place] = table[key]
+    return columns
+
+
+def _enough(element: _Element, data: bytes, end: int) -> None:
+    if end > len(data):
+        raise FileError(
+            f"cut off: the file ends before its {element.size} {element.name} elements do"
+        )

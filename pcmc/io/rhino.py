@@ -1,0 +1,146 @@
+"""Rhino (.3dm): a layer per patch with its mesh in double precision, in the patch's colour.
+
+Tensions, pressures and plane are the layers' user text; supports are point clouds on the layers "fixed"
+and "sliding". Scalars are lost.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..arrays import Floats, Ints
+from ..errors import FileError
+from ..palette import patch_colors
+from ..surface import Surface
+from .contents import (
+    FIXED,
+    FREE,
+    SLIDING,
+    Contents,
+    Description,
+    described,
+    description,
+    support_of,
+)
+from .library import library, reading
+from .merge import TOLERANCE
+from .polygons import triangulate
+
+MERGE = True
+KEY = "pcmc"
+HELD = {"fixed": FIXED, "sliding": SLIDING}
+VERSION = 7  # of Rhino's format
+COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255)}
+
+
+def write(path: Path, surface: Surface, **_: Any) -> None:
+    """Layers "patches::<name>" in metres; the plan's lengths are what they are."""
+    rhino = library("rhino3dm")
+    model = rhino.File3dm()
+    model.Settings.ModelUnitSystem = rhino.UnitSystem.Meters
+    text = description(surface)
+    for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
+        rgba = (*(round(255 * float(c)) for c in color), 255)
+        attributes = _layer(rhino, model, patch.name, rgba, text)
+        faces = surface.faces[surface.patch_of_face == k]
+        used, local = np.unique(faces, return_inverse=True)
+        mesh = rhino.Mesh()
+        mesh.Vertices.UseDoublePrecisionVertices = True
+        for point in surface.vertices[used].tolist():  # the library takes them one by one
+            mesh.Vertices.AddPoint3d(*point)
+        for corners in local.reshape(-1, 3).tolist():
+            mesh.Faces.AddFace(*corners)
+        mesh.Normals.ComputeNormals()
+        model.Objects.AddMesh(mesh, attributes)
+    support = support_of(surface)
+    for name, kind in HELD.items():
+        held = surface.vertices[support == kind]
+        if len(held):
+            cloud = rhino.PointCloud()
+            for point in held.tolist():
+                cloud.Add(rhino.Point3d(*point))
+            model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], text))
+    if not model.Write(str(path), VERSION):
+        raise FileError("cannot be written by rhino3dm; is there such a folder, and space?")
+
+
+def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str) -> Any:
+    """A new layer, and object attributes that put an object on it."""
+    layer = rhino.Layer()
+    layer.Name, layer.Color = name, color
+    layer.SetUserString(KEY, text)
+    attributes = rhino.ObjectAttributes()
+    attributes.LayerIndex, attributes.Name = model.Layers.Add(layer), name
+    return attributes
+
+
+def read(path: Path) -> Contents:
+    """Layers as patches; curves, surfaces and other objects are passed over, and said."""
+    rhino = library("rhino3dm")
+    with reading("3DM"):
+        model = rhino.File3dm.Read(str(path))
+    if model is None:
+        raise FileError("not a Rhino file, or cut off")
+    X, corners, counts, label = [], [], [], []
+    names: list[str] = []
+    held: dict[int, list[Floats]] = {FIXED: [], SLIDING: []}
+    about, others, start = Description(), 0, 0
+    for item in model.Objects:
+        layer = model.Layers[item.Attributes.LayerIndex]
+        geometry = item.Geometry
+        told = layer.GetUserString(KEY)
+        if told:
+            about = described(told)
+        if isinstance(geometry, rhino.Mesh):
+            points = _coordinates(geometry.Vertices.ToPoint3dArray())
+            faces = np.array([geometry.Faces[k] for k in range(geometry.Faces.Count)]).reshape(
+                -1, 4
+            )
+            size = np.where(
+                faces[:, 2] == faces[:, 3], 3, 4
+            )  # a triangle names its last corner twice
+            names += [] if layer.Name in names else [layer.Name]
+            X.append(points)
+            corners.append(faces[np.arange(4) < size[:, None]] + start)
+            counts.append(size)
+            label.append(np.full(len(size), names.index(layer.Name)))
+            start += len(points)
+        elif isinstance(geometry, rhino.PointCloud) and layer.Name in HELD:
+            held[HELD[layer.Name]].append(_coordinates(geometry.GetPoints()))
+        else:
+            others += 1
+    if not X:
+        raise FileError(f"it holds no meshes ({others} other objects); mesh the surfaces in Rhino")
+    points = np.concatenate(X)
+    F, source, notes = triangulate(points, np.concatenate(corners), np.concatenate(counts))
+    if others:
+        notes = (*notes, f"{others} objects that are not meshes were left out")
+    support = _supports(points, held) if about.plane is not None or any(held.values()) else None
+    return Contents(
+        points,
+        F,
+        np.concatenate(label)[source],
+        about.named(names),
+        support,
+        about.plane,
+        notes=notes,
+    )
+
+
+def _coordinates(points: Any) -> Floats:
+    return np.array([(p.X, p.Y, p.Z) for p in points], dtype=np.float64).reshape(-1, 3)
+
+
+def _supports(X: Floats, held: dict[int, list[Floats]]) -> Ints:
+    """Vertices at which a support's point lies."""
+    support = np.full(len(X), FREE, dtype=np.int8)
+    tree, reach = cKDTree(X), TOLERANCE * float(np.linalg.norm(np.ptp(X, axis=0)))
+    for kind in (SLIDING, FIXED):
+        for points in held[kind]:
+            for near in tree.query_ball_point(points, reach):
+                support[near] = kind
+    return support

@@ -1,0 +1,62 @@
+"""STL (.stl): written as text with one solid per patch, read in either form.
+
+Nothing but triangles and names: supports, tensions, pressures and scalars are lost.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileError
+from ..surface import Surface
+from .contents import Contents
+from .library import library, reading
+from .scenes import from_meshes
+from .text import rows
+
+MERGE = True
+FACET = (
+    "facet normal %.6g %.6g %.6g\nouter loop\nvertex %.9g %.9g %.9g\nvertex %.9g %.9g %.9g\n"
+    "vertex %.9g %.9g %.9g\nendloop\nendfacet\n"
+)
+
+
+def write(path: Path, surface: Surface, **_: Any) -> None:
+    """Coordinates to nine digits, which is all that readers of STL keep."""
+    P = surface.vertices[surface.faces]
+    normal = np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    lines = np.concatenate([normal, P.reshape(-1, 9)], axis=1)
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        for k, patch in enumerate(surface.patches):
+            chosen = lines[surface.patch_of_face == k]
+            file.write(f"solid {patch.name}\n{rows(FACET, *chosen.T)}endsolid {patch.name}\n")
+
+
+def read(path: Path) -> Contents:
+    """Solids as patches."""
+    trimesh = library("trimesh")
+    _complete(path)
+    with reading("STL"):
+        scene = trimesh.load_scene(path, file_type="stl", process=False)
+    return from_meshes(scene, path.stem)
+
+
+def _complete(path: Path) -> None:
+    """Text must end with ``endsolid``, binary hold the triangles it announces: readers do not look."""
+    data = path.read_bytes()
+    if data[:5] == b"solid" and b"facet" in data[:2000]:
+        last = data.rstrip().rsplit(b"\n", 1)[-1].strip()
+        if not last.startswith(b"endsolid"):
+            line = data.rstrip().count(b"\n") + 1
+            raise FileError(f"line {line}: cut off before 'endsolid', found {last[:40].decode()!r}")
+        return
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) < 84 or len(data) < 84 + 50 * count:
+        raise FileError(
+            f"not an STL file, or cut off: {count} triangles need {84 + 50 * count} bytes, found"
+            f" {len(data)}"
+        )

@@ -1,0 +1,241 @@
+"""What is written is read back, as far as the format goes, and nothing half-written stays."""
+
+import sys
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+from tents import tent
+
+import pcmc
+from pcmc.errors import FileError, FileWarning, MissingExtra, OptionError, PcmcError, SurfaceError
+from pcmc.io import FORMATS, load
+
+SINGLE = (".stl", ".glb", ".gltf")  # in single precision
+NAMES_ONLY = (".stl",)  # of all that is not the mesh
+SCALARS = (".pcmc", ".ply", ".vtp", ".vtu", ".glb", ".gltf")
+
+
+def matched(found, wanted, tolerance):
+    """Where each vertex wanted is among those found."""
+    assert len(found) == len(wanted)
+    distance, place = cKDTree(found).query(wanted)
+    assert distance.max() <= tolerance
+    assert len(np.unique(place)) == len(wanted)
+    return place
+
+
+def turned(face):
+    """A face from its smallest vertex on, the orientation kept."""
+    k = int(np.argmin(face))
+    return tuple(int(v) for v in np.roll(face, -k))
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("names", [("west side", "east", "wall"), ("Süd/Ost", "a.b", "κ_1 (2)")])
+def test_round_trip(tmp_path, suffix, names):
+    surface = tent(names=names)
+    path = tmp_path / f"roof one{suffix}"
+    pcmc.write(path, surface)
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    again = pcmc.read(path)
+    tolerance = surface.size * (1e-7 if suffix in SINGLE else 0.0)
+    place = matched(again.vertices, surface.vertices, tolerance)
+    assert sorted(p.name for p in again.patches) == sorted(names)
+    for k, name in enumerate(names):
+        wanted = {turned(f) for f in place[surface.faces[surface.patch_of_face == k]]}
+        mine = again.patch_of_face == again.patch_index(name)
+        assert {turned(f) for f in again.faces[mine]} == wanted
+    if suffix in NAMES_ONLY:
+        assert set(again.tensions) == {1.0} == set(again.pressures)
+        np.testing.assert_array_equal(again.fixed, again.topology.on_boundary)
+        return
+    assert again.patches == surface.patches
+    assert again.plane == surface.plane
+    np.testing.assert_array_equal(again.fixed[place], surface.fixed)
+    np.testing.assert_array_equal(again.on_plane[place], surface.on_plane)
+    assert pcmc.energy(again) == pytest.approx(pcmc.energy(surface), rel=tolerance or 1e-14)
+
+
+@pytest.mark.parametrize("suffix", [s for s in FORMATS if s != ".3dm"])  # it has the time in it
+def test_same_surface_same_bytes(tmp_path, suffix):
+    for name in ("a", "b"):
+        pcmc.write(tmp_path / f"{name}{suffix}", tent())
+    assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_scalars_travel_or_are_said_to_be_lost(tmp_path, suffix):
+    surface, path = tent(), tmp_path / f"a{suffix}"
+    scalars = {"height": surface.vertices[:, 2], "mean_curvature": pcmc.mean_curvature(surface)}
+    if suffix not in SCALARS:
+        with pytest.warns(FileWarning, match="cannot carry height, mean_curvature; left out"):
+            pcmc.write(path, surface, scalars=scalars)
+        assert not load(path).scalars
+        return
+    pcmc.write(path, surface, scalars=scalars)
+    contents = load(path)
+    place = matched(contents.vertices, surface.vertices, 1e-6)
+    for name, values in scalars.items():
+        np.testing.assert_allclose(
+            contents.scalars[name][place], values, rtol=1e-6 if suffix in SINGLE else 0
+        )
+
+
+@pytest.mark.parametrize("suffix", [".pcmc", ".ply", ".vtp", ".vtu"])
+def test_scalars_of_faces_travel(tmp_path, suffix):
+    surface, values = tent(), np.linspace(0, 1, 12)
+    pcmc.write(tmp_path / f"a{suffix}", surface, scalars={"load": values})
+    np.testing.assert_array_equal(load(tmp_path / f"a{suffix}").scalars["load"], values)
+
+
+def test_gltf_says_that_face_scalars_are_lost(tmp_path):
+    with pytest.warns(FileWarning, match=r"\.glb file cannot carry load"):
+        pcmc.write(tmp_path / "a.glb", tent(), scalars={"load": np.zeros(12)})
+
+
+def test_native_keeps_the_certificate(tmp_path):
+    told = {"verdict": "stable", "residual": np.float64(1e-13), "areas": np.array([1.0, 0.1])}
+    pcmc.write(tmp_path / "a.pcmc", tent(), certificate=told)
+    assert load(tmp_path / "a.pcmc").certificate == {
+        "verdict": "stable", "residual": 1e-13, "areas": [1.0, 0.1],
+    }  # fmt: skip
+    with pytest.raises(FileError, match="a object cannot be written"):
+        pcmc.write(tmp_path / "b.pcmc", tent(), certificate={"what": object()})
+    with pytest.warns(FileWarning, match="cannot carry certificate"):
+        pcmc.write(tmp_path / "a.obj", tent(), certificate=told)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.obj", "a.pcmc"]
+
+
+def test_closed_and_flat_surfaces(tmp_path):
+    """Nothing held, and a boundary that is not held either: as written, not guessed."""
+    X = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    F = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    flap = pcmc.Surface(X, F[1:], [0] * 3, [pcmc.Patch("a", 2.0)], fixed=[0])
+    for suffix in set(FORMATS) - set(NAMES_ONLY):
+        pcmc.write(tmp_path / f"a{suffix}", flap)
+        again = pcmc.read(tmp_path / f"a{suffix}")
+        assert again.fixed.sum() == 1, suffix
+        np.testing.assert_allclose(again.vertices[again.fixed], [X[0]], atol=1e-7)
+
+
+def test_what_the_caller_says_wins(tmp_path):
+    path = tmp_path / "a.obj"
+    pcmc.write(path, tent())
+    plane = tent().plane
+    again = pcmc.read(
+        path, tensions={"wall": 9.0}, pressures=2.0, fixed="boundary", on_plane=(), plane=plane
+    )
+    assert again.tensions.tolist() == [3.0, 2.1, 9.0]
+    assert again.pressures.tolist() == [2.0] * 3
+    np.testing.assert_array_equal(again.fixed, again.topology.on_boundary)
+    held = pcmc.read(path, fixed=[0, 1])
+    assert np.flatnonzero(held.fixed).tolist() == [0, 1]
+    with pytest.raises(OptionError, match=r"a\.obj: unknown patch 'wal'; did you mean 'wall'"):
+        pcmc.read(path, tensions={"wal": 1.0})
+    with pytest.raises(OptionError, match="unknown fixed 'boundry'; did you mean 'boundary'"):
+        pcmc.read(path, fixed="boundry")
+    with pytest.raises(SurfaceError, match=r"a\.obj: fixed\[0\] = 99"):
+        pcmc.read(path, fixed=[99])
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("part", [0.0, 0.02, 0.3, 0.6, 0.9, 0.99])
+def test_truncated_files_are_refused_in_one_line(tmp_path, suffix, part):
+    pcmc.write(tmp_path / f"a{suffix}", tent())
+    data = (tmp_path / f"a{suffix}").read_bytes()
+    path = tmp_path / f"cut{suffix}"
+    path.write_bytes(data[: int(part * len(data))])
+    with pytest.raises((FileError, SurfaceError)) as caught:
+        pcmc.read(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    assert len(message) < 400
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_other_formats_under_this_suffix_are_refused(tmp_path, suffix):
+    path = tmp_path / f"wrong{suffix}"
+    for data in (b"", b"\x00\xff\xfe" * 200, "Grüße\n".encode("latin-1"), b"<html></html>\n" * 9):
+        path.write_bytes(data)
+        with pytest.raises(FileError, match="wrong"):
+            pcmc.read(path)
+
+
+def test_paths_that_cannot_be(tmp_path):
+    with pytest.raises(FileError, match=r"unknown suffix '\.obk'; did you mean '\.obj'"):
+        pcmc.read(tmp_path / "a.obk")
+    with pytest.raises(FileError, match="unknown suffix ''"):
+        pcmc.write(tmp_path / "a", tent())
+    with pytest.raises(FileError, match=r"cannot be read \(No such file"):
+        pcmc.read(tmp_path / "none.ply")
+    (tmp_path / "folder.obj").mkdir()
+    with pytest.raises(FileError, match=r"cannot be read \(Is a directory"):
+        pcmc.read(tmp_path / "folder.obj")
+    for suffix in FORMATS:
+        with pytest.raises(FileError, match="cannot be written"):
+            pcmc.write(tmp_path / "no folder" / f"a{suffix}", tent())
+    with pytest.raises(FileError, match="has a line break"):
+        pcmc.write(tmp_path / "a.obj", tent(names=("a\nb", "c", "d")))
+    with pytest.raises(FileError, match=r"scalars\['h'\]: expected shape \(10,\)"):
+        pcmc.write(tmp_path / "a.ply", tent(), scalars={"h": np.zeros(3)})
+    for suffix in (".ply", ".vtp"):
+        with pytest.raises(FileError, match="the name 'support' is taken"):
+            pcmc.write(tmp_path / f"a{suffix}", tent(), scalars={"support": np.zeros(10)})
+    assert [p.name for p in tmp_path.iterdir()] == ["folder.obj"]
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
+    path = tmp_path / "a.obj"
+    pcmc.write(path, tent())
+    before = path.read_bytes()
+
+    def half(path, *_, **__):
+        path.write_text("half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pcmc.io.obj.write", half)
+    with pytest.raises(KeyboardInterrupt):
+        pcmc.write(path, tent())
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["a.obj"]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "name"),
+    [(".stl", "trimesh"), (".glb", "trimesh"), (".vtp", "pyvista"), (".3dm", "rhino3dm")],
+)
+def test_missing_libraries_are_named(tmp_path, monkeypatch, suffix, name):
+    path = tmp_path / f"a{suffix}"
+    pcmc.write(path, tent())
+    monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(MissingExtra, match=rf"{name} is not installed.*pcmc\[files\]"):
+        pcmc.read(path)
+
+
+def test_damaged_native_files(tmp_path):
+    import json
+
+    pcmc.write(tmp_path / "a.pcmc", tent())
+    with np.load(tmp_path / "a.pcmc") as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    meta = json.loads(str(arrays["meta"]))
+
+    def changed(**changes):
+        path = tmp_path / "b.pcmc"
+        with path.open("wb") as file:
+            np.savez(file, **{**arrays, "meta": np.array(json.dumps({**meta, **changes}))})
+        return path
+
+    with pytest.raises(FileError, match=r"newer pcmc \(format 2.*update pcmc"):
+        pcmc.read(changed(version=2))
+    with pytest.raises(FileError, match="expected the format 'pcmc surface', found 'other'"):
+        pcmc.read(changed(format="other"))
+    with pytest.raises(FileError, match="description is damaged"):
+        pcmc.read(changed(description="{}"))
+    assert pcmc.read(changed()).n == 10
+
+
+def test_every_error_is_ours():
+    assert issubclass(FileError, PcmcError)
