@@ -7,16 +7,19 @@ error that any flow can show for long.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import pandas as pd
 
 from generators import bezier_hall, four_fans, two_caps, two_squares
-from pcmc import gradient, solve
+from pcmc import Surface, gradient, solve
 
 from .flow import errors
 from .folder import Folder
 from .study import Study
 
-EXAMPLES = {
+EXAMPLES: dict[str, Callable[[], Surface]] = {
     "example1": two_squares,
     "example2": two_caps,
     "example3": four_fans,
@@ -29,7 +32,7 @@ def data(folder: Folder, short: bool) -> None:
     rows = []
     for name, build in EXAMPLES.items():
         start = build()
-        options = {"iterations": 5} if short else {}
+        options: dict[str, Any] = {"iterations": 5} if short else {}
         result = solve(start, "newton", target="stationary", **options)
         rows.append(
             {

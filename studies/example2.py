@@ -69,9 +69,11 @@ def _patch(stages: dict[str, Surface], name: str) -> dict[str, float | str]:
     mine = np.unique(start.faces[start.patch_faces([index])])
     centre, _ = BALLS[name]
     inside = mine[start.topology.interior[mine]]
+    radius = float(np.linalg.norm(start.vertices[inside] - centre, axis=1).mean())
     return {
         "patch": name,
-        "radius": float(np.linalg.norm(start.vertices[inside] - centre, axis=1).mean()),
+        "radius": radius,
+        "sphere_curvature": 1.0 / radius,
         "initial_curvature": float(np.mean(mean_curvature(start)[inside])),
         "initial_curvature_variational": float(
             np.mean(mean_curvature(start, "variational")[inside])

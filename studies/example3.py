@@ -16,16 +16,24 @@ from .folder import Folder
 from .study import Study
 
 T0, ITERATIONS = 0.01, 1000
+# The coarsest mesh of ``mesh_search`` on which the flow ends as printed, and how much the fans sag
+# below the cone for the printed ‖∇E‖² at the start: the paper tells neither.
+RINGS, BULGE = 8, -1.13
+FINE_RINGS = 14
+BELOW = 0.00499  # the paper prints "below 0.005" at its last iteration, and not which that is
 OPTIONS = {"t0": T0, "iterations": ITERATIONS}
 
 
 def cases() -> list[Case]:
-    """The calibrated mesh, both Armijo tests and L-BFGS, and a mesh on which the flow ends."""
+    """The calibrated mesh, stopped as printed and not; then other tests, methods and meshes."""
+    build = partial(four_fans, RINGS, bulge=BULGE)
     return [
-        Case("main", four_fans, OPTIONS),
-        Case("sufficient", four_fans, OPTIONS | {"armijo": "sufficient"}),
-        Case("lbfgs", four_fans, {"evaluations": 2 * ITERATIONS}, method="lbfgs"),
-        Case("fine", partial(four_fans, 14), OPTIONS),
+        Case("main", build, OPTIONS | {"tolerance": BELOW}),
+        Case("on", build, OPTIONS),
+        Case("sufficient", build, OPTIONS | {"armijo": "sufficient"}),
+        Case("lbfgs", build, {"evaluations": 2 * ITERATIONS}, method="lbfgs"),
+        Case("cone", partial(four_fans, RINGS), OPTIONS),
+        Case("fine", partial(four_fans, FINE_RINGS), OPTIONS),
     ]
 
 
@@ -57,6 +65,9 @@ def table(folder: Folder) -> dict[str, float]:
         "axis_offset_fine": _axis_offset(fine["final"]),
         "ellipse_misfit": _misfit(ridges, "main"),
         "triangle_misfit": _misfit(ridges, "main", ellipse=False),
+        "cone_initial_gradient_squared": records.initial_gradient_squared["cone"],
+        "on_gradient_squared": records.gradient_squared["on"],
+        "cone_gradient_squared": records.gradient_squared["cone"],
         "fine_gradient_squared": records.gradient_squared["fine"],
         "fine_largest_cotangent": records.largest_error_cotangent["fine"],
         "fine_largest_variational": records.largest_error_variational["fine"],
@@ -99,7 +110,7 @@ def _misfit(ridges: pd.DataFrame, mesh: str, *, ellipse: bool = True) -> float:
 def figure(folder: Folder) -> None:
     """Figs. 17 to 21."""
     shapes(folder, "main", {"initial": ("fig17", "fig18"), "final": ("fig19", "fig20")}, "fig21")
-    gradient_history(folder, {"the paper's flow": "main", "L-BFGS": "lbfgs"}, "methods")
+    gradient_history(folder, {"the paper's flow": "on", "L-BFGS": "lbfgs"}, "methods")
 
 
 STUDY = Study(
@@ -108,6 +119,6 @@ STUDY = Study(
     data,
     table,
     figure,
-    parameters=OPTIONS,
+    parameters={"rings": RINGS, "bulge": BULGE, **OPTIONS},
     seconds=15,
 )

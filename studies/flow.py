@@ -86,11 +86,13 @@ def largest_error(surface: Surface) -> float:
     """Largest |H - H̄| / H̄ with the cotangent H; infinite where a triangle has collapsed."""
     error = np.abs(curvature_error(surface))
     return float(
-        np.where(np.isnan(error[_measured(surface)]), np.inf, error[_measured(surface)]).max()
+        np.where(
+            np.isnan(error[measured_vertices(surface)]), np.inf, error[measured_vertices(surface)]
+        ).max()
     )
 
 
-def _measured(surface: Surface) -> Ints:
+def measured_vertices(surface: Surface) -> Ints:
     """Numbers of the vertices inside a patch under pressure."""
     target = target_curvature(surface)
     return np.flatnonzero(np.isfinite(target) & (target != 0.0))
@@ -160,7 +162,7 @@ def curvature_table(surfaces: Mapping[str, Surface]) -> pd.DataFrame:
     """A row per vertex inside a patch under pressure: H by both definitions, H̄, and the errors."""
     tables = []
     for name, surface in surfaces.items():
-        target, rows = target_curvature(surface), _measured(surface)
+        target, rows = target_curvature(surface), measured_vertices(surface)
         x, y, z = surface.vertices[rows].T
         columns: dict[str, Any] = {"mesh": name, "vertex": rows, "x": x, "y": y, "z": z}
         columns["target"] = target[rows]

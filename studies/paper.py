@@ -45,6 +45,8 @@ class Claim:
     near : relative difference (to the paper's) up to which a number that differs is called near.
     figures : which figures rest on it.
     needed : whether a figure is not reproduced where this fails; otherwise it is a condition.
+    given : an input of the paper's, which a study merely has to use.
+    bound : whether ``paper`` is a number that we chose to stand for the paper's words.
     """
 
     says: str
@@ -56,6 +58,15 @@ class Claim:
     near: float = 0.0
     figures: tuple[str, ...] = ()
     needed: bool = True
+    given: bool = False
+    bound: bool = False
+
+    @property
+    def kind(self) -> str:
+        """ "input", "number" (printed) or "sentence" (words of the paper, turned into a relation)."""
+        if self.given:
+            return "input"
+        return "sentence" if self.bound or isinstance(self.paper, str) else "number"
 
 
 @dataclass(frozen=True)
@@ -87,7 +98,8 @@ class Finding:
         """The claim without its example, and what we find, in words."""
         says = self.claim.says.partition(": ")[2] or self.claim.says
         bound = self.claim.relation if self.claim.relation != "=" else ""
-        return f"{says}: {self.ours:.4g}, paper {bound}{self.paper:.5g}"
+        word = "printed" if self.claim.kind == "number" else "to hold"
+        return f"{says}: {self.ours:.4g}, {word} {bound}{self.paper:.5g}"
 
 
 @cache
@@ -122,7 +134,7 @@ def judge(claim: Claim, measured: Mapping[str, float]) -> Finding:
         verdict = MISSING
     elif RELATIONS[claim.relation](ours, value, claim.tolerance):
         verdict = HOLDS
-    elif abs(ours - value) <= claim.near * abs(value):
+    elif claim.near > 0.0 and abs(ours - value) <= claim.near * abs(value):
         verdict = NEAR
     else:
         verdict = DIFFERS
@@ -155,11 +167,11 @@ def compare(measured: Mapping[str, float]) -> tuple[pd.DataFrame, pd.DataFrame]:
         [
             {
                 "study": f.claim.ours.split(".")[0],
+                "kind": f.claim.kind,
                 "what": f.claim.says,
                 "where": f.claim.where,
                 "relation": f.claim.relation,
                 "paper": f.paper,
-                "printed": not isinstance(f.claim.paper, str),
                 "ours": f.ours,
                 "difference": f.difference,
                 "verdict": f.verdict,

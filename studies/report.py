@@ -12,10 +12,14 @@ from rich.table import Table
 from pcmc.errors import FileError
 
 from .folder import Folder, write_bytes
-from .paper import compare, read_measured
+from .paper import HOLDS, compare, read_measured
 from .runner import Outcome
 
 BEGIN, END = "<!-- comparison: begin -->", "<!-- comparison: end -->"
+HEADS = {
+    "sentence": ["What the paper says", "Where", "To hold", "Ours", "Verdict"],
+    "number": ["What the paper prints", "Where", "Paper", "Ours", "Difference", "Verdict"],
+}
 COLOURS = {"reproduced": "green", "near": "yellow", "conditionally reproduced": "yellow"}
 
 
@@ -28,15 +32,17 @@ def write_comparison(results: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def show(comparison: pd.DataFrame, figures: pd.DataFrame, console: Console) -> None:
-    """Both tables on the screen, the comparison last."""
+    """The figures, then the comparison: sentences, and last the printed numbers."""
     table = Table("figure", "what it shows", "label", "reason")
     for number, shows, name, reason in _figure_cells(figures):
         table.add_row(number, shows, _coloured(name), reason)
     console.print(table)
-    table = Table("what the paper says", "where", "paper", "ours", "difference", "verdict")
-    for row in _cells(comparison):
-        table.add_row(*row[:-1], _coloured(row[-1]))
-    console.print(table)
+    for kind, head in HEADS.items():
+        table = Table(*head)
+        for row in _cells(comparison, kind):
+            table.add_row(*row[:-1], _coloured(row[-1]))
+        console.print(table)
+    console.print(given_sentence(comparison))
 
 
 def show_outcomes(outcomes: Sequence[Outcome], console: Console) -> None:
@@ -49,15 +55,18 @@ def show_outcomes(outcomes: Sequence[Outcome], console: Console) -> None:
 
 
 def readme_block(results: Path) -> str:
-    """The tables as Markdown, between their markers."""
+    """The tables as Markdown, between their markers; the sentences folded away."""
     folder = Folder(results)
-    comparison = folder.read_table("comparison")
-    figures = folder.read_table("figures")
-    head = ["What the paper says", "Where", "Paper", "Ours", "Difference", "Verdict"]
-    lines = [BEGIN, "", *_markdown(head, _cells(comparison)), ""]
+    comparison, figures = folder.read_table("comparison"), folder.read_table("figures")
+    numbers, sentences = (
+        _markdown(head, _cells(comparison, kind))
+        for kind, head in (("number", HEADS["number"]), ("sentence", HEADS["sentence"]))
+    )
     head = ["Figure", "What it shows", "Label", "Reason"]
-    lines += [*_markdown(head, _figure_cells(figures)), "", END]
-    return "\n".join(lines)
+    lines = [BEGIN, "", *numbers, "", given_sentence(comparison), ""]
+    lines += [*_markdown(head, _figure_cells(figures)), ""]
+    lines += ["<details><summary>What the paper says in words, measured</summary>", "", *sentences]
+    return "\n".join([*lines, "", "</details>", "", END])
 
 
 def with_block(readme: str, block: str) -> str:
@@ -77,16 +86,26 @@ def write_readme(readme: Path, results: Path) -> None:
     write_bytes(readme, text.encode())
 
 
-def _cells(comparison: pd.DataFrame) -> list[list[str]]:
-    """A row of words for each claim; a claim between two of our own numbers has no printed one."""
+def given_sentence(comparison: pd.DataFrame) -> str:
+    """How many of the paper's inputs (tensions, lengths, steps) the studies use as printed."""
+    given = comparison[comparison.kind == "input"]
+    differ = given[given.verdict != HOLDS].what.tolist()
+    rest = f"; not so: {', '.join(differ)}" if differ else ""
+    used = len(given) - len(differ)
+    return f"{used} of the {len(given)} inputs that the paper prints are used as printed{rest}."
+
+
+def _cells(comparison: pd.DataFrame, kind: str) -> list[list[str]]:
+    """A row of words for each claim of a kind."""
     cells = []
-    for row in comparison.to_dict("records"):
+    for row in comparison[comparison.kind == kind].to_dict("records"):
         equal = row["relation"] == "="
-        bound = "" if equal else f"{row['relation']} "
-        paper = f"{bound}{row['paper']:.7g}{'' if row['printed'] else ' (ours)'}"
-        difference = f"{row['difference']:+.3g}" if equal else ""
+        paper = f"{'' if equal else row['relation'] + ' '}{row['paper']:.7g}"
         ours = f"{row['ours']:.6g}"
-        cells.append([row["what"], row["where"], paper, ours, difference, row["verdict"]])
+        difference = [f"{row['difference']:+.3g}" if equal else ""] if kind == "number" else []
+        if kind == "sentence":
+            paper, ours = f"{row['relation']} {row['paper']:.4g}", f"{row['ours']:.4g}"
+        cells.append([row["what"], row["where"], paper, ours, *difference, row["verdict"]])
     return cells
 
 

@@ -116,9 +116,9 @@ def test_label_of_a_figure_follows_from_its_claims():
 
     assert labelled(1.0, 1.0) == (REPRODUCED, "")
     assert labelled(1.0, 1.0, "its scale") == (CONDITIONAL, "its scale")
-    assert labelled(1.0, 2.0) == (CONDITIONAL, "extra: 2, paper 1")
-    assert labelled(1.4, 1.0) == (CONDITIONAL, "needed: 1.4, paper 1")
-    assert labelled(9.0, 1.0) == (NOT, "needed: 9, paper 1")
+    assert labelled(1.0, 2.0) == (CONDITIONAL, "extra: 2, printed 1")
+    assert labelled(1.4, 1.0) == (CONDITIONAL, "needed: 1.4, printed 1")
+    assert labelled(9.0, 1.0) == (NOT, "needed: 9, printed 1")
     assert label(figure, [])[0] == NOT
 
 
