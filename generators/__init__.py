@@ -1,5 +1,6 @@
 """The paper's examples and the closed forms, as Surfaces to start from."""
 
+from .bezier_hall import bezier_hall
 from .double_bubble import double_bubble, double_bubble_exact
 from .four_fans import four_fans
 from .joined_caps import joined_caps, joined_caps_exact
@@ -10,6 +11,7 @@ from .two_caps import two_caps
 from .two_squares import two_squares
 
 __all__ = [
+    "bezier_hall",
     "double_bubble",
     "double_bubble_exact",
     "four_fans",
