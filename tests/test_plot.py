@@ -85,6 +85,22 @@ def test_what_is_behind_is_hidden(renderer):
     assert (grey & (alone[..., 0] < 245)).mean() > 0.3
 
 
+def test_light_falls_on_both_sides_alike():
+    surface = two_squares(4)
+    under = pcmc.Surface(
+        surface.vertices, surface.faces[:, ::-1], surface.patch_of_face, surface.patches,
+        surface.fixed, surface.on_plane,
+    )  # fmt: skip
+    np.testing.assert_array_equal(plot.draw(surface), plot.draw(under))
+
+
+def test_patches_left_out_leave_no_lines_or_dots():
+    surface = two_squares(4)
+    image = plot.draw(surface, view="plan", patches=["left"], width=600)
+    assert (image[:, 310:] == 255).all()
+    assert (image[:, :290] < 250).any()
+
+
 @pytest.mark.skipif(not raster.opengl(), reason="the system has no OpenGL")
 @pytest.mark.parametrize("view", ["diagonal", "elevation", "plan", (20.0, -35.0)])
 def test_both_painters_agree(view):

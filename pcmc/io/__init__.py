@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -83,7 +84,8 @@ def load(path: str | os.PathLike[str]) -> Contents:
     try:
         with path.open("rb"):
             pass
-        contents = module.read(path)
+        contents = without_unused(module.read(path))
+        return merged(contents) if getattr(module, "MERGE", False) else contents
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror or error})") from None
     except UnicodeDecodeError as error:
@@ -92,8 +94,6 @@ def load(path: str | os.PathLike[str]) -> Contents:
         ) from None
     except PcmcError as error:
         raise _located(path, error) from None
-    contents = without_unused(contents)
-    return merged(contents) if getattr(module, "MERGE", False) else contents
 
 
 def write(
@@ -101,7 +101,7 @@ def write(
     surface: Surface,
     *,
     scalars: Mapping[str, Floats] | None = None,
-    certificate: Mapping[str, Any] | None = None,
+    certificate: object | None = None,
 ) -> None:
     """Write a surface as the suffix says; the file appears whole or not at all.
 
@@ -109,7 +109,7 @@ def write(
     ----------
     path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
     scalars : (n,) or (m,) arrays by name (curvature, error, ...), kept where the format can.
-    certificate : values by name, kept where the format can.
+    certificate : a Certificate, or values by name, kept where the format can (.pcmc).
 
     Warns
     -----
@@ -127,7 +127,7 @@ def write(
         lost.append("certificate")
     try:
         with whole(path) as temporary:
-            module.write(temporary, surface, scalars=scalars, certificate=certificate or {})
+            module.write(temporary, surface, scalars=scalars, certificate=_values(certificate))
     except OSError as error:
         raise FileError(f"{path}: cannot be written ({error.strerror or error})") from None
     except PcmcError as error:
@@ -148,6 +148,16 @@ def _module(path: Path) -> ModuleType:
     if suffix not in FORMATS:
         raise FileError(f"{path}: {unknown('suffix', suffix, FORMATS)}")
     return import_module(f".{FORMATS[suffix]}", __name__)
+
+
+def _values(certificate: Any) -> Mapping[str, Any]:
+    """The certificate's public values by name."""
+    if certificate is None or isinstance(certificate, Mapping):
+        return certificate or {}
+    if not is_dataclass(certificate):
+        raise FileError(f"certificate: expected a Certificate, found {type(certificate).__name__}")
+    shown = [f.name for f in fields(certificate) if f.repr and not f.name.startswith("_")]
+    return {name: getattr(certificate, name) for name in shown}
 
 
 def _scalar(surface: Surface, name: str, value: npt.ArrayLike) -> Floats:

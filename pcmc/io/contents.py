@@ -72,7 +72,7 @@ def without_unused(contents: Contents) -> Contents:
 
 def merged(contents: Contents) -> Contents:
     """The same with vertices at one place made one, as patches that were written apart need."""
-    keep, place = coincident(contents.vertices)
+    keep, place = coincident(check.positions(contents.vertices))
     if len(keep) == len(contents.vertices):
         return contents
     support = None

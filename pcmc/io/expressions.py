@@ -36,8 +36,9 @@ def linear(expression: str, known: Mapping[str, float], fail: Fail) -> Floats:
     """
     source = expression.strip().replace("^", "**")
     try:
-        return _term(ast.parse(source, mode="eval").body, known)
-    except (SyntaxError, ValueError, ZeroDivisionError, OverflowError, RecursionError) as error:
+        with np.errstate(all="raise"):
+            return _term(ast.parse(source, mode="eval").body, known)
+    except (SyntaxError, ValueError, ArithmeticError, RecursionError) as error:
         raise fail(f"{expression.strip()[:60]!r} ({error.args[0]})") from None
 
 

@@ -1,8 +1,9 @@
 """The native format (.pcmc): everything there is to a surface, to the last bit.
 
 A zip archive of NumPy arrays (an .npz) that ``numpy.load`` opens: ``vertices``, ``faces``,
-``patch_of_face``, ``support``, one ``scalar <name>`` per scalar, and ``meta``, a JSON text with the
-format's version, the patches, the plane and the certificate.
+``patch_of_face``, ``support``, one ``scalar <name>`` per scalar, one ``certificate <name>`` per array
+of the certificate, and ``meta``, a JSON text with the format's version, the patches, the plane and the
+rest of the certificate, its tables as lists of rows.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from ..arrays import Floats
 from ..errors import FileError
@@ -30,13 +32,17 @@ def write(
     path: Path, surface: Surface, scalars: Mapping[str, Floats], certificate: Mapping[str, Any]
 ) -> None:
     """The archive; the same surface gives the same bytes."""
+    found = {
+        k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object
+    }
     meta = {
         "format": FORMAT,
         "version": VERSION,
         "description": description(surface),
-        "certificate": dict(certificate),
+        "certificate": {k: v for k, v in certificate.items() if k not in found},
     }
     arrays: dict[str, Any] = {f"scalar {name}": value for name, value in scalars.items()}
+    arrays |= {f"certificate {name}": value for name, value in found.items()}
     with path.open("wb") as file:
         np.savez_compressed(
             file, meta=np.array(json.dumps(meta, default=_plain)), vertices=surface.vertices,
@@ -61,15 +67,21 @@ def read(path: Path) -> Contents:
         return Contents(
             arrays.pop("vertices"), arrays.pop("faces"), arrays.pop("patch_of_face"),
             tuple(told.patches.values()), arrays.pop("support"), told.plane,
-            scalars={name.removeprefix("scalar "): value for name, value in arrays.items()},
-            certificate=meta["certificate"],
+            scalars=_under("scalar ", arrays),
+            certificate={**meta["certificate"], **_under("certificate ", arrays)},
         )  # fmt: skip
+
+
+def _under(prefix: str, arrays: Mapping[str, Any]) -> dict[str, Any]:
+    return {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
 
 
 def _plain(value: Any) -> Any:
     """What JSON can hold of a certificate's values."""
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
     if isinstance(value, Enum):
-        return value.value
+        return value.name.lower()
+    if isinstance(value, pd.DataFrame):
+        return value.to_dict(orient="records")
     raise FileError(f"certificate: a {type(value).__name__} cannot be written; give plain values")

@@ -90,9 +90,10 @@ def read(path: Path) -> Contents:
     held: dict[int, list[Floats]] = {FIXED: [], SLIDING: []}
     about, others, start = Description(), 0, 0
     for item in model.Objects:
-        layer = model.Layers[item.Attributes.LayerIndex]
-        geometry = item.Geometry
-        told = layer.GetUserString(KEY)
+        place, geometry = item.Attributes.LayerIndex, item.Geometry
+        layer = model.Layers[place] if 0 <= place < len(model.Layers) else None
+        name = path.stem if layer is None else layer.Name
+        told = None if layer is None else layer.GetUserString(KEY)
         if told:
             about = described(told)
         if isinstance(geometry, rhino.Mesh):
@@ -103,14 +104,14 @@ def read(path: Path) -> Contents:
             size = np.where(
                 faces[:, 2] == faces[:, 3], 3, 4
             )  # a triangle names its last corner twice
-            names += [] if layer.Name in names else [layer.Name]
+            names += [] if name in names else [name]
             X.append(points)
             corners.append(faces[np.arange(4) < size[:, None]] + start)
             counts.append(size)
-            label.append(np.full(len(size), names.index(layer.Name)))
+            label.append(np.full(len(size), names.index(name)))
             start += len(points)
-        elif isinstance(geometry, rhino.PointCloud) and layer.Name in HELD:
-            held[HELD[layer.Name]].append(_coordinates(geometry.GetPoints()))
+        elif isinstance(geometry, rhino.PointCloud) and name in HELD:
+            held[HELD[name]].append(_coordinates(geometry.GetPoints()))
         else:
             others += 1
     if not X:

@@ -1,0 +1,421 @@
+"""Files that other programs write, and files that are wrong, each in its own way."""
+
+import numpy as np
+import pytest
+
+import pcmc
+from pcmc.errors import FileError, FileWarning, FreeSurfaceWarning, PcmcError, SurfaceError
+from pcmc.io import load
+from pcmc.io.polygons import triangulate
+
+meshio = pytest.importorskip("meshio")
+pyvista = pytest.importorskip("pyvista")
+rhino3dm = pytest.importorskip("rhino3dm")
+trimesh = pytest.importorskip("trimesh")
+
+# Two unit squares side by side, with a step at the far end, in quads and in triangles.
+X = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0.5]], dtype=float)
+QUADS = [[0, 1, 4, 3], [1, 2, 5, 4]]
+TRIANGLES = np.array([[0, 1, 4], [0, 4, 3], [1, 2, 4], [2, 5, 4]])
+
+
+def check(surface, names=("left", "right")):
+    """The two squares, all of their boundary held."""
+    assert surface.n == 6
+    assert surface.m == 4
+    assert [p.name for p in surface.patches] == list(names)
+    assert surface.fixed.all()
+    assert set(surface.tensions) == {1.0} == set(surface.pressures)
+    assert pcmc.energy(surface.moved(surface.vertices)) == pytest.approx(pcmc.energy(expected()))
+    order = np.lexsort(surface.vertices.T)
+    np.testing.assert_allclose(surface.vertices[order], X[np.lexsort(X.T)], atol=1e-7)
+
+
+def expected():
+    patches = [pcmc.Patch("left", 1.0), pcmc.Patch("right", 1.0)]
+    return pcmc.Surface(X, TRIANGLES, [0, 0, 1, 1], patches, fixed=range(6))
+
+
+def halves():
+    """The two squares as trimesh meshes with vertices of their own."""
+    meshes = [trimesh.Trimesh(X, TRIANGLES[k : k + 2], process=False) for k in (0, 2)]
+    for mesh in meshes:
+        mesh.remove_unreferenced_vertices()
+    return meshes
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".glb", ".gltf", ".stl"])
+def test_trimesh_scenes(tmp_path, suffix):
+    scene = trimesh.Scene()
+    up = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])  # glTF's y is up
+    for name, mesh in zip(("left", "right"), halves(), strict=True):
+        if suffix in (".glb", ".gltf"):
+            mesh.apply_transform(up)
+        scene.add_geometry(mesh, geom_name=name, node_name=name)
+    path = tmp_path / f"two{suffix}"
+    if suffix == ".gltf":
+        for name, data in scene.export(file_type="gltf").items():
+            (tmp_path / name.replace("model.gltf", path.name)).write_bytes(data)
+    elif suffix == ".stl":
+        path.write_text(
+            "".join(
+                m.export(file_type="stl_ascii").replace("solid", f"solid {n}", 1)
+                for n, m in zip(("left", "right"), halves(), strict=True)
+            )
+        )
+    else:
+        path.write_bytes(trimesh.util.decode_text(scene.export(file_type=suffix[1:])).encode()
+                         if suffix == ".obj" else scene.export(file_type="glb"))  # fmt: skip
+    check(pcmc.read(path))
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".stl"])
+def test_trimesh_single_meshes(tmp_path, suffix):
+    trimesh.Trimesh(X, TRIANGLES, process=False).export(tmp_path / f"roof{suffix}")
+    check(pcmc.read(tmp_path / f"roof{suffix}"), names=["roof"])
+
+
+@pytest.mark.parametrize("suffix", [".vtp", ".vtu", ".ply", ".stl", ".obj"])
+@pytest.mark.parametrize("binary", [True, False])
+def test_pyvista(tmp_path, suffix, binary):
+    mesh = pyvista.PolyData.from_irregular_faces(X, QUADS)
+    mesh.cell_data["RegionId"] = [3, 7]
+    if suffix == ".vtu":
+        mesh = mesh.cast_to_unstructured_grid()
+    path = tmp_path / f"roof{suffix}"
+    if suffix in (".stl", ".obj"):
+        mesh = mesh.triangulate()
+    if suffix == ".obj":
+        pyvista.save_meshio(path, mesh)
+    else:
+        mesh.save(path, binary=binary)
+    labelled = suffix in (".vtp", ".vtu")
+    if suffix in (".stl", ".obj"):
+        surface = pcmc.read(path)
+    else:
+        with pytest.warns(FileWarning, match=f"{path}: 2 quads were cut into triangles"):
+            surface = pcmc.read(path)
+    names = ("patch 3", "patch 7") if labelled else ("roof",)
+    if suffix == ".stl" and not binary:
+        names = ("Visualization Toolkit generated SLA File",)
+    assert [p.name for p in surface.patches] == list(names)
+    assert (surface.n, surface.m) == (6, 4)
+    assert surface.fixed.all()
+
+
+def test_vtk_cells_of_other_kinds(tmp_path):
+    lines = pyvista.PolyData(X, faces=[3, 0, 1, 4, 3, 0, 4, 3], lines=[2, 0, 1])
+    lines.cell_data["patch"] = [5, 1, 1]  # the line's comes first
+    lines.save(tmp_path / "a.vtp")
+    with pytest.warns(FileWarning, match="2 vertices that no face uses were left out"):
+        surface = pcmc.read(tmp_path / "a.vtp")
+    assert (surface.n, surface.m, surface.patches[0].name) == (4, 2, "patch 1")
+    strip = pyvista.PolyData(X, strips=[4, 0, 1, 3, 4])
+    strip.save(tmp_path / "s.vtp")
+    with pytest.warns(FileWarning):
+        assert pcmc.read(tmp_path / "s.vtp").m == 2
+    solid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: np.array([[0, 1, 3, 5]])}, X)
+    solid.save(tmp_path / "a.vtu")
+    with pytest.raises(FileError, match="cell 0 is of VTK's type 10; only triangles"):
+        pcmc.read(tmp_path / "a.vtu")
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".obj", ".vtu", ".stl"])
+@pytest.mark.parametrize("binary", [True, False])
+def test_meshio(tmp_path, suffix, binary):
+    cells = [("triangle", TRIANGLES[:2]), ("quad", np.array(QUADS[1:]))]
+    if suffix == ".stl":
+        cells = [("triangle", TRIANGLES)]
+    path = tmp_path / f"roof{suffix}"
+    options = {} if suffix == ".obj" else {"binary": binary}
+    data = {} if suffix != ".vtu" else {"gmsh:physical": [[1, 1], [2]]}
+    meshio.write(path, meshio.Mesh(X, cells, cell_data=data), **options)
+    names = ("patch 1", "patch 2") if data else ("roof",)
+    if suffix == ".stl":
+        return check(pcmc.read(path), names)
+    with pytest.warns(FileWarning, match="1 quads were cut into triangles"):
+        surface = pcmc.read(path)
+    check(surface, names)
+
+
+def test_rhino_quads_on_layers(tmp_path):
+    model = rhino3dm.File3dm()
+    for name, quad in zip(("left", "right"), QUADS, strict=True):
+        layer = rhino3dm.Layer()
+        layer.Name = name
+        mesh = rhino3dm.Mesh()
+        for k in quad:
+            mesh.Vertices.Add(*X[k])
+        mesh.Faces.AddFace(0, 1, 2, 3)
+        attributes = rhino3dm.ObjectAttributes()
+        attributes.LayerIndex = model.Layers.Add(layer)
+        model.Objects.AddMesh(mesh, attributes)
+    model.Objects.AddPoint(rhino3dm.Point3d(0, 0, 0))
+    model.Write(str(tmp_path / "a.3dm"), 7)
+    with pytest.warns(FileWarning, match=r"2 quads were .*; 1 objects that are not meshes were"):
+        check(pcmc.read(tmp_path / "a.3dm"))
+    empty = rhino3dm.File3dm()
+    empty.Objects.AddPoint(rhino3dm.Point3d(0, 0, 0))
+    empty.Write(str(tmp_path / "b.3dm"), 7)
+    with pytest.raises(FileError, match=r"no meshes \(1 other objects\); mesh the surfaces"):
+        pcmc.read(tmp_path / "b.3dm")
+
+
+def test_junctions_written_apart_are_joined(tmp_path):
+    """Each patch with vertices of its own, nearly at the same places, as drawing programs do."""
+    wall = np.array([[1, 0, 0], [1, 1, 0], [1, 1, -1], [1, 0, -1.0]])
+    jitter = 1e-9 * np.random.default_rng(0).normal(size=(18, 3))
+    parts = [X[[0, 1, 4, 3]], X[[1, 2, 5, 4]], wall]
+    text = "".join(
+        f"v {x!r} {y!r} {z!r}\n" for x, y, z in (np.concatenate(parts) + jitter[:12]).tolist()
+    )
+    for k, name in enumerate(("left", "right", "wall")):
+        text += f"g {name}\nf {4 * k + 1} {4 * k + 2} {4 * k + 3}\nf {4 * k + 1} {4 * k + 3} {4 * k + 4}\n"
+    (tmp_path / "a.obj").write_text(text)
+    surface = pcmc.read(tmp_path / "a.obj")
+    assert surface.n == 8
+    assert surface.topology.junction_edge.sum() == 1
+    assert surface.topology.on_junction.sum() == 2
+
+
+OBJ = {
+    "names by o": ("o a\nf 1 2 5\no b\nf 1/1 5/2/3 4//1\n", ["a", "b"], 2),
+    "names by material": ("usemtl red\nf 1 2 5\nusemtl blue\nf 1 5 4\n", ["red", "blue"], 2),
+    "one group twice": ("g a\nf 1 2 5\ng b\nf 2 3 6\ng a\nf 1 5 4\n", ["a", "b"], 3),
+    "counted back": ("g a\nf -6 -5 -2\nv 9 9 9\nf -7 -3 -4\n", ["a"], 2),
+    "no names": ("s off\nf 1 2 5\nl 1 2\n", ["file"], 1),
+    "a line that goes on": ("f 1 2 \\\n 5\n", ["file"], 1),
+    "a pentagon": ("f 1 2 3 6 4\n", ["file"], 3),
+}
+
+
+@pytest.mark.filterwarnings("ignore::pcmc.errors.FileWarning")
+@pytest.mark.parametrize("case", OBJ)
+def test_obj_dialects(tmp_path, case):
+    text, names, faces = OBJ[case]
+    head = "# other\nmtllib x.mtl\nvn 0 0 1\n" + "".join(
+        "v {} {} {}\n".format(*x) for x in X.tolist()
+    )
+    (tmp_path / "file.obj").write_text(head + text)
+    surface = pcmc.read(tmp_path / "file.obj")
+    assert [p.name for p in surface.patches] == names
+    assert surface.m == faces
+
+
+PLY = """ply
+format ascii 1.0
+comment made by hand
+element vertex 6
+property float x
+property float y
+property float z
+property uchar red
+element edge 1
+property int vertex1
+property int vertex2
+element face 3
+property uchar flag
+property list uchar int vertex_index
+property float weight
+end_header
+0 0 0 255
+1 0 0 255
+2 0 0 255
+0 1 0 255
+1 1 0 255
+2 1 0.5 255
+0 1
+7 3 0 1 4 1.5
+7 3 0 4 3 2.5
+8 4 1 2 5 4 3.5
+"""
+
+
+@pytest.mark.parametrize("order", ["ascii", "<", ">"])
+def test_ply_in_every_form(tmp_path, order):
+    path = tmp_path / "a.ply"
+    path.write_text(PLY)
+    if order != "ascii":
+        name = "binary_little_endian" if order == "<" else "binary_big_endian"
+        head = PLY[: PLY.index("0 0 0 255")].replace("ascii", name).encode()
+        body = b"".join(np.array([*x], f"{order}f4").tobytes() + b"\xff" for x in X)
+        body += np.array([0, 1], f"{order}i4").tobytes()
+        for flag, face, weight in ((7, (0, 1, 4), 1.5), (7, (0, 4, 3), 2.5), (8, QUADS[1], 3.5)):
+            body += bytes([flag, len(face)]) + np.array(face, f"{order}i4").tobytes()
+            body += np.array([weight], f"{order}f4").tobytes()
+        path.write_bytes(head + body)
+    with pytest.warns(FileWarning, match="1 quads"):
+        check(pcmc.read(path), names=["a"])
+    contents = load(path)
+    assert contents.scalars["weight"].tolist() == [1.5, 2.5, 3.5, 3.5]
+    assert contents.scalars["flag"].tolist() == [7, 7, 8, 8]
+    assert set(contents.scalars["red"]) == {255.0}
+
+
+def test_polygons_are_cut_well():
+    dart = np.array([[0, 0, 0], [2, 2, 0], [0, 1, 0], [-2, 2, 0.0]])  # concave at 2
+    faces, origin, notes = triangulate(dart, np.arange(4), np.array([4]))
+    assert sorted(sorted(f) for f in faces.tolist()) == [[0, 1, 2], [0, 2, 3]]
+    assert origin.tolist() == [0, 0]
+    assert notes == ("1 quads were cut into triangles",)
+    normal = np.cross(dart[faces[:, 1]] - dart[faces[:, 0]], dart[faces[:, 2]] - dart[faces[:, 0]])
+    assert (normal[:, 2] > 0).all()
+    angle = 2 * np.pi * np.arange(6) / 6
+    hexagon = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    corners = np.array([0, 1, 2, 0, 1, 2, 3, 4, 5])
+    faces, origin, notes = triangulate(hexagon, corners, np.array([3, 6]))
+    assert origin.tolist() == [0, 1, 1, 1, 1]
+    assert notes == ("1 polygons were cut into triangles",)
+    comb = np.array([[0, 0], [5, 0], [5, 3], [4, 3], [4, 1], [3, 1], [3, 3], [2, 3], [2, 1], [1, 1],
+                     [1, 3], [0, 3]])  # fmt: skip
+    with pytest.raises(FileError, match="face 1 is a polygon of 12 corners that no fan"):
+        triangulate(np.pad(1.0 * comb, ((0, 0), (0, 1))), np.arange(12), np.array([12]))
+
+
+V = "".join("v {} {} {}\n".format(*x) for x in X.tolist())
+WRONG = {
+    "obj, a coordinate": (".obj", "v 0 0 0\nv 1 zero 0\n", r"line 2: expected three coordinates"),
+    "obj, two coordinates": (".obj", "v 0 0\n", r"line 1: expected three coordinates"),
+    "obj, no faces": (".obj", V, "it holds no faces"),
+    "obj, a number": (".obj", V + "f 1 2 x\n", r"line 7: expected vertex numbers, found 'f 1 2 x'"),
+    "obj, a vertex": (".obj", V + "f 1 2 5\nf 1 2 9\n", r"line 8: the face names .* outside 1\.\.6"),
+    "obj, zero": (".obj", V + "f 0 1 2\n", r"line 7: the face names a vertex outside"),
+    "obj, two corners": (".obj", V + "f 1 2\n", "line 7: the face has fewer than three corners"),
+    "obj, a support": (".obj", V + "g fixed\np 12\ng a\nf 1 2 5\n", r"a point here is outside 1\.\.6"),
+    "obj, twice": (".obj", V + "f 1 2 5\nf 2 5 1\n", "faces 0 and 1 are the same triangle"),
+    "obj, reversed": (".obj", V + "f 1 2 5\nf 1 4 5\n", "not consistently oriented"),
+    "obj, three at an edge": (
+        ".obj", V + "v 0 0 1\nf 1 2 5\nf 5 2 6\nf 2 5 7\n", "3 of its faces share edge",
+    ),
+    "obj, flat": (".obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "face 0 .* has zero area"),
+    "obj, not finite": (".obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", r"vertices\[0\] .* not finite"),
+    "obj, damaged comment": (".obj", "# pcmc {\n" + V + "f 1 2 5\n", "description is damaged"),
+    "ply, no format": (".ply", "ply\nend_header\n", "no format that is known"),
+    "ply, a type": (".ply", PLY.replace("uchar red", "colour red"), r"line 8: cannot be understood"),
+    "ply, two lists": (
+        ".ply", PLY.replace("property float weight", "property list uchar int more"),
+        r"line 15: a second list",
+    ),
+    "ply, no z": (".ply", PLY.replace("property float z\n", ""), "no property z"),
+    "ply, no faces": (".ply", PLY.replace("element face", "element edges"), "no vertices and faces"),
+    "ply, no corners": (".ply", PLY.replace("vertex_index", "texture"), "list no vertex_indices"),
+    "ply, a word": (".ply", PLY.replace("2 1 0.5", "2 one 0.5"), "not all numbers"),
+    "ply, an index": (".ply", PLY.replace("1 2 5 4 3.5", "1 2 6 4 3.5"), r"outside 0\.\.5"),
+    "ply, cut off": (".ply", PLY[: PLY.index("8 4")], "cut off: .* 3 face elements"),
+    "stl, cut off": (".stl", "solid a\nfacet normal 0 0 1\n outer loop\n", "line 3: cut off before"),
+    "stl, no triangles": (".stl", b"\0" * 84, "no triangles|not a readable"),
+    "vtp, damaged": (".vtp", "<VTKFile>\n<Piece>\n</VTKFile>", "not a readable vtp file|no faces"),
+    "glb, damaged": (".glb", b"glTF\2\0\0\0\x20\0\0\0\4\0\0\0JSON{}  ", "not a readable glTF|no tri"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_wrong_is_said_in_one_line(tmp_path, case, capfd):
+    suffix, data, message = WRONG[case]
+    path = tmp_path / f"file{suffix}"
+    path.write_bytes(data if isinstance(data, bytes) else data.encode())
+    with pytest.raises(PcmcError, match=message) as caught:
+        pcmc.read(path, fixed="boundary")
+    assert isinstance(caught.value, FileError | SurfaceError)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr() == ("", "")
+
+
+CUBE = """// A quarter of a cube's surface, by hand
+PARAMETER side = 2*sqrt(4)/2
+SPACE_DIMENSION 3
+CONSTRAINT 2  /* the floor */
+FORMULA: z/2 - 1 = side - 2
+
+vertices /* given by
+coordinates */
+10  0 0 side  constraint 2
+20  side 0 side  constraint 2
+30  side  side^1 side fixed
+40  0 2.0 side  fixed
+50  1 1 side + 1
+
+edges
+1 10 20 color red
+2 20 30
+3 30 40
+4 40 10
+5 10 50
+6 20 50
+faces
+1 1 6 -5 tension side/4 color blue
+2 5 -6 2 3 4
+bodies
+1 1 2 volume 3 lagrange_multiplier 0.25
+2 -2 density 2
+read
+hessian
+"""
+
+
+def test_foreign_datafile(tmp_path):
+    path = tmp_path / "a.fe"
+    path.write_text(CUBE.replace("side + 1", "side+1"))
+    with pytest.warns(
+        FileWarning, match="1 polygons were cut .*; body 2 has no pressure in the file"
+    ):
+        surface = pcmc.read(path)
+    assert surface.plane == pcmc.Plane((0.0, 0.0, 2.0))
+    np.testing.assert_allclose(surface.vertices[[2, 4]], [[2, 2, 2], [1, 1, 3]])
+    assert np.flatnonzero(surface.on_plane).tolist() == [0, 1]
+    assert np.flatnonzero(surface.fixed).tolist() == [2, 3]
+    assert surface.patch_of_face.tolist() == [0, 1, 1, 1]
+    assert surface.tensions.tolist() == [0.5, 1.0]
+    assert surface.pressures.tolist() == [0.25, -0.75]  # of two bodies on its two sides
+
+
+FE = {
+    "no faces": ("faces\n", "facettes\n", "no faces section"),
+    "a word": ("20  side 0", "20  sid 0", r"line 10: 'sid' \('sid' is not a number, a parameter"),
+    "too few": ("40  0 2.0 side  fixed", "40  0 2.0", "line 12: expected a vertex number and three"),
+    "spaces": ("side^1", "side ^ 1 *", r"line 11: '\^' "),
+    "an edge": ("6 20 50", "6 20 60", r"line 21: there is no vertex 60"),
+    "a face's edge": ("1 1 6 -5", "1 1 7 -5", "line 23: there is no edge 7"),
+    "not a cycle": ("1 1 6 -5", "1 1 6 5", "line 23: the edges of the face do not follow"),
+    "a body's face": ("2 -2 density", "2 -3 density", "line 27: there is no face 3"),
+    "a pressure": ("0.25", "p", r"line 26: 'p' \("),
+    "a tension": ("side/4 color", "x color", "line 23: expected a number, found 'x'"),
+    "a sphere": ("z/2 - 1 =", "z*z =", r"line 5: constraint 2 is not a plane: 'z\*z"),
+    "no coordinate": ("z/2 - 1 =", "1 =", "line 5: constraint 2 is not a plane: .* no coordinate"),
+    "no formula": ("FORMULA", "ENERGY", "constraint 2 has no formula"),
+    "two constraints": ("20  side 0 side  constraint 2", "20  side 0 side  constraint 2 3", "a free vertex"),
+    "two planes": ("20  side 0 side  constraint 2", "20  side 0 side  constraint 3", "on constraints 2, 3"),
+    "a boundary": ("20  side 0 side  constraint 2", "20  1 2 3 boundary 1", "line 10: a vertex on a param"),
+    "string model": ("SPACE_DIMENSION 3", "STRING", r"line 3: string is not supported; load the file"),
+    "not finite": ("2*sqrt(4)/2", "1/0", r"line 2: '1/0' \(divide by zero"),
+    "letters": ("1 10 20 color", "1 ten 20 color", "line 16: expected an edge number and two vertices"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", FE)
+def test_wrong_datafiles_name_the_line(tmp_path, case):
+    old, new, message = FE[case]
+    text = CUBE.replace("side + 1", "side+1")
+    assert text.count(old) == 1
+    path = tmp_path / "a.fe"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(FileError, match=message) as caught:
+        pcmc.read(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_datafile_without_bodies(tmp_path):
+    path = tmp_path / "a.fe"
+    path.write_text(CUBE.replace("side + 1", "side+1").split("bodies")[0])
+    with pytest.warns(FileWarning, match="no bodies, so no patch is under pressure"):
+        assert pcmc.read(path).pressures.tolist() == [0.0, 0.0]
+
+
+def test_closed_mesh_is_free(tmp_path):
+    trimesh.creation.icosphere(1).export(tmp_path / "ball.stl")
+    with pytest.warns(FreeSurfaceWarning):
+        ball = pcmc.read(tmp_path / "ball.stl", tensions=0.5)
+    assert (ball.n, ball.m) == (42, 80)
+    assert not ball.fixed.any()
+    assert ball.patches == (pcmc.Patch("ball", 0.5),)
