@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from .arrays import Bools, Floats, Ints
 from .curves import Curve
 from .errors import MissingExtra, PlanError
+from .planar import cross
 
 try:
     import shapely
@@ -235,7 +236,31 @@ def _find_crossings(drawn: Sequence[Drawn], meetings: _Meetings) -> None:
                         " that part out of one of them"
                     )
                 xy = np.array(part.coords)[0]
-                meetings.add([(i, one.nearest(xy)[0]), (j, two.nearest(xy)[0])])
+                s, t = _crossing(one, one.nearest(xy)[0], two, two.nearest(xy)[0])
+                meetings.add([(i, s), (j, t)])
+
+
+def _crossing(one: Drawn, s: float, two: Drawn, t: float) -> tuple[float, float]:
+    """The parameters at which two curves cross, by Newton's method from near there."""
+
+    def apart(s: float, t: float) -> Floats:
+        return (two.curve.at([t]) - one.curve.at([s]))[0, :2]
+
+    gap, step = apart(s, t), 1e-6
+    for _ in range(8):
+        along_s = (apart(s - step, t) - apart(s + step, t)) / (2.0 * step)
+        along_t = (apart(s, t + step) - apart(s, t - step)) / (2.0 * step)
+        turn = float(cross(along_s, along_t))
+        if abs(turn) < 1e-9 * float(np.linalg.norm(along_s) * np.linalg.norm(along_t)):
+            break
+        new_s, new_t = s + float(cross(gap, along_t)) / turn, t + float(cross(gap, along_s)) / turn
+        new_s = min(max(new_s, 0.0), float(len(one.curve.pieces)))
+        new_t = min(max(new_t, 0.0), float(len(two.curve.pieces)))
+        new_gap = apart(new_s, new_t)
+        if np.linalg.norm(new_gap) >= np.linalg.norm(gap):
+            break
+        s, t, gap = new_s, new_t, new_gap
+    return s, t
 
 
 def _find_ends(drawn: Sequence[Drawn], meetings: _Meetings, snap: float) -> None:

@@ -16,9 +16,12 @@ from .planar import PlanarMesh, locate, signed_areas, triangulate
 from .surface import Patch, Surface
 from .walls import Standing, WallTop, stand
 
+MOST = 5_000_000  # triangles
+
 
 def surface(plan: Plan) -> Surface:
     """The mesh of the plan at its initial height, with its walls and supports."""
+    _check_size(plan)
     lines, on_edge = _lines(plan)
     spots = np.array([to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)])
     stops = np.concatenate(
@@ -29,6 +32,8 @@ def surface(plan: Plan) -> Surface:
     fixed, sliding = _supports(plan, drawn, lines, on_edge, len(mesh.points))
     if not (fixed | sliding).any():
         raise PlanError("nothing holds the roof; fix an edge or give supports")
+    if (fixed | sliding).all():
+        raise PlanError("every vertex of the mesh is held; use a smaller edge_length")
     base, height = _heights(plan, drawn, mesh, fixed | sliding)
     patches, patch_of_face = _patches(plan, mesh)
     X = to_space(np.column_stack([mesh.points, height]), plan.plane)
@@ -42,6 +47,18 @@ def surface(plan: Plan) -> Surface:
         np.concatenate([sliding, walls.sliding]),
         plan.plane,
     )
+
+
+def _check_size(plan: Plan) -> None:
+    """An edge length that is a slip must not fill the memory."""
+    x, y = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2].T
+    area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
+    count = area / (np.sqrt(0.1875) * plan.edge_length**2)
+    if count > MOST:
+        raise PlanError(
+            f"edge_length={plan.edge_length:g} would make about {count:.2g} triangles; at most"
+            f" {MOST} are allowed"
+        )
 
 
 def _lines(plan: Plan) -> tuple[list[Line], list[Curve]]:

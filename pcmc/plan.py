@@ -30,7 +30,9 @@ class Divider:
     wall : tension of the wall, force/length, ≥ 0; None for no wall.
     name : of the wall's patch; by default "wall 1", "wall 2", … in order.
     bottom : "sliding" on Π; "held" on Π in all directions; or "sloped": held in all directions on
-        the surface that the boundary curves span (for boundaries that leave Π).
+        the surface that the boundary curves span (for boundaries that leave Π). A sliding wall
+        that ends on a straight edge tends to slip along it to where it is shorter; hold it, or end
+        it in re-entrant corners.
     """
 
     curve: Any

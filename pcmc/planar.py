@@ -208,11 +208,25 @@ def _constrained(points: Floats, segments: Ints) -> Ints:
         raise SurfaceError("the points lie on one line; they enclose no area") from None
     area = signed_areas(points, T)
     T[area < 0] = T[area < 0][:, ::-1]
-    n = len(points)
-    present = _edge_keys(T[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), n)
-    for a, b in segments[~np.isin(_edge_keys(segments, n), present)]:
+    for a, b in segments[_absent(segments, T, len(points))]:
         T = _with_segment(points, T, int(a), int(b))
+    lost = _absent(segments, T, len(points))
+    if len(lost):
+        raise _crossing(points, *segments[lost[0]])
     return T
+
+
+def _absent(segments: Ints, T: Ints, n: int) -> Ints:
+    """Numbers of the segments that are not edges of the triangles."""
+    present = _edge_keys(T[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), n)
+    return np.flatnonzero(~np.isin(_edge_keys(segments, n), present))
+
+
+def _crossing(X: Floats, a: int, b: int) -> SurfaceError:
+    return SurfaceError(
+        f"segment {X[a].tolist()} - {X[b].tolist()} crosses another segment or passes through a"
+        " point; cut it there"
+    )
 
 
 def _with_segment(X: Floats, T: Ints, a: int, b: int) -> Ints:
@@ -237,10 +251,7 @@ def _with_segment(X: Floats, T: Ints, a: int, b: int) -> Ints:
             rim.append(at)
             at = follow.get(at)
         if at != end or not rim:
-            raise SurfaceError(
-                f"segment {X[a].tolist()} - {X[b].tolist()} crosses another segment or passes"
-                " through a point; cut it there"
-            )
+            raise _crossing(X, a, b)
         _fill(X, end, start, rim[::-1], new)
     return np.concatenate([T[~crossed], np.array(new, dtype=np.int64)])
 

@@ -27,7 +27,8 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     - boundary edge, both ends fixed: fixed;
     - boundary edge, one end sliding and the other sliding, or fixed and on Π: sliding;
     - junction or seam edge, both ends fixed, not leading from boundary to boundary: fixed;
-    - every other edge, such as an interior edge between two fixed vertices: free.
+    - edge inside a sheet, both ends fixed and off the boundary (a held line in a patch): fixed;
+    - every other edge, such as one across a sheet between two fixed boundary vertices: free.
 
     Parameters
     ----------
@@ -84,7 +85,8 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
     boundary = topo.boundary_edge
     crossing = topo.on_boundary[start] & topo.on_boundary[end]
     inner = (topo.junction_edge | topo.seam_edge) & ~crossing
-    both_fixed = fixed[start] & fixed[end] & (boundary | inner)
+    inside = ~(topo.on_boundary[start] | topo.on_boundary[end])
+    both_fixed = fixed[start] & fixed[end] & (boundary | inner | inside)
     height = surface.plane.height(surface.vertices)
     resting = sliding | (fixed & (np.abs(height) <= 1e-9 * surface.size))
     slides = boundary & resting[start] & resting[end] & (sliding[start] | sliding[end])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from .arrays import Bools, Floats, Ints
 from .errors import MissingExtra, OptionError, SurfaceError
+from .polish import angles, polished
 from .quality import edge_lengths
 from .refine import held_midpoints, refine
 from .surface import Surface
@@ -22,7 +23,7 @@ PASSES = 3  # of MMG at most, each on the result of the one before; a patch take
 GOOD_ANGLE = 25.0  # degrees; no further pass is made when all angles reach it
 LEAST_ANGLE = 20.0  # degrees; a patch that stays below it ...
 WORSE = 0.8  # ... and below this share of its old smallest angle keeps its old triangles, cut
-BLUNT = 25.0  # degrees; the second angle of a triangle that fills a sharp corner well
+BLUNT, OBTUSE = 25.0, 100.0  # degrees; for the upper two angles of one that fills a corner well
 
 
 def remesh(
@@ -72,10 +73,11 @@ def remesh(
     candidates = []
     mesh = old
     for _ in range(PASSES):
-        size = _sizes(mesh, edge_length, near_curves, growth)
+        size = _sizes(mesh, edge_length, growth)
         mesh = _by_mmg(mesh, size, growth, CHORD * edge_length if chord is None else chord)
+        mesh = replace(mesh, X=polished(mesh.X, mesh.F, mesh.source < 0, GOOD_ANGLE))
         candidates.append(mesh)
-        if _angles(mesh.X, mesh.F).min() >= GOOD_ANGLE:
+        if angles(mesh.X, mesh.F).min() >= GOOD_ANGLE:
             break
     return _assembled(surface, old, candidates)
 
@@ -123,10 +125,9 @@ def _curve_edges(surface: Surface) -> Bools:
 def _cut_curves(surface: Surface, length: float) -> _Mesh:
     """The mesh with new vertices on its curves, at most about ``length`` apart."""
     counts = _pieces(surface, length)
-    while (
-        len(counts) and np.median(counts) >= 2.0
-    ):  # 1→4 keeps the triangles' shape, cutting single edges does not
-        surface = refine(surface)
+    # 1→4 keeps the triangles' shape, cutting single edges does not
+    while len(counts) and np.median(counts) >= 2.0:
+        surface = _refined_round(surface)
         counts = _pieces(surface, length)
     topo, stay = surface.topology, _curve_edges(surface)
     fixed_edge, sliding_edge = held_midpoints(surface)
@@ -138,6 +139,41 @@ def _cut_curves(surface: Surface, length: float) -> _Mesh:
     while (counts > 1).any():
         mesh, counts, support = _cut_once(mesh, counts, support)
     return mesh
+
+
+def _refined_round(surface: Surface) -> Surface:
+    """1→4 with the new vertices off the curves on cubics that end square to the vertex normals.
+
+    With t the components of the edge b - a across the normals at its ends, the middle of the cubic is
+    (a + b)/2 + (t_a - t_b)/8.
+    """
+    chosen = np.flatnonzero(~_curve_edges(surface))
+    ends, normals = surface.topology.edges[chosen], _edge_normals(surface, chosen)
+    edge = (surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]])[:, None]
+    across = edge - (edge * normals).sum(axis=2, keepdims=True) * normals
+    rise = (across[:, 0] - across[:, 1]) / 8.0
+    most = 0.2 * np.linalg.norm(edge[:, 0], axis=1)
+    rise *= np.minimum(1.0, most / np.maximum(np.linalg.norm(rise, axis=1), 1e-300))[:, None]
+    fine = refine(surface)
+    X = fine.vertices.copy()
+    X[surface.n + chosen] += rise
+    return fine.moved(X)
+
+
+def _edge_normals(surface: Surface, chosen: Ints) -> Floats:
+    """(c,2,3) unit normals at the ends of edges inside sheets, of the edge's own sheet."""
+    X, F, topo = surface.vertices, surface.faces, surface.topology
+    vector = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]])
+    key, place = np.unique(
+        (surface.patch_of_face[:, None].astype(np.int64) * surface.n + F).ravel(),
+        return_inverse=True,
+    )
+    total = np.zeros((len(key), 3))
+    np.add.at(total, place, np.repeat(vector, 3, axis=0))
+    total /= np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
+    patch_of_edge = np.zeros(len(topo.edges), dtype=np.int64)
+    patch_of_edge[topo.edge_of_face] = surface.patch_of_face[:, None]
+    return total[np.searchsorted(key, patch_of_edge[chosen, None] * surface.n + topo.edges[chosen])]
 
 
 def _pieces(surface: Surface, length: float) -> Ints:
@@ -197,12 +233,17 @@ def _cut_triangles(F: Ints, patch: Ints, ends: Ints, number: Ints, n: int) -> tu
     return np.concatenate(faces), np.concatenate(owner)
 
 
-def _sizes(mesh: _Mesh, edge_length: float, near: float | None, growth: float) -> Floats:
-    """(n,) the edge length wanted at each vertex."""
+def _sizes(mesh: _Mesh, edge_length: float, growth: float) -> Floats:
+    """(n,) the edge length wanted at each vertex: a curve's own next to it, growing away from it."""
     size = np.full(len(mesh.X), float(edge_length))
-    if near is not None and len(mesh.curves):
-        distance = cKDTree(mesh.X[np.unique(mesh.curves)]).query(mesh.X)[0]
-        size = np.minimum(size, near + (growth - 1.0) * distance)
+    if len(mesh.curves):
+        start, end = mesh.curves.T
+        length = np.linalg.norm(mesh.X[end] - mesh.X[start], axis=1)
+        spacing = np.zeros(len(mesh.X))
+        np.maximum.at(spacing, mesh.curves, length[:, None])
+        on_curve = np.flatnonzero(spacing)
+        distance, nearest = cKDTree(mesh.X[on_curve]).query(mesh.X)
+        size = np.minimum(size, spacing[on_curve][nearest] + (growth - 1.0) * distance)
     return size
 
 
@@ -256,8 +297,8 @@ def _corners_to_keep(mesh: _Mesh) -> Ints:
     on_curve = np.zeros(len(mesh.X), dtype=bool)
     on_curve[mesh.curves] = True
     between = np.flatnonzero(on_curve[mesh.F].all(axis=1))
-    second = np.sort(_angles(mesh.X, mesh.F[between]), axis=1)[:, 1]
-    return between[second >= BLUNT]
+    _, second, largest = np.sort(angles(mesh.X, mesh.F[between]), axis=1).T
+    return between[(second >= BLUNT) & (largest <= OBTUSE)]
 
 
 def _check_kept(before: _Mesh, curves: Ints, F: Ints, n: int) -> None:
@@ -302,13 +343,5 @@ def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Sur
 def _patch_angles(mesh: _Mesh, count: int) -> Floats:
     """(count,) the smallest angle in each patch, degrees."""
     smallest = np.full(count, 180.0)
-    np.minimum.at(smallest, mesh.patch, _angles(mesh.X, mesh.F).min(axis=1))
+    np.minimum.at(smallest, mesh.patch, angles(mesh.X, mesh.F).min(axis=1))
     return smallest
-
-
-def _angles(X: Floats, F: Ints) -> Floats:
-    """(m,3) angles, degrees."""
-    a, b = X[F[:, [1, 2, 0]]] - X[F], X[F[:, [2, 0, 1]]] - X[F]
-    cosine = np.einsum("fij,fij->fi", a, b)
-    sine = np.linalg.norm(np.cross(a, b), axis=2)
-    return np.degrees(np.arctan2(sine, cosine))

@@ -1,0 +1,131 @@
+"""Curves: closed forms of length and position, joints, and curves from plain data."""
+
+import numpy as np
+import pytest
+
+from pcmc import Plane
+from pcmc.curves import arc, bezier, circle, curve, frame, join, polyline, to_local, to_space
+from pcmc.errors import OptionError
+
+
+def test_lengths_in_closed_form():
+    assert polyline([[0, 0], [3, 0], [3, 4]], closed=True).length == pytest.approx(12.0)
+    assert circle([1, 2], 3.0).length == pytest.approx(6 * np.pi, rel=5e-4)
+    assert arc([2, 0], [0, 2], [-2, 0]).length == pytest.approx(2 * np.pi, rel=5e-4)
+    parabola = bezier([[0, 0], [1, 2], [2, 0]])  # y = 2x - x²
+    exact = np.sqrt(5) + np.arcsinh(2) / 2
+    assert parabola.length == pytest.approx(exact, rel=5e-4)
+
+
+def test_points_lie_on_the_curve_to_rounding():
+    c = circle([1, 2], 3.0)
+    points = c.at(c.between(0.0, 1.0, 0.5))
+    np.testing.assert_allclose(np.linalg.norm(points - [1, 2], axis=1), 3.0, rtol=1e-14)
+    t = np.linspace(0, 1, 7)
+    cubic = bezier([[0, 0, 1], [1, 2, 0], [3, -1, 2], [4, 1, 5]])
+    weights = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], axis=1)
+    exact = weights @ [[0, 0, 1], [1, 2, 0], [3, -1, 2], [4, 1, 5]]
+    np.testing.assert_allclose(cubic.at(t), exact, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("start", "through", "end", "angle"),
+    [
+        ([1, 0], [0, 1], [-1, 0], np.pi),
+        ([1, 0], [0, -1], [-1, 0], np.pi),  # clockwise
+        ([1, 0], [-1, 0], [0, -1], 1.5 * np.pi),
+        ([1, 0, 0], [0, 0, 1], [-1, 0, 0], np.pi),  # upright
+    ],
+)
+def test_arcs_pass_their_three_points(start, through, end, angle):
+    path = arc(start, through, end)
+    np.testing.assert_allclose(path.at([0.0, 1.0]), [start, end], atol=1e-14)
+    distance = np.linalg.norm(path.at(np.linspace(0, 1, 3601)) - through, axis=1)
+    assert distance.min() < 1e-3
+    assert path.length == pytest.approx(angle, rel=5e-4)
+
+
+def test_spacing_is_even_and_bends_get_enough_edges():
+    line = polyline([[0, 0], [10, 0]])
+    np.testing.assert_allclose(np.diff(line.between(0.0, 1.0, 3.0)), 1 / 3)
+    assert len(circle([0, 0], 0.01).between(0.0, 1.0, 1.0)) == 7  # an edge per 45°
+    ring = polyline([[0, 0], [4, 0], [4, 4], [0, 4]], closed=True)
+    around = ring.at(
+        ring.between(3.0, 5.0, 1.0)
+    )  # over the closing point: the sides at x = 0, y = 0
+    assert (around.min(axis=1) == 0.0).all()
+    assert len(around) == 7
+
+
+def test_corners_are_turns_above_ten_degrees():
+    angle = np.radians([0, 0, 5, 5, 40])
+    path = polyline(np.cumsum(np.stack([np.cos(angle), np.sin(angle)], axis=1), axis=0))
+    assert path.corners.tolist() == [3.0]
+    tangent = join(polyline([[0, 0], [1, 0]]), arc([1, 0], [2, 1], [1, 2]))
+    assert tangent.corners.tolist() == []
+
+
+def test_reversed_runs_backwards():
+    path = join(polyline([[0, 0], [2, 0]]), arc([2, 0], [1, 1], [0, 0]))
+    t = np.linspace(0, 2, 9)
+    np.testing.assert_allclose(path.reversed().at(2.0 - t), path.at(t), atol=1e-14)
+
+
+def test_plane_coordinates_there_and_back():
+    plane = Plane((1, 2, 3), (1, -2, 2))
+    points = np.random.default_rng(0).normal(size=(5, 3))
+    local = to_local(points, plane)
+    np.testing.assert_allclose(local[:, 2], plane.height(points), atol=1e-14)
+    np.testing.assert_allclose(to_space(local, plane), points, atol=1e-14)
+    np.testing.assert_array_equal(frame(Plane()), np.eye(3))
+    on_plane = circle([0, 0], 2.0).local(plane).at([0.3])
+    assert on_plane[0, 2] == 0.0
+    in_space = circle([1, 2, 3], 2.0)
+    np.testing.assert_allclose(
+        to_space(in_space.local(plane).at([0.3]), plane), in_space.at([0.3]), atol=1e-14
+    )
+
+
+def test_curves_from_plain_data():
+    assert curve([[0, 0], [1, 0], [0, 1]], closed=True).closed
+    assert not curve([[0, 0], [1, 0], [0, 1]]).closed
+    assert curve([[0, 0], [1, 0], [0, 1], [0, 0]]).closed
+    path = curve([{"bezier": [[0, 0], [1, 1], [2, 0]]}, {"polyline": [[2, 0], [0, 0]]}])
+    assert path.closed
+    assert curve(path) is path
+    assert curve({"polyline": [[0, 0], [1, 0], [0, 1]], "closed": True}).closed
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ([[0, 0]], "polyline: expected 2 points, found 1"),
+        ([[0, 0], [0, 0]], "points 0 and 1 are both"),
+        ([[0, 0], [1, np.nan]], "point 1 = .* is not finite"),
+        ([[0, 0], [1]], "expected points"),
+        ([[0, 0, 0, 0], [1, 1, 1, 1]], "found shape"),
+        ("outline", "expected points"),
+        ({"spline": [[0, 0], [1, 1]]}, "unknown curve 'spline'"),
+        ({"circl": {}}, "did you mean 'circle'"),
+        ({"arc": [[0, 0], [1, 1]]}, "arc: expected 3 points, found 2"),
+        ({"arc": [[0, 0], [1, 1], [2, 2]]}, "lie on one line"),
+        ({"circle": {"centre": [0, 0], "radius": -1.0}}, "radius must be a finite number > 0"),
+        ({"circle": {"centre": [0, 0]}}, "expected centre and radius"),
+        ({"bezier": [[1, 1], [1, 1]]}, "all control points"),
+        ({"bezier": [[0, 0], [1, 1]], "closed": True}, "closed is for polylines"),
+        ({"bezier": [[0, 0], [1, 1]], "arc": []}, "exactly one of"),
+        ([{"polyline": [[0, 0], [1, 0]]}, {"polyline": [[2, 0], [1, 1]]}], "curve 1 starts at"),
+        ([{"polyline": [[0, 0], [1, 0]]}, {"polyline": [[1, 0, 0], [1, 1, 0]]}], "in space"),
+        ([{"circle": {"centre": [0, 0], "radius": 1}}, {"bezier": [[0, 0], [1, 1]]}], "is closed"),
+    ],
+)  # fmt: skip
+def test_bad_curves_are_refused(spec, message):
+    with pytest.raises(OptionError, match=message):
+        curve(spec)
+
+
+def test_a_closed_polyline_needs_three_points():
+    with pytest.raises(OptionError, match="needs 3 points"):
+        polyline([[0, 0], [1, 0]], closed=True)
+    with pytest.raises(OptionError, match="no curves"):
+        join()
