@@ -90,9 +90,11 @@ class Inertia:
 
 
 def inertia(surface: pcmc.Surface, probe: float = 0.0, normal: bool = True) -> Inertia:
-    """The program's ``eigenprobe``; with ``normal`` each free vertex moves along its normal only.
+    """The program's ``eigenprobe``.
 
-    At junctions and points, where the vertex has no single normal, all directions are free.
+    With ``normal`` vertices move along the normal in a sheet, across the curve at a junction, in all
+    directions at a point, and in what of this the support allows: as many unknowns as the motion
+    space of ``pcmc.motion`` has. Without, all free coordinates are unknowns.
     """
     out = run(surface, f"hessian_normal {'on' if normal else 'off'}\neigenprobe {probe!r}")
     found = re.search(r"Eigencounts:\s*(\d+)\s*<,\s*(\d+)\s*==,\s*(\d+)\s*>", out)

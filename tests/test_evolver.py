@@ -87,3 +87,14 @@ def test_what_goes_wrong_is_said(monkeypatch):
     assert not evolver.available()
     with pytest.raises(evolver.EvolverError, match="not installed"):
         evolver.energy(tent())
+
+
+@pytest.mark.parametrize("name", ["tent", "two squares", "four fans"])
+def test_its_normal_motions_are_as_many_as_ours(name):
+    surface = SURFACES[name]()
+    counts = evolver.inertia(surface)
+    total = counts.negative + counts.zero + counts.positive
+    kind, free, sliding = surface.topology.vertex_kind, surface.free, surface.on_plane
+    expected = sum((d + 1) * (free & (kind == d)).sum() for d in range(3))
+    expected += sum(d * (sliding & (kind == d)).sum() for d in (1, 2))
+    assert total == expected

@@ -15,7 +15,6 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import FileError, OptionError, unknown
 from ..surface import Patch, Plane, Surface
 from ..topology import topology
-from .merge import coincident
 
 FREE, SLIDING, FIXED = 0, 1, 2
 ROUNDING = 1e-6  # of the size: what a format may round by
@@ -72,6 +71,8 @@ def without_unused(contents: Contents) -> Contents:
 
 def merged(contents: Contents) -> Contents:
     """The same with vertices at one place made one, as patches that were written apart need."""
+    from .merge import coincident  # scipy.spatial is slow to import, and rarely needed
+
     keep, place = coincident(check.positions(contents.vertices))
     if len(keep) == len(contents.vertices):
         return contents
