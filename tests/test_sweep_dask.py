@@ -83,9 +83,9 @@ def test_a_cluster_gives_the_same_table_even_if_a_worker_is_killed(cluster, tmp_
 def test_cases_that_misbehave_on_a_cluster(cluster):
     cluster.start_worker("one")
     sweep = Sweep("sweep_cases:misbehave", {"how": ["raise", "hang", "kill", "behave"]})
-    result = run(sweep, scheduler=cluster.address, time_limit=0.5)
+    result = run(sweep, scheduler=cluster.address, time_limit=1.0)
     assert result["status"].tolist() == ["raised", "timed out", "killed", "finished"]
-    same(result, run(sweep, workers=2, time_limit=0.5))
+    same(result, run(sweep, workers=2, time_limit=1.0))
 
 
 def test_a_scheduler_that_goes_away_stops_the_sweep(cluster, tmp_path):

@@ -197,13 +197,13 @@ SCRIPT = """
 import sys
 from pcmc.sweep import Sweep, run
 grid = {"rate": [3.6 + 0.01 * i for i in range(40)], "seed": [0.1, 0.2, 0.3, 0.4, 0.5]}
-run(Sweep("sweep_cases:chaos", grid, {"pause": 0.02}), sys.argv[1], workers=2)
+run(Sweep("sweep_cases:chaos", grid, {"pause": 0.03}), sys.argv[1], workers=2)
 """
 
 
 @pytest.mark.slow
 def test_ten_kills_at_random_instants_change_nothing(tmp_path):
-    sweep, path = Sweep("sweep_cases:chaos", LONG, {"pause": 0.02}), tmp_path / "s.jsonl"
+    sweep, path = Sweep("sweep_cases:chaos", LONG, {"pause": 0.03}), tmp_path / "s.jsonl"
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     chance, lengths = random.Random(1), []
     for _ in range(10):
@@ -212,7 +212,7 @@ def test_ten_kills_at_random_instants_change_nothing(tmp_path):
         while not path.exists() or path.stat().st_size <= before:
             assert killed.poll() is None, "the sweep ended before it was killed"
             time.sleep(0.005)
-        time.sleep(chance.uniform(0.0, 0.15))
+        time.sleep(chance.uniform(0.0, 0.12))
         killed.send_signal(signal.SIGKILL)
         killed.wait()
         lengths.append(len(read_store(path)))

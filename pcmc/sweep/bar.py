@@ -27,15 +27,20 @@ def bar(console: Console | None = None) -> Iterator[Callable[[Progress], None]]:
     """
     try:
         from rich import progress as rich
+        from rich.table import Column
     except ImportError:
         raise MissingExtra("rich", "cli") from None
     columns: tuple[Any, ...] = (
-        rich.BarColumn(),
-        rich.MofNCompleteColumn(),
-        rich.TextColumn("{task.fields[left]} left"),
-        rich.TextColumn("{task.description}", markup=False),
+        rich.BarColumn(20),
+        rich.MofNCompleteColumn(table_column=Column(no_wrap=True, min_width=9)),
+        rich.TextColumn("{task.fields[left]} left", table_column=Column(min_width=10)),
+        rich.TextColumn(
+            "{task.description}",
+            markup=False,
+            table_column=Column(ratio=1, no_wrap=True, overflow="ellipsis"),
+        ),
     )
-    with rich.Progress(*columns, console=console) as drawn:
+    with rich.Progress(*columns, console=console, expand=True) as drawn:
         task = drawn.add_task("", total=None, left="?")
 
         def draw(state: Progress) -> None:

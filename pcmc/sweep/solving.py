@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import inspect
-import numbers
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields, is_dataclass
-from enum import Enum
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
 from importlib import import_module
 from typing import Any
 
-import pcmc
+import pandas as pd
 
 from ..energy import gradient
 from ..errors import OptionError, unknown
@@ -58,51 +56,46 @@ def solve_case(generator: str, method: str = "newton", **arguments: Any) -> dict
 
     Returns
     -------
-    dict : ``status`` (the solver's, in small letters), ``verdict`` of the certificate, ``message``,
-        then ``energy``, ``gradient_squared`` (‖∇E‖², the paper's squared sum),
-        ``iterations_taken``, ``evaluations_made``, ``triangles``, and the certificate's numbers;
-        those in mappings and nested values as ``name.key``, arrays left out.
+    dict : ``status`` (the solver's, in small letters), ``verdict`` of the certificate, ``message``;
+        ``iterations_taken``, ``evaluations_made``, ``triangles``, ``gradient_squared`` (‖∇E‖², the
+        paper's squared sum); the certificate's numbers; and each number of its tables as
+        ``large.area``, ``junction 0.length``, ``boundary 0.reaction_z``. A number with the name of
+        one of the arguments is called ``name_reached``.
 
     Raises
     ------
     OptionError : an unknown generator, method or parameter name. A sweep raises it before any case
         is run.
+
+    Examples
+    --------
+    >>> case = solve_case("generators:two_squares", "lbfgs", alpha_aux=1.0)
+    >>> case["status"], round(case["energy"], 4), round(case["left.area"], 3)
+    ('converged', 58.5059, 17.583)
     """
     build, shape, solver = _split(generator, method, arguments)
     result = solve(build(**shape), method, **solver)
-    told = {
-        "status": result.status.name.lower().replace("_", " "),
-        "verdict": "",
-        "message": result.message,
-        "energy": result.energy,
-        "gradient_squared": float((gradient(result.surface) ** 2).sum()),
+    certificate = result.certificate
+    found = {
         "iterations_taken": result.iterations,
         "evaluations_made": result.evaluations,
         "triangles": result.surface.m,
+        "gradient_squared": float((gradient(result.surface) ** 2).sum()),
+        **certificate.numbers(),
+        **_cells(certificate.patches, certificate.patches["patch"]),
+        **_cells(certificate.junctions, [f"junction {i}" for i in certificate.junctions.index]),
+        **_cells(certificate.boundaries, [f"boundary {i}" for i in certificate.boundaries.index]),
     }
-    certify = getattr(pcmc, "certify", None)
-    certificate = dict(numbers_of(certify(result.surface))) if certify else {}
-    return told | {name: value for name, value in certificate.items() if name not in arguments}
+    words = {
+        "status": result.status.name.lower().replace("_", " "),
+        "verdict": found.pop("verdict").replace("_", " "),
+        "message": result.message,
+    }
+    return words | {f"{n}_reached" if n in arguments else n: v for n, v in found.items()}
 
 
-def numbers_of(value: object, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Names and values of all numbers, words and truth values in a dataclass or mapping.
-
-    >>> dict(numbers_of({"index": 1, "error": {"large": 0.5, "small": None}, "modes": [1, 2]}))
-    {'index': 1, 'error.large': 0.5, 'error.small': None}
-    """
-    if is_dataclass(value):
-        items = [(f.name, getattr(value, f.name)) for f in fields(value)]
-    elif isinstance(value, Mapping):
-        items = [(str(key), item) for key, item in value.items()]
-    else:
-        items = []
-    for name, item in items:
-        if isinstance(item, Enum):
-            yield prefix + name, item.name.lower().replace("_", " ")
-        elif item is None or isinstance(item, str | bool | numbers.Number):
-            yield prefix + name, item
-        elif getattr(item, "shape", None) == ():
-            yield prefix + name, item.item()
-        else:
-            yield from numbers_of(item, f"{prefix}{name}.")
+def _cells(frame: pd.DataFrame, names: Iterable[str]) -> dict[str, Any]:
+    """The numbers of a table, each named by its row and column."""
+    numeric = frame.select_dtypes("number")
+    rows = zip(names, numeric.to_dict("records"), strict=True)
+    return {f"{name}.{column}": value for name, row in rows for column, value in row.items()}
