@@ -8,6 +8,7 @@ done once per pattern; ``factor`` then takes new values. Backends, fastest first
 from __future__ import annotations
 
 import importlib.util
+import os
 import threading
 import weakref
 from dataclasses import dataclass
@@ -123,6 +124,8 @@ class _Pardiso:
 
         self._kept = kept
         self._solver = pypardiso.PyPardisoSolver(mtype=-2)
+        # pypardiso looks for MKL in the whole prefix, 0.2 s each time, unless it is told where
+        os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
         self._error = pypardiso.pardiso_wrapper.PyPardisoError
         self._lock = threading.Lock()
         for place, value in ((1, 1), (2, 2), (8, 2), (10, 8), (11, 0), (13, 0), (21, 1), (24, 1)):
