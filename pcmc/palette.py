@@ -8,8 +8,8 @@ from .arrays import Floats
 from .surface import Surface
 
 # Paul Tol's "light" scheme.
-SHEETS = ("#77AADD", "#EE8866", "#44BB99", "#EEDD88", "#FFAABB")
-WALLS = ("#DDDDDD", "#BBCC33", "#99DDFF", "#AAAA00")
+SHEETS = ("#77AADD", "#EE8866", "#44BB99", "#EEDD88", "#AAAA00")
+WALLS = ("#DDDDDD", "#99DDFF", "#BBCC33", "#FFAABB")
 
 
 def rgb(color: str) -> Floats:

@@ -15,7 +15,7 @@ from ..files import whole
 DPI = 200.0
 TEXT, SMALL = 7.0, 6.0  # points
 INK = "#202020"
-LARGE = 120_000  # bytes
+LARGE = 145_000  # bytes
 # Okabe and Ito's scheme, in an order whose first few differ most.
 CURVES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
@@ -51,7 +51,7 @@ def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
     """The figure as an (h,w,3) image, written as a PNG if there is a path.
 
     The file says nothing of when and by what it was made: the same figure gives the same bytes.
-    Above 120 kB it is written again in 256 colours.
+    Above 145 kB it is written again in 256 colours.
     """
     from PIL import Image as Pillow
 
