@@ -18,39 +18,40 @@ from .options import positive
 WIDTH, DEPTH, HEIGHT = 190.22, 101.56, 29.17
 LEFT, MIDDLE, RIGHT, LEFT_WALL, RIGHT_WALL = range(5)
 
-# Knots and control points of cubics, (x, y, z), smooth across inner knots. The outline runs
-# counter-clockwise: it comes down to the four feet, where the walls end, rises between them, and
-# touches the sides of the box at knots, so that the box is met at every edge length.
+# Knots and control points of cubics, (x, y, z). The outline runs counter-clockwise: it comes down to
+# the four feet, where the walls end, rises between them, and touches the sides of the box at knots,
+# so that the box is met at every edge length. In plan it is convex and smooth: at a re-entrant
+# corner the paper's flow draws the vertices next to it into the corner, and its triangles collapse.
 WEST = [
-    (58, 93, 4), (42, 100, 9), (0, 96, 20),
-    (0, 51, 17), (0, 14, 14.5), (44, 4, 6), (65, 10, 0),
+    (60, 97.5, 4), (38, 95, 11.5), (0, 84, 12.5),
+    (0, 51, 10.5), (0, 18, 8.5), (38, 7, 7.5), (63, 4.2, 1),
 ]  # fmt: skip
 SOUTH = [
-    (65, 10, 0), (78, 3, 6), (87, 0, 15),
-    (101, 0, 16), (115, 0, 17), (121, 4, 11), (132, 11, 6),
+    (63, 4.2, 1), (74, 2.96, 8.5), (85, 0, 9.5),
+    (98, 0, 9.5), (111, 0, 9.5), (122, 1.9, 8.5), (133, 3.4, 3),
 ]  # fmt: skip
 EAST = [
-    (132, 11, 6), (149, 4, 10), (WIDTH, 11, 14),
-    (WIDTH, 52, 14), (WIDTH, 88, 14), (160, 97, 6), (140, 90, 0),
+    (133, 3.4, 3), (153, 6.1, 7.5), (WIDTH, 20, 8.5),
+    (WIDTH, 53, 9.5), (WIDTH, 84, 10.5), (158, 92.6, 9.5), (136, 96.5, 0),
 ]  # fmt: skip
 NORTH = [
-    (140, 90, 0), (126, 98, 7), (114, DEPTH, 19),
-    (97, DEPTH, 20), (80, DEPTH, 21), (70, 98.5, 11), (58, 93, 4),
+    (136, 96.5, 0), (124, 98.6, 10.5), (112, DEPTH, 12.5),
+    (98, DEPTH, 12.5), (84, DEPTH, 12.5), (71, 99.1, 11.5), (60, 97.5, 4),
 ]  # fmt: skip
 ARCHES = (
-    [(65, 10, 0), (56, 38, 24), (53, 65, 29), (58, 93, 4)],
-    [(132, 11, 6), (138, 39, 29), (145, 62, 24), (140, 90, 0)],
+    [(63, 4.2, 1), (68, 36, 26), (66, 66, 27), (60, 97.5, 4)],
+    [(133, 3.4, 3), (128, 35, 27), (131, 66, 25), (136, 96.5, 0)],
 )
 HOLE = [
-    (114, 55, 25), (114, 64, 26), (106, 70, 27.5),
-    (96, 69, 28), (86, 68, 28.5), (80, 62, 26.5),
-    (81, 54, 26), (82, 46, 25.5), (89, 42, 24),
-    (98, 42.5, 24), (107, 43, 24), (114, 46, 24), (114, 55, 25),
+    (113, 54, 24), (113, 63, 24.5), (106, 69, 25),
+    (97, 68, 25), (88, 67, 25), (81, 61, 24.5),
+    (82, 53, 24), (83, 45, 23.5), (89, 40, 23),
+    (98, 40.5, 23), (107, 41, 23), (113, 45, 23.5), (113, 54, 24),
 ]  # fmt: skip
 
 
 def bezier_hall(
-    edge_length: float = 4.0,
+    edge_length: float = 3.6,
     *,
     alpha: float = 30.0,
     alpha_left: float = 10.0,
@@ -61,6 +62,9 @@ def bezier_hall(
     The paper gives the box, 190.22 by 101.56 by 29.17, the tensions and the kinds of boundary; the
     curves are this package's own. Outline, hole and the walls' sloping feet are fixed in all
     directions. The initial roof is a membrane under an even load over outline, hole and arches.
+    On these curves an edge length of 3.6 brings the paper's flow nearest to what is printed: ‖∇E‖²
+    = 2.678e5 at the start, and its least error at iteration 225. There is an equilibrium down to
+    α = 24 at least.
 
     Parameters
     ----------

@@ -10,16 +10,26 @@ import numpy as np
 import pandas as pd
 
 from generators import two_squares
-from pcmc import Surface, curvature_error, mean_curvature
+from pcmc import Surface, curvature_error, mean_curvature, solve
+from pcmc.solvers.result import Progress
 
 from .example import energy_history
-from .flow import Case, curvature_table, junction_top, run_cases, turn
+from .flow import (
+    PAPER,
+    SHORT_ITERATIONS,
+    Case,
+    curvature_table,
+    junction_top,
+    run_cases,
+    turn,
+)
 from .folder import Folder
 from .study import Study
 
 T0, T0_HISTORIES, ITERATIONS = 0.005, 0.05, 300
 WALLS = (0.0, 1.0, 2.0, 3.0)  # Fig. 7b to 7e
 COARSE, FINE = 4, 8
+STANDS = 0.05  # a wall lower than this, over an initial height of 1, is not seen
 VARIANTS = {  # Fig. 10: the lines and their names
     "proposed": (True, True),
     "no-line-search": (True, False),
@@ -55,8 +65,27 @@ def _case(name: str, n: int, diagonals: str, wall: float, options: dict[str, Any
 
 
 def data(folder: Folder, short: bool) -> None:
-    """Solve every case."""
+    """Solve every case, and follow the wall of α 3, which does not stand for long."""
     run_cases(folder, cases(), short=short)
+    folder.write_table("standing", _standing(SHORT_ITERATIONS if short else ITERATIONS))
+
+
+def _standing(iterations: int) -> pd.DataFrame:
+    """The height of the wall of α 3 after each iteration, with and without momentum."""
+    start = two_squares(COARSE, alpha_aux=WALLS[-1])
+    junction = start.topology.on_junction
+    tables = []
+    for momentum in (True, False):
+        heights = [start.vertices[junction, 2].max()]
+
+        def note(progress: Progress, heights: list[float] = heights) -> None:
+            heights.append(progress.surface().vertices[junction, 2].max())
+
+        options: dict[str, Any] = {**PAPER, "t0": T0, "tolerance": None, "momentum": momentum}
+        solve(start, "nesterov", note, iterations=iterations, **options)
+        columns = {"momentum": momentum, "iteration": range(len(heights)), "height": heights}
+        tables.append(pd.DataFrame(columns))
+    return pd.concat(tables, ignore_index=True)
 
 
 def table(folder: Folder) -> dict[str, float]:
@@ -72,7 +101,15 @@ def table(folder: Folder) -> dict[str, float]:
     fig10 = _fig10(folder.read_table("histories"))
     folder.write_table("fig10", fig10)
     records = folder.read_table("records").set_index("case")
-    return _given(start) | _shape_numbers(junction.set_index("case"), records) | _numbers10(fig10)
+    standing = folder.read_table("standing")
+    tall = standing[standing.height > STANDS].groupby("momentum").iteration.max()
+    until = {"stands_until": tall[True], "stands_until_without_momentum": tall[False]}
+    return (
+        until
+        | _given(start)
+        | _shape_numbers(junction.set_index("case"), records)
+        | _numbers10(fig10)
+    )
 
 
 def _given(start: Surface) -> dict[str, float]:
@@ -158,7 +195,7 @@ def _main(wall: float, n: int = COARSE) -> str:
 
 def figure(folder: Folder) -> None:
     """Figs. 6 to 10."""
-    from pcmc.plot import draw, panel
+    from pcmc.plot import draw, lines, panel
 
     meshes = {wall: folder.read_mesh(_main(wall)) for wall in WALLS}
     start, end = meshes[2.0]["initial"], meshes[2.0]["final"]
@@ -169,14 +206,20 @@ def figure(folder: Folder) -> None:
         titles=["initial shape", *(f"α of the wall = {wall:g}" for wall in WALLS)],
     )  # fmt: skip
     draw(end, folder.figure("fig08"), numbers=mean_curvature(end), legend=True)
+    standing = folder.read_table("standing")
+    heights = {
+        "with momentum" if momentum else "without": (mine.iteration, mine.height)
+        for momentum, mine in standing.groupby("momentum", sort=False)
+    }
+    lines(heights, folder.figure("fig07-wall"), x="iteration", y="height of the wall, α 3")
     pair = [end, folder.read_mesh(_main(2.0, FINE))["final"]]
     panel(
         pair, folder.figure("fig09"), views="plan", titles=["(a) coarse mesh", "(b) fine mesh"],
         scalars=[100.0 * curvature_error(s) for s in pair], label="error, %",
     )  # fmt: skip
     for test, name in (("printed", "fig10"), ("sufficient", "fig10-sufficient")):
-        lines = {v.replace("-", " "): f"fig10-{v}-{test}" for v in VARIANTS}
-        energy_history(folder, lines, name)
+        named = {v.replace("-", " "): f"fig10-{v}-{test}" for v in VARIANTS}
+        energy_history(folder, named, name)
 
 
 STUDY = Study(
