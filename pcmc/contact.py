@@ -165,16 +165,22 @@ def pull_and_capacity(surface: Surface, below: Walls, rests: Bools) -> tuple[Flo
     return pull, np.where(rests, capacity, 0.0)
 
 
-def lifted(surface: Surface, below: Walls, free: Bools, fraction: float = 0.05) -> Surface:
-    """The full surface with the given resting vertices raised off Π by a fraction of their spacing.
-
-    The wall below comes back hanging from them.
-    """
+def crest_spacing(surface: Surface, below: Walls) -> Floats:
+    """(n,) the shorter crest edge at each crest vertex, length; infinite elsewhere."""
     ends = surface.vertices[below.edges]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     spacing = np.full(surface.n, np.inf)
     np.minimum.at(spacing, below.edges[:, 0], lengths)
     np.minimum.at(spacing, below.edges[:, 1], lengths)
+    return spacing
+
+
+def lifted(surface: Surface, below: Walls, free: Bools, fraction: float = 0.05) -> Surface:
+    """The full surface with the given resting vertices raised off Π by a fraction of their spacing.
+
+    The wall below comes back hanging from them.
+    """
+    spacing = crest_spacing(surface, below)
     X = surface.vertices.copy()
     X[free] += (fraction * spacing[free] * below.side[free])[:, None] * np.array(
         surface.plane.normal

@@ -18,8 +18,10 @@ from .assemble import Pattern, assemble, pattern
 from .factor import Factor, Factoriser, factoriser
 from .motion import MotionSpace, Structure, perpendicular
 from .surface import Surface
+from .topology import SHEET
 
 FLOOR = 1e-2  # tension, relative to the largest, that walls without tension get in L_α
+PIN = 1e8  # weight, relative to its stiffness, that holds a vertex to its given motion
 SHIFT = 1e-9  # of the diagonal, so that a surface that nothing holds has a Laplacian to solve with
 
 
@@ -33,7 +35,7 @@ class Smoother:
     def __init__(self, surface: Surface, frame: Structure, backend: str | None = None) -> None:
         floor = FLOOR * float(surface.tensions.max())
         tensions = {p.name: max(p.tension, floor) for p in surface.patches}
-        self._surface = surface.retensioned(tensions, {name: 0.0 for name in tensions})
+        self._surface = surface.retensioned(tensions, dict.fromkeys(tensions, 0.0))
         self._frame = replace(
             frame, active=np.ones(surface.m, dtype=bool), faces=surface.faces,
             patch_of_face=surface.patch_of_face, topology=surface.topology,
@@ -96,3 +98,36 @@ class _Coordinate:
         out = np.zeros_like(forces)
         out[self._free] = self._factor.solve(forces[self._free])
         return out
+
+
+class Carrier:
+    """Carries the inside of the sheets along with their curves.
+
+    The motion of curves and points is extended harmonically into the sheets (L_α w = 0 there, w given on
+    the curves); of w each sheet vertex takes the part along its sheet, so the shape is not touched.
+    """
+
+    def __init__(
+        self, surface: Surface, frame: Structure, X: Floats, backend: str | None = None
+    ) -> None:
+        used = ~frame.idle
+        basis = np.zeros((surface.n, 3, 3))
+        basis[:, 0, 0] = 1.0
+        space = MotionSpace(basis, used.astype(np.int64))
+        equal = surface.retensioned({p.name: 1.0 for p in surface.patches})
+        kept = pattern(frame, space)
+        data = assemble(equal, frame, space, kept, X, hessian=0.0, stiffness=1.0)
+        diagonal = kept.indptr[:-1]
+        self._used = used
+        self._led = (frame.kind != SHEET) | surface.fixed
+        self._weight = np.where(self._led[used], PIN * data[diagonal], 0.0)
+        data[diagonal] += self._weight
+        self._factor = factoriser(kept, backend).factor(data)
+
+    def carry(self, space: MotionSpace, motion: Floats) -> Floats:
+        """The motion (n,3) with the sheets' vertices carried along."""
+        lead = np.where(self._led[:, None], motion, 0.0)[self._used]
+        follow = np.zeros_like(motion)
+        follow[self._used] = self._factor.solve(self._weight[:, None] * lead)
+        follow[self._led] = 0.0
+        return motion + follow - space.project(follow)

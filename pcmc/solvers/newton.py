@@ -20,6 +20,7 @@ from ..assemble import Pattern, assemble, pattern
 from ..contact import (
     Walls,
     creases,
+    crest_spacing,
     hung,
     lifted,
     pinched,
@@ -28,7 +29,7 @@ from ..contact import (
     settled,
     walls,
 )
-from ..descent import Smoother
+from ..descent import Carrier, Smoother
 from ..energy import energy_and_gradient, energy_at
 from ..factor import Factor, Factoriser, SingularMatrix, factoriser
 from ..modes import lowest, negatives_without, stiffness
@@ -41,6 +42,7 @@ from . import options as check
 from .result import Callback, Progress, Result, Status
 
 TARGETS = ("minimum", "stationary")
+LOW = 2e-3  # height, in spacings along the crest, at which a sinking junction is set to rest
 SLACK = 1e-13  # relative rounding of E, below which a rise of E means nothing
 
 
@@ -82,6 +84,7 @@ class _Level:
         self.options = options
         self.log = log
         self.walls: Walls = walls(surface)
+        self.spacing = crest_spacing(surface, self.walls)
         self.first_quality = 0.0
         self.pinch(resting(surface, self.walls))
         self.first_quality = self.quality(self.X)
@@ -104,6 +107,7 @@ class _Level:
         self.factoriser: Factoriser | None = None
         self.factor: Factor | None = None
         self.smoother: Smoother | None = None
+        self.carrier: Carrier | None = None
         self.smooth_age = 99
         self.measure()
 
@@ -197,7 +201,9 @@ class _Level:
         if not standing.any():
             return X, standing
         height = self.surface.plane.height(X)
-        down = standing & (self.walls.side * height <= 0.0)
+        above = self.walls.side * height
+        sinks = above < self.walls.side * self.surface.plane.height(self.X)
+        down = standing & ((above <= 0.0) | (sinks & (above <= LOW * self.spacing)))
         X[down] -= height[down, None] * np.array(self.surface.plane.normal)
         X = hung(self.surface, self.walls, X, self.space)
         return X, down
@@ -216,6 +222,8 @@ class _Level:
         slope = float((self.gradient * d).sum())
         for t in (1.0, 0.5, 0.25, 0.125) if fresh else (1.0,):
             X, down = self.moved_by(t * d)
+            if self.spoils(X):
+                X, down = self.moved_by(t * self.carried(d))
             if self.spoils(X):
                 continue
             if down.any():
@@ -236,6 +244,13 @@ class _Level:
             self.measure()
         self.factor = None
         return not fresh
+
+    def carried(self, d: Floats) -> Floats:
+        """The motion d with the insides of the sheets carried along."""
+        if self.carrier is None:
+            self.carrier = Carrier(self.surface, self.frame, self.X, self.options.backend)
+            self.log.factorisations += 1
+        return self.carrier.carry(self.space, d)
 
     def positive(self) -> bool:
         """Factorise; where a minimum is sought, shift until no negative eigenvalue is left."""
