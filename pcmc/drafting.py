@@ -13,10 +13,12 @@ from .errors import PlanError
 from .lift import dome, spanned
 from .plan import EDGES, Area, Plan
 from .planar import PlanarMesh, locate, signed_areas, triangulate
+from .polish import polished
 from .surface import Patch, Surface
 from .walls import Standing, WallTop, stand
 
 MOST = 5_000_000  # triangles
+GOOD_ANGLE = 28.0  # degrees; below it the slope has spoilt a triangle that was good in plan
 
 
 def surface(plan: Plan) -> Surface:
@@ -36,7 +38,9 @@ def surface(plan: Plan) -> Surface:
         raise PlanError("every vertex of the mesh is held; use a smaller edge_length")
     base, height = _heights(plan, drawn, mesh, fixed | sliding)
     patches, patch_of_face = _patches(plan, mesh)
-    X = to_space(np.column_stack([mesh.points, height]), plan.plane)
+    raised = np.column_stack([mesh.points, height])
+    inner = np.arange(len(raised)) >= len(drawn.points)
+    X = to_space(polished(raised, mesh.triangles, inner, GOOD_ANGLE), plan.plane)
     walls, wall_patches = _walls(plan, drawn, lines, X, base, fixed)
     return Surface(
         np.concatenate([X, walls.vertices]),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -12,9 +12,10 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from .arrays import Bools, Floats, Ints
 from .errors import OptionError, SurfaceError
+from .polish import angles, polished
 
 CLEARANCE = 0.62  # of the edge length: nearer to a segment, a free point would crowd it
-GOOD_ANGLE = 30.0  # degrees; triangles below it get a point at their circumcentre
+GOOD_ANGLE = 30.0  # degrees; where it is not reached, points are added and moved
 OUTSIDE = -1
 
 
@@ -39,7 +40,7 @@ def triangulate(
     segments: Ints,
     edge_length: float,
     holes: Sequence[Sequence[float]] = (),
-    rounds: int = 24,
+    rounds: int = 12,
 ) -> PlanarMesh:
     """Near-equilateral triangles in everything that the segments enclose.
 
@@ -81,7 +82,7 @@ def triangulate(
     mesh = _inside(everything, segments, holes, len(fixed))
     for step in range(rounds):
         X = mesh.points
-        if step % 4 == 0 and step < rounds - 8:
+        if step % 4 == 0 and step < rounds - 4:
             X = _crowd_removed(mesh, len(fixed), spacing, edge_length)
             if len(X) == len(mesh.points):
                 X = np.concatenate(
@@ -90,7 +91,9 @@ def triangulate(
         else:
             X = _relaxed(mesh, len(fixed))
         mesh = _inside(X, segments, holes, len(fixed))
-    return mesh
+    movable = np.arange(len(mesh.points)) >= len(fixed)
+    flat = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
+    return replace(mesh, points=polished(flat, mesh.triangles, movable, GOOD_ANGLE)[:, :2])
 
 
 def signed_areas(points: Floats, triangles: Ints) -> Floats:
@@ -288,13 +291,6 @@ def _relaxed(mesh: PlanarMesh, k: int) -> Floats:
     return moved
 
 
-def _angles(X: Floats, T: Ints) -> Floats:
-    """(t,3) angles, degrees."""
-    p = X[T]
-    u, v = p[:, [1, 2, 0]] - p, p[:, [2, 0, 1]] - p
-    return np.degrees(np.arctan2(np.abs(cross(u, v)), np.einsum("tij,tij->ti", u, v)))
-
-
 def _wanted(points: Floats, fixed: Floats, spacing: Floats, h: float) -> Floats:
     """(p,) edge length wanted at each point: the nearest given point's, growing away from it."""
     distance, nearest = cKDTree(fixed).query(points)
@@ -313,7 +309,7 @@ def _additions(mesh: PlanarMesh, segments: Ints, k: int, spacing: Floats, h: flo
     centre = a + offset / np.where(flat, 1.0, twice)[:, None]
     radius = np.linalg.norm(centre - a, axis=1)
     wanted = _wanted(X[T].mean(axis=1), X[:k], spacing, h)
-    sharp = _angles(X, T).min(axis=1) < GOOD_ANGLE
+    sharp = angles(X, T).min(axis=1) < GOOD_ANGLE
     chosen = np.flatnonzero(~flat & ((radius > wanted) | (sharp & (radius > 0.8 * wanted))))
     order = chosen[np.argsort(-radius[chosen] / wanted[chosen], kind="stable")]
     place, need = centre[order], 0.7 * wanted[order]

@@ -13,7 +13,7 @@ REACHES = (0.02, 0.06, 0.15)  # of the longest edge of the star
 
 
 def angles(X: Floats, F: Ints) -> Floats:
-    """(…,m,3) angles of triangles, degrees; X may be a stack (…,n,3) of places for its vertices.
+    """(…,m,3) angles of triangles, degrees; X (n,2), (n,3), or a stack of them (…,n,3).
 
     >>> angles(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])).round(9).tolist()
     [[90.0, 45.0, 45.0]]
@@ -21,8 +21,8 @@ def angles(X: Floats, F: Ints) -> Floats:
     corner = X[..., F, :]
     a, b = np.roll(corner, -1, axis=-2) - corner, np.roll(corner, 1, axis=-2) - corner
     cosine = (a * b).sum(axis=-1)
-    sine = np.linalg.norm(np.cross(a, b), axis=-1)
-    return np.degrees(np.arctan2(sine, cosine))
+    both = (a * a).sum(axis=-1) * (b * b).sum(axis=-1)
+    return np.degrees(np.arctan2(np.sqrt(np.maximum(both - cosine**2, 0.0)), cosine))
 
 
 def polished(X: Floats, F: Ints, movable: Bools, goal: float) -> Floats:

@@ -25,6 +25,22 @@ def patch_angles(surface: Surface) -> dict[str, float]:
     return {p.name: float(angle[of == k].min()) for k, p in enumerate(surface.patches)}
 
 
+def sharpest_corner(surface: Surface) -> float:
+    """The smallest angle between two curve edges of one triangle: no mesh there can do better."""
+    on_curve = surface.topology.curve_edge[surface.topology.edge_of_face]
+    sides = (
+        surface.vertices[surface.faces[:, [2, 0, 1]]]
+        - surface.vertices[surface.faces[:, [1, 2, 0]]]
+    )
+    corners = []
+    for k in range(3):  # the sides opposite the other two corners meet at corner k
+        i, j = (k + 1) % 3, (k + 2) % 3
+        a, b = (sides[on_curve[:, i] & on_curve[:, j], m] for m in (i, j))
+        length = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
+        corners.append(np.degrees(np.arccos(-(a * b).sum(axis=1) / length)))
+    return float(np.concatenate(corners).min())
+
+
 def curve_edges(surface: Surface) -> np.ndarray:
     return surface.topology.edges[surface.topology.curve_edge]
 
@@ -49,14 +65,18 @@ def assert_same_curves(old: Surface, new: Surface) -> None:
     assert len(new.topology.boundary_loops) == len(old.topology.boundary_loops)
 
 
-@pytest.mark.parametrize("example", [generators.two_caps, generators.bezier_hall])
-def test_a_solved_example_to_half_the_edge_length(example):
-    solved = solve(example()).surface
+@pytest.mark.parametrize(
+    ("example", "length"),
+    [(generators.two_caps, 1.2), (generators.two_caps, 0.8), (generators.bezier_hall, 4.6)],
+)
+def test_a_solved_example_to_half_the_edge_length(example, length):
+    solved = solve(example(length)).surface
     h = float(edge_lengths(solved).mean())
     fine = remesh(solved, h / 2)
     assert_same_curves(solved, fine)
     assert fine.patches == solved.patches
-    assert min(patch_angles(fine).values()) >= 20.0
+    assert min(patch_angles(fine).values()) >= min(20.0, sharpest_corner(solved) - 1e-6)
+    assert sharpest_corner(solved) > 19.0
     assert 3.0 < fine.m / solved.m < 6.0
     assert edge_lengths(fine).mean() == pytest.approx(h / 2, rel=0.1)
     np.testing.assert_allclose(patch_areas(fine), patch_areas(solved), rtol=0.01)
@@ -75,9 +95,9 @@ def test_walls_that_share_a_line_and_slide():
 
 
 def test_a_thin_wall_keeps_its_triangles_where_they_are_better():
-    """The wall of Example 2 ends in corners of 11°: no triangle there can be better."""
-    start = generators.two_caps()
+    start = generators.two_caps(1.2)
     before = patch_angles(start)
+    assert before["wall"] == pytest.approx(sharpest_corner(start), rel=0.02)
     assert before["wall"] < 12.0
     fine = patch_angles(remesh(start, 0.6))
     assert fine["wall"] > 0.8 * before["wall"]
@@ -106,7 +126,7 @@ def test_new_vertices_lie_near_the_smooth_surface():
 
 
 def test_finer_near_curves():
-    start = generators.bezier_hall()
+    start = generators.bezier_hall(4.6)
     fine = remesh(start, 5.0, near_curves=1.2)
     assert_same_curves(start, fine)
     length = edge_lengths(fine)
@@ -116,7 +136,7 @@ def test_finer_near_curves():
 
 
 def test_finer_where_it_bends():
-    start = generators.bezier_hall()
+    start = generators.bezier_hall(4.6)
     assert remesh(start, 5.0, chord=0.05).m > 1.5 * remesh(start, 5.0).m
 
 
@@ -142,7 +162,7 @@ def test_held_points_and_lines_inside_a_patch_stay():
 
 
 def test_the_same_mesh_twice():
-    start = generators.two_caps()
+    start = generators.two_caps(1.2)
     one, two = remesh(start, 0.7), remesh(start, 0.7)
     np.testing.assert_array_equal(one.vertices, two.vertices)
     np.testing.assert_array_equal(one.faces, two.faces)
