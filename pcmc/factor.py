@@ -27,7 +27,7 @@ BACKENDS = ("pardiso", "superlu")
 
 
 class SingularMatrix(ArithmeticError):
-    """A pivot is exactly zero: the matrix has no factorisation."""
+    """A pivot is zero: the matrix has no factorisation, or none that shows its inertia."""
 
 
 class Factor(Protocol):
@@ -128,7 +128,7 @@ class _Pardiso:
         os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
         self._error = pypardiso.pardiso_wrapper.PyPardisoError
         self._lock = threading.Lock()
-        for place, value in ((1, 1), (2, 2), (8, 2), (10, 8), (11, 0), (13, 0), (21, 1), (24, 1)):
+        for place, value in ((1, 1), (2, 2), (8, 2), (10, 13), (11, 0), (13, 0), (21, 1), (24, 1)):
             self._solver.set_iparm(place, value)
         self._analysed = False
         # MKL keeps the factor outside Python: free it with this object, but not at interpreter exit.
@@ -145,6 +145,8 @@ class _Pardiso:
         except self._error as error:
             raise SingularMatrix(str(error)) from None
         iparm = self._solver.iparm
+        if iparm[13]:  # MKL replaces a pivot below 1e-13 of the matrix and goes on
+            raise SingularMatrix(f"{iparm[13]} pivots are zero to rounding")
         return _PardisoFactor(self, matrix, int(iparm[22]))
 
     def run(self, phase: int, matrix: csr_array, right: Floats) -> Floats:

@@ -1,0 +1,137 @@
+"""Sparse factorisation with inertia: every backend against dense linear algebra."""
+
+import numpy as np
+import pytest
+from motion_cases import SURFACES
+from scipy.sparse import csr_array
+
+from pcmc import factor
+from pcmc.assemble import Pattern, assemble, pattern
+from pcmc.errors import MissingExtra, OptionError
+from pcmc.factor import SingularMatrix, available, factoriser
+from pcmc.motion import motion_space, structure
+
+BACKENDS = [
+    pytest.param(name, marks=pytest.mark.skipif(name not in available(), reason="not installed"))
+    for name in factor.BACKENDS
+]
+every_backend = pytest.mark.parametrize("backend", BACKENDS)
+
+
+def upper(A):
+    """The pattern (with every diagonal entry) and values of a symmetric matrix's upper triangle."""
+    rows, columns = np.nonzero(np.triu(A) + np.eye(len(A)))
+    kept = csr_array((np.ones(len(rows)), (rows, columns)), shape=A.shape)
+    return Pattern(kept.indptr, kept.indices, np.empty((0, 3))), A[rows, columns].astype(float)
+
+
+def random_symmetric(size, seed):
+    random = np.random.default_rng(seed)
+    A = np.where(random.random((size, size)) < 4 / size, random.standard_normal((size, size)), 0.0)
+    return A + A.T + np.diag(3.0 * random.standard_normal(size))
+
+
+def assembled(name):
+    surface = SURFACES[name]()
+    frame = structure(surface)
+    space = motion_space(surface, frame, surface.vertices)
+    kept = pattern(frame, space)
+    return kept, assemble(surface, frame, space, kept, surface.vertices)
+
+
+def dense(kept, data):
+    U = kept.matrix(data).toarray()
+    return U + np.triu(U, 1).T
+
+
+@every_backend
+@pytest.mark.parametrize("seed", range(4))
+def test_solutions_and_inertia_of_random_matrices(backend, seed):
+    A = random_symmetric(60, seed)
+    kept, data = upper(A)
+    found = factoriser(kept, backend).factor(data)
+    values = np.linalg.eigvalsh(A)
+    assert found.negative == (values < 0).sum()
+    assert 0 < found.negative < 60
+    right = np.random.default_rng(seed).standard_normal((60, 3))
+    scale = np.linalg.cond(A) * 1e-13
+    np.testing.assert_allclose(found.solve(right), np.linalg.solve(A, right), atol=scale)
+    np.testing.assert_allclose(
+        found.solve(right[:, 0]), np.linalg.solve(A, right[:, 0]), atol=scale
+    )
+
+
+@every_backend
+@pytest.mark.parametrize("name", ["three patches, tilted", "tent", "pyramid"])
+def test_solutions_and_inertia_of_hessians(backend, name):
+    kept, data = assembled(name)
+    A = dense(kept, data)
+    found = factoriser(kept, backend).factor(data)
+    assert found.negative == (np.linalg.eigvalsh(A) < 0).sum()
+    right = np.cos(np.arange(len(A)))
+    assert np.linalg.norm(A @ found.solve(right) - right) < 1e-11 * np.linalg.norm(right)
+
+
+@every_backend
+def test_new_values_in_the_same_pattern(backend):
+    kept, data = assembled("three patches")
+    keeper = factoriser(kept, backend)
+    right = np.ones(kept.size)
+    for scale in (1.0, 2.0, -1.0):
+        found = keeper.factor(scale * data)
+        A = dense(kept, scale * data)
+        assert found.negative == (np.linalg.eigvalsh(A) < 0).sum()
+        np.testing.assert_allclose(A @ found.solve(right), right, atol=1e-10)
+
+
+@every_backend
+def test_several_factorisers_live_side_by_side(backend):
+    first, second = factoriser(*_one(2.0, backend)), factoriser(*_one(4.0, backend))
+    two, four = first.factor(np.array([2.0])), second.factor(np.array([4.0]))
+    del second
+    assert two.solve(np.array([1.0])) == pytest.approx([0.5])
+    assert four.solve(np.array([1.0])) == pytest.approx([0.25])
+
+
+def _one(value, backend):
+    return upper(np.array([[value]]))[0], backend
+
+
+@every_backend
+@pytest.mark.parametrize(
+    "A",
+    [np.zeros((3, 3)), np.ones((3, 3)), np.diag([1.0, 0.0, 2.0])],
+    ids=["zero", "rank 1", "row"],
+)
+def test_a_singular_matrix_is_refused(backend, A):
+    kept, data = upper(A)
+    with pytest.raises(SingularMatrix):
+        factoriser(kept, backend).factor(data)
+
+
+def test_superlu_says_where_a_row_exchange_hides_the_inertia():
+    kept, data = upper(np.array([[0.0, 1.0], [1.0, 0.0]]))
+    found = factoriser(kept, "superlu").factor(data)
+    np.testing.assert_allclose(found.solve(np.array([2.0, 3.0])), [3.0, 2.0])
+    with pytest.raises(SingularMatrix, match="zero pivot forced a row exchange"):
+        _ = found.negative
+
+
+def test_unknown_and_missing_backends(monkeypatch):
+    kept, _ = upper(np.eye(2))
+    with pytest.raises(
+        OptionError, match="unknown factorisation backend 'superl'; did you mean 'super"
+    ):
+        factoriser(kept, "superl")
+    monkeypatch.setattr(factor, "available", lambda: ("superlu",))
+    with pytest.raises(MissingExtra, match=r"pypardiso is not installed.*pcmc\[fast\]"):
+        factoriser(kept, "pardiso")
+    assert factoriser(kept).factor(np.ones(2)).negative == 0
+
+
+def test_the_fastest_backend_comes_first(monkeypatch):
+    assert available()[-1] == "superlu"
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert factor.available.__wrapped__() == ("superlu",)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: object())
+    assert factor.available.__wrapped__() == factor.BACKENDS

@@ -1,0 +1,200 @@
+"""The motion space: what it is made of at each kind of vertex, and that the rest changes no shape."""
+
+import numpy as np
+import pytest
+from motion_cases import SURFACES, TILTED, seam
+from shapes import disc, pyramid, rotation, shaken, three_patches
+
+from generators import two_squares
+from pcmc import Patch, Plane, Surface, energy, gradient
+from pcmc.energy import energy_and_gradient
+from pcmc.motion import force_scale, motion_space, structure
+from pcmc.topology import CURVE, POINT, SHEET
+
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+
+
+def frame_and_space(surface: Surface):
+    frame = structure(surface)
+    return frame, motion_space(surface, frame, surface.vertices)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_the_basis_is_orthonormal_and_within_the_supports(name):
+    surface = SURFACES[name]()
+    _, space = frame_and_space(surface)
+    used = np.arange(3) < space.dimension[:, None]
+    gram = np.einsum("vcd,ved->vce", space.basis, space.basis)
+    np.testing.assert_allclose(gram, used[:, :, None] * np.eye(3), atol=1e-14)
+    assert (space.dimension[surface.fixed] == 0).all()
+    heights = space.basis[surface.on_plane] @ np.array(surface.plane.normal)
+    np.testing.assert_allclose(heights, 0.0, atol=1e-14)
+    assert space.size == space.dimension.sum() > 0
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_pull_and_push_are_transposes_and_project_is_a_projection(name):
+    surface = SURFACES[name]()
+    _, space = frame_and_space(surface)
+    random = np.random.default_rng(1)
+    s, v = random.standard_normal(space.size), random.standard_normal((surface.n, 3))
+    assert space.pull(v) @ s == pytest.approx((v * space.push(s)).sum(), rel=1e-12)
+    np.testing.assert_allclose(space.pull(space.push(s)), s, atol=1e-14)
+    once = space.project(v)
+    np.testing.assert_allclose(space.project(once), once, atol=1e-14)
+    assert np.abs(v - once).max() > 0.1
+
+
+def test_each_kind_of_vertex_has_its_dimension():
+    surface = shaken(three_patches())
+    frame, space = frame_and_space(surface)
+    free, sliding = surface.free, surface.on_plane
+    for kind, dimension in ((SHEET, 1), (CURVE, 2), (POINT, 3)):
+        assert (frame.kind[free] == kind).any()
+        assert (space.dimension[free & (frame.kind == kind)] == dimension).all()
+    assert (space.dimension[sliding & (frame.kind == CURVE)] == 1).all()
+    assert (space.dimension[sliding & (frame.kind == POINT)] == 2).all()
+
+
+def test_directions_are_the_normal_and_the_plane_across_the_curve():
+    surface = shaken(three_patches(plane=TILTED))
+    frame, space = frame_and_space(surface)
+    X = surface.vertices
+    corners = X[frame.faces]
+    vector = np.zeros_like(X)
+    for corner in range(3):
+        np.add.at(
+            vector, frame.faces[:, corner],
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]),
+        )  # fmt: skip
+    sheet = surface.free & (frame.kind == SHEET)
+    normal = vector[sheet] / np.linalg.norm(vector[sheet], axis=1)[:, None]
+    np.testing.assert_allclose(space.basis[sheet, 0], normal, atol=1e-14)
+    for v in np.flatnonzero(surface.free & (frame.kind == CURVE)):
+        one, two = (frame.curve_edges[(frame.curve_edges == v).any(axis=1)]).sum(axis=1) - v
+        # the chord weighted by lengths or not: both lie in the plane of the two edges
+        tangent = np.cross(*space.basis[v, :2])
+        plane = np.cross(X[one] - X[v], X[two] - X[v])
+        assert abs(tangent @ plane) < 1e-12 * np.linalg.norm(plane) + 1e-13
+        assert abs(tangent @ (X[one] - X[two])) > 0.9 * np.linalg.norm(X[one] - X[two])
+
+
+def test_sliding_inside_a_sheet_and_where_the_sheet_lies_in_the_plane():
+    """An apex held to a plane moves along it where the roof's normal does, and not at all otherwise."""
+    level = pyramid(on_plane=[4], plane=Plane((0, 0, 1.0)))
+    assert frame_and_space(level)[1].dimension[4] == 0
+    normal = np.array([1.0, 2.0, 2.0]) / 3.0
+    slope = pyramid(on_plane=[4], plane=Plane((0, 0, 1.0), normal))
+    space = frame_and_space(slope)[1]
+    assert space.dimension[4] == 1
+    up = np.array([0.0, 0.0, 1.0])
+    along = up - (up @ normal) * normal
+    np.testing.assert_allclose(np.abs(space.basis[4, 0] @ along), np.linalg.norm(along), rtol=1e-12)
+
+
+def test_a_foot_that_runs_across_the_plane_slides_both_ways():
+    """The end of a curve that stands upright on Π: both of its directions are along Π."""
+    X = [[0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 0]]
+    walls = [[0, 5, 1], [0, 2, 5], [0, 5, 3], [0, 4, 5]]
+    surface = Surface(
+        X, walls, [0, 1, 2, 3], [Patch(f"wall {k}", 1.0, pressure=0.0) for k in range(4)],
+        fixed=[0, 1, 2, 3, 4], on_plane=[5],
+    )  # fmt: skip
+    space = frame_and_space(surface)[1]
+    assert space.dimension.tolist() == [0, 0, 0, 0, 0, 2]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_space_turns_with_the_surface(seed):
+    surface = shaken(three_patches(plane=TILTED), seed=seed)
+    R = rotation(seed)
+    shift = np.array([1.0, -2.0, 0.5])
+    turned = Surface(
+        surface.vertices @ R.T + shift, surface.faces, surface.patch_of_face, surface.patches,
+        fixed=surface.fixed, on_plane=surface.on_plane,
+        plane=Plane(R @ surface.plane.point + shift, R @ surface.plane.normal),
+    )  # fmt: skip
+    v = np.random.default_rng(seed).standard_normal((surface.n, 3))
+    here, there = frame_and_space(surface)[1], frame_and_space(turned)[1]
+    np.testing.assert_array_equal(here.dimension, there.dimension)
+    np.testing.assert_allclose(there.project(v @ R.T), here.project(v) @ R.T, atol=1e-12)
+
+
+def test_what_is_left_out_changes_no_shape():
+    """Vertices of a folded plane may wander in it, and along the fold: E does not see it."""
+    flat, faces = disc(4)
+    random = np.random.default_rng(2)
+    fold = np.abs(flat[:, 1]) < 1e-9
+    flat = flat + 0.03 * random.standard_normal(flat.shape) * np.column_stack([fold + ~fold, ~fold])
+    X = np.column_stack([flat, 0.7 * np.abs(flat[:, 1])])
+    right = (flat[faces].mean(axis=1)[:, 1] > 0.0).astype(int)
+    rim = np.hypot(*flat.T) > 0.9
+    patches = [Patch("left", 2.0, pressure=0.4), Patch("right", 3.0)]
+    surface = Surface(X, faces, right, patches, fixed=rim)
+    _, space = frame_and_space(surface)
+    assert {1, 2} <= set(space.dimension.tolist())
+    forces = gradient(surface)
+    np.testing.assert_allclose(forces - space.project(forces), 0.0, atol=1e-14)
+    assert np.abs(forces).max() > 0.01
+
+
+def test_a_wall_without_tension_has_no_motion_and_its_junction_is_one_smooth_sheet():
+    surface = two_squares(4, alpha_aux=0.0)
+    frame, space = frame_and_space(surface)
+    wall = surface.patch_of_face == 2
+    assert not frame.active[wall].any()
+    assert frame.active[~wall].all()
+    idle = np.setdiff1d(surface.faces[wall], surface.faces[~wall])
+    assert frame.idle[idle].all()
+    assert (space.dimension[idle] == 0).all()
+    crest = np.setdiff1d(
+        np.intersect1d(surface.faces[wall], surface.faces[~wall]), np.flatnonzero(surface.fixed)
+    )
+    assert (frame.kind[crest] == SHEET).all()
+    assert (space.dimension[crest] == 1).all()
+
+
+def test_a_seam_is_smooth_until_tension_or_pressure_differ():
+    surface = seam()
+    middle = [6, 7, 8]
+    assert (structure(surface).kind[middle] == SHEET).all()
+    assert (structure(surface.retensioned({"north": 3.0})).kind[middle] == CURVE).all()
+    pushed = surface.retensioned(pressures={"north": 0.5})
+    assert (structure(pushed).kind[middle] == CURVE).all()
+
+
+def test_creases_are_curves():
+    surface = seam()
+    frame = structure(surface, np.array([[6, 7], [8, 7]]))
+    assert frame.kind[[6, 7, 8]].tolist() == [POINT, CURVE, POINT]
+    assert motion_space(surface, frame, surface.vertices).dimension[[6, 7, 8]].tolist() == [3, 2, 3]
+
+
+def test_a_curve_that_turns_back_on_itself_moves_in_all_directions():
+    surface = seam()
+    frame = structure(surface, np.array([[6, 7], [7, 8]]))
+    X = surface.vertices.copy()
+    X[8] = 2 * X[7] - X[8]
+    X[8] += X[6] - X[8]  # both neighbours in one place: no tangent
+    assert motion_space(surface, frame, X).dimension[7] == 3
+
+
+def test_the_residual_is_the_slope_of_the_energy_along_the_basis():
+    surface = SURFACES["three patches, tilted"]()
+    frame, space = frame_and_space(surface)
+    X = surface.vertices
+    residual = space.pull(energy_and_gradient(surface, X)[1])
+    s = np.random.default_rng(3).standard_normal(space.size)
+    t = 1e-5
+    slope = (
+        energy(surface.moved(X + t * space.push(s))) - energy(surface.moved(X - t * space.push(s)))
+    ) / (2 * t)
+    assert residual @ s == pytest.approx(slope, rel=1e-8)
+
+
+def test_force_scale_is_the_norm_of_the_triangles_forces():
+    surface = pyramid(1.5)
+    frame = structure(surface)
+    # four triangles with sides 2, √3, √3: each corner is pulled with ½ α of the side opposite
+    assert force_scale(surface, frame, surface.vertices) == pytest.approx(0.75 * np.sqrt(4 * 10.0))
+    assert force_scale(surface, frame, 0 * surface.vertices) == 1.0
