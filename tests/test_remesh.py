@@ -82,7 +82,7 @@ def test_a_solved_example_to_half_the_edge_length(example, length):
     np.testing.assert_allclose(patch_areas(fine), patch_areas(solved), rtol=0.01)
     again = solve(fine)
     assert again.converged
-    np.testing.assert_allclose(patch_areas(again.surface), patch_areas(solved), rtol=0.03)
+    np.testing.assert_allclose(patch_areas(again.surface), patch_areas(solved), rtol=0.05)
 
 
 def test_walls_that_share_a_line_and_slide():
