@@ -181,7 +181,7 @@ def test_a_curve_that_turns_back_on_itself_moves_in_all_directions():
 
 def test_the_residual_is_the_slope_of_the_energy_along_the_basis():
     surface = SURFACES["three patches, tilted"]()
-    frame, space = frame_and_space(surface)
+    _, space = frame_and_space(surface)
     X = surface.vertices
     residual = space.pull(energy_and_gradient(surface, X)[1])
     s = np.random.default_rng(3).standard_normal(space.size)
