@@ -13,12 +13,12 @@ import numpy as np
 import pandas as pd
 
 from .arrays import Bools, Floats, Ints
-from .contact import Walls, creases, pinched, resting, walls
+from .contact import Walls, pinched, resting, standing_structure, walls
 from .curvature import METHODS, curvature_error, mean_curvature
 from .energy import energy_and_gradient, patch_areas, volume
 from .factor import SingularMatrix
 from .modes import Stiffness, lowest, stiffness
-from .motion import MotionSpace, Structure, force_scale, motion_space, structure
+from .motion import MotionSpace, Structure, force_scale, motion_space
 from .quality import triangle_quality
 from .rigid import rigid_modes, rigid_motions
 from .surface import Surface
@@ -150,7 +150,7 @@ def certify(
     below = walls(surface)
     rests = resting(surface, below)
     standing = pinched(surface, below, rests)
-    frame = structure(standing, creases(below, rests))
+    frame = standing_structure(standing, below, rests)
     X = standing.vertices
     space = motion_space(standing, frame, X)
     value, forces = energy_and_gradient(standing, X, supports=False)
@@ -162,9 +162,7 @@ def certify(
         system = _system(standing, frame, space)
     values, fields = _modes(system, modes)
     ratio = load_ratio(standing)
-    verdict, detail = _verdict(
-        surface, residual, tolerance, quality, system, values, ratio, status
-    )
+    verdict, detail = _verdict(surface, residual, tolerance, quality, system, values, ratio, status)
     return Certificate(
         verdict=verdict,
         detail=detail,

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from .arrays import Bools, Floats, Ints
 from .energy import energy_and_gradient
-from .motion import MotionSpace
+from .motion import MotionSpace, Structure, structure
 from .surface import Surface
 from .topology import topology
 
@@ -146,6 +146,19 @@ def creases(below: Walls, rests: Bools) -> Ints:
     """(k,2) junction edges that lie on Π, both ends at rest or in a corner."""
     down = rests | below.anchored
     return below.edges[down[below.edges].all(axis=1)]
+
+
+def beside(below: Walls, rests: Bools) -> Bools:
+    """(n,) standing crest vertices next to a resting one."""
+    mask = np.zeros(len(rests), dtype=bool)
+    for one, other in (below.edges.T, below.edges.T[::-1]):
+        mask[one[rests[other]]] = True
+    return mask & below.can_rest & ~rests
+
+
+def standing_structure(standing: Surface, below: Walls, rests: Bools) -> Structure:
+    """The ``motion.structure`` of a pinched surface, with its creases on Π and what stands beside."""
+    return structure(standing, creases(below, rests), beside(below, rests))
 
 
 def pull_and_capacity(surface: Surface, below: Walls, rests: Bools) -> tuple[Floats, Floats]:

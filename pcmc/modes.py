@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array, triu
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from . import kernels
 from .arrays import Floats
@@ -104,8 +104,11 @@ def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
     scaled = diags_array(1.0 / root) @ system.matrix @ diags_array(1.0 / root)
     operator = LinearOperator((size, size), inverse, dtype=float)
     start = inverse(np.cos(np.arange(size) * 1.618))  # fixed, so that runs repeat
-    vectors = eigsh(operator, k=k, which="LM", v0=start)[1]
+    try:
+        vectors = eigsh(operator, k=k, which="LM", v0=start)[1]
+    except ArpackNoConvergence as partial:
+        vectors = np.asarray(partial.eigenvectors, dtype=float)
     values = np.einsum("ik,ik->k", vectors, scaled @ vectors)
     order = np.argsort(values)[:count]
-    fields = np.stack([system.space.push(vectors[:, i] / root) for i in order])
-    return values[order], fields
+    fields = [system.space.push(vectors[:, i] / root) for i in order]
+    return values[order], np.array(fields).reshape(len(order), len(system.space.dimension), 3)

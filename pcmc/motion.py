@@ -36,6 +36,7 @@ class Structure:
     curve_edges : (k,2) edges where active sheets meet, end, or change tension or pressure.
     kind : (n,) SHEET, CURVE or POINT in that sense.
     idle : (n,) vertices of no active face.
+    level : (n,) curve vertices beside one that rests on Π: their tangent is taken along Π.
     """
 
     active: Bools
@@ -45,6 +46,7 @@ class Structure:
     curve_edges: Ints
     kind: Ints
     idle: Bools
+    level: Bools
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,11 +85,14 @@ class MotionSpace:
         return self.push(self.pull(vectors))
 
 
-def structure(surface: Surface, creases: Ints | None = None) -> Structure:
+def structure(
+    surface: Surface, creases: Ints | None = None, level: Bools | None = None
+) -> Structure:
     """The pulling faces of a surface and what its vertices lie on.
 
     ``creases`` (k,2) are edges that count as curves whatever meets there: a junction that rests on Π
-    is held by it and may be sharp.
+    is held by it and may be sharp. ``level`` (n,) marks curve vertices whose tangent is taken along
+    Π: beside a resting vertex the curve has a corner and no tangent of its own.
 
     Two sheets of equal tension and pressure that meet with no pulling wall between them are one
     smooth sheet: their common curve can slide along it freely and carries no motion of its own.
@@ -107,7 +112,14 @@ def structure(surface: Surface, creases: Ints | None = None) -> Structure:
     curve_edges = topo.edges[is_curve]
     idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
     return Structure(
-        active, faces, patch, topo, curve_edges, vertex_kind(curve_edges, surface.n), idle
+        active=active,
+        faces=faces,
+        patch_of_face=patch,
+        topology=topo,
+        curve_edges=curve_edges,
+        kind=vertex_kind(curve_edges, surface.n),
+        idle=idle,
+        level=np.zeros(surface.n, dtype=bool) if level is None else level,
     )
 
 
@@ -126,6 +138,10 @@ def motion_space(surface: Surface, frame: Structure, X: Floats) -> MotionSpace:
 
     curve = moving & (frame.kind == CURVE)
     tangent = curve_tangents(X, frame.curve_edges)
+    if frame.level.any():
+        along = surface.plane.along(tangent[frame.level])
+        length = np.linalg.norm(along, axis=1)
+        tangent[frame.level] = along / np.where(length > 0.0, length, 1.0)[:, None]
     straight = np.einsum("ij,ij->i", tangent, tangent) > 0.5
     ring = np.flatnonzero(curve & straight)
     basis[ring, 0], basis[ring, 1] = perpendicular(tangent[ring])
@@ -146,7 +162,6 @@ def force_scale(surface: Surface, frame: Structure, X: Floats) -> float:
     sides = X[frame.faces[:, [1, 2, 0]]] - X[frame.faces]
     pull = 0.5 * surface.tensions[frame.patch_of_face] * np.linalg.norm(sides, axis=2).T
     return float(np.linalg.norm(pull)) or 1.0
-
 
 
 def perpendicular(directions: Floats) -> tuple[Floats, Floats]:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 
 from .arrays import Floats, Ints
 from .energy import apply_supports
+from .kernels import compiled
 from .surface import Surface
 from .topology import CURVE, POINT
+
+SQRT3 = sqrt(3.0)
 
 
 def triangle_quality(X: Floats, F: Ints) -> Floats:
@@ -19,6 +24,54 @@ def triangle_quality(X: Floats, F: Ints) -> Floats:
     sides = X[F[:, [1, 2, 0]]] - X[F]
     area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     return 4.0 * np.sqrt(3.0) * area / np.einsum("fij,fij->f", sides, sides)
+
+
+def worst_quality(X: Floats, F: Ints) -> float:
+    """The smallest triangle quality, 1 where there are no triangles."""
+    return float(_worst(X, F))
+
+
+def compare(X: Floats, Y: Floats, F: Ints) -> tuple[bool, float, float]:
+    """Whether a triangle turns over on the way from X to Y, and the worst quality at X and at Y."""
+    return bool(_turns(X, Y, F)), float(_worst(X, F)), float(_worst(Y, F))
+
+
+@compiled
+def _worst(X, F):  # type: ignore[no-untyped-def]
+    worst = 1.0
+    for f in range(len(F)):
+        i, j, k = F[f, 0], F[f, 1], F[f, 2]
+        ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
+        wx, wy, wz = X[k, 0] - X[i, 0], X[k, 1] - X[i, 1], X[k, 2] - X[i, 2]
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        uu, ww, uw = (
+            ux * ux + uy * uy + uz * uz,
+            wx * wx + wy * wy + wz * wz,
+            ux * wx + uy * wy + uz * wz,
+        )
+        squares = 2.0 * (uu + ww - uw)
+        twice = sqrt(nx * nx + ny * ny + nz * nz)
+        if twice * 2.0 * SQRT3 < worst * squares or squares == 0.0:
+            worst = twice * 2.0 * SQRT3 / squares if squares > 0.0 else 0.0
+    return worst
+
+
+@compiled
+def _turns(X, Y, F):  # type: ignore[no-untyped-def]
+    for f in range(len(F)):
+        i, j, k = F[f, 0], F[f, 1], F[f, 2]
+        ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
+        wx, wy, wz = X[k, 0] - X[i, 0], X[k, 1] - X[i, 1], X[k, 2] - X[i, 2]
+        px, py, pz = Y[j, 0] - Y[i, 0], Y[j, 1] - Y[i, 1], Y[j, 2] - Y[i, 2]
+        qx, qy, qz = Y[k, 0] - Y[i, 0], Y[k, 1] - Y[i, 1], Y[k, 2] - Y[i, 2]
+        dot = (
+            (uy * wz - uz * wy) * (py * qz - pz * qy)
+            + (uz * wx - ux * wz) * (pz * qx - px * qz)
+            + (ux * wy - uy * wx) * (px * qy - py * qx)
+        )
+        if dot <= 0.0:
+            return True
+    return False
 
 
 def minimum_angle(surface: Surface) -> float:

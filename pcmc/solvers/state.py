@@ -1,0 +1,172 @@
+"""Where the geometric solver stands on one mesh: shape, frames, residual, and what rests on Π."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..contact import (
+    Walls,
+    crest_spacing,
+    hung,
+    lifted,
+    pinched,
+    pull_and_capacity,
+    resting,
+    settled,
+    standing_structure,
+    walls,
+)
+from ..energy import energy_and_gradient, energy_at
+from ..motion import MotionSpace, Structure, force_scale, motion_space
+from ..quality import compare, redistribution, worst_quality
+from ..surface import Surface
+
+LOW = 2e-3  # height, in spacings along the crest, at which a sinking junction is set to rest
+CARES = 60  # times that the vertices are spread at most
+RELEASES = 30  # times that resting junctions are lifted at most
+
+
+class State:
+    """One mesh: the surface as it stands, and how it may move.
+
+    Attributes
+    ----------
+    full, surface : all of the mesh as it last was; the part of it that stands (see ``contact``).
+    X : (n,3) where the standing surface is now.
+    rests : (n,) junction vertices at rest on Π.
+    frame, space : what each vertex lies on, and the basis of its motion there.
+    energy, gradient, residual, norm, scale : E, ∇E, Bᵀ∇E, its norm and the forces it compares with.
+    version : changes whenever the faces or the number of unknowns do.
+    evaluations : energy or gradient evaluations so far.
+    """
+
+    def __init__(self, surface: Surface, care: float) -> None:
+        self.full = surface
+        self.care_bound = care
+        self.walls: Walls = walls(surface)
+        self.spacing = crest_spacing(surface, self.walls)
+        self.evaluations = 0
+        self.version = 0
+        self.cares, self.releases = CARES, RELEASES
+        self._pinch(resting(surface, self.walls))
+
+    def _pinch(self, rests: Bools) -> None:
+        self.rests = rests
+        self.surface = pinched(self.full, self.walls, rests)
+        self.X: Floats = self.surface.vertices.copy()
+        self.frame: Structure = standing_structure(self.surface, self.walls, rests)
+        self.judged: Ints = self.surface.faces[~self.walls.pinchable[self.surface.patch_of_face]]
+        self.version += 1
+        self.space: MotionSpace = motion_space(self.surface, self.frame, self.X)
+        self.measure()
+
+    def measure(self) -> None:
+        """Energy, gradient, frames and residual where the surface stands."""
+        self.energy, self.gradient = energy_and_gradient(self.surface, self.X)
+        self.evaluations += 1
+        before = self.space.dimension
+        self.space = motion_space(self.surface, self.frame, self.X)
+        if not np.array_equal(before, self.space.dimension):
+            self.version += 1
+        self.scale = force_scale(self.surface, self.frame, self.X)
+        self.residual = self.space.pull(self.gradient)
+        self.norm = float(np.linalg.norm(self.residual))
+
+    def energy_at(self, X: Floats) -> float:
+        """E of the standing surface at X."""
+        self.evaluations += 1
+        return energy_at(self.surface, X)
+
+    def residual_vectors(self, X: Floats) -> Floats:
+        """B Bᵀ ∇E (n,3) with the frames and the gradient at X."""
+        self.evaluations += 1
+        gradient = energy_and_gradient(self.surface, X)[1]
+        return motion_space(self.surface, self.frame, X).project(gradient)
+
+    @property
+    def relative(self) -> float:
+        """The residual relative to its scale."""
+        return self.norm / self.scale
+
+    @property
+    def worst(self) -> float:
+        """Quality of the worst triangle outside walls that may pinch."""
+        return worst_quality(self.X, self.judged)
+
+    def result_surface(self) -> Surface:
+        """The whole surface as it stands, vanished walls on the junction that rests."""
+        if not self.rests.any():
+            return self.full.moved(self.X)
+        return self.full.moved(settled(self.full, self.walls, self.rests, self.X))
+
+    def move(self, X: Floats, down: Bools) -> None:
+        """Go to X; crests that came ``down`` rest from now on."""
+        self.X = X
+        if down.any():
+            self.full = self.result_surface()
+            self._pinch(self.rests | down)
+        else:
+            self.measure()
+
+    def moved_by(self, d: Floats) -> tuple[Floats, Bools]:
+        """X + d and the crests it brings down to Π, which it leaves there.
+
+        The rows of a wall follow its crest in proportion to its height.
+        """
+        X = self.X + d
+        standing = self.walls.can_rest & ~self.rests
+        if not standing.any():
+            return X, standing
+        height = self.surface.plane.height(X)
+        above = self.walls.side * height
+        sinks = above < self.walls.side * self.surface.plane.height(self.X)
+        down = standing & ((above <= 0.0) | (sinks & (above <= LOW * self.spacing)))
+        X[down] -= height[down, None] * np.array(self.surface.plane.normal)
+        X = hung(self.surface, self.walls, X, self.space)
+        return X, down
+
+    def spoils(self, X: Floats) -> bool:
+        """Whether the move to X turns a triangle over or makes the worst one much worse.
+
+        The triangles of walls that may pinch are not judged: there a vanishing height is the answer.
+        """
+        turned, before, after = compare(self.X, X, self.judged)
+        return turned or after < 0.7 * min(before, self.care_bound)
+
+    def care(self) -> bool:
+        """Spread the vertices along the shape while triangles are poor; True if they moved."""
+        start = worst = self.worst
+        if self.cares <= 0 or self.relative < 1e-7 or worst >= self.care_bound:
+            return False
+        self.cares -= 1
+        best, X = self.X, self.X
+        for _ in range(20):
+            move = redistribution(self.surface, X, self.frame.curve_edges, self.frame.kind)
+            move[self.rests] = 0.0
+            space = motion_space(self.surface, self.frame, X)
+            X = hung(self.surface, self.walls, X + move - space.project(move), space)
+            quality = worst_quality(X, self.judged)
+            if quality > worst:
+                best, worst = X, quality
+            if quality >= self.care_bound:
+                break
+        if worst <= 1.02 * start:
+            self.cares = 0
+            return False
+        self.X = best
+        self.measure()
+        return True
+
+    def release(self) -> bool:
+        """Lift the resting vertices that the sheets pull harder than the wall can hold."""
+        if not self.rests.any() or self.releases <= 0:
+            return False
+        pull, capacity = pull_and_capacity(self.surface.moved(self.X), self.walls, self.rests)
+        free = self.rests & (pull > capacity * (1 + 1e-9))
+        if not free.any():
+            return False
+        self.releases -= 1
+        self.full = lifted(self.result_surface(), self.walls, free)
+        self._pinch(self.rests & ~free)
+        return True

@@ -1,0 +1,237 @@
+"""The steps of the geometric solver: Newton on a kept factor, smooth descent, leaving a saddle."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from ..arrays import Floats
+from ..assemble import Pattern, assemble, pattern
+from ..descent import Carrier, Smoother
+from ..factor import Factor, Factoriser, SingularMatrix, factoriser
+from ..modes import lowest, negatives_without, stiffness
+from ..motion import MotionSpace
+from ..rigid import rigid_modes, rigid_motions
+from .state import State
+
+SHIFTS = (0.0, 0.25, 1.0, 4.0)  # of the stiffness, tried in turn until the matrix is positive
+LENGTHS = (1.0, 0.5, 0.25, 0.125)  # of a Newton step, tried in turn
+REFRESH = 6  # descent steps between two factorisations of the Laplacian
+ROUNDING = 1e3 * float(np.finfo(float).eps)
+
+
+class Stepper:
+    """Takes steps on a State, keeping factorisations while they serve.
+
+    Attributes
+    ----------
+    kind : the last step: ``"newton"``, ``"shifted"``, ``"contact"``, ``"descent"`` or ``"saddle"``.
+    factorisations : matrices factorised so far.
+    """
+
+    def __init__(self, state: State, minimum: bool, backend: str | None) -> None:
+        self.state, self.minimum, self.backend = state, minimum, backend
+        self.kind = "start"
+        self.factorisations = 0
+        self._shifted = 0
+        self._version = -1
+        self._forget()
+
+    def _forget(self) -> None:
+        """Drop what belongs to other faces or unknowns."""
+        if self._version == self.state.version:
+            return
+        self._version = self.state.version
+        self._pattern: Pattern | None = None
+        self._factoriser: Factoriser | None = None
+        self._factor: Factor | None = None
+        self._smoother: Smoother | None = None
+        self._carrier: Carrier | None = None
+        self._age = REFRESH
+
+    def drop_factor(self) -> None:
+        """Factorise anew at the next Newton step."""
+        self._factor = None
+
+    def newton(self) -> bool:
+        """A Newton step, shortened if need be; False, and nothing moved, where none helps."""
+        self._forget()
+        state = self.state
+        fresh = self._factor is None
+        if not self._positive():
+            return False
+        d = self._direction() if self._shift == 0.0 else self._shifted_direction()
+        start, energy, norm = state.X, state.energy, state.norm
+        slope = float((state.gradient * d).sum())
+        for t in LENGTHS if fresh else LENGTHS[:1]:
+            X, down = state.moved_by(t * d)
+            if state.spoils(X):
+                X, down = state.moved_by(t * self._carried(d))
+            if state.spoils(X):
+                continue
+            state.move(X, down)
+            if down.any():
+                self.kind = "contact"
+                return True
+            if self._helps(t, slope, energy, norm):
+                if state.norm > 0.1 * norm or self._inner > 8:
+                    self._factor = None
+                self.kind = "newton" if self._shift == 0.0 else "shifted"
+                return True
+            if state.relative <= ROUNDING:
+                break
+            state.move(start, np.zeros(len(start), dtype=bool))
+        self._factor = None
+        return not fresh
+
+    def descend(self) -> bool:
+        """One smooth step down with backtracking; False where E does not fall."""
+        self._forget()
+        state = self.state
+        if self._smoother is None:
+            self._smoother = Smoother(state.surface, state.frame, self.backend)
+        if self._age >= REFRESH:
+            self._smoother.refresh(state.X)
+            self.factorisations += self._smoother.factorisations
+            self._age = 0
+        self._age += 1
+        forces = state.space.push(state.residual)
+        d = -self._smoother.solve(forces)
+        slope = float((forces * d).sum())
+        for t in 0.5 ** np.arange(12):
+            X, down = state.moved_by(t * d)
+            value = state.energy_at(X)
+            if np.isfinite(value) and value < state.energy + 1e-3 * t * slope:
+                state.move(X, down)
+                self._factor = None
+                self.kind = "descent"
+                return True
+        return False
+
+    def saddle_near(self) -> bool:
+        """Whether Newton steps have had to be shifted for a while."""
+        self._shifted = self._shifted + 1 if self.kind == "shifted" else 0
+        return self._shifted > 0 and self._shifted % 4 == 0
+
+    def leave_saddle(self) -> bool:
+        """Move along the lowest mode as far as E keeps falling; False where no mode lowers it."""
+        state = self.state
+        rigid = rigid_modes(state.space, rigid_motions(state.surface), state.X)
+        try:
+            system = stiffness(
+                state.surface.moved(state.X), state.frame, state.space, rigid, self.backend
+            )
+        except SingularMatrix:
+            return False
+        self.factorisations += 1
+        if system.negative == 0:
+            return False
+        modes = lowest(system, 1)[1]
+        if not len(modes):
+            return False
+        unit = modes[0] / np.abs(modes[0]).max()
+        unit *= np.sign(unit.sum()) or 1.0
+        X = self._downhill(unit)
+        if X is None:
+            X = self._downhill(-unit)
+        if X is None:
+            return False
+        state.X = X
+        state.measure()
+        self._factor = None
+        self.kind = "saddle"
+        return True
+
+    def _downhill(self, unit: Floats) -> Floats | None:
+        """The farthest doubling along a direction on which E keeps falling, or None."""
+        state = self.state
+        best, lowest_energy = None, state.energy
+        t = 1e-3 * state.full.size
+        while t < 0.1 * state.full.size:
+            X, down = state.moved_by(t * unit)
+            value = state.energy_at(X)
+            if not value < lowest_energy or down.any() or state.spoils(X):
+                break
+            best, lowest_energy = X, value
+            t *= 2.0
+        return best
+
+    def _positive(self) -> bool:
+        """Factorise; where a minimum is sought, shift until no negative eigenvalue is left."""
+        for shift in SHIFTS if self.minimum else SHIFTS[:1]:
+            if self._factorise(shift) and (self.negative == 0 or not self.minimum):
+                return True
+            self._factor = None
+        return False
+
+    def _factorise(self, shift: float) -> bool:
+        """Factorise BᵀHB + shift BᵀLB here, unless a factor is kept; False where it is singular."""
+        if self._factor is not None:
+            return True
+        state = self.state
+        if self._pattern is None or self._factoriser is None:
+            self._pattern = pattern(state.frame, state.space)
+            self._factoriser = factoriser(self._pattern, self.backend)
+        data = assemble(state.surface, state.frame, state.space, self._pattern, state.X, 1.0, shift)
+        try:
+            self._factor = self._factoriser.factor(data)
+        except SingularMatrix:
+            return False
+        self.factorisations += 1
+        self._shift = shift
+        self._space: MotionSpace = state.space
+        rigid = rigid_modes(state.space, rigid_motions(state.surface), state.X)
+        self.negative = negatives_without(self._factor, rigid)
+        return True
+
+    def _precondition(self, residual: Floats) -> Floats:
+        """The kept factor's answer to a residual in the present basis."""
+        assert self._factor is not None
+        now, then = self.state.space, self._space
+        if now is then:
+            return self._factor.solve(residual)
+        return now.pull(then.push(self._factor.solve(then.pull(now.push(residual)))))
+
+    def _derivative(self, s: Floats) -> Floats:
+        """Change of the residual along s, by a difference: the frames turn with the surface."""
+        state = self.state
+        d = state.space.push(s)
+        length = float(np.abs(d).max())
+        if length == 0.0:
+            return np.zeros_like(s)
+        t = 1e-7 * state.full.size / length
+        ahead = state.residual_vectors(state.X + t * d)
+        behind = state.residual_vectors(state.X - t * d)
+        return state.space.pull(ahead - behind) / (2.0 * t)
+
+    def _direction(self) -> Floats:
+        """-B J⁻¹ r with J the derivative of r itself, by GMRES on the kept factor."""
+        residual = self.state.residual
+        size = (len(residual), len(residual))
+        norms: list[float] = []
+        s, _ = gmres(
+            LinearOperator(size, self._derivative, dtype=float), -residual,
+            M=LinearOperator(size, self._precondition, dtype=float),
+            rtol=1e-3, restart=12, maxiter=1, callback=norms.append, callback_type="pr_norm",
+        )  # fmt: skip
+        self._inner = len(norms)
+        return self.state.space.push(s)
+
+    def _shifted_direction(self) -> Floats:
+        self._inner = 0
+        return -self.state.space.push(self._precondition(self.state.residual))
+
+    def _carried(self, d: Floats) -> Floats:
+        """The motion d with the insides of the sheets carried along."""
+        if self._carrier is None:
+            state = self.state
+            self._carrier = Carrier(state.surface, state.frame, state.X, self.backend)
+            self.factorisations += 1
+        return self._carrier.carry(self.state.space, d)
+
+    def _helps(self, t: float, slope: float, energy: float, norm: float) -> bool:
+        """Whether the step just taken lowers the residual enough or, towards a minimum, E."""
+        if self.state.norm < (1.0 - 0.3 * t) * norm:
+            return True
+        falls = self.state.energy <= energy + 1e-2 * t * slope and slope < 0.0
+        return falls and self.minimum
