@@ -128,7 +128,7 @@ class _Pardiso:
         os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
         self._error = pypardiso.pardiso_wrapper.PyPardisoError
         self._lock = threading.Lock()
-        for place, value in ((1, 1), (2, 2), (8, 2), (10, 13), (11, 0), (13, 0), (21, 1), (24, 1)):
+        for place, value in ((1, 1), (2, 2), (8, 0), (10, 13), (11, 0), (13, 0), (21, 1), (24, 1)):
             self._solver.set_iparm(place, value)
         self._analysed = False
         # MKL keeps the factor outside Python: free it with this object, but not at interpreter exit.

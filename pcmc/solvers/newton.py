@@ -27,6 +27,7 @@ from .steps import Stepper
 
 TARGETS = ("minimum", "stationary")
 DESCENTS = 5  # smooth steps after a Newton step that did not help
+ROUNDED = 1e-10  # relative residual that counts as rest where rounding lets no step improve it
 COLLAPSED = 1e-3  # triangle quality at which the run ends
 POOR = 0.02  # triangle quality that explains why no step helps
 
@@ -37,7 +38,8 @@ class NewtonOptions:
 
     Parameters
     ----------
-    tolerance : converged when ‖Bᵀ∇E‖ ≤ tolerance × the norm of the single triangles' forces.
+    tolerance : converged when ‖Bᵀ∇E‖ ≤ tolerance × the norm of the single triangles' forces, or when
+        rounding lets no step improve on 1e-10 of it.
     iterations : the most steps of any kind.
     target : ``"minimum"`` leaves saddles; ``"stationary"`` converges to them.
     levels : solve here, refine 1→4 this many times, and finish on each.
@@ -46,7 +48,7 @@ class NewtonOptions:
     backend : factorisation, ``"pardiso"`` or ``"superlu"``; None for the fastest here.
     """
 
-    tolerance: float = 1e-11
+    tolerance: float = 1e-12
     iterations: int = 200
     target: str = "minimum"
     levels: int = 0
@@ -127,6 +129,8 @@ def _run(state: State, stepper: Stepper, options: NewtonOptions, log: _Log, leve
                 if state.care():
                     stepper.drop_factor()
                 wait = _step(state, stepper, wait)
+                if wait < 0 and state.relative <= ROUNDED:
+                    return Status.CONVERGED
                 if wait < 0:
                     return Status.DEGENERATE if state.worst < POOR else Status.STALLED
             if not np.isfinite(state.energy):

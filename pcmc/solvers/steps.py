@@ -200,9 +200,8 @@ class Stepper:
         if length == 0.0:
             return np.zeros_like(s)
         t = 1e-7 * state.full.size / length
-        ahead = state.residual_vectors(state.X + t * d)
-        behind = state.residual_vectors(state.X - t * d)
-        return state.space.pull(ahead - behind) / (2.0 * t)
+        change = state.residual_vectors(state.X + t * d) - state.space.push(state.residual)
+        return state.space.pull(change) / t
 
     def _direction(self) -> Floats:
         """-B J⁻¹ r with J the derivative of r itself, by GMRES on the kept factor."""
