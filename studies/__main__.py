@@ -14,6 +14,7 @@ from pcmc.errors import MissingExtra, PcmcError
 from .registry import STUDIES, chosen, of_the_paper
 from .study import STEPS, Study
 
+WIDTH = 150  # columns of tables that go to a file or a log
 HOME = Path(__file__).resolve().parent.parent
 
 
@@ -73,7 +74,7 @@ def _run(studies: Sequence[Study], asked: argparse.Namespace, steps: Sequence[st
 
     start = time.perf_counter()
     results = asked.results or (_scratch() if asked.short else HOME / "results")
-    console = Console()
+    console = Console(width=None if sys.stdout.isatty() else WIDTH)
     outcomes = run_all(
         studies, results, console, workers=asked.workers, short=asked.short, steps=steps
     )

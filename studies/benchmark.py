@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -93,7 +94,7 @@ def median_seconds(call: Callable[[], object], repeats: int = REPEATS) -> float:
 
 def main() -> int:
     """Print every benchmark's rows."""
-    console = Console()
+    console = Console(width=None if sys.stdout.isatty() else 120)
     table = Table("what", "median", "unit", "remark")
     for benchmark in BENCHMARKS:
         for row in benchmark():

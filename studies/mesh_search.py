@@ -59,7 +59,7 @@ def cases() -> list[Case]:
         for rings in (7, 8, 9, 10, 12):
             build = partial(four_fans, rings, bulge=bulge)
             listed.append(_case("example3", f"lattice, bulge {bulge:g}", 20.0 / rings, build, 0.01))
-    for h in (10.0, 8.0, 6.0, 5.0, 4.5, 4.0, 3.9, 3.8, 3.7, 3.6, 3.5, 3.4, 3.3):
+    for h in (10.0, 8.0, 6.0, 5.0, 4.5, 4.0, 3.8, 3.7, 3.6, 3.5, 3.4):
         listed.append(_case("example4", "hall", h, partial(bezier_hall, h), 0.005))
     return listed
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -102,7 +103,8 @@ def _cells(comparison: pd.DataFrame, kind: str) -> list[list[str]]:
         equal = row["relation"] == "="
         paper = f"{'' if equal else row['relation'] + ' '}{row['paper']:.7g}"
         ours = f"{row['ours']:.6g}"
-        difference = [f"{row['difference']:+.3g}" if equal else ""] if kind == "number" else []
+        known = equal and math.isfinite(row["difference"])
+        difference = [f"{row['difference']:+.3g}" if known else ""] if kind == "number" else []
         if kind == "sentence":
             paper, ours = f"{row['relation']} {row['paper']:.4g}", f"{row['ours']:.4g}"
         cells.append([row["what"], row["where"], paper, ours, *difference, row["verdict"]])
