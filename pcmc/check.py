@@ -45,7 +45,7 @@ def face_array(faces: npt.ArrayLike, n: int) -> Ints:
     F = _integers(faces, "faces")
     if F.ndim != 2 or F.shape[1] != 3 or not len(F):
         raise SurfaceError(f"faces: expected shape (m, 3) with m > 0, found {F.shape}")
-    bad = np.flatnonzero(((F < 0) | (F >= n)).any(axis=1))
+    bad = np.flatnonzero(((F < 0) | (n <= F)).any(axis=1))
     if len(bad):
         raise SurfaceError(
             f"faces[{bad[0]}] = {F[bad[0]].tolist()} names a vertex outside 0..{n - 1}"
@@ -72,11 +72,9 @@ def patch_array(patch_of_face: npt.ArrayLike, m: int, patches: Sequence[Any]) ->
     P = _integers(patch_of_face, "patch_of_face")
     if P.shape != (m,):
         raise SurfaceError(f"patch_of_face: expected shape ({m},), one per face, found {P.shape}")
-    bad = np.flatnonzero((P < 0) | (P >= len(names)))
+    bad = np.flatnonzero((P < 0) | (len(names) <= P))
     if len(bad):
-        raise SurfaceError(
-            f"patch_of_face[{bad[0]}] = {P[bad[0]]} is outside 0..{len(names) - 1}"
-        )
+        raise SurfaceError(f"patch_of_face[{bad[0]}] = {P[bad[0]]} is outside 0..{len(names) - 1}")
     empty = np.flatnonzero(np.bincount(P, minlength=len(names)) == 0)
     if len(empty):
         raise SurfaceError(f"patch {names[empty[0]]!r} (index {empty[0]}) has no faces; remove it")

@@ -8,7 +8,6 @@ from .arrays import Floats
 from .motion import MotionSpace
 from .surface import Surface
 
-
 SEEN = 0.05  # part of a rigid motion in the motion space below which it only slides the surface
 
 

@@ -53,7 +53,9 @@ class Patch:
                 " 0 makes a wall that does not pull"
             )
         if not math.isfinite(self.pressure):
-            raise SurfaceError(f"patch {self.name!r}: pressure must be finite, found {self.pressure}")
+            raise SurfaceError(
+                f"patch {self.name!r}: pressure must be finite, found {self.pressure}"
+            )
         if self.tension == 0.0 and self.pressure != 0.0:
             raise SurfaceError(
                 f"patch {self.name!r}: a patch under pressure {self.pressure} needs a tension > 0;"

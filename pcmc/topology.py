@@ -112,9 +112,7 @@ class Topology:
     def boundary_loops(self) -> tuple[Curve, ...]:
         """Boundary curves of each patch's outline, cut where more than two boundary edges meet."""
         boundary = self.edges[self.boundary_edge]
-        return self._curves(
-            self.boundary_edge, vertex_kind(boundary, self.vertex_count) == POINT
-        )
+        return self._curves(self.boundary_edge, vertex_kind(boundary, self.vertex_count) == POINT)
 
     @cached_property
     def components(self) -> Ints:
@@ -162,7 +160,9 @@ def topology(faces: Ints, patch_of_face: Ints, vertex_count: int) -> Topology:
     >>> t.edges[~t.boundary_edge].tolist(), t.valence.tolist()
     ([[0, 2]], [1, 2, 1, 1, 1])
     """
-    corners = np.concatenate([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]]).astype(np.int64)
+    corners = np.concatenate([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]]).astype(
+        np.int64
+    )
     low, high = corners.min(axis=1), corners.max(axis=1)
     key, inverse, count = np.unique(
         low * vertex_count + high, return_inverse=True, return_counts=True
