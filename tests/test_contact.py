@@ -1,0 +1,258 @@
+"""Walls that pinch: what hangs from where, what goes when a junction rests on Π, and when it lifts."""
+
+import numpy as np
+import pytest
+from shapes import rotation, shaken
+
+from generators import double_bubble, four_fans, two_caps, two_squares
+from pcmc import Plane, Surface, energy, solve
+from pcmc.contact import (
+    beside,
+    creases,
+    crest_spacing,
+    hung,
+    lifted,
+    pinched,
+    pull_and_capacity,
+    resting,
+    settled,
+    standing_structure,
+    walls,
+)
+from pcmc.motion import motion_space
+from pcmc.quality import triangle_quality
+
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+
+
+def crest_of(surface, below):
+    """Free crest vertices in order along y (all these walls stand on x = 0)."""
+    free = np.flatnonzero(below.can_rest)
+    return free[np.argsort(surface.vertices[free, 1])]
+
+
+def pressed(n=6, count=2, **arguments):
+    """Two squares whose junction rests on Π at the first ``count`` vertices from one corner."""
+    surface = two_squares(n, **arguments)
+    below = walls(surface)
+    rests = np.zeros(surface.n, dtype=bool)
+    rests[crest_of(surface, below)[:count]] = True
+    standing = pinched(surface, below, rests)
+    full = surface.moved(settled(surface, below, rests, standing.vertices))
+    return full, below, rests, standing
+
+
+def elsewhere(surface, seed=0):
+    """The surface turned and moved, its plane with it, and the map of points."""
+    R, shift = rotation(seed), np.array([3.0, -1.0, 2.0])
+    plane = Plane(R @ surface.plane.point + shift, R @ surface.plane.normal)
+    turned = Surface(
+        surface.vertices @ R.T + shift, surface.faces, surface.patch_of_face, surface.patches,
+        fixed=surface.fixed, on_plane=surface.on_plane, plane=plane,
+    )  # fmt: skip
+    return turned, lambda X: X @ R.T + shift
+
+
+def test_which_walls_can_pinch():
+    surface = two_squares(6)
+    below = walls(surface)
+    assert below.pinchable.tolist() == [False, False, True]
+    assert len(below.edges) == 6
+    assert below.can_rest.sum() == 5
+    assert below.anchored.sum() == 2
+    assert surface.fixed[below.anchored].all()
+    wall = np.unique(surface.faces[surface.patch_of_face == 2])
+    crest = np.unique(below.edges)
+    np.testing.assert_array_equal(below.hanging, np.setdiff1d(wall, crest))
+    assert set(below.tension) == {2.0}
+    assert walls(four_fans(4)).pinchable.sum() == 4
+
+
+def test_a_wall_that_does_not_stand_on_the_plane_cannot():
+    below = walls(double_bubble(1.2))
+    assert not below.pinchable.any()
+    assert not below.can_rest.any()
+    assert len(below.hanging) == len(below.edges) == 0
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: two_squares(6), lambda: four_fans(5), lambda: two_caps(0.8)],
+    ids=["two squares", "four fans", "two caps"],
+)  # fmt: skip
+def test_each_wall_vertex_hangs_where_it_is(make):
+    surface = make()
+    below = walls(surface)
+    np.testing.assert_allclose(hung(surface, below, surface.vertices), surface.vertices, atol=1e-2)
+    i, j = below.ends.T
+    assert ((below.along >= 0) & (below.along <= 1) & (below.share >= 0) & (below.share <= 1)).all()
+    crest = np.unique(below.edges)
+    assert np.isin(i, crest).all()
+    assert np.isin(j, crest).all()
+    foot = np.abs(surface.plane.height(surface.vertices[below.hanging])) < 1e-12
+    assert (below.share[foot] == 0.0).all()
+    assert (below.share[~foot] > 0.0).all()
+
+
+def test_the_rows_of_a_wall_follow_its_crest():
+    surface = two_squares(6)
+    below = walls(surface)
+    X = surface.vertices.copy()
+    crest = crest_of(surface, below)
+    X[crest] = X[crest] * [1, 1, 1.7] + [0.3, 0.0, 0.0]
+    moved = hung(surface, below, X)
+    straight = (below.along == 0.0) | (below.along == 1.0)
+    assert straight.all()
+    owner = np.where(below.along == 0.0, below.ends[:, 0], below.ends[:, 1])
+    np.testing.assert_allclose(moved[below.hanging, :2], X[owner, :2], atol=1e-12)
+    np.testing.assert_allclose(moved[below.hanging, 2], below.share * X[owner, 2], atol=1e-12)
+    others = np.setdiff1d(np.arange(surface.n), below.hanging)
+    np.testing.assert_array_equal(moved[others], X[others])
+
+
+def test_with_a_motion_space_only_what_lies_along_the_wall():
+    surface = shaken(two_squares(6), 0.02)
+    below = walls(surface)
+    space = motion_space(
+        surface, standing_structure(surface, below, resting(surface, below)), surface.vertices
+    )
+    X = surface.vertices.copy()
+    X[below.can_rest] += [0.1, 0.0, 0.2]
+    change = hung(surface, below, X, space) - X
+    np.testing.assert_allclose(space.project(change), 0.0, atol=1e-14)
+    assert np.abs(change).max() > 0.05
+
+
+def test_hanging_turns_with_the_plane():
+    surface = two_squares(6)
+    turned, place = elsewhere(surface)
+    here, there = walls(surface), walls(turned)
+    X = surface.vertices.copy()
+    X[here.can_rest] += [0.3, 0.0, 0.5]
+    expected = place(hung(surface, here, X))
+    np.testing.assert_allclose(hung(turned, there, place(X)), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, 3, 5])
+def test_what_is_left_when_a_junction_rests(count):
+    full, below, rests, standing = pressed(count=count)
+    assert rests.sum() == count
+    np.testing.assert_array_equal(resting(full, below), rests)
+    assert triangle_quality(standing.vertices, standing.faces).min() > 0.1
+    assert standing.on_plane[rests].all()
+    outer = full.patch_of_face != 2
+    assert (standing.patch_of_face != 2).sum() == outer.sum()
+    if count == 5:
+        assert (standing.patch_of_face != 2).all()
+    # what is gone has no area, so E is that of the full surface with its wall pressed flat
+    assert energy(standing) == pytest.approx(energy(full), rel=1e-13)
+    again = pinched(full, below, rests)
+    np.testing.assert_array_equal(again.faces, standing.faces)
+    np.testing.assert_allclose(again.vertices, standing.vertices, atol=1e-14)
+
+
+def test_without_a_resting_vertex_nothing_changes():
+    surface = two_squares(4)
+    below = walls(surface)
+    assert not resting(surface, below).any()
+    assert pinched(surface, below, resting(surface, below)) is surface
+
+
+def test_pinching_turns_with_the_plane():
+    full, below, rests, standing = pressed()
+    turned, place = elsewhere(two_squares(6))
+    there = walls(turned)
+    turned = turned.moved(place(full.vertices))
+    np.testing.assert_array_equal(resting(turned, there), rests)
+    other = pinched(turned, there, rests)
+    np.testing.assert_array_equal(other.faces, standing.faces)
+    np.testing.assert_allclose(other.vertices, place(standing.vertices), atol=1e-12)
+    for one, two in zip(
+        pull_and_capacity(standing, below, rests),
+        pull_and_capacity(other, there, rests),
+        strict=True,
+    ):
+        np.testing.assert_allclose(one, two, atol=1e-12)
+
+
+def test_curves_and_neighbours_of_the_resting_part():
+    full, below, rests, _ = pressed(count=2)
+    crest = crest_of(full, below)
+    corner = np.flatnonzero(below.anchored)
+    corner = corner[np.argsort(full.vertices[corner, 1])][0]
+    expected = {frozenset((corner, crest[0])), frozenset((crest[0], crest[1]))}
+    assert {frozenset(edge) for edge in creases(below, rests).tolist()} == expected
+    assert np.flatnonzero(beside(below, rests)).tolist() == [crest[2]]
+    spacing = crest_spacing(full, below)
+    assert spacing[corner] == pytest.approx(4 / 6)
+    assert np.isinf(spacing[np.setdiff1d(np.arange(full.n), below.edges)]).all()
+
+
+@pytest.mark.parametrize("count", [5])
+def test_pull_less_capacity_is_what_lifting_gains(count):
+    """(E(lifted by z) - E(resting)) / z tends to capacity - pull."""
+    full, below, rests, standing = pressed(count=count)
+    pull, capacity = pull_and_capacity(standing, below, rests)
+    assert (capacity[~rests] == 0).all()
+    assert (pull[~rests] == 0).all()
+    spacing = crest_spacing(full, below)
+    for v in np.flatnonzero(rests):
+        one = np.arange(full.n) == v
+        fraction = 1e-6
+        slope = (energy(lifted(full, below, one, fraction)) - energy(full)) / (
+            fraction * spacing[v]
+        )
+        assert slope == pytest.approx(capacity[v] - pull[v], abs=1e-5)
+        assert capacity[v] == pytest.approx(2.0 * 4 / 6, rel=1e-12)  # α_w times the spacing
+
+
+def test_a_lifted_wall_is_back():
+    full, below, rests, _ = pressed(count=3)
+    up = lifted(full, below, rests, 0.1)
+    assert not resting(up, below).any()
+    assert up.plane.height(up.vertices[rests]) == pytest.approx(0.1 * 4 / 6)
+    assert triangle_quality(up.vertices, up.faces).min() > 0.02
+    partly = lifted(full, below, np.arange(full.n) == crest_of(full, below)[2], 0.1)
+    np.testing.assert_array_equal(
+        resting(partly, below), rests & (partly.plane.height(partly.vertices) == 0)
+    )
+    assert resting(partly, below).sum() == 2
+
+
+def complementary(surface):
+    """Whether the pull on each resting vertex is one that its wall can take."""
+    below = walls(surface)
+    rests = resting(surface, below)
+    pull, capacity = pull_and_capacity(pinched(surface, below, rests), below, rests)
+    return rests, pull, capacity
+
+
+@pytest.mark.parametrize(("n", "alpha_aux", "count"), [(8, 3.0, 7), (16, 2.0, 2)])
+def test_a_converged_contact_is_one(n, alpha_aux, count):
+    result = solve(two_squares(n, alpha_aux=alpha_aux), target="stationary")
+    assert result.converged
+    rests, pull, capacity = complementary(result.surface)
+    assert rests.sum() == count
+    assert (pull <= capacity * (1 + 1e-9)).all()
+    assert (pull[rests] > 0.0).all()
+    found = result.certificate
+    np.testing.assert_array_equal(found.pinched, np.flatnonzero(rests))
+    assert found.curvature_error < 1e-9
+    heights = result.surface.plane.height(result.surface.vertices)
+    assert (heights[walls(result.surface).can_rest & ~rests] > 0.0).all()
+
+
+def test_the_wall_stands_just_below_the_tension_that_keeps_it_down():
+    """With the whole junction at rest the shape does not depend on α_w; its largest pull per length is
+    the tension below which the wall stands up somewhere."""
+    low = solve(two_squares(8, alpha_aux=3.0), target="stationary")
+    rests, pull, capacity = complementary(low.surface)
+    assert rests.sum() == 7
+    threshold = 3.0 * float((pull[rests] / capacity[rests]).max())
+    assert 2.5 < threshold < 2.8
+    above = solve(two_squares(8, alpha_aux=1.03 * threshold), target="stationary")
+    below = solve(two_squares(8, alpha_aux=0.9 * threshold), target="stationary")
+    assert above.converged
+    assert below.converged
+    assert complementary(above.surface)[0].sum() == 7
+    assert above.energy == pytest.approx(low.energy, rel=1e-3)  # the triangles may lie elsewhere
+    assert complementary(below.surface)[0].sum() < 7
