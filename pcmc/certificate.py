@@ -219,13 +219,35 @@ def _modes(system: Stiffness | None, count: int) -> tuple[Floats, Floats]:
     return lowest(system, count)
 
 
+def unbalanced(standing: Surface) -> str:
+    """Names a junction whose tensions cannot balance whatever the angles; empty if there is none.
+
+    Σ α n = 0 (7) needs the largest tension to be at most the sum of the others. Where a junction is
+    held all along, its support takes the difference.
+    """
+    held = standing.fixed | standing.on_plane
+    for curve in standing.topology.junctions:
+        tensions = sorted(standing.tensions[list(curve.sheets)])
+        if tensions[-1] > sum(tensions[:-1]) * (1.0 + 1e-9) and not held[curve.vertices].all():
+            names = " | ".join(standing.patches[i].name for i in curve.sheets)
+            others = " + ".join(f"{tension:g}" for tension in tensions[:-1])
+            return f"the tensions at the junction {names} cannot balance: {tensions[-1]:g} > {others}"
+    return ""
+
+
 def _verdict(
     surface: Surface, residual: float, tolerance: float, quality: float,
     system: Stiffness | None, values: Floats, ratio: float, status: str,
 ) -> tuple[Verdict, str]:  # fmt: skip
-    if status == "DIVERGED" or (ratio > 1.0 + 1e-9 and residual > tolerance):
-        why = f"the pressure is {ratio:.2f} times what the boundary's tension could carry"
-        return Verdict.NO_EQUILIBRIUM, why if ratio > 1.0 else "the surface inflates without bound"
+    if residual > tolerance:
+        excess = unbalanced(surface)
+        if excess:
+            return Verdict.NO_EQUILIBRIUM, excess
+        if ratio > 1.0 + 1e-9:
+            why = f"the pressure is {ratio:.2f} times what the boundary's tension could carry"
+            return Verdict.NO_EQUILIBRIUM, why
+        if status == "DIVERGED":
+            return Verdict.NO_EQUILIBRIUM, "the surface inflates without bound"
     if status == "DEGENERATE" or quality <= COLLAPSED:
         return Verdict.DEGENERATE, _where_collapsed(surface)
     if residual > tolerance or system is None:

@@ -16,7 +16,7 @@ from .errors import OptionError, unknown
 from .surface import Surface
 
 Method = Literal["cotangent", "variational"]
-METHODS = ("cotangent", "variational")
+METHODS: tuple[Method, ...] = ("cotangent", "variational")
 
 
 def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
