@@ -280,7 +280,6 @@ def _by_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> _Mesh:
     F, patch = tool.get_triangles_with_refs()
     place = np.append(-1, kept)[reference]
     known = place >= 0
-    X[known] = mesh.X[place[known]]  # MMG scales the mesh, which changes the last digits
     number = np.full(len(mesh.X), -1)
     number[place[known]] = np.flatnonzero(known)
     curves = number[mesh.curves]
@@ -315,7 +314,10 @@ def _check_kept(before: _Mesh, curves: Ints, F: Ints, n: int) -> None:
 
 
 def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Surface:
-    """A Surface of the best triangles for each patch: they fit, because the curves are the same."""
+    """A Surface of the best triangles for each patch: they fit, because the curves are the same.
+
+    Kept vertices are taken from ``old``: MMG scales the mesh, which changes the last digits.
+    """
     meshes = [old, *candidates]
     angle = np.array([_patch_angles(mesh, len(surface.patches)) for mesh in meshes])
     best = 1 + np.argmax(np.minimum(angle[1:], GOOD_ANGLE), axis=0)

@@ -54,7 +54,7 @@ def add_walls(
     """Put a wall, down to Π, under every border between two patches that has none.
 
     The walls share a vertical line where borders meet, and have rows as fine as the mesh. The wall
-    under the border of "a" and "b" is the patch "wall-a-b".
+    under the border of "a" and "b" is the patch "wall-a-b"; its normals point from a to b.
 
     Parameters
     ----------

@@ -250,6 +250,10 @@ def test_heights_in_closed_form():
     expected = 0.2 * np.maximum(1 - radius**2, 0.0) ** 0.75  # flat enough not to be limited
     found = dome(mesh.points, mesh.triangles, held, rise=0.2)
     np.testing.assert_allclose(found, expected, atol=0.01)
+    full = dome(mesh.points, mesh.triangles, held)
+    assert full.max() == pytest.approx(0.3, rel=0.01)
+    gap = np.linalg.norm(mesh.points[:, None] - rim[None], axis=2).min(axis=1)
+    assert (full <= 0.8 * gap + 1e-12).all()
     heights = np.where(held, mesh.points[:, 0] * 2 + 1, np.nan)
     base = spanned(mesh.points, mesh.triangles, heights)
     np.testing.assert_allclose(base, mesh.points[:, 0] * 2 + 1, atol=1e-12)

@@ -34,6 +34,14 @@ def angles(mesh):
     return np.degrees(np.arccos(cosine / np.linalg.norm(u, axis=2) / np.linalg.norm(v, axis=2)))
 
 
+def opposite_angles(mesh, but):
+    """Sum of the two angles opposite each inner edge, one left out: at most 180° if Delaunay."""
+    side = np.sort(mesh.triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+    edge, place, count = np.unique(side, axis=0, return_inverse=True, return_counts=True)
+    inner = (count == 2) & (edge != but).any(axis=1)
+    return np.bincount(place.ravel(), angles(mesh).ravel())[inner]
+
+
 def edges(mesh):
     return {
         tuple(sorted(map(int, edge)))
@@ -87,14 +95,17 @@ def test_segments_inside_cut_regions_and_dangling_ones_do_not():
 
 
 def test_a_segment_that_delaunay_leaves_out_is_put_in():
-    """Two long parallel sides with points between them that are much nearer to each other."""
-    x = np.linspace(0, 10, 21)
-    top = np.stack([x, 0.1 + 0.02 * x * (10 - x)], axis=1)
-    points = np.concatenate([[[0, -0.1], [10, -0.1]], top[::-1]])
-    mesh = triangulate(points, loop(len(points)), 5.0)
-    assert (0, 1) in edges(mesh)
+    """A long segment between two rows of points that are much nearer to each other."""
+    x = np.linspace(0.5, 9.5, 19)
+    row = np.stack([x, 0.1 + 0.01 * x * (10 - x)], axis=1)
+    points = np.concatenate([[[0, 0]], row * [1, -1], [[10, 0]], row[::-1]])
+    segments = np.concatenate([loop(40), [[0, 20]]])
+    mesh = triangulate(points, segments, 50.0)
+    assert (0, 20) in edges(mesh)
+    assert mesh.region.max() == 1
+    assert (opposite_angles(mesh, but=(0, 20)) <= 180.0 + 1e-9).all()
     x_, y_ = points.T
-    area = 0.5 * abs(np.sum(x_ * np.roll(y_, -1) - np.roll(x_, -1) * y_))
+    area = 0.5 * np.sum(x_ * np.roll(y_, -1) - np.roll(x_, -1) * y_)
     assert signed_areas(mesh.points, mesh.triangles).sum() == pytest.approx(area)
 
 

@@ -76,6 +76,30 @@ def test_interior_edge_between_fixed_vertices_is_free():
     assert not refine(square).fixed[middle_of(square, 0, 2)]
 
 
+def test_interior_edge_between_sliding_vertices_is_free():
+    square = Surface(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], [0, 0],
+        [Patch("a", 1.0)], on_plane=range(4),
+    )  # fmt: skip
+    assert refine(square).free.sum() == 1
+    assert refine(square).free[middle_of(square, 0, 2)]
+
+
+def test_a_held_line_inside_a_patch_is_held_between_its_vertices():
+    t = np.arange(5.0)
+    x, y = np.meshgrid(t, t, indexing="ij")
+    X = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)
+    k = np.arange(25).reshape(5, 5)
+    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
+    F = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    line = [k[1, 2], k[2, 2], k[3, 2]]
+    surface = Surface(X, F, [0] * len(F), [Patch("a", 1.0)], fixed=[*line, k[0, 2]])
+    fine = refine(surface)
+    assert fine.fixed[middle_of(surface, k[1, 2], k[2, 2])]
+    assert not fine.fixed[middle_of(surface, k[0, 2], k[1, 2])]  # may lead across to a support
+    assert fine.fixed.sum() == 6
+
+
 def test_seam_across_the_plan_is_free_but_a_held_chain_along_a_junction_is_fixed():
     X = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     square = Surface(

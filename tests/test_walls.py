@@ -53,6 +53,8 @@ def test_walls_of_a_mesh_stand_on_the_plane_under_its_border():
     faces = surface.faces[surface.patch_of_face == 2]
     X = surface.vertices
     np.testing.assert_allclose(X[np.unique(faces), 0], 4.0)
+    across = np.cross(X[faces[:, 1]] - X[faces[:, 0]], X[faces[:, 2]] - X[faces[:, 0]])
+    assert (across[:, 0] > 0).all()  # from patch 1 to patch 2
     top = surface.topology.junctions[0].vertices
     y, z = X[top, 1], X[top, 2]
     under = abs(float(np.sum(0.5 * (z[1:] + z[:-1]) * np.diff(y))))
@@ -61,6 +63,19 @@ def test_walls_of_a_mesh_stand_on_the_plane_under_its_border():
     assert foot.sum() == len(top) - 2
     np.testing.assert_allclose(X[foot, 2], 0.0)
     np.testing.assert_allclose(np.sort(X[foot, 1]), np.sort(y)[1:-1])
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_walls_normals_point_from_its_first_patch_to_its_second(axis, first):
+    X, F = grid(6, bump)
+    side = (X[F].mean(axis=1)[:, axis] > 0).astype(int)
+    order = np.argsort(side != first, kind="stable")  # the first label to come is patch 0
+    surface = surface_from_labels(X, F[order], side[order], tension=2.0, walls=1.0)
+    faces = surface.faces[surface.patch_of_face == 2]
+    Y = surface.vertices
+    across = np.cross(Y[faces[:, 1]] - Y[faces[:, 0]], Y[faces[:, 2]] - Y[faces[:, 0]])[:, axis]
+    assert (np.sign(across) == (1 if first == 0 else -1)).all()
 
 
 def test_walls_that_meet_share_their_line_and_its_rows():
