@@ -118,6 +118,7 @@ class Carrier:
         kept = pattern(frame, space)
         data = assemble(equal, frame, space, kept, X, hessian=0.0, stiffness=1.0)
         diagonal = kept.indptr[:-1]
+        data[diagonal] *= 1.0 + SHIFT
         self._used = used
         self._led = (frame.kind != SHEET) | surface.fixed
         self._weight = np.where(self._led[used], PIN * data[diagonal], 0.0)

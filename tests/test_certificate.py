@@ -1,0 +1,290 @@
+"""The certificate: its numbers against their definitions and closed forms, and every verdict."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from shapes import pyramid, shaken, three_patches
+
+from generators import (
+    double_bubble,
+    four_fans,
+    joined_caps,
+    sphere,
+    spherical_cap,
+    spherical_cap_exact,
+    two_squares,
+)
+from pcmc import (
+    Patch,
+    Surface,
+    certify,
+    curvature_error,
+    energy,
+    gradient,
+    mean_curvature,
+    solve,
+)
+from pcmc.certificate import Verdict, conormal_sum, load_ratio
+from pcmc.energy import patch_areas, volume
+from pcmc.quality import triangle_quality
+
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+
+
+@pytest.fixture(scope="module")
+def squares():
+    return solve(two_squares(6, alpha_aux=1.0))
+
+
+def test_a_roof_at_rest(squares):
+    surface, found = squares.surface, squares.certificate
+    assert found.verdict is Verdict.STABLE
+    assert found.certified
+    assert found.detail == ""
+    assert found.index == 0
+    assert found.eigenvalues[0] > 0.0
+    assert found.residual < 1e-10
+    assert found.energy == pytest.approx(energy(surface), rel=1e-14)
+    assert found.volume == pytest.approx(volume(surface), rel=1e-14)
+    assert found.curvature_error < 1e-9
+    assert len(found.pinched) == 0
+    assert found.status == "CONVERGED"
+
+
+def test_the_rows_of_the_patches(squares):
+    surface, table = squares.surface, squares.certificate.patches.set_index("patch")
+    assert list(table.index) == ["left", "right", "wall"]
+    np.testing.assert_allclose(table["area"], patch_areas(surface), rtol=1e-14)
+    assert table["tension"].tolist() == [2.0, 2.0, 1.0]
+    assert table["target"].tolist() == [0.25, 0.25, 0.0]
+    quality = triangle_quality(surface.vertices, surface.faces)
+    for name in table.index:
+        faces = surface.patch_of_face == surface.patch_index(name)
+        assert table.quality[name] == quality[faces].min()
+    for method in ("variational", "cotangent"):
+        error = np.abs(curvature_error(surface, method))
+        inside = np.zeros(surface.n, dtype=bool)
+        inside[surface.faces[surface.patch_of_face == 0]] = True
+        error = error[inside & np.isfinite(error)]
+        assert table[f"{method}_max"]["left"] == error.max()
+        assert table[f"{method}_mean"]["left"] == pytest.approx(error.mean(), rel=1e-12)
+        assert np.isnan(table[f"{method}_max"]["wall"])  # relative to zero there is none
+    assert table["variational_max"]["left"] < 1e-9 < table["cotangent_max"]["left"] < 0.03
+    assert table["mean_H"]["right"] == pytest.approx(0.25, abs=1e-9)
+    mean = mean_curvature(surface, "variational")
+    assert squares.certificate.curvature_error == pytest.approx(
+        np.nanmax(np.abs(curvature_error(surface, "variational")))
+    )
+    assert np.nanmax(np.abs(mean)) < 0.26
+
+
+def test_the_numbers_and_the_printed_table(squares):
+    found = squares.certificate
+    numbers = found.numbers()
+    assert numbers["verdict"] == "stable"
+    assert numbers["index"] == 0
+    assert numbers["lowest_eigenvalue"] == found.eigenvalues[0]
+    assert numbers["curvature_error_cotangent"] == found.patches["cotangent_max"].max()
+    assert numbers["pinched"] == 0
+    assert all(isinstance(value, str | int | float) for value in numbers.values())
+    text = str(found)
+    for word in (
+        "stable: at rest",
+        "residual",
+        "Morse index",
+        "left | right | wall",
+        "per_length_max",
+    ):
+        assert word in text
+    assert max(map(len, text.splitlines())) < 130
+    assert len(text.splitlines()) < 30
+
+
+def three_sheets(tensions, angles):
+    """Flat sheets of four triangles each that meet along the x axis, at these angles."""
+    X = [np.array([x, 0.0, 0.0]) for x in (0, 0.5, 1)]
+    F, patch = [], []
+    for k, angle in enumerate(angles):
+        i = len(X)
+        X += [[x, np.cos(angle), np.sin(angle)] for x in (0, 0.5, 1)]
+        F += [[0, i, i + 1], [0, i + 1, 1], [1, i + 1, i + 2], [1, i + 2, 2]]
+        patch += [k] * 4
+    patches = [Patch(f"sheet {k}", alpha, pressure=0.0) for k, alpha in enumerate(tensions)]
+    return Surface(X, F, patch, patches, fixed=[0, 2, *range(3, len(X))])
+
+
+def test_conormals_add_up_with_their_tensions():
+    """Σ α n with n outwards from each sheet, so minus the direction in which the sheet lies."""
+    angles = np.array([0.3, 2.0, 4.4])
+    tensions = np.array([1.0, 2.5, 0.7])
+    surface = three_sheets(tensions, angles)
+    sums = conormal_sum(surface)
+    expected = -np.stack([0 * angles, np.cos(angles), np.sin(angles)], axis=1).T @ tensions
+    junction = surface.topology.junction_edge
+    assert junction.sum() == 2
+    np.testing.assert_allclose(sums[junction], [expected, expected], atol=1e-14)
+    row = certify(surface).junctions.iloc[0]
+    assert row["junction"] == "sheet 0 | sheet 1 | sheet 2"
+    assert row["length"] == 1.0
+    assert row["sum_alpha_n_mean"] == pytest.approx(np.linalg.norm(expected))
+    assert row["sum_alpha_n_max"] == pytest.approx(np.linalg.norm(expected))
+    # each side of the middle vertex pulls it with ½ α times the edge
+    assert row["force_left"] == pytest.approx(np.linalg.norm(expected))
+
+
+def test_conormals_balance_at_120_degrees():
+    surface = three_sheets([2.0] * 3, np.array([0, 2, 4]) * np.pi / 3)
+    row = certify(surface).junctions.iloc[0]
+    assert row["sum_alpha_n_max"] < 1e-14
+    assert row["force_left"] < 1e-13
+
+
+def test_the_exact_bubbles_balance_as_the_mesh_is_refined():
+    left = [
+        certify(double_bubble(edge, exact=True), modes=0).junctions["sum_alpha_n_mean"].max()
+        for edge in (0.8, 0.4, 0.2)
+    ]
+    assert left[0] < 0.5
+    assert left[2] < 0.35 * left[0]
+    assert left[1] < 0.6 * left[0]
+
+
+def test_modes_are_fields_that_one_can_move_along():
+    surface = solve(
+        joined_caps(1.0, alpha_left=4, alpha_right=4, alpha_aux=1, depth=5), target="stationary"
+    )
+    assert surface.converged
+    surface = surface.surface
+    found = certify(surface, modes=3)
+    assert found.verdict is Verdict.SADDLE
+    assert found.detail.startswith("index 1")
+    assert not found.certified
+    assert found.modes.shape == (3, surface.n, 3)
+    assert (np.diff(found.eigenvalues) >= 0.0).all()
+    assert found.eigenvalues[0] < 0.0 < found.eigenvalues[1]
+    t = 1e-3 * surface.size / np.abs(found.modes[0]).max()
+    for k, value in enumerate(found.eigenvalues[:2]):
+        mode = t * found.modes[k]
+        rise = sum(
+            energy(surface.moved(surface.vertices + s * mode)) for s in (1, -1)
+        ) - 2 * energy(surface)
+        assert rise == pytest.approx(value * t**2, rel=0.02)  # E'' along the mode is λ
+    assert certify(surface, modes=0).index == 1
+    assert len(certify(surface, modes=0).eigenvalues) == 0
+
+
+@pytest.mark.parametrize("surface", [shaken(pyramid(), 0.2), two_squares(4), four_fans(4)])
+def test_forces_left_are_not_converged(surface):
+    found = certify(surface)
+    assert found.verdict is Verdict.NOT_CONVERGED
+    assert found.index is None
+    assert len(found.eigenvalues) == len(found.modes) == 0
+    assert f"{found.residual:.1e}" in found.detail
+    assert found.numbers()["lowest_eigenvalue"] is None
+    assert "Morse index  -" in str(found)
+
+
+def test_the_tolerance_decides():
+    surface = solve(two_squares(4), iterations=3).surface
+    residual = certify(surface).residual
+    assert 1e-12 < residual < 0.1
+    assert certify(surface, tolerance=2 * residual).verdict is Verdict.STABLE
+    assert certify(surface, tolerance=0.5 * residual).verdict is Verdict.NOT_CONVERGED
+
+
+def test_a_neutral_surface():
+    """Walls that meet over a disc: at some tension of theirs a sideways shift costs nothing."""
+
+    def lowest(alpha_aux):
+        found = solve(four_fans(4, alpha_aux=alpha_aux), target="stationary").certificate
+        return found.eigenvalues[0]
+
+    assert lowest(2.0) > 0.0 > lowest(4.0)
+    critical = brentq(lowest, 2.0, 4.0, xtol=1e-3)
+    found = solve(four_fans(4, alpha_aux=critical), target="stationary").certificate
+    assert found.index in (0, 2)
+    near = solve(four_fans(4, alpha_aux=critical - 2e-3), target="stationary").certificate
+    assert near.verdict is Verdict.NEUTRAL
+    assert near.certified
+    assert "softest mode" in near.detail
+
+
+def test_no_equilibrium_from_the_load_alone():
+    found = certify(spherical_cap(0.25, alpha=0.45))
+    assert found.load_ratio == pytest.approx(1.0 / 0.9, rel=0.03)
+    assert found.verdict is Verdict.NO_EQUILIBRIUM
+    assert f"{found.load_ratio:.2f} times what the boundary's tension could carry" in found.detail
+    assert certify(spherical_cap(0.25, alpha=0.55)).verdict is Verdict.NOT_CONVERGED
+
+
+@pytest.mark.parametrize("alpha", [0.6, 1.0])
+def test_the_load_ratio_of_a_disc_is_its_radius_over_twice_the_tension(alpha):
+    surface = spherical_cap(0.1, alpha=alpha, exact=True)
+    assert load_ratio(surface) == pytest.approx(0.5 / alpha, rel=2e-3)
+    assert load_ratio(double_bubble(0.8)) == 0.0
+
+
+def test_a_collapsed_triangle_is_named():
+    surface = solve(spherical_cap(0.25)).surface
+    X = surface.vertices.copy()
+    face = 40
+    a, b, c = surface.faces[face]
+    assert surface.free[c]
+    X[c] = 0.5 * (X[a] + X[b])
+    found = certify(surface.moved(X))
+    assert found.verdict is Verdict.DEGENERATE
+    assert "of patch 'cap' near [" in found.detail
+    assert found.quality < 1e-3
+
+
+def test_the_solvers_ending_counts():
+    surface = solve(spherical_cap(0.25)).surface
+    away = certify(two_squares(4), status="DIVERGED")
+    assert away.verdict is Verdict.NO_EQUILIBRIUM
+    assert away.detail == "the surface inflates without bound"
+    assert certify(surface, status="DIVERGED").verdict is Verdict.STABLE
+    assert certify(surface, status="DEGENERATE").verdict is Verdict.DEGENERATE
+    assert certify(surface, status="CONVERGED").verdict is Verdict.STABLE
+
+
+def test_what_nothing_holds_has_no_reactions():
+    found = solve(sphere(1.0), target="stationary").certificate
+    assert found.verdict is Verdict.SADDLE
+    assert found.index == 1
+    assert len(found.boundaries) == len(found.junctions) == 0
+    assert not found.reactions.any()
+
+
+def test_reactions_are_where_supports_are(squares):
+    surface, found = squares.surface, squares.certificate
+    assert found.reactions.shape == (surface.n, 3)
+    assert not found.reactions[surface.free].any()
+    normal = np.array(surface.plane.normal)
+    sliding = found.reactions[surface.on_plane]
+    np.testing.assert_allclose(sliding, (sliding @ normal)[:, None] * normal, atol=1e-14)
+    total = found.boundaries[["reaction_x", "reaction_y", "reaction_z"]].sum()
+    np.testing.assert_allclose(total, found.reactions.sum(axis=0), atol=1e-12)
+    np.testing.assert_allclose(total[:2], 0.0, atol=1e-9)
+
+
+def test_every_verdict_is_a_sentence():
+    sentences = [verdict.value for verdict in Verdict]
+    assert len(set(sentences)) == len(sentences)
+    assert all(": " in sentence for sentence in sentences)
+
+
+def test_the_certificate_sees_walls_apart():
+    surface = shaken(three_patches(), 0.01)
+    found = certify(surface)
+    quality = triangle_quality(surface.vertices, surface.faces)
+    walls = surface.pressures[surface.patch_of_face] == 0.0
+    assert found.quality == quality[~walls].min()
+    assert found.walls_quality == quality[walls].min()
+
+
+def test_the_residual_is_relative_to_the_tension_forces():
+    surface = pyramid(1.5, height=0.6)
+    found = certify(surface)
+    assert found.residual == pytest.approx(np.linalg.norm(gradient(surface)) / found.scale)
+    exact = spherical_cap_exact()
+    assert certify(spherical_cap(0.125, exact=True)).energy == pytest.approx(exact.energy, rel=2e-3)
