@@ -31,6 +31,7 @@ def cases() -> list[Case]:
     return [
         Case("main", build, OPTIONS, varied),
         Case("sufficient", build, OPTIONS | {"armijo": "sufficient"}, varied),
+        Case("calibrated", two_caps, OPTIONS),
         Case("lbfgs", build, {"evaluations": 2 * ITERATIONS}, varied, method="lbfgs"),
         *finer,
     ]
@@ -57,6 +58,8 @@ def table(folder: Folder) -> dict[str, float]:
     return found | {
         "alpha_wall": stages["initial"].tensions[stages["initial"].patch_index("wall")],
         "t0": T0,
+        "calibrated_initial_gradient_squared": records.initial_gradient_squared["calibrated"],
+        "calibrated_least_gradient_squared": records.least_gradient_squared["calibrated"],
         "lbfgs_gradient_squared": records.gradient_squared["lbfgs"],
         "forced_steps_sufficient": records.forced_steps["sufficient"],
     }

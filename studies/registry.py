@@ -6,10 +6,19 @@ from collections.abc import Iterable
 
 from pcmc.errors import OptionError, unknown
 
-from . import alpha_grid, equilibria, example1, example2, example3, example4, mesh_search
+from . import (
+    alpha_grid,
+    calibration,
+    equilibria,
+    example1,
+    example2,
+    example3,
+    example4,
+    mesh_search,
+)
 from .study import Study
 
-MODULES = (example1, example2, example3, example4, alpha_grid, mesh_search, equilibria)
+MODULES = (example1, example2, example3, example4, alpha_grid, calibration, mesh_search, equilibria)
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 
 

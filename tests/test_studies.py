@@ -286,7 +286,7 @@ def test_command_runs_from_anywhere_and_ends_with_the_comparison(tmp_path):
         capture_output=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert "what the paper says" in done.stdout
+    assert "What the paper prints" in done.stdout
     assert (tmp_path / "r" / "comparison.csv").is_file()
     assert (tmp_path / "r" / "example3" / "fig19.png").stat().st_size > 1000
     left = [p.name for p in (tmp_path / "r").rglob("*") if p.name.startswith(".")]
