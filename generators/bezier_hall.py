@@ -11,7 +11,7 @@ from pcmc.arrays import Floats, Ints
 
 from .bezier import chain
 from .building import Builder
-from .drape import drape
+from .drape import membrane
 from .meshing import fill
 from .options import positive
 
@@ -88,7 +88,7 @@ def bezier_hall(
         count += len(inner)
     plan = np.concatenate([held[:, :2], *(inner for inner, _ in pieces)])
     given = np.arange(count) < len(held)
-    z = drape(plan, np.concatenate(faces), given, np.resize(held[:, 2], count), HEIGHT)
+    z = membrane(plan, np.concatenate(faces), given, np.resize(held[:, 2], count), HEIGHT)
     mesh.points(np.column_stack([plan, z])[~given])
     for patch, part in zip((LEFT, MIDDLE, RIGHT), faces, strict=True):
         mesh.faces(part, patch)

@@ -1,4 +1,4 @@
-"""Heights for a roof whose edges are given: a membrane under an even load."""
+"""Heights over a plan whose edges are given: a loaded membrane, or a soap film."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from scipy.sparse.linalg import splu
 
 from pcmc.arrays import Bools, Floats, Ints
 
+ITERATIONS = 100
 
-def drape(plan: Floats, faces: Ints, held: Bools, heights: Floats, top: float) -> Floats:
+
+def membrane(plan: Floats, faces: Ints, held: Bools, heights: Floats, top: float) -> Floats:
     """(n,) heights z with -Δz = q over the plan, z given where held, and q such that max z = top.
 
     Linear finite elements on the plan's triangles.
@@ -21,28 +23,52 @@ def drape(plan: Floats, faces: Ints, held: Bools, heights: Floats, top: float) -
 
     >>> plan = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]])
     >>> faces = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
-    >>> drape(plan, faces, np.arange(5) < 4, np.zeros(5), 3.0).tolist()
+    >>> membrane(plan, faces, np.arange(5) < 4, np.zeros(5), 3.0).tolist()
     [0.0, 0.0, 0.0, 0.0, 3.0]
     """
-    stiffness, load = _membrane(plan, faces)
+    stiffness, areas = _stiffness(np.column_stack([plan, np.zeros(len(plan))]), faces)
     free = ~held
     solver = splu(csc_array(stiffness[free][:, free]))
     still = np.where(held, heights, 0.0)
     still[free] = solver.solve(-stiffness[free][:, held] @ heights[held])
-    lifted = solver.solve(load[free])
+    load = np.bincount(faces.ravel(), np.repeat(areas / 3.0, 3), minlength=len(plan))
+    lifted = solver.solve(load[free].astype(float))
     still[free] += ((top - still[free]) / lifted).min() * lifted
     return still
 
 
-def _membrane(plan: Floats, faces: Ints) -> tuple[csc_array, Floats]:
-    """Stiffness ∫ ⟨∇u, ∇v⟩ (n,n) and load ∫ v (n,)."""
-    opposite = plan[faces[:, [2, 0, 1]]] - plan[faces[:, [1, 2, 0]]]
-    a, b = opposite[:, 0], opposite[:, 1]
-    twice = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-    block = np.einsum("fic,fjc->fij", opposite, opposite) / (2.0 * twice)[:, None, None]
+def soap_film(plan: Floats, faces: Ints, held: Bools, heights: Floats) -> Floats:
+    """(n,) heights of the surface of least area over the plan, z given where held.
+
+    Solves Σ (cot a + cot b)(z_i - z_j) = 0 with the cotangents of the last surface, again and
+    again (Pinkall and Polthier 1993), until z changes by less than 1e-12 of its range.
+
+    >>> plan = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]])
+    >>> faces = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    >>> soap_film(plan, faces, np.arange(5) < 4, np.array([0, 2, 0, 2.0, 9.0])).round(9).tolist()
+    [0.0, 2.0, 0.0, 2.0, 1.0]
+    """
+    free = ~held
+    z = np.where(held, heights, 0.0)
+    film = np.column_stack([plan, np.zeros(len(plan))])
+    for _ in range(ITERATIONS):
+        stiffness, _ = _stiffness(film, faces)
+        film[:, 2] = z
+        film[free, 2] = splu(csc_array(stiffness[free][:, free])).solve(
+            -stiffness[free][:, held] @ z[held]
+        )
+        if np.abs(film[:, 2] - z).max() <= 1e-12 * np.ptp(z[held]):
+            break
+        z = film[:, 2].copy()
+    return film[:, 2]
+
+
+def _stiffness(X: Floats, faces: Ints) -> tuple[csc_array, Floats]:
+    """Stiffness ∫ ⟨∇u, ∇v⟩ (n,n) on the triangles, and their areas (m,)."""
+    opposite = X[faces[:, [2, 0, 1]]] - X[faces[:, [1, 2, 0]]]
+    area = 0.5 * np.linalg.norm(np.cross(opposite[:, 0], opposite[:, 1]), axis=1)
+    block = np.einsum("fic,fjc->fij", opposite, opposite) / (4.0 * area)[:, None, None]
     rows = np.broadcast_to(faces[:, :, None], block.shape).ravel()
     columns = np.broadcast_to(faces[:, None, :], block.shape).ravel()
-    n = len(plan)
-    load = np.bincount(faces.ravel(), np.repeat(twice / 6.0, 3), minlength=n)
-    stiffness = coo_array((block.ravel(), (rows, columns)), shape=(n, n)).tocsc()
-    return stiffness, load.astype(float)
+    shape = (len(X), len(X))
+    return coo_array((block.ravel(), (rows, columns)), shape=shape).tocsc(), area

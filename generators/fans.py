@@ -9,11 +9,12 @@ from pcmc.arrays import Floats, Ints
 from pcmc.errors import OptionError, unknown
 
 from .building import Builder
+from .drape import soap_film
 from .meshing import fill
 from .options import positive, whole
 from .strips import numbered, strips
 
-MESHES = ("rings", "even", "lattice")
+MESHES = ("rings", "even", "double", "lattice")
 
 
 def fans(
@@ -25,24 +26,25 @@ def fans(
     alpha_aux: float,
     radius: float,
     height: float,
-    bulge: float,
+    bulge: float | None,
     mesh: str,
 ) -> Surface:
     """``count`` equal fans over a disc, and right-triangle walls that share the vertical line.
 
-    The initial surface is z = height (1 - w) + bulge w (1 - w²) cos² φ with w = r/radius and φ from
-    -π/2 at one ridge of a fan to π/2 at the next: straight ridges, and with bulge 0 a cone.
+    The initial fans are soap films between the straight ridges and the rim; or, with a ``bulge``,
+    z = height (1 - w) + bulge w (1 - w²) cos² φ with w = r/radius and φ from -π/2 at one ridge of
+    a fan to π/2 at the next, a cone for bulge 0.
 
     Parameters
     ----------
     name : the patches are called by it and a number, the walls "wall 1" and so on.
     rings : rings of triangles from the centre to the rim; radius/rings is the length of an edge.
     mesh : "rings", ring k with k segments in each fan; "even", with as many as make them about as
-        long as the rings are wide; "lattice", a triangular lattice fitted into the fan.
+        long as the rings are wide; "double", with 2 k; "lattice", a triangular lattice fitted in.
     """
     rings = whole(rings, "rings", least=2)
     radius, height = positive(radius, "radius"), positive(height, "height")
-    if not np.isfinite(bulge):
+    if bulge is not None and not np.isfinite(bulge):
         raise OptionError(f"bulge must be a finite number, found {bulge!r}")
     if mesh not in MESHES:
         raise OptionError(unknown("mesh", mesh, MESHES))
@@ -55,16 +57,20 @@ def fans(
     ridge = np.stack([radius * share, 0.0 * share, height * (1.0 - share)], axis=1)
     ridges = [np.append(axis[-1], builder.points(ridge @ turn)) for turn in turns]
 
-    inner, outline, faces = _fan(count, rings, mesh)
-    points = np.concatenate([inner, outline]) * radius
-    lift = _lift(np.concatenate([inner, outline]), count, height, bulge)
-    lift[len(inner) :] = 0.0  # rounding must not take the rim off Π
+    points, faces, rim_count = _fan(count, rings, mesh)
+    z = _bulged(points, count, height, bulge or 0.0)
+    z[len(z) - rim_count :] = 0.0  # rounding must not take the rim off Π
+    if bulge is None:
+        held = np.ones(len(z), dtype=bool)
+        held[1 + 2 * rings : len(z) - rim_count] = False
+        z = soap_film(radius * points, faces, held, z)
+    fan = np.column_stack([radius * points, z])[1 + 2 * rings :]
     rim = [line[-1:] for line in ridges]
     for i, turn in enumerate(turns):
-        new = builder.points(np.column_stack([points, lift]) @ turn)
+        new = builder.points(fan @ turn)
         numbers = np.concatenate([ridges[i], ridges[(i + 1) % count][1:], new])
         builder.faces(numbers[faces], i)
-        rim.append(new[len(inner) :])
+        rim.append(new[len(new) - rim_count :])
     foot = [
         builder.wall(count + i, line, builder.positions(line) * [1.0, 1.0, 0.0], spacing, axis)
         for i, line in enumerate(ridges)
@@ -74,52 +80,62 @@ def fans(
     return builder.surface(patches, fixed=np.concatenate(rim), on_plane=np.concatenate(foot))
 
 
-def _fan(count: int, rings: int, mesh: str) -> tuple[Floats, Floats, Ints]:
-    """The unit fan from angle 0 to 2π/count: inner points, points of its arc, and its faces.
+def _fan(count: int, rings: int, mesh: str) -> tuple[Floats, Ints, int]:
+    """The unit fan from angle 0 to 2π/count: points (k,2), faces, and how many points its arc has.
 
-    Faces number the tip 0, the first ridge 1..rings, the second ridge, the inner points, the arc.
+    First the tip, then both ridges from tip to rim, then the inner points, then the arc's.
     """
     angle = 2.0 * np.pi / count
     ring = np.arange(1, rings + 1)
-    segments = ring if mesh == "rings" else np.maximum(1, np.rint(ring * angle).astype(np.int64))
+    even = np.maximum(1, np.rint(ring * angle).astype(np.int64))
     if mesh == "lattice":
-        return _lattice_fan(angle, rings, int(segments[-1]))
+        return _lattice_fan(angle, rings, int(even[-1]))
+    segments = {"rings": ring, "even": even, "double": 2 * ring}[mesh]
     line, step = numbered(segments + 1)
     between = (step > 0) & (step < segments[line])
     theta = angle * (step / segments[line])[between]
-    points = (ring[line[between]] / rings)[:, None] * np.stack([np.cos(theta), np.sin(theta)], 1)
+    inside = (ring[line[between]] / rings)[:, None] * _directions(theta)
     numbers = np.where(step == 0, 1 + line, 1 + rings + line)
-    numbers[between] = 1 + 2 * rings + np.arange(len(points))
-    middle = np.zeros(rings, dtype=bool)
-    faces = strips(np.append(0, numbers), np.append(0, segments), middle)
-    arc = line[between] == rings - 1
-    return points[~arc], points[arc], faces
+    numbers[between] = 1 + 2 * rings + np.arange(len(inside))
+    faces = strips(np.append(0, numbers), np.append(0, segments))
+    points = np.concatenate([_edges(rings, angle), inside])
+    return points, faces, int(segments[-1]) - 1
 
 
-def _lattice_fan(angle: float, rings: int, segments: int) -> tuple[Floats, Floats, Ints]:
+def _lattice_fan(angle: float, rings: int, segments: int) -> tuple[Floats, Ints, int]:
     """A fan meshed symmetrically about its bisector, then turned to start at angle 0."""
-    share = np.arange(1, rings + 1)[:, None] / rings
     half = 0.5 * angle
-    first = share * [np.cos(half), -np.sin(half)]
-    theta = half * np.arange(-segments, segments + 1, 2)[1:-1] / segments
-    arc = np.stack([np.cos(theta), np.sin(theta)], axis=1)
-    second = first * [1.0, -1.0]
-    outline = np.concatenate([np.zeros((1, 2)), first, arc, second[::-1]])
-    inner, faces = fill([outline], 1.0 / rings)
-    one, two = 1 + np.arange(rings), 1 + rings + np.arange(rings)
-    new = 1 + 2 * rings
-    ends = np.cumsum([new, len(inner), len(arc)])
-    numbers = np.concatenate(
-        [[0], one, np.arange(ends[1], ends[2]), two[::-1], np.arange(new, ends[1])]
-    )
     back = np.array([[np.cos(half), np.sin(half)], [-np.sin(half), np.cos(half)]])
-    return inner @ back, arc @ back, numbers[faces]
+    edges = _edges(rings, angle)
+    one, two = 1 + np.arange(rings), 1 + rings + np.arange(rings)
+    theta = half * np.arange(-segments, segments + 1, 2)[1:-1] / segments
+    arc = _directions(theta)
+    first = edges[one, :1] * [np.cos(half), -np.sin(half)]
+    second = first * [1.0, -1.0]
+    outline = np.concatenate([edges[:1], first, arc, second[::-1]])
+    inner, faces = fill([outline], 1.0 / rings)
+    points = np.concatenate([edges, inner @ back, arc @ back])
+    new = np.arange(len(edges), len(points))
+    numbers = np.concatenate([[0], one, new[len(inner) :], two[::-1], new[: len(inner)]])
+    return points, numbers[faces], len(arc)
 
 
-def _lift(points: Floats, count: int, height: float, bulge: float) -> Floats:
-    """(k,) initial height over points of the unit fan."""
+def _edges(rings: int, angle: float) -> Floats:
+    """(1 + 2 rings, 2) the tip and both ridges of the unit fan."""
+    share = np.arange(1, rings + 1)[:, None] / rings
+    return np.concatenate(
+        [np.zeros((1, 2)), share * [1.0, 0.0], share * [np.cos(angle), np.sin(angle)]]
+    )
+
+
+def _directions(theta: Floats) -> Floats:
+    return np.stack([np.cos(theta), np.sin(theta)], axis=1)
+
+
+def _bulged(points: Floats, count: int, height: float, bulge: float) -> Floats:
+    """(k,) heights over points of the unit fan: the cone and a bulge that ends at ridges and rim."""
     w = np.linalg.norm(points, axis=1)
-    phi = np.arctan2(points[:, 1], points[:, 0]) * (0.5 * count) - 0.5 * np.pi
+    phi = 0.5 * count * np.arctan2(points[:, 1], points[:, 0]) - 0.5 * np.pi
     return height * (1.0 - w) + bulge * w * (1.0 - w**2) * np.cos(phi) ** 2
 
 
