@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -137,8 +138,8 @@ class Surface:
     faces: Ints
     patch_of_face: Ints
     patches: tuple[Patch, ...]
-    fixed: Bools = field(default=())  # type: ignore[assignment]
-    on_plane: Bools = field(default=())  # type: ignore[assignment]
+    fixed: Bools = field(default=cast(Bools, ()))
+    on_plane: Bools = field(default=cast(Bools, ()))
     plane: Plane = Plane()
 
     def __post_init__(self) -> None:
@@ -223,10 +224,12 @@ class Surface:
     ) -> Surface:
         """The same surface with other tensions or pressures, given by patch name."""
         patches = list(self.patches)
-        for key, values in (("tension", tensions or {}), ("pressure", pressures or {})):
-            for name, value in values.items():
-                index = self.patch_index(name)
-                patches[index] = replace(patches[index], **{key: value})
+        for name, value in (tensions or {}).items():
+            index = self.patch_index(name)
+            patches[index] = replace(patches[index], tension=value)
+        for name, value in (pressures or {}).items():
+            index = self.patch_index(name)
+            patches[index] = replace(patches[index], pressure=value)
         return self._with(patches=tuple(patches))
 
     def patch_faces(self, patches: Sequence[int]) -> Bools:
