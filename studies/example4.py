@@ -17,7 +17,7 @@ from .folder import Folder
 from .study import Study
 
 T0, ITERATIONS = 0.005, 1000
-EDGE_LENGTH = 3.6  # of those in ``mesh_search`` the nearest to all that is printed
+EDGE_LENGTH = 3.5  # of those in ``mesh_search`` the nearest to all that is printed
 OPTIONS = {"t0": T0, "iterations": ITERATIONS}
 MARKS = (225, 500, 1000)  # iterations at which the paper prints ‖∇E‖²
 

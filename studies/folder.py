@@ -19,6 +19,8 @@ from pcmc.files import whole
 
 FLOATS = "%.10g"  # enough to compare with what is printed, few enough to read
 
+LARGE = 100_000  # bytes of a figure: a repository keeps every version
+
 
 @dataclass(frozen=True)
 class Folder:
@@ -81,6 +83,17 @@ class Folder:
         """Where the figure ``name`` goes: a PNG in this folder."""
         self.path.mkdir(parents=True, exist_ok=True)
         return self.path / f"{name}.png"
+
+    def shrink_figures(self) -> None:
+        """Bring figures of more than LARGE bytes to a palette of 128 colours."""
+        for path in sorted(self.path.glob("*.png")):
+            if path.stat().st_size > LARGE:
+                from PIL import Image
+
+                data = BytesIO()
+                with Image.open(path) as image:
+                    image.convert("RGB").quantize(128).save(data, "PNG", optimize=True)
+                write_bytes(path, data.getvalue())
 
     def mesh_hashes(self) -> dict[str, str]:
         """16 hexadecimal digits of each mesh's faces and positions, by mesh and stage."""

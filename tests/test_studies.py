@@ -77,6 +77,20 @@ def test_mesh_comes_back_with_a_stage_that_has_collapsed(tmp_path):
     assert len(set(hashes.values())) == 2
 
 
+def test_large_figures_shrink_and_small_ones_stay(tmp_path):
+    from PIL import Image
+
+    noise = np.random.default_rng(1).integers(0, 255, (300, 300, 3), dtype=np.uint8)
+    folder = Folder(tmp_path)
+    Image.fromarray(noise).save(folder.figure("large"))
+    Image.fromarray(noise[:50, :50]).save(folder.figure("small"))
+    before = {p.stem: p.stat().st_size for p in tmp_path.glob("*.png")}
+    folder.shrink_figures()
+    after = {p.stem: p.stat().st_size for p in tmp_path.glob("*.png")}
+    assert after["large"] < 0.5 * before["large"]
+    assert after["small"] == before["small"]
+
+
 def test_missing_file_says_which_study_writes_it(tmp_path):
     with pytest.raises(FileError, match=r"python -m studies run example9"):
         Folder(tmp_path / "example9").read_table("records")
