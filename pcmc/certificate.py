@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from . import kernels
 from .arrays import Bools, Floats, Ints
 from .contact import Walls, pinched, resting, standing_structure, walls
 from .curvature import METHODS, curvature_error, mean_curvature
@@ -178,8 +179,8 @@ def certify(
         walls_quality=walls_quality,
         patches=_patch_table(surface, standing),
         junctions=_junction_table(standing, space.project(forces)),
-        boundaries=_boundary_table(standing, forces),
-        reactions=_reactions(standing, forces),
+        boundaries=_boundary_table(standing),
+        reactions=_reactions(standing),
         pinched=np.flatnonzero(rests),
         load_ratio=ratio,
         status=status,
@@ -231,7 +232,9 @@ def unbalanced(standing: Surface) -> str:
         if tensions[-1] > sum(tensions[:-1]) * (1.0 + 1e-9) and not held[curve.vertices].all():
             names = " | ".join(standing.patches[i].name for i in curve.sheets)
             others = " + ".join(f"{tension:g}" for tension in tensions[:-1])
-            return f"the tensions at the junction {names} cannot balance: {tensions[-1]:g} > {others}"
+            return (
+                f"the tensions at the junction {names} cannot balance: {tensions[-1]:g} > {others}"
+            )
     return ""
 
 
@@ -343,8 +346,8 @@ def conormal_sum(surface: Surface) -> Floats:
     return total
 
 
-def _boundary_table(surface: Surface, forces: Floats) -> pd.DataFrame:
-    reactions = _reactions(surface, forces)
+def _boundary_table(surface: Surface) -> pd.DataFrame:
+    reactions = _reactions(surface)
     held = surface.fixed | surface.on_plane
     loops = surface.topology.boundary_loops
     # a corner that several curves share gives each an equal part, so that the rows add up
@@ -371,8 +374,20 @@ def _boundary_table(surface: Surface, forces: Floats) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _reactions(surface: Surface, forces: Floats) -> Floats:
-    """(n,3) what the supports exert: all of ∇E where fixed, its part normal to Π where sliding."""
+def _reactions(surface: Surface) -> Floats:
+    """(n,3) what the supports exert: all of the force where fixed, its part normal to Π where sliding.
+
+    The force at a vertex is Σ α ∂A - ⅓ Σ p A_T ν_T: a third of each triangle's tension and pressure.
+    At a boundary this is not ∇E, whose volume is that of a cone to the point of Π: the cone's side
+    moves with the boundary too, and has no pressure on it.
+    """
+    X, F = surface.vertices, surface.faces
+    zero = np.zeros(len(surface.patches))
+    forces = kernels.measure(X, F, surface.patch_of_face, np.zeros(3), surface.tensions, zero)[2]
+    vector = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]) / 6.0
+    vector *= surface.pressures[surface.patch_of_face, None]
+    for axis in range(3):
+        forces[:, axis] -= np.bincount(F.ravel(), np.repeat(vector[:, axis], 3), surface.n)
     reactions = np.zeros_like(forces)
     reactions[surface.fixed] = forces[surface.fixed]
     sliding = surface.on_plane

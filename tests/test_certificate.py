@@ -267,6 +267,15 @@ def test_reactions_are_where_supports_are(squares):
     np.testing.assert_allclose(total[:2], 0.0, atol=1e-9)
 
 
+def test_supports_carry_the_whole_load_and_the_tension_of_the_rim():
+    surface = solve(spherical_cap(0.1, alpha=0.6)).surface
+    found = certify(surface)
+    corners = surface.vertices[surface.faces]
+    area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
+    np.testing.assert_allclose(found.reactions.sum(axis=0), -area, atol=1e-10)
+    assert found.boundaries["per_length_max"][0] == pytest.approx(0.6, rel=2e-3)
+
+
 def test_every_verdict_is_a_sentence():
     sentences = [verdict.value for verdict in Verdict]
     assert len(set(sentences)) == len(sentences)
