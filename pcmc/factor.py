@@ -70,7 +70,13 @@ def factoriser(kept: Pattern, backend: str | None = None) -> Factoriser:
         raise OptionError(unknown("factorisation backend", chosen, BACKENDS))
     if chosen not in available():
         raise MissingExtra("pypardiso", "fast")
-    return _Pardiso(kept) if chosen == "pardiso" else _SuperLU(kept)
+    # MKL refuses a matrix without rows
+    return _Pardiso(kept) if chosen == "pardiso" and kept.size else _SuperLU(kept)
+
+
+def _finite(data: Floats) -> None:
+    if not np.isfinite(data).all():
+        raise SingularMatrix("the matrix has entries that are not finite")
 
 
 class _SuperLU:
@@ -89,6 +95,7 @@ class _SuperLU:
         self._shape = full.shape
 
     def factor(self, data: Floats) -> Factor:
+        _finite(data)
         matrix = csc_array((data[self._source], self._indices, self._indptr), shape=self._shape)
         try:
             lu = splu(
@@ -131,16 +138,17 @@ class _Pardiso:
         for place, value in ((1, 1), (2, 2), (8, 0), (10, 13), (11, 0), (13, 0), (21, 1), (24, 1)):
             self._solver.set_iparm(place, value)
         self._analysed = False
-        # MKL keeps the factor outside Python: free it with this object, but not at interpreter exit.
-        weakref.finalize(self, _release, self._solver, kept).atexit = False
 
     def factor(self, data: Floats) -> Factor:
+        _finite(data)
         matrix = self._kept.matrix(data)
         nothing = np.zeros((self._kept.size, 1), order="F")
         try:
             if not self._analysed:
                 self.run(11, matrix, nothing)
                 self._analysed = True
+                # MKL keeps the factor outside Python: free it with this object, not at exit.
+                weakref.finalize(self, _release, self._solver, self._kept).atexit = False
             self.run(22, matrix, nothing)
         except self._error as error:
             raise SingularMatrix(str(error)) from None

@@ -1,5 +1,7 @@
 """Sparse factorisation with inertia: every backend against dense linear algebra."""
 
+import gc
+
 import numpy as np
 import pytest
 from motion_cases import SURFACES
@@ -107,6 +109,35 @@ def test_a_singular_matrix_is_refused(backend, A):
     kept, data = upper(A)
     with pytest.raises(SingularMatrix):
         factoriser(kept, backend).factor(data)
+
+
+@every_backend
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_numbers_that_are_not_finite_are_refused(backend, wrong):
+    kept, data = upper(np.eye(3))
+    data[1] = wrong
+    with pytest.raises(SingularMatrix, match="entries that are not finite"):
+        factoriser(kept, backend).factor(data)
+
+
+@every_backend
+def test_a_matrix_without_rows(backend):
+    kept, data = upper(np.eye(0))
+    found = factoriser(kept, backend).factor(data)
+    assert found.negative == 0
+    assert found.solve(np.empty(0)).shape == (0,)
+
+
+@every_backend
+@pytest.mark.parametrize("used", [False, True])
+def test_memory_is_given_back_with_the_factoriser(backend, used):
+    kept, data = upper(np.eye(50))
+    for _ in range(20):
+        keeper = factoriser(kept, backend)
+        if used:
+            keeper.factor(data)
+        del keeper
+    gc.collect()  # an error in the library's clean-up would show as a warning here
 
 
 def test_superlu_says_where_a_row_exchange_hides_the_inertia():
