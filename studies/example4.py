@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -17,17 +16,15 @@ from .folder import Folder
 from .study import Study
 
 T0, ITERATIONS = 0.005, 1000
-EDGE_LENGTH = 3.5  # of those in ``mesh_search`` the nearest to all that is printed
 OPTIONS = {"t0": T0, "iterations": ITERATIONS}
 MARKS = (225, 500, 1000)  # iterations at which the paper prints ‖∇E‖²
 
 
 def cases() -> list[Case]:
     """The flow with both Armijo tests, each watched for its best iteration."""
-    build = partial(bezier_hall, EDGE_LENGTH)
     return [
-        Case("main", build, OPTIONS, watched=True),
-        Case("sufficient", build, OPTIONS | {"armijo": "sufficient"}, watched=True),
+        Case("main", bezier_hall, OPTIONS, watched=True),
+        Case("sufficient", bezier_hall, OPTIONS | {"armijo": "sufficient"}, watched=True),
     ]
 
 
@@ -114,6 +111,6 @@ STUDY = Study(
     data,
     table,
     figure,
-    parameters={"edge_length": EDGE_LENGTH, **OPTIONS},
+    parameters=OPTIONS,
     seconds=15,
 )
