@@ -1,52 +1,33 @@
-"""How the lines of a plan meet: checked, cut at their meetings, and divided into edges."""
+"""How the lines of a plan meet: cut at their meetings, and divided into edges."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from enum import IntEnum
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
+import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .arrays import Bools, Floats, Ints
 from .curves import Curve
-from .errors import MissingExtra, PlanError
-from .planar import cross
-
-try:
-    import shapely
-except ImportError:
-    raise MissingExtra("shapely", "plan") from None
-
-SNAP = 0.01  # of the edge length: lines that miss each other by less are taken to meet
-
-
-class Kind(IntEnum):
-    """What a line is. Where lines meet, the first kind among them says where the point is."""
-
-    OUTLINE = 0
-    HOLE = 1
-    SUPPORT = 2
-    DIVIDER = 3
-
-
-@dataclass(frozen=True, eq=False)
-class Line:
-    """A named curve of a plan, in the coordinates of Π (two along it, and the height)."""
-
-    name: str
-    kind: Kind
-    curve: Curve
-
-    @property
-    def bounds(self) -> bool:
-        """Whether the line is part of the plan's boundary."""
-        return self.kind in (Kind.OUTLINE, Kind.HOLE)
+from .errors import PlanError
+from .lines import (
+    SNAP,
+    Drawn,
+    Kind,
+    Line,
+    check_holes,
+    check_line,
+    crossing,
+    inside,
+    lines_at,
+    overlap,
+    spot,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,20 +87,24 @@ def arrange(
     drawn = [Drawn(line) for line in lines]
     snap = SNAP * edge_length
     for one in drawn:
-        _check_line(one)
-    _check_holes(drawn)
+        check_line(one)
+    check_holes(drawn)
     meetings = _Meetings()
     for number, one in enumerate(drawn):
         last = float(len(one.curve.pieces))
         ends = [] if one.curve.closed else [0.0, last]
         for t in [*ends, *one.curve.corners.tolist()]:
             meetings.add([(number, t)])
-    _find_crossings(drawn, meetings)
+    _findcrossings(drawn, meetings)
     _find_ends(drawn, meetings, snap)
     spots = np.zeros((0, 3)) if spots is None else spots
-    passing = [_passing(drawn, xy, snap) for xy in spots[:, :2]]
+    passing = [lines_at(drawn, xy, snap) for xy in spots[:, :2]]
+    contains = inside(drawn)
+    for xy, found in zip(spots[:, :2], passing, strict=True):
+        if not found and not contains(xy):
+            raise PlanError(f"the support at {spot(xy)} lies outside the plan, or in a hole")
     for xy in np.zeros((0, 2)) if stops is None else stops:
-        meetings.add(_passing(drawn, xy, snap))
+        meetings.add(lines_at(drawn, xy, snap))
     first_spot = len(meetings.line)
     alone = [place for place, found in enumerate(passing) if not found]
     for found in passing:
@@ -150,31 +135,6 @@ def hole_points(drawn: Arrangement, lines: Sequence[Line]) -> list[tuple[float, 
     return found
 
 
-class Drawn:
-    """A line with its dense drawing on Π."""
-
-    def __init__(self, line: Line) -> None:
-        self.line, self.curve = line, line.curve
-        self.name, self.kind = line.name, line.kind
-        self.xy = self.curve.at(self.curve.dense)[:, :2]
-        steps = np.linalg.norm(np.diff(self.xy, axis=0), axis=1)
-        if not steps.any():
-            raise PlanError(f"{self.name} has no length on the plane")
-        self.reach = np.concatenate([[0.0], np.cumsum(steps)])
-        self.shape: Any = shapely.LineString(self.xy)
-
-    def nearest(self, xy: Floats) -> tuple[float, float]:
-        """The parameter of the curve's point nearest to xy, and its distance."""
-        t = float(np.interp(self.shape.project(shapely.Point(xy)), self.reach, self.curve.dense))
-        width, last = 2.0 / 64.0, float(len(self.curve.pieces))
-        for _ in range(8):  # each round narrows the bracket 16 times
-            trial = np.clip(t + width * np.linspace(-1.0, 1.0, 33), 0.0, last)
-            distance = np.linalg.norm(self.curve.at(trial)[:, :2] - xy, axis=1)
-            best = int(np.argmin(distance))
-            t, width = float(trial[best]), width / 16.0
-        return t, float(distance[best])
-
-
 @dataclass
 class _Meetings:
     """Places on lines that become vertices, and which of them are one vertex."""
@@ -191,37 +151,7 @@ class _Meetings:
             self.t.append(t)
 
 
-def _at(xy: Floats) -> str:
-    return f"({xy[0]:.6g}, {xy[1]:.6g})"
-
-
-def _check_line(one: Drawn) -> None:
-    if one.line.bounds and not one.curve.closed:
-        gap = float(np.linalg.norm(one.xy[-1] - one.xy[0]))
-        raise PlanError(
-            f"{one.name} is open: it starts at {_at(one.xy[0])} and ends at {_at(one.xy[-1])},"
-            f" {gap:.3g} apart; close it"
-        )
-    if not one.shape.is_simple:
-        pieces = shapely.get_parts(shapely.node(one.shape))
-        ends = np.concatenate([np.array(p.coords)[[0, -1]] for p in pieces])
-        where, count = np.unique(ends.round(9), axis=0, return_counts=True)
-        raise PlanError(f"{one.name} crosses itself at {_at(where[np.argmax(count)])}")
-
-
-def _check_holes(drawn: Sequence[Drawn]) -> None:
-    outline = shapely.Polygon(drawn[0].xy)
-    holes = [(one, shapely.Polygon(one.xy)) for one in drawn if one.kind is Kind.HOLE]
-    for place, (one, area) in enumerate(holes):
-        if not outline.contains_properly(area):
-            where = "crosses or touches" if outline.intersects(area) else "lies outside"
-            raise PlanError(f"{one.name} {where} the outline; a hole must lie inside it")
-        for other, other_area in holes[:place]:
-            if area.intersects(other_area):
-                raise PlanError(f"{other.name} and {one.name} touch or overlap; join them into one")
-
-
-def _find_crossings(drawn: Sequence[Drawn], meetings: _Meetings) -> None:
+def _findcrossings(drawn: Sequence[Drawn], meetings: _Meetings) -> None:
     for j, two in enumerate(drawn):
         for i, one in enumerate(drawn[:j]):
             if one.line.bounds and two.line.bounds:
@@ -231,72 +161,29 @@ def _find_crossings(drawn: Sequence[Drawn], meetings: _Meetings) -> None:
                     continue
                 if part.geom_type != "Point":
                     start, end = np.array(part.coords)[[0, -1]]
-                    raise PlanError(
-                        f"{two.name} runs along {one.name} from {_at(start)} to {_at(end)}; leave"
-                        " that part out of one of them"
-                    )
+                    raise overlap(two, one, f"from {spot(start)} to {spot(end)}")
                 xy = np.array(part.coords)[0]
-                s, t = _crossing(one, one.nearest(xy)[0], two, two.nearest(xy)[0])
+                s, t = crossing(one, one.nearest(xy)[0], two, two.nearest(xy)[0])
                 meetings.add([(i, s), (j, t)])
-
-
-def _crossing(one: Drawn, s: float, two: Drawn, t: float) -> tuple[float, float]:
-    """The parameters at which two curves cross, by Newton's method from near there."""
-
-    def apart(s: float, t: float) -> Floats:
-        return (two.curve.at([t]) - one.curve.at([s]))[0, :2]
-
-    gap, step = apart(s, t), 1e-6
-    for _ in range(8):
-        along_s = (apart(s - step, t) - apart(s + step, t)) / (2.0 * step)
-        along_t = (apart(s, t + step) - apart(s, t - step)) / (2.0 * step)
-        turn = float(cross(along_s, along_t))
-        if abs(turn) < 1e-9 * float(np.linalg.norm(along_s) * np.linalg.norm(along_t)):
-            break
-        new_s, new_t = s + float(cross(gap, along_t)) / turn, t + float(cross(gap, along_s)) / turn
-        new_s = min(max(new_s, 0.0), float(len(one.curve.pieces)))
-        new_t = min(max(new_t, 0.0), float(len(two.curve.pieces)))
-        new_gap = apart(new_s, new_t)
-        if np.linalg.norm(new_gap) >= np.linalg.norm(gap):
-            break
-        s, t, gap = new_s, new_t, new_gap
-    return s, t
 
 
 def _find_ends(drawn: Sequence[Drawn], meetings: _Meetings, snap: float) -> None:
     """Dividers end on other lines, or beyond the plan's boundary; supports may end anywhere."""
-    contains = _inside(drawn)
+    contains = inside(drawn)
     for number, one in enumerate(drawn):
         if one.curve.closed or one.line.bounds:
             continue
         for t in (0.0, float(len(one.curve.pieces))):
             xy = one.curve.at(t)[0, :2]
-            found = _passing(drawn, xy, snap, leave_out=number)
+            found = lines_at(drawn, xy, snap, leave_out=number)
             if one.kind is Kind.DIVIDER and not found and contains(xy):
                 gaps = [(other.nearest(xy)[1], other) for other in drawn if other is not one]
                 gap, other = min(gaps, key=lambda pair: pair[0])
                 raise PlanError(
-                    f"{one.name} ends at {_at(xy)} without reaching another line; {other.name} is"
+                    f"{one.name} ends at {spot(xy)} without reaching another line; {other.name} is"
                     f" nearest, {gap:.3g} away: extend the divider to it"
                 )
             meetings.add([(number, t), *found])
-
-
-def _inside(drawn: Sequence[Drawn]) -> Callable[[Floats], bool]:
-    """Whether a point is inside the outline and outside all holes."""
-    area = shapely.Polygon(drawn[0].xy)
-    for one in drawn:
-        if one.kind is Kind.HOLE:
-            area = area.difference(shapely.Polygon(one.xy))
-    return lambda xy: bool(shapely.contains_xy(area, *xy))
-
-
-def _passing(
-    drawn: Sequence[Drawn], xy: Floats, snap: float, leave_out: int = -1
-) -> list[tuple[int, float]]:
-    """Lines that pass a point, with the parameter there."""
-    near = [(number, *one.nearest(xy)) for number, one in enumerate(drawn) if number != leave_out]
-    return [(number, t) for number, t, distance in near if distance <= snap]
 
 
 def _nodes(drawn: Sequence[Drawn], meetings: _Meetings, snap: float) -> tuple[Ints, Floats, Floats]:
@@ -339,7 +226,9 @@ def _chains(
         for (low, first), (high, last) in pairwise(stops):
             inner = one.curve.between(low, high, edge_length)
             ends = (min(first, last), max(first, last))
-            if not len(inner) and ends in direct:  # the chord of a bend already drawn
+            # the chord of a bend already drawn, and a divider from support to support, must bend
+            stiff = one.kind is Kind.DIVIDER and _on_edges(heights, first, last)
+            if not len(inner) and (stiff or ends in direct):
                 inner = one.curve.between(low, high, one.curve.length / 1e6)
                 inner = inner[[len(inner) // 2]]
             if not len(inner):
@@ -350,6 +239,11 @@ def _chains(
             chains.append(Chain(number, np.array([first, *range(n, n + len(where)), last])))
             n += len(where)
     return chains, np.concatenate(new), np.concatenate(new_heights)
+
+
+def _on_edges(heights: Floats, first: int, last: int) -> bool:
+    """Whether both nodes have a height of their own: a wall between them would have no room."""
+    return max(first, last) < len(heights) and not np.isnan(heights[[first, last]]).any()
 
 
 def _stops(t: Floats, node: Ints, curve: Curve) -> list[tuple[float, int]]:
@@ -372,13 +266,19 @@ def _kept(
     drawn: Sequence[Drawn], chains: list[Chain], points: Floats, edge_length: float
 ) -> list[Chain]:
     """The chains without what passes outside the plan or through its holes."""
-    contains = _inside(drawn)
+    contains = inside(drawn)
     kept = []
     for chain in chains:
         place = len(chain.vertices) // 2
         middle = points[chain.vertices[place - 1 : place + 1]].mean(axis=0)
-        if drawn[chain.line].line.bounds or contains(middle):
-            kept.append(chain)
+        one = drawn[chain.line]
+        if not (one.line.bounds or contains(middle)):
+            continue
+        if not one.line.bounds:
+            along = lines_at(drawn, middle, SNAP * edge_length, leave_out=chain.line)
+            if along:
+                raise overlap(one, drawn[along[0][0]], f"near {spot(middle)}")
+        kept.append(chain)
     gone = set(range(len(drawn))) - {chain.line for chain in kept}
     if gone:
         raise PlanError(f"{drawn[min(gone)].name} lies outside the plan, or in a hole")
@@ -398,7 +298,7 @@ def _check_chords(
         first, second = owner[i[0]], owner[j[0]]
         raise PlanError(
             f"with edges of length {edge_length:g}, {drawn[first].name} and {drawn[second].name}"
-            f" cross near {_at(points[ends[i[0]]].mean(axis=0))}; use a smaller edge_length"
+            f" cross near {spot(points[ends[i[0]]].mean(axis=0))}; use a smaller edge_length"
         )
 
 

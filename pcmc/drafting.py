@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .arrangement import SNAP, Arrangement, Drawn, Kind, Line, arrange, hole_points
+from .arrangement import Arrangement, arrange, hole_points
 from .arrays import Bools, Floats, Ints
 from .curves import Curve, to_local, to_space
-from .errors import PlanError
+from .errors import PlanError, SurfaceError
 from .lift import dome, spanned
+from .lines import SNAP, Drawn, Kind, Line
 from .plan import EDGES, Area, Plan
 from .planar import PlanarMesh, locate, signed_areas, triangulate
 from .polish import polished
@@ -30,7 +31,7 @@ def surface(plan: Plan) -> Surface:
         [np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in on_edge)]
     )
     drawn = arrange(lines, plan.edge_length, spots.reshape(-1, 3), stops)
-    mesh = triangulate(drawn.points, drawn.segments, plan.edge_length, hole_points(drawn, lines))
+    mesh = _meshed(plan, drawn, hole_points(drawn, lines))
     fixed, sliding = _supports(plan, drawn, lines, on_edge, len(mesh.points))
     if not (fixed | sliding).any():
         raise PlanError("nothing holds the roof; fix an edge or give supports")
@@ -51,6 +52,16 @@ def surface(plan: Plan) -> Surface:
         np.concatenate([sliding, walls.sliding]),
         plan.plane,
     )
+
+
+def _meshed(plan: Plan, drawn: Arrangement, holes: Sequence[Sequence[float]]) -> PlanarMesh:
+    try:
+        return triangulate(drawn.points, drawn.segments, plan.edge_length, holes)
+    except SurfaceError as error:
+        raise PlanError(
+            f"the plan's lines come too close to each other for edges of length"
+            f" {plan.edge_length:g}: {error}"
+        ) from None
 
 
 def _check_size(plan: Plan) -> None:

@@ -15,6 +15,7 @@ FULLNESS = (
     0.75  # power of the membrane's height: below 1 the dome is fuller and meets walls steeper
 )
 SLOPE = 0.8  # of the dome at its edge: steeper would draw the triangles out
+LEAST = 0.15  # of that slope, everywhere, so that there is room for walls
 
 
 def stiffness(points: Floats, triangles: Ints) -> csr_array:
@@ -54,8 +55,8 @@ def dome(points: Floats, triangles: Ints, held: Bools, rise: float | None = None
 
     A membrane under pressure, Δu = -1 with u = 0 at held vertices and a free edge elsewhere, gives
     the shape (u / max u)^0.75. ``rise`` is by default 0.3 of the radius of the largest circle clear
-    of held vertices. Near those the height is at most 0.8 times the distance (more only where a
-    larger rise demands it).
+    of held vertices. The height is between 0.12 and 0.8 times the distance from those (more only
+    where a larger rise demands it).
     """
     area = np.abs(signed_areas(points, triangles))
     load = np.bincount(triangles.ravel(), np.repeat(area / 3.0, 3), len(points)).astype(float)
@@ -64,7 +65,8 @@ def dome(points: Floats, triangles: Ints, held: Bools, rise: float | None = None
     radius = float(distance.max())
     rise = RISE * radius if rise is None else rise
     slope = max(SLOPE, SLOPE / RISE * rise / radius)
-    return np.minimum(rise * (u / u.max()) ** FULLNESS, slope * distance)
+    full = rise * (u / u.max()) ** FULLNESS
+    return np.clip(full, LEAST * slope * distance, slope * distance)
 
 
 def _solved(L: csr_array, load: Floats, known: Bools) -> Floats:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .curves import Curve, curve
-from .errors import OptionError, unknown
+from .errors import MissingExtra, OptionError, unknown
 from .surface import Plane, Surface
 
 EDGES = ("fixed", "sliding", "free")
@@ -98,6 +98,8 @@ class Plan:
 
     Raises
     ------
+    MissingExtra
+        When ``surface`` is called without the library shapely.
     PlanError
         When ``surface`` is called: the lines do not divide the plan as they should; names the line.
     OptionError
@@ -144,8 +146,12 @@ class Plan:
 
     def surface(self) -> Surface:
         """The mesh of the plan at its initial height, with its walls and supports."""
-        from .drafting import surface  # needs shapely, which a plan by itself does not
-
+        try:
+            from .drafting import surface  # needs shapely, which a plan by itself does not
+        except ModuleNotFoundError as error:
+            if error.name != "shapely":
+                raise
+            raise MissingExtra("shapely", "plan") from None
         return surface(self)
 
 

@@ -171,8 +171,9 @@ class _Builder:
         if len(bad):
             vertex = top.vertices[bad[0]]
             raise SurfaceError(
-                f"no room for a wall under vertex {vertex}: it lies {height[bad[0]]:.3g} above the"
-                f" wall's bottom ({len(bad)} such vertices); raise it, or lower the plane"
+                f"no room for a wall under vertex {vertex}, {height[bad[0]]:.3g} above the wall's"
+                f" bottom, at {self.local[vertex].round(6).tolist()} ({len(bad)} such vertices);"
+                " raise it, or use shorter edges if both ends of the wall are held"
             )
 
     def line(self, vertex: int, held: bool) -> list[int]:

@@ -286,6 +286,9 @@ TURNED = join(arc(WEST, [0, 3.85], EAST), arc(EAST, [0, -3.85], WEST))  # octago
         ({"dividers": [[[25, 0], [25, 9]]]}, "divider 'wall 1' lies outside the plan"),
         ({"dividers": [WALL, [[0, 6], [9, 6]]]}, "divider 'wall 1' is nearest, 1 away"),
         ({"dividers": [[[0, 0], [20, 0]]]}, "divider 'wall 1' runs along the outline"),
+        ({"dividers": [[[1, 0.004], [9, 0]]]}, "'wall 1' runs along the outline near"),
+        ({"supports": [[25, 3]]}, r"the support at \(25, 3\) lies outside the plan"),
+        ({"supports": [[17, 5]], "holes": [COURT]}, r"the support at \(17, 5\) lies outside"),
         ({"dividers": [[[2, 0], [8, 12], [8, 0], [2, 12]]]}, "'wall 1' crosses itself at"),
         ({"dividers": [[[5, 5, 0], [5, 5, 3]]]}, "'wall 1' has no length on the plane"),
         ({"dividers": [WALL], "patches": {"a": {"tension": 1}}}, "into 2 parts, but 1 patches"),
@@ -352,6 +355,11 @@ def test_a_plan_needs_an_outline():
         plan_from({"tension": 1.0})
 
 
+def test_a_short_divider_between_edges_still_gets_a_wall():
+    surface = Plan(BOX, [[[19, 0], [20, 1]]], tension=5.0, edge_length=2.0).surface()
+    assert len(vertices_of(surface, "wall 1")) == 4
+
+
 def test_walls_need_room_above_the_plane():
     low = [[0, 0, -2], [20, 0, -2], [20, 12, -2], [0, 12, -2]]
     with pytest.raises(SurfaceError, match="no room for a wall"):
@@ -364,10 +372,10 @@ def test_without_shapely_the_extra_is_named(monkeypatch):
 
     def without(name, *rest, **more):
         if name == "shapely":
-            raise ImportError(name)
+            raise ModuleNotFoundError(name, name=name)
         return real(name, *rest, **more)
 
-    for module in ("pcmc.arrangement", "pcmc.drafting"):
+    for module in ("pcmc.lines", "pcmc.arrangement", "pcmc.drafting"):
         monkeypatch.delitem(sys.modules, module, raising=False)
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(MissingExtra, match=r"pcmc\[plan\]"):

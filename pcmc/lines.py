@@ -1,0 +1,144 @@
+"""The lines of a plan, drawn on Π: what each must be, and where two of them meet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+import shapely
+
+from .arrays import Floats
+from .curves import Curve
+from .errors import PlanError
+from .planar import cross
+
+SNAP = 0.01  # of the edge length: lines that miss each other by less are taken to meet
+
+
+class Kind(IntEnum):
+    """What a line is. Where lines meet, the first kind among them says where the point is."""
+
+    OUTLINE = 0
+    HOLE = 1
+    SUPPORT = 2
+    DIVIDER = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A named curve of a plan, in the coordinates of Π (two along it, and the height)."""
+
+    name: str
+    kind: Kind
+    curve: Curve
+
+    @property
+    def bounds(self) -> bool:
+        """Whether the line is part of the plan's boundary."""
+        return self.kind in (Kind.OUTLINE, Kind.HOLE)
+
+
+class Drawn:
+    """A line with its dense drawing on Π."""
+
+    def __init__(self, line: Line) -> None:
+        self.line, self.curve = line, line.curve
+        self.name, self.kind = line.name, line.kind
+        self.xy = self.curve.at(self.curve.dense)[:, :2]
+        steps = np.linalg.norm(np.diff(self.xy, axis=0), axis=1)
+        if not steps.any():
+            raise PlanError(f"{self.name} has no length on the plane")
+        self.reach = np.concatenate([[0.0], np.cumsum(steps)])
+        self.shape: Any = shapely.LineString(self.xy)
+
+    def nearest(self, xy: Floats) -> tuple[float, float]:
+        """The parameter of the curve's point nearest to xy, and its distance."""
+        t = float(np.interp(self.shape.project(shapely.Point(xy)), self.reach, self.curve.dense))
+        width, last = 2.0 / 64.0, float(len(self.curve.pieces))
+        for _ in range(8):  # each round narrows the bracket 16 times
+            trial = np.clip(t + width * np.linspace(-1.0, 1.0, 33), 0.0, last)
+            distance = np.linalg.norm(self.curve.at(trial)[:, :2] - xy, axis=1)
+            best = int(np.argmin(distance))
+            t, width = float(trial[best]), width / 16.0
+        return t, float(distance[best])
+
+
+def spot(xy: Floats) -> str:
+    """A place, for messages."""
+    return f"({xy[0]:.6g}, {xy[1]:.6g})"
+
+
+def overlap(one: Drawn, other: Drawn, where: str) -> PlanError:
+    """The error for two lines that coincide along a part."""
+    return PlanError(f"{one.name} runs along {other.name} {where}; leave that part out")
+
+
+def check_line(one: Drawn) -> None:
+    """Boundaries are closed, and no line crosses itself."""
+    if one.line.bounds and not one.curve.closed:
+        gap = float(np.linalg.norm(one.xy[-1] - one.xy[0]))
+        raise PlanError(
+            f"{one.name} is open: it starts at {spot(one.xy[0])} and ends at {spot(one.xy[-1])},"
+            f" {gap:.3g} apart; close it"
+        )
+    if not one.shape.is_simple:
+        pieces = shapely.get_parts(shapely.node(one.shape))
+        ends = np.concatenate([np.array(p.coords)[[0, -1]] for p in pieces])
+        where, count = np.unique(ends.round(9), axis=0, return_counts=True)
+        raise PlanError(f"{one.name} crosses itself at {spot(where[np.argmax(count)])}")
+
+
+def check_holes(drawn: Sequence[Drawn]) -> None:
+    """Holes lie inside the outline and apart from each other."""
+    outline = shapely.Polygon(drawn[0].xy)
+    holes = [(one, shapely.Polygon(one.xy)) for one in drawn if one.kind is Kind.HOLE]
+    for place, (one, area) in enumerate(holes):
+        if not outline.contains_properly(area):
+            where = "crosses or touches" if outline.intersects(area) else "lies outside"
+            raise PlanError(f"{one.name} {where} the outline; a hole must lie inside it")
+        for other, other_area in holes[:place]:
+            if area.intersects(other_area):
+                raise PlanError(f"{other.name} and {one.name} touch or overlap; join them into one")
+
+
+def inside(drawn: Sequence[Drawn]) -> Callable[[Floats], bool]:
+    """Whether a point is inside the outline and outside all holes."""
+    area = shapely.Polygon(drawn[0].xy)
+    for one in drawn:
+        if one.kind is Kind.HOLE:
+            area = area.difference(shapely.Polygon(one.xy))
+    return lambda xy: bool(shapely.contains_xy(area, *xy))
+
+
+def lines_at(
+    drawn: Sequence[Drawn], xy: Floats, snap: float, leave_out: int = -1
+) -> list[tuple[int, float]]:
+    """Lines that pass a point, with the parameter there."""
+    near = [(number, *one.nearest(xy)) for number, one in enumerate(drawn) if number != leave_out]
+    return [(number, t) for number, t, distance in near if distance <= snap]
+
+
+def crossing(one: Drawn, s: float, two: Drawn, t: float) -> tuple[float, float]:
+    """The parameters at which two curves cross, by Newton's method from near there."""
+
+    def apart(s: float, t: float) -> Floats:
+        return (two.curve.at([t]) - one.curve.at([s]))[0, :2]
+
+    gap, step = apart(s, t), 1e-6
+    for _ in range(8):
+        along_s = (apart(s - step, t) - apart(s + step, t)) / (2.0 * step)
+        along_t = (apart(s, t + step) - apart(s, t - step)) / (2.0 * step)
+        turn = float(cross(along_s, along_t))
+        if abs(turn) < 1e-9 * float(np.linalg.norm(along_s) * np.linalg.norm(along_t)):
+            break
+        new_s, new_t = s + float(cross(gap, along_t)) / turn, t + float(cross(gap, along_s)) / turn
+        new_s = min(max(new_s, 0.0), float(len(one.curve.pieces)))
+        new_t = min(max(new_t, 0.0), float(len(two.curve.pieces)))
+        new_gap = apart(new_s, new_t)
+        if np.linalg.norm(new_gap) >= np.linalg.norm(gap):
+            break
+        s, t, gap = new_s, new_t, new_gap
+    return s, t
