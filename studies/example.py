@@ -62,7 +62,10 @@ def shapes(
         )  # fmt: skip
         if error is not None:
             percent = 100.0 * curvature_error(surface)
-            draw(surface, folder.figure(error), view="plan", scalars=percent, label="error, %")
+            draw(
+                surface, folder.figure(error), view="plan", scalars=percent, label="error, %",
+                width=800,
+            )  # fmt: skip
     energy_history(folder, {"proposed method": case}, history)
 
 

@@ -85,14 +85,14 @@ class Folder:
         return self.path / f"{name}.png"
 
     def shrink_figures(self) -> None:
-        """Bring figures of more than LARGE bytes to a palette of 128 colours."""
+        """Bring figures of more than LARGE bytes to a palette of 256 colours."""
         for path in sorted(self.path.glob("*.png")):
             if path.stat().st_size > LARGE:
                 from PIL import Image
 
                 data = BytesIO()
                 with Image.open(path) as image:
-                    image.convert("RGB").quantize(128).save(data, "PNG", optimize=True)
+                    image.convert("RGB").quantize(256).save(data, "PNG", optimize=True)
                 write_bytes(path, data.getvalue())
 
     def mesh_hashes(self) -> dict[str, str]:
