@@ -7,7 +7,6 @@ varied.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -88,7 +87,7 @@ def nearest(found: Iterable[Candidate]) -> list[Candidate]:
 
 
 def _distance(candidate: Candidate) -> float:
-    return abs(math.log(candidate.ratio))
+    return abs(candidate.ratio - 1.0)
 
 
 _Family = tuple[str, str, tuple[float, ...], Callable[[float], Surface]]
