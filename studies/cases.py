@@ -1,0 +1,38 @@
+"""A sweep inside a study: resumable, its numbers and its times in separate tables."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from pcmc.errors import SweepError
+from pcmc.sweep import Sweep, provenance, read_store, run
+
+from .folder import Folder
+
+
+def run_sweep(
+    folder: Folder, name: str, sweep: Sweep, *, workers: int | None = None, limit: float = 120.0
+) -> pd.DataFrame:
+    """A row per case, in the grid's order. Times go to ``name_times``.
+
+    While it runs, the cases are stored in the study's folder ``build``, which no commit takes in. A
+    run that was stopped goes on from there; one that ends takes the store away.
+
+    Raises
+    ------
+    SweepError : the run was stopped (Ctrl-C), and is not complete.
+    """
+    store = folder.path / "build" / f"{name}-{sweep.fingerprint[:8]}.jsonl"
+    store.parent.mkdir(parents=True, exist_ok=True)
+    table = run(sweep, store, workers=workers, time_limit=limit)
+    if len(table) < len(sweep):
+        raise SweepError(
+            f"{name}: {len(table)} of {len(sweep)} cases are done and kept in {store}; run the"
+            " study again to go on from there"
+        )
+    times = provenance(read_store(store))[["wall_time"]].round(3)
+    folder.write_table(f"{name}_times", times.reset_index())
+    store.unlink()
+    if not any(store.parent.iterdir()):
+        store.parent.rmdir()
+    return table
