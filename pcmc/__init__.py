@@ -1,25 +1,35 @@
 """Piecewise constant-mean-curvature surfaces: triangle meshes of patches in equilibrium."""
 
+from . import explore
 from .certificate import Certificate, Verdict, certify
 from .curvature import curvature_error, mean_curvature, target_curvature
+from .design import Design, meet
 from .energy import energy, gradient, hessian
 from .io import read, write
+from .quantities import Parameter, Target
+from .sensitivity import sensitivities
 from .solvers import solve
 from .surface import Patch, Plane, Surface
 
 __all__ = [
     "Certificate",
+    "Design",
+    "Parameter",
     "Patch",
     "Plane",
     "Surface",
+    "Target",
     "Verdict",
     "certify",
     "curvature_error",
     "energy",
+    "explore",
     "gradient",
     "hessian",
     "mean_curvature",
+    "meet",
     "read",
+    "sensitivities",
     "solve",
     "target_curvature",
     "write",

@@ -1,0 +1,110 @@
+"""What the page draws of a surface: its sheets, lines and supports once, its fields at every change."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..arrays import Bools, Floats
+from ..certificate import Certificate
+from ..curvature import curvature_error, mean_curvature
+from ..energy import patch_areas
+from ..palette import patch_colors
+from ..surface import Surface
+
+Arrays = dict[str, npt.NDArray[Any]]
+
+
+def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
+    """What stays the same however the surface moves.
+
+    A vertex where sheets meet is drawn once for each, so that colours and shading break there:
+    ``sheet_faces`` (m,3) index such corners, ``sheet_vertex`` and ``sheet_patch`` say whose they are.
+    """
+    corner = surface.patch_of_face[:, None].astype(np.int64) * surface.n + surface.faces
+    corners, faces = np.unique(corner, return_inverse=True)
+    topo = surface.topology
+    header = {
+        "patches": [
+            {"name": p.name, "wall": p.auxiliary, "color": color}
+            for p, color in zip(surface.patches, patch_colors(surface).tolist(), strict=True)
+        ],
+        "vertices": surface.n,
+        "triangles": surface.m,
+        "size": surface.size,
+        "up": surface.plane.normal,
+        "ground": float(surface.plane.height(centre(surface))),
+    }
+    inner, curves = ~topo.curve_edge, topo.curve_edge
+    of_wall = _walls_alone(surface)
+    return header, {
+        "sheet_faces": faces.reshape(-1, 3),
+        "sheet_vertex": corners % surface.n,
+        "sheet_patch": corners // surface.n,
+        "edges": topo.edges[inner],
+        "edge_wall": of_wall[inner],
+        "curves": topo.edges[curves],
+        "curve_wall": of_wall[curves],
+        "fixed": np.flatnonzero(surface.fixed),
+        "sliding": np.flatnonzero(surface.on_plane),
+    }
+
+
+def _walls_alone(surface: Surface) -> Bools:
+    """(e,) edges all of whose triangles belong to walls."""
+    alone = np.ones(len(surface.topology.edges), dtype=bool)
+    roof = surface.pressures[surface.patch_of_face] != 0.0
+    alone[surface.topology.edge_of_face[roof]] = False
+    return alone
+
+
+def centre(surface: Surface) -> Floats:
+    """(3,) middle of the bounding box; the page's origin, where single precision is at its best."""
+    X = surface.vertices
+    return 0.5 * (X.min(axis=0) + X.max(axis=0))
+
+
+def fields(surface: Surface, found: Certificate, origin: Floats) -> Arrays:
+    """Vertices relative to the origin, and the numbers that colours may show."""
+    arrays: Arrays = {
+        "vertices": surface.vertices - origin,
+        "curvature": mean_curvature(surface, "variational"),
+        "error": curvature_error(surface, "cotangent"),
+        "reactions": reactions_per_length(surface, found.reactions),
+    }
+    if len(found.modes):
+        arrays["mode"] = found.modes[0] / (np.abs(found.modes[0]).max() or 1.0)
+    return arrays
+
+
+def reactions_per_length(surface: Surface, reactions: Floats) -> Floats:
+    """(n,3) force per length along the boundary; NaN where no boundary is held.
+
+    Half of each boundary edge belongs to either end.
+    """
+    topo = surface.topology
+    edges = topo.edges[topo.boundary_edge]
+    ends = surface.vertices[edges]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    share = np.bincount(edges.ravel(), np.repeat(0.5 * length, 2), surface.n)
+    held = (surface.fixed | surface.on_plane) & (share > 0.0)
+    result = np.full((surface.n, 3), np.nan)
+    result[held] = reactions[held] / share[held, None]
+    return result
+
+
+def findings(surface: Surface, found: Certificate) -> dict[str, Any]:
+    """The certificate in numbers, for the page's table."""
+    height = surface.plane.height(surface.vertices)
+    under_pressure = surface.pressures != 0.0
+    return {
+        **found.numbers(),
+        "height": float(height.max()),
+        "area": float(patch_areas(surface)[under_pressure].sum()),
+        "patches": [
+            {"name": row["patch"], "mean_H": row["mean_H"], "area": row["area"]}
+            for row in found.patches.to_dict(orient="records")
+        ],
+    }

@@ -1,0 +1,266 @@
+// The page: wishes go to the server one at a time, its answers to the viewer, panel and verdict.
+
+import { arrowsOf, COLOURS, fieldOf, showFindings, showLegend, showVerdict } from "./findings.js";
+import { digits, Panel } from "./panel.js";
+import { Viewer } from "./viewer.js";
+import { ask, fetchFile } from "./wire.js";
+
+const OVERTAKE = 400; // milliseconds after which a newer wish ends the work on an older one
+const find = (selector) => document.querySelector(selector);
+const KINDS = {
+  ".pcmc": "everything", ".3dm": "Rhino", ".obj": "most programs", ".glb": "viewers, AR",
+  ".ply": "with colours' values", ".stl": "printing", ".vtp": "ParaView", ".fe": "Surface Evolver",
+};
+
+class Page {
+  async open() {
+    const known = new URLSearchParams(location.search).get("design") || sessionStorage.getItem("design");
+    // a copy of this tab must not take this tab's design along
+    sessionStorage.removeItem("design");
+    addEventListener("pagehide", () => sessionStorage.setItem("design", this.name));
+    const { header, arrays } = await ask("api/open", known ? { design: known } : {})
+      .catch((error) => (known && !location.search ? ask("api/open") : Promise.reject(error)));
+    this.name = header.design;
+    this.size = header.size;
+    this.choice = "patches";
+    find("#title").textContent = header.title || "pcmc explore";
+    document.title = header.title ? `${header.title} – pcmc explore` : "pcmc explore";
+    this.underPressure = new Uint8Array(header.vertices);
+    arrays.sheet_patch.forEach((p, i) => {
+      if (!header.patches[p].wall) this.underPressure[arrays.sheet_vertex[i]] = 1;
+    });
+    this.startViewer(header, arrays);
+    this.panel = new Panel(find("#patches"), header.patches, header.asked, find("#together"),
+      (final) => this.wish(final));
+    find("#together-row").hidden = header.patches.length < 2;
+    this.addChoices();
+    this.addExports(header.formats);
+    this.addActs();
+    this.take({ header, arrays }, true);
+    this.tellWork();
+  }
+
+  startViewer(header, arrays) {
+    try {
+      this.viewer = new Viewer(find("#canvas"), (spacing) => {
+        find("#scale").textContent = spacing ? `grid ${digits(spacing)}` : "";
+      });
+    } catch (error) {
+      find("#canvas").hidden = true;
+      find("#no-graphics").hidden = false;
+      find("#no-graphics").textContent = error.message === "no WebGL 2"
+        ? "This browser shows no 3D pictures (WebGL 2 is missing or switched off); all else works."
+        : `The 3D picture cannot be drawn: ${error.message}`;
+      return;
+    }
+    this.viewer.setMesh(header, arrays);
+  }
+
+  // -- wishes: one under way, and the newest of those that came since ------------------------------
+
+  wish(final) {
+    this.next = { act: final ? "settle" : "follow", values: this.panel.values() };
+    find("#verdict").dataset.busy = "true";
+    this.pump();
+  }
+
+  act(name) {
+    this.next = { act: name, values: {} };
+    this.pump(true);
+  }
+
+  pump(now = false) {
+    clearTimeout(this.timer);
+    if (!this.next) return;
+    const waited = performance.now() - this.since;
+    if (this.busy && !now && waited < OVERTAKE) {
+      this.timer = setTimeout(() => this.pump(), OVERTAKE - waited);
+      return;
+    }
+    const { act, values } = this.next;
+    this.next = null;
+    this.send(act, values);
+  }
+
+  async send(act, values) {
+    const ticket = {};
+    this.busy = ticket;
+    this.since = performance.now();
+    this.tellWork();
+    try {
+      const answer = await ask(`api/${this.name}/${act}`, values);
+      if (!answer.header.superseded && this.busy === ticket) {
+        this.take(answer, !["follow", "settle"].includes(act));
+      }
+    } catch (error) {
+      this.tell(error.message);
+      if (!this.next) this.panel.show(this.header.asked, this.header.shown, true);
+    }
+    if (this.busy !== ticket) return;
+    this.busy = null;
+    this.tellWork();
+    this.pump();
+  }
+
+  tellWork() {
+    clearTimeout(this.slow);
+    const card = find("#verdict");
+    card.dataset.busy = String(Boolean(this.busy || this.next));
+    if (!this.busy) {
+      card.classList.remove("working");
+      card.removeAttribute("aria-busy");
+      return;
+    }
+    this.slow = setTimeout(() => {
+      card.classList.add("working");
+      card.setAttribute("aria-busy", "true");
+    }, 250);
+  }
+
+  // -- answers -------------------------------------------------------------------------------------
+
+  /** Show an answer; `values` sets the sliders too, which a moving hand would not like. */
+  take({ header, arrays }, values) {
+    this.header = header;
+    this.arrays = { ...arrays, underPressure: this.underPressure };
+    showVerdict(find("#verdict"), header);
+    showFindings(find("#findings tbody"), header.findings);
+    if (!this.next) this.panel.show(header.asked, header.shown, values);
+    find("#undo").disabled = !header.undo;
+    find("#redo").disabled = !header.redo;
+    find("#stabilise").hidden = !(header.at_rest && header.verdict.name === "saddle");
+    find("#back").hidden = header.at_rest || !header.undo;
+    find("#sway").hidden = !arrays.mode || !header.at_rest || !this.viewer;
+    if (!this.swaying || !arrays.mode) {
+      this.sway(false);
+      this.viewer?.setVertices(arrays.vertices);
+    }
+    this.colour();
+  }
+
+  colour() {
+    const field = fieldOf(this.choice, this.arrays);
+    showLegend(find("#legend"), this.choice, field);
+    if (!this.viewer) return;
+    this.viewer.setField(field);
+    this.viewer.setArrows(this.choice === "reactions" ? arrowsOf(this.arrays, field, this.size) : null);
+  }
+
+  /** Move along the softest mode and back, slowly. */
+  sway(on) {
+    this.swaying = on;
+    find("#sway").setAttribute("aria-pressed", String(on));
+    cancelAnimationFrame(this.frame);
+    if (!on) return;
+    const start = performance.now();
+    const step = (time) => {
+      const { vertices, mode } = this.arrays;
+      if (!this.swaying || !mode) return;
+      const part = 0.05 * this.size * Math.sin((time - start) / 450);
+      this.viewer.setVertices(vertices.map((x, i) => x + part * mode[i]));
+      this.frame = requestAnimationFrame(step);
+    };
+    this.frame = requestAnimationFrame(step);
+  }
+
+  /** One line that goes away by itself. */
+  tell(text) {
+    const note = find("#note");
+    note.textContent = text;
+    note.hidden = false;
+    clearTimeout(this.noted);
+    this.noted = setTimeout(() => { note.hidden = true; }, 8000);
+  }
+
+  // -- controls ------------------------------------------------------------------------------------
+
+  addChoices() {
+    find("#colours").replaceChildren(...Object.entries(COLOURS).map(([name, { label }]) => choice(
+      "radio", label, name === this.choice, () => { this.choice = name; this.colour(); }, name)));
+    const shows = { mesh: "Mesh", supports: "Supports", walls: "Walls", smooth: "Smooth", grid: "Grid" };
+    find("#shows").replaceChildren(...Object.entries(shows).map(([name, label]) => choice(
+      "checkbox", label, this.viewer?.options[name],
+      (on) => this.viewer?.setOptions({ [name]: on }), name)));
+  }
+
+  addExports(formats) {
+    const menu = find("#export");
+    const kinds = Object.entries(KINDS).filter(([suffix]) => formats.includes(suffix));
+    menu.querySelector("div").replaceChildren(...[...kinds, [".png", "picture of this view"]].map(
+      ([suffix, words]) => {
+        const button = document.createElement("button");
+        const name = document.createElement("b");
+        button.type = "button";
+        button.value = suffix;
+        name.textContent = suffix;
+        button.append(name, ` ${words}`);
+        button.addEventListener("click", () => this.save(suffix));
+        return button;
+      }));
+    menu.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape" || !menu.open) return;
+      menu.open = false;
+      menu.querySelector("summary").focus();
+    });
+    addEventListener("pointerdown", (event) => {
+      if (!menu.contains(event.target)) menu.open = false;
+    });
+  }
+
+  async save(suffix) {
+    find("#export").open = false;
+    try {
+      const body = suffix === ".png"
+        ? await this.viewer.picture() : await fetchFile(`api/${this.name}/export?suffix=${suffix}`);
+      download(body, `surface${suffix}`);
+      if (!this.header.at_rest) this.tell("What was saved is the surface drawn, not the values asked for.");
+    } catch (error) {
+      this.tell(error.message);
+    }
+  }
+
+  addActs() {
+    for (const name of ["undo", "redo", "reset", "stabilise"]) {
+      find(`#${name}`).addEventListener("click", () => this.act(name));
+    }
+    find("#back").addEventListener("click", () => this.act("undo"));
+    find("#sway").addEventListener("click", () => {
+      if (this.swaying) this.viewer.setVertices(this.arrays.vertices);
+      this.sway(!this.swaying);
+    });
+    for (const button of document.querySelectorAll("#views button")) {
+      button.addEventListener("click", () => this.viewer?.camera.look(button.dataset.view));
+    }
+    addEventListener("keydown", (event) => {
+      if (!(event.ctrlKey || event.metaKey) || event.target.type === "number") return;
+      const key = event.key.toLowerCase();
+      const act = key === "y" || (key === "z" && event.shiftKey) ? "redo" : key === "z" ? "undo" : "";
+      if (!act) return;
+      event.preventDefault();
+      if (!find(`#${act}`).disabled) this.act(act);
+    });
+  }
+}
+
+function choice(type, label, checked, chosen, value) {
+  const root = document.createElement("label");
+  const input = document.createElement("input");
+  Object.assign(input, { type, name: type === "radio" ? "colour" : value, value, checked });
+  input.addEventListener("change", () => chosen(input.checked));
+  root.append(input, label);
+  return root;
+}
+
+function download(body, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(body);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+const page = new Page();
+page.open().catch((error) => {
+  find("#verdict .word").textContent = "Not opened";
+  find("#verdict .sentence").textContent = error.message;
+});

@@ -1,0 +1,154 @@
+// Where the surface is seen from, and how mouse, fingers and keys change that.
+
+// azimuth, elevation and angle of view in degrees; a narrow angle keeps parallels parallel
+const NAMED = { diagonal: [-60, 28, 28], elevation: [-90, 0, 1], plan: [-90, 89.9, 1] };
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [
+  a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const scaled = (a, s) => a.map((x) => x * s);
+const plus = (...all) => all.reduce((a, b) => a.map((x, k) => x + b[k]));
+const unit = (a) => scaled(a, 1 / Math.hypot(...a));
+
+export class Camera {
+  /** `changed` is called after every turn. */
+  constructor(changed) {
+    this.changed = changed;
+    this.up = [0, 0, 1];
+    this.box = [[-1, -1, -1], [1, 1, 1]];
+    this.aspect = 1;
+    this.look("diagonal");
+  }
+
+  /** Stand upright on a plane with this normal. */
+  stand(up) {
+    this.up = unit(up);
+    const first = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].find((e) => Math.abs(dot(e, this.up)) < 0.9);
+    this.first = unit(plus(first, scaled(this.up, -dot(first, this.up))));
+    this.second = cross(this.up, this.first);
+  }
+
+  look(name) {
+    [this.azimuth, this.elevation, this.angle] = NAMED[name].map((a) => (a * Math.PI) / 180);
+    this.zoom = 1;
+    this.shift = [0, 0];
+    this.changed();
+  }
+
+  turn(right, up) {
+    this.azimuth -= right;
+    this.elevation = Math.min(1.569, Math.max(-1.569, this.elevation + up));
+    this.changed();
+  }
+
+  move(right, up) {
+    this.shift = [this.shift[0] + right, this.shift[1] + up];
+    this.changed();
+  }
+
+  closer(factor) {
+    this.zoom = Math.min(40, Math.max(0.2, this.zoom * factor));
+    this.changed();
+  }
+
+  /** Right, upward and backward unit vectors. */
+  axes() {
+    const away = plus(scaled(this.first, Math.cos(this.azimuth)),
+      scaled(this.second, Math.sin(this.azimuth)));
+    const back = plus(scaled(away, Math.cos(this.elevation)),
+      scaled(this.up, Math.sin(this.elevation)));
+    const right = cross(this.up, away);
+    return [right, cross(back, right), back];
+  }
+
+  /** The box's eight corners, so that the view can hold them all. */
+  corners() {
+    return [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [0, 1, 2].map((k) => this.box[(i >> k) & 1][k]));
+  }
+
+  /** Column-major matrix from space to clip coordinates; also sets eye and pixels per length. */
+  matrix(height) {
+    const [right, upward, back] = this.axes();
+    const tall = Math.tan(this.angle / 2);
+    const wide = tall * this.aspect;
+    const middle = scaled(plus(...this.box), 0.5);
+    // as near as the box allows: each corner must lie within all four sides of the view
+    let distance = 0;
+    for (const corner of this.corners()) {
+      const p = plus(corner, scaled(middle, -1));
+      distance = Math.max(distance, dot(p, back) + Math.abs(dot(p, right)) / (0.9 * wide),
+        dot(p, back) + Math.abs(dot(p, upward)) / (0.76 * tall));
+    }
+    const reach = Math.hypot(...plus(this.box[1], scaled(this.box[0], -1)));
+    distance /= this.zoom;
+    const target = plus(middle, scaled(right, -this.shift[0] * distance),
+      scaled(upward, -this.shift[1] * distance + 0.03 * reach / this.zoom));
+    this.eye = plus(target, scaled(back, distance));
+    this.pixels = height / (2 * tall * distance);
+    const near = Math.max(0.02 * distance, distance - 2 * reach);
+    const far = distance + 3 * reach;
+    const [a, b] = [(far + near) / (near - far), (2 * far * near) / (near - far)];
+    const m = new Float32Array(16);
+    for (let k = 0; k < 3; k++) {
+      m[4 * k] = right[k] / wide;
+      m[4 * k + 1] = upward[k] / tall;
+      m[4 * k + 2] = a * back[k];
+      m[4 * k + 3] = -back[k];
+    }
+    m[12] = -dot(right, this.eye) / wide;
+    m[13] = -dot(upward, this.eye) / tall;
+    m[14] = -a * dot(back, this.eye) + b;
+    m[15] = dot(back, this.eye);
+    return m;
+  }
+
+  /** Mouse, touch and keys on an element. */
+  attach(element) {
+    const held = new Map();
+    const span = () => {
+      const [a, b] = [...held.values()];
+      return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, apart: Math.hypot(a.x - b.x, a.y - b.y) };
+    };
+    element.addEventListener("pointerdown", (event) => {
+      element.setPointerCapture(event.pointerId);
+      held.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    });
+    element.addEventListener("pointermove", (event) => {
+      if (!held.has(event.pointerId)) return;
+      const before = held.get(event.pointerId);
+      const old = held.size === 2 ? span() : null;
+      held.set(event.pointerId, { x: event.clientX, y: event.clientY });
+      const part = 1 / element.clientHeight;
+      if (old) {
+        const now = span();
+        this.move(0.5 * (now.x - old.x) * part, 0.5 * (old.y - now.y) * part);
+        this.closer(now.apart / Math.max(old.apart, 1));
+      } else if (event.shiftKey || event.buttons & 6) {
+        this.move(0.5 * (event.clientX - before.x) * part, 0.5 * (before.y - event.clientY) * part);
+      } else {
+        this.turn(5 * (event.clientX - before.x) * part, 5 * (event.clientY - before.y) * part);
+      }
+    });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      element.addEventListener(end, (event) => held.delete(event.pointerId));
+    }
+    element.addEventListener("contextmenu", (event) => event.preventDefault());
+    element.addEventListener("dblclick", () => this.look("diagonal"));
+    element.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const lines = event.deltaMode === 1 ? 30 : 1;
+      this.closer(Math.exp(-0.0012 * lines * event.deltaY));
+    }, { passive: false });
+    const keys = {
+      ArrowLeft: () => this.turn(-0.1, 0), ArrowRight: () => this.turn(0.1, 0),
+      ArrowUp: () => this.turn(0, 0.1), ArrowDown: () => this.turn(0, -0.1),
+      "+": () => this.closer(1.15), "=": () => this.closer(1.15), "-": () => this.closer(1 / 1.15),
+      Home: () => this.look("diagonal"),
+    };
+    element.addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.metaKey || event.altKey || !keys[event.key]) return;
+      event.preventDefault();
+      keys[event.key]();
+    });
+  }
+}

@@ -1,0 +1,353 @@
+"""The server behind the page: files, and a design for each page that asks for one."""
+
+from __future__ import annotations
+
+import json
+import secrets
+import socket
+import tempfile
+import threading
+import warnings
+from collections import OrderedDict
+from contextlib import suppress
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from ..certificate import Certificate
+from ..curvature import curvature_error, mean_curvature
+from ..errors import MissingExtra, OptionError, PcmcError, SurfaceError
+from ..io import FORMATS, write
+from ..surface import Patch, Surface
+from .design import Design, State, begin
+from .drawing import centre, fields, findings, outline
+from .packing import pack, plain
+
+DESIGNS_KEPT = 32  # the least recently used is put away when another page opens
+SOLVES_AT_ONCE = 2
+LONGEST_REQUEST = 1_000_000  # bytes
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+TYPES = {
+    ".html": "text/html",
+    ".css": "text/css",
+    ".js": "text/javascript",
+    ".svg": "image/svg+xml",
+}
+ACTS = ("follow", "settle", "stabilise", "undo", "redo", "reset", "state")
+
+
+class Refused(Exception):
+    """A request that is answered with one line."""
+
+    def __init__(self, status: HTTPStatus, line: str) -> None:
+        super().__init__(line)
+        self.status = status
+
+
+class Explorer:
+    """A running server. ``url`` is the page; ``close`` ends it.
+
+    Each page has a design of its own; ``designs`` are those of the pages opened last.
+    """
+
+    def __init__(self, surface: Surface, host: str, port: int, title: str) -> None:
+        if not isinstance(surface, Surface):
+            raise SurfaceError(f"explore: expected a Surface, found {type(surface).__name__}")
+        self._server = _listen(host, port)
+        self._server.explorer = self
+        self.title = title
+        self.local = host in LOOPBACK
+        self.origin = centre(surface)
+        self.beginning = begin(surface)
+        self.designs: OrderedDict[str, Design] = OrderedDict()
+        self._turn = threading.Semaphore(SOLVES_AT_ONCE)
+        self._lock = threading.Lock()
+        self.port = int(self._server.server_address[1])
+        named = f"[{host}]" if ":" in host else host
+        self.url = f"http://{'127.0.0.1' if host in ('', '0.0.0.0') else named}:{self.port}/"
+        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
+        self._thread.start()
+
+    def open(self) -> tuple[str, Design]:
+        """A new design and the name it is asked for by."""
+        name, design = secrets.token_urlsafe(12), Design(self.beginning, self._turn)
+        with self._lock:
+            self.designs[name] = design
+            while len(self.designs) > DESIGNS_KEPT:
+                self.designs.popitem(last=False)
+        return name, design
+
+    def design(self, name: str) -> Design:
+        """The design of that name."""
+        with self._lock:
+            if name not in self.designs:
+                raise Refused(
+                    HTTPStatus.GONE,
+                    f"this design was put away, as {DESIGNS_KEPT} others were opened since or the"
+                    " server was started anew; reload the page to begin again",
+                )
+            self.designs.move_to_end(name)
+            return self.designs[name]
+
+    def wait(self) -> None:
+        """Until the server is closed."""
+        while self._thread.is_alive():
+            self._thread.join(0.5)
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._server.shutdown()
+        self._server.server_close()
+        self._server.hang_up()
+        self._thread.join()
+
+
+class View:
+    """The page as a notebook shows it. ``surface`` is the one that it shows now."""
+
+    def __init__(self, surface: Surface, height: int, title: str) -> None:
+        self.explorer = Explorer(surface, "127.0.0.1", 0, title)
+        self._name, self._design = self.explorer.open()
+        self.height = int(height)
+
+    @property
+    def surface(self) -> Surface:
+        """The surface as it is shown now."""
+        return self._design.surface
+
+    @property
+    def url(self) -> str:
+        """The page's address, for a window of its own."""
+        return f"{self.explorer.url}?design={self._name}"
+
+    def close(self) -> None:
+        """End the server behind the page."""
+        self.explorer.close()
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe src="{self.url}" width="100%" height="{self.height}" style="border:0"'
+            ' allow="fullscreen" title="pcmc explore"></iframe>'
+        )
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+    explorer: Explorer
+
+    def __init__(self, address: tuple[str, int]) -> None:
+        self._lines: set[socket.socket] = set()
+        super().__init__(address, _Handler)
+
+    def get_request(self) -> tuple[socket.socket, Any]:
+        line, address = super().get_request()
+        self._lines.add(line)
+        return line, address
+
+    def shutdown_request(self, request: Any) -> None:
+        self._lines.discard(request)
+        super().shutdown_request(request)
+
+    def hang_up(self) -> None:
+        """End the connections that browsers keep open."""
+        for line in list(self._lines):
+            with suppress(OSError):
+                line.shutdown(socket.SHUT_RDWR)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that goes away in the middle of an answer is no error."""
+
+
+def _listen(host: str, port: int) -> _Server:
+    try:
+        return _Server((host, port))
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise OptionError(
+            f"cannot listen on {host!r}, port {port}: {reason}; port 0 takes any that is free"
+        ) from None
+
+
+class _Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    server: _Server
+
+    def do_GET(self) -> None:
+        self._answered(self._get)
+
+    def do_POST(self) -> None:
+        self._answered(self._post)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Nothing: the terminal is the user's."""
+
+    # -- requests ----------------------------------------------------------------------------------
+
+    def _answered(self, act: Any) -> None:
+        try:
+            self._check_origin()
+            act()
+        except Refused as error:
+            self._send_error_line(error.status, str(error))
+        except (PcmcError, MissingExtra) as error:
+            self._send_error_line(HTTPStatus.BAD_REQUEST, str(error))
+
+    def _check_origin(self) -> None:
+        """Only this page's own scripts, under this machine's own name: no other site may ask."""
+        host = self.headers.get("Host", "")
+        origin = self.headers.get("Origin")
+        explorer = self.server.explorer
+        name = host.rsplit(":", 1)[0].strip("[]")
+        if explorer.local and name not in LOOPBACK:
+            raise Refused(HTTPStatus.FORBIDDEN, f"this page is served on {explorer.url} only")
+        if origin is not None and urlsplit(origin).netloc != host:
+            raise Refused(HTTPStatus.FORBIDDEN, "a page of another site may not ask")
+
+    def _get(self) -> None:
+        parts = urlsplit(self.path)
+        steps = parts.path.strip("/").split("/")
+        if parts.path == "/":
+            self._send_file("index.html")
+        elif steps[0] == "page" and len(steps) == 2:
+            self._send_file(steps[1])
+        elif steps[0] == "api" and len(steps) == 3 and steps[2] == "export":
+            suffix = parse_qs(parts.query).get("suffix", [""])[0]
+            self._export(self.server.explorer.design(steps[1]), suffix)
+        else:
+            raise Refused(HTTPStatus.NOT_FOUND, f"there is nothing at {parts.path}")
+
+    def _post(self) -> None:
+        asked = self._json()
+        steps = urlsplit(self.path).path.strip("/").split("/")
+        explorer = self.server.explorer
+        if steps == ["api", "open"]:
+            name = asked.get("design")
+            name, design = (name, explorer.design(name)) if name else explorer.open()
+            header, arrays = outline(design.surface)
+            first = {"design": name, "title": explorer.title, "formats": list(FORMATS), **header}
+            self._send_state(design.state(), first, arrays)
+        elif len(steps) == 3 and steps[0] == "api" and steps[2] in ACTS:
+            design = explorer.design(steps[1])
+            given = (_values(asked),) if steps[2] in ("follow", "settle") else ()
+            self._send_state(getattr(design, steps[2])(*given))
+        else:
+            raise Refused(HTTPStatus.NOT_FOUND, f"there is nothing at {self.path}")
+
+    def _json(self) -> dict[str, Any]:
+        length = self.headers.get("Content-Length", "")
+        if not length.isdigit() or int(length) > LONGEST_REQUEST:
+            self.close_connection = True
+            raise Refused(HTTPStatus.BAD_REQUEST, "the request has no length, or is too long")
+        try:
+            asked = json.loads(self.rfile.read(int(length)) or b"{}")
+        except ValueError as error:
+            raise Refused(HTTPStatus.BAD_REQUEST, f"not JSON: {error}") from None
+        if not isinstance(asked, dict):
+            raise Refused(HTTPStatus.BAD_REQUEST, "expected a JSON object")
+        return asked
+
+    # -- answers -----------------------------------------------------------------------------------
+
+    def _send_state(
+        self,
+        state: State,
+        first: dict[str, Any] | None = None,
+        arrays: dict[str, Any] | None = None,
+    ) -> None:
+        header: dict[str, Any] = {"superseded": state.superseded, **(first or {})}
+        drawn: dict[str, Any] = dict(arrays or {})
+        if not state.superseded:
+            header |= {
+                "asked": _patches(state.asked),
+                "shown": _patches(state.surface.patches),
+                "verdict": _verdict(state.trouble or state.found),
+                "at_rest": state.trouble is None,
+                "findings": findings(state.surface, state.found),
+                "undo": state.undo,
+                "redo": state.redo,
+            }
+            drawn |= fields(state.surface, state.found, self.server.explorer.origin)
+        self._send(pack(header, drawn), "application/octet-stream")
+
+    def _export(self, design: Design, suffix: str) -> None:
+        state = design.state()
+        if suffix not in FORMATS:
+            raise Refused(HTTPStatus.BAD_REQUEST, f"no format {suffix!r}")
+        with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+            warnings.simplefilter(
+                "ignore"
+            )  # what a format cannot carry, every format of its kind says
+            path = Path(folder) / f"surface{suffix}"
+            write(path, state.surface, scalars=_scalars(state.surface),
+                  certificate=plain(state.found.numbers()))  # fmt: skip
+            body = path.read_bytes()
+        self._send(body, "application/octet-stream", f'attachment; filename="surface{suffix}"')
+
+    def _send_file(self, name: str) -> None:
+        kind = TYPES.get(Path(name).suffix)
+        file = files(__package__).joinpath("page", name)
+        if kind is None or "\\" in name or not file.is_file():
+            raise Refused(HTTPStatus.NOT_FOUND, f"there is no page {name!r}")
+        self._send(file.read_bytes(), f"{kind}; charset=utf-8")
+
+    def _send_error_line(self, status: HTTPStatus, line: str) -> None:
+        self._send(json.dumps({"error": line}).encode(), "application/json", status=status)
+
+    def _send(
+        self, body: bytes, kind: str, disposition: str = "", status: HTTPStatus = HTTPStatus.OK
+    ) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.send_header("Cache-Control", "no-store")
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header(
+            "Content-Security-Policy",
+            "default-src 'self'; img-src 'self' blob: data:",
+        )
+        if disposition:
+            self.send_header("Content-Disposition", disposition)
+        self.end_headers()
+        self.wfile.write(body)
+
+
+def _values(asked: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """Tensions and pressures by patch, refused unless they are numbers."""
+    values: dict[str, dict[str, float]] = {}
+    for key in ("tensions", "pressures"):
+        given = asked.get(key, {})
+        if not isinstance(given, dict):
+            raise Refused(HTTPStatus.BAD_REQUEST, f"{key}: expected numbers by patch")
+        for name, value in given.items():
+            if not isinstance(value, int | float) or isinstance(value, bool):
+                raise Refused(HTTPStatus.BAD_REQUEST, f"{key}: {name!r} is not a number: {value!r}")
+        values[key] = given
+    return values
+
+
+def _patches(patches: tuple[Patch, ...]) -> list[dict[str, Any]]:
+    return [
+        {"name": p.name, "tension": p.tension, "pressure": p.pressure, "target": p.target_curvature}
+        for p in patches
+    ]
+
+
+def _verdict(found: Certificate) -> dict[str, str]:
+    sentence = found.verdict.value
+    word, _, rest = sentence.partition(": ")
+    return {
+        "name": found.verdict.name.lower(),
+        "word": word,
+        "sentence": rest,
+        "detail": found.detail,
+    }
+
+
+def _scalars(surface: Surface) -> dict[str, Any]:
+    return {
+        "mean_curvature": mean_curvature(surface, "variational"),
+        "curvature_error": curvature_error(surface, "cotangent"),
+    }
