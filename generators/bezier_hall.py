@@ -74,6 +74,11 @@ def bezier_hall(
     alpha : tension of "left", "middle" and "right".
     alpha_left, alpha_right : tension of "left wall" and "right wall".
 
+    Returns
+    -------
+    Surface
+        Every angle is at least 25°.
+
     >>> surface = bezier_hall()
     >>> [round(float(side), 2) for side in np.ptp(surface.vertices, axis=0)]
     [190.22, 101.56, 29.17]

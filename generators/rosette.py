@@ -46,8 +46,8 @@ def rosette(segments: Ints) -> Rosette:
 def even_segments(radii: Floats, edge_length: float) -> Ints:
     """Segments for rings of the given radii that make them about ``edge_length`` long, at least 6.
 
-    >>> even_segments(np.array([1.0, 2.0]), 1.0).tolist()
-    [6, 13]
+    >>> even_segments(np.array([0.5, 1.0, 2.0]), 1.0).tolist()
+    [6, 6, 13]
     """
     return np.maximum(6, np.rint(2.0 * np.pi * radii / edge_length)).astype(np.int64)
 

@@ -61,5 +61,5 @@ def _midpoints_before(j: Ints, own: Ints, other: Ints, ties: Bools) -> Ints:
     """How many of the other line's midpoints (k + ½)/other come before (j + ½)/own, or tie."""
     # (2k + 1) own < (2j + 1) other, in whole numbers so that no tie is lost to rounding
     twice = (2 * j + 1) * other
-    below = (twice - own + 2 * own - 1) // (2 * own)
+    below = (twice + own - 1) // (2 * own)
     return np.clip(np.where(ties, (twice + own) // (2 * own), below), 0, other)

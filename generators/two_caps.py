@@ -40,7 +40,7 @@ def two_caps(
     Returns
     -------
     Surface
-        Angles of the two patches are at least 27°; the wall's follow from its height of 0.37.
+        Angles of the two patches are at least 30°; the wall's follow from its height of 0.37.
 
     >>> surface = two_caps()
     >>> [p.name for p in surface.patches], float(surface.vertices[:, 2].max().round(1))
