@@ -1,0 +1,175 @@
+"""A parameter λ of a surface: a line in the space of its tensions and pressures.
+
+    α_i(λ) = a_i + w_i λ,    p_i(λ) = b_i + u_i λ
+
+E is linear in tensions and pressures, so ∂E/∂λ = Σ w_i A_i - Σ u_i V_i, whatever λ is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from numbers import Real
+
+import numpy as np
+
+from .. import kernels
+from ..arrays import Floats
+from ..energy import apply_supports
+from ..errors import OptionError
+from ..surface import Surface
+
+EQUAL = 1e-9  # relative difference up to which two tensions give the same λ
+
+
+@dataclass(frozen=True)
+class Direction:
+    """Which tensions and pressures change with λ, and how fast.
+
+    Parameters
+    ----------
+    tensions : weight w_i by patch name.
+    pressures : weight u_i by patch name.
+    relative : False: what is named is λ times its weight, α_i = w_i λ, so that ``{"roof": 1.0}`` is
+        the tension of "roof" itself. True: counted from where the surface starts, α_i = α_i(start)
+        + w_i λ with λ = 0 there.
+
+    Examples
+    --------
+    The tension of one patch; all walls together; a pressure; the ratio p/α of a patch of tension 2:
+
+    >>> roof, walls = Direction({"roof": 1.0}), Direction({"wall 1": 1.0, "wall 2": 1.0})
+    >>> load, ratio = Direction(pressures={"roof": 1.0}), Direction(pressures={"roof": 2.0})
+    """
+
+    tensions: Mapping[str, float] = field(default_factory=dict)
+    pressures: Mapping[str, float] = field(default_factory=dict)
+    relative: bool = False
+
+    def __post_init__(self) -> None:
+        for key in ("tensions", "pressures"):
+            weights = getattr(self, key)
+            if not isinstance(weights, Mapping):
+                raise OptionError(
+                    f"Direction.{key}: expected weights by patch name, such as {{'roof': 1.0}},"
+                    f" found {weights!r}"
+                )
+            for name, weight in weights.items():
+                if not (isinstance(weight, Real) and math.isfinite(weight)) or weight == 0.0:
+                    raise OptionError(
+                        f"Direction.{key}[{name!r}]: expected a finite weight, not 0, found"
+                        f" {weight!r}"
+                    )
+        if not self.tensions and not self.pressures:
+            raise OptionError("Direction: name at least one patch whose tension or pressure varies")
+
+    @classmethod
+    def ratio(cls, surface: Surface, upper: str, lower: str) -> Direction:
+        """λ = α_upper / α_lower, the tension of ``lower`` staying what it is in ``surface``."""
+        below = surface.patches[surface.patch_index(lower)].tension
+        surface.patch_index(upper)
+        if below == 0.0:
+            raise OptionError(f"Direction.ratio: patch {lower!r} has tension 0, so no ratio to it")
+        return cls({upper: below})
+
+    def line(self, surface: Surface) -> Line:
+        """The line through the tensions and pressures of a surface."""
+        w = _rates(surface, self.tensions)
+        u = _rates(surface, self.pressures)
+        value = 0.0 if self.relative else _common_value(surface, w, u)
+        line = Line(value, surface.tensions - w * value, surface.pressures - u * value, w, u)
+        if not (surface.tensions[w != 0.0] > 0.0).all():
+            name = surface.patches[int(np.argmax((w != 0.0) & (surface.tensions <= 0.0)))].name
+            raise OptionError(
+                f"the tension of {name!r} is 0, where its triangles stop pulling; start from a"
+                " tension > 0"
+            )
+        return line
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A ``Direction`` bound to a surface.
+
+    Attributes
+    ----------
+    value : λ of that surface.
+    tensions, pressures : (k,) a and b, those at λ = 0.
+    tension_rates, pressure_rates : (k,) w and u.
+    """
+
+    value: float
+    tensions: Floats
+    pressures: Floats
+    tension_rates: Floats
+    pressure_rates: Floats
+
+    @property
+    def scale(self) -> float:
+        """A natural size of λ: the varied tensions and pressures over their weights."""
+        w, u = self.tension_rates, self.pressure_rates
+        tensions = (self.tensions + w * self.value)[w != 0.0]
+        pressures = (self.pressures + u * self.value)[u != 0.0]
+        size = np.linalg.norm(np.concatenate([tensions, pressures]))
+        return float(size / np.linalg.norm(np.concatenate([w, u]))) or 1.0
+
+    def allows(self, value: float) -> bool:
+        """Whether every varied tension is still positive at λ."""
+        w = self.tension_rates
+        return bool(((self.tensions + w * value)[w != 0.0] > 0.0).all())
+
+    def applied(self, surface: Surface, value: float) -> Surface:
+        """The surface with its tensions and pressures at λ."""
+        names = [p.name for p in surface.patches]
+        return surface.retensioned(
+            {n: self.tensions[i] + w * value for i, n in enumerate(names) if (w := self.tension_rates[i])},
+            {n: self.pressures[i] + u * value for i, n in enumerate(names) if (u := self.pressure_rates[i])},
+        )  # fmt: skip
+
+    def columns(self, surface: Surface, value: float) -> dict[str, float]:
+        """The varied tensions and pressures at λ, as columns of a table."""
+        found = {}
+        for i, patch in enumerate(surface.patches):
+            if self.tension_rates[i]:
+                found[f"tension {patch.name}"] = self.tensions[i] + self.tension_rates[i] * value
+            if self.pressure_rates[i]:
+                found[f"pressure {patch.name}"] = self.pressures[i] + self.pressure_rates[i] * value
+        return found
+
+    def gradient(self, surface: Surface, X: Floats) -> Floats:
+        """∂∇E/∂λ = Σ w_i ∇A_i - Σ u_i ∇V_i (n,3), supports applied."""
+        return weighted_gradient(surface, X, self.tension_rates, self.pressure_rates)
+
+
+def weighted_gradient(surface: Surface, X: Floats, areas: Floats, volumes: Floats) -> Floats:
+    """Σ areas_i ∇A_i - Σ volumes_i ∇V_i (n,3), supports applied."""
+    origin = np.array(surface.plane.point)
+    vectors = kernels.measure(X, surface.faces, surface.patch_of_face, origin, areas, volumes)[2]
+    return apply_supports(surface, vectors)
+
+
+def _rates(surface: Surface, weights: Mapping[str, float]) -> Floats:
+    rates = np.zeros(len(surface.patches))
+    for name, weight in weights.items():
+        rates[surface.patch_index(name)] = weight
+    return rates
+
+
+def _common_value(surface: Surface, w: Floats, u: Floats) -> float:
+    """λ of the surface; every named tension and pressure must agree on it."""
+    found = [
+        (f"{kind} of {surface.patches[i].name!r}", values[i] / rates[i])
+        for kind, values, rates in (
+            ("tension", surface.tensions, w), ("pressure", surface.pressures, u),
+        )
+        for i in np.flatnonzero(rates)
+    ]  # fmt: skip
+    first, value = found[0]
+    for name, other in found[1:]:
+        if abs(other - value) > EQUAL * max(abs(value), abs(other)):
+            raise OptionError(
+                f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}: give"
+                " weights in proportion to the surface's own values, or relative=True"
+            )
+    return float(value)

@@ -1,0 +1,73 @@
+"""How a branch is followed, and how it may end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from ..errors import OptionError
+from ..solvers import options as check
+
+CONTROLS = ("arclength", "parameter", "volume", "height")
+
+
+class Ending(Enum):
+    """Why a branch ends. The value is a sentence."""
+
+    REACHED = "the branch reached the value asked for"
+    FOLDS = "the branch passed as many folds as asked for"
+    STEPS = "stopped after the number of steps allowed; raise steps to go on"
+    LOST = "the branch could not be followed further: the steps became too short"
+    DEGENERATE = (
+        "the branch could not be followed further: triangles collapse; try remesh=, or a finer mesh"
+    )
+    STOPPED = "stopped on request"
+
+
+@dataclass(frozen=True)
+class FollowOptions:
+    """How a branch is followed.
+
+    Parameters
+    ----------
+    control : what a step prescribes: ``"arclength"``; ``"volume"`` or ``"height"`` of the highest
+        vertex, which end where that turns; ``"parameter"``, which ends at a fold.
+    step : length of the first step; the branch starts towards smaller λ where it is negative. A
+        relative change of λ by 1 has length 1, as has a mean displacement by the surface's size.
+    smallest, largest : the shortest and the longest step.
+    steps : the most steps.
+    tolerance : relative residual of each point.
+    folds : end after this many folds; None for any number.
+    care : triangles are spread along the shape while the worst has less than this quality.
+    remesh : edge length of a new mesh (`pcmc.remesh`) where spreading leaves a triangle below that
+        quality; None keeps the triangles.
+    keep : every so many points the surface is kept; the last one is in any case.
+    backend : factorisation, ``"pardiso"`` or ``"superlu"``; None for the fastest here.
+    """
+
+    control: str = "arclength"
+    step: float = 0.05
+    smallest: float = 1e-5
+    largest: float = 0.15
+    steps: int = 200
+    tolerance: float = 1e-10
+    folds: int | None = None
+    care: float = 0.45
+    remesh: float | None = None
+    keep: int = 1
+    backend: str | None = None
+
+    def __post_init__(self) -> None:
+        check.choice("control", self.control, CONTROLS)
+        if check.number("step", self.step) == 0.0:
+            raise OptionError("step: expected a number that is not 0; its sign is the first dλ's")
+        check.number("smallest", self.smallest, above=0.0)
+        check.number("largest", self.largest, least=self.smallest)
+        check.whole("steps", self.steps)
+        check.number("tolerance", self.tolerance, above=0.0)
+        if self.folds is not None:
+            check.whole("folds", self.folds, least=1)
+        check.number("care", self.care, least=0.0, below=1.0)
+        if self.remesh is not None:
+            check.number("remesh", self.remesh, above=0.0)
+        check.whole("keep", self.keep, least=1)

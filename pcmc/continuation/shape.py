@@ -1,0 +1,176 @@
+"""What stays the same along a branch: faces, supports, and which junctions rest on Π."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..assemble import Pattern, assemble, pattern
+from ..contact import Walls, creases, hung, pinched, pull_and_capacity, resting, settled, walls
+from ..descent import Carrier
+from ..energy import energy_and_gradient, patch_volumes
+from ..factor import Factor, Factoriser, factoriser
+from ..kernels import area_vectors
+from ..modes import Stiffness, full_matrix, lumped_mass, negatives_without
+from ..motion import MotionSpace, Structure, force_scale, motion_space, structure
+from ..quality import redistribution, triangle_quality
+from ..rigid import rigid_modes, rigid_motions
+from ..surface import Surface
+from ..topology import SHEET
+from .direction import weighted_gradient
+
+SWEEPS = 20  # of redistribution at most
+CLEAR = 1.02  # ratio of qualities that counts as better
+
+
+class Shape:
+    """A surface's faces and supports, with the tensions of the moment given from outside.
+
+    Attributes
+    ----------
+    full : the surface as it was given.
+    surface : the same without the walls that are gone where a junction rests on Π.
+    frame : what its vertices lie on.
+    """
+
+    def __init__(self, surface: Surface, backend: str | None = None) -> None:
+        self.full = surface
+        self.below: Walls = walls(surface)
+        self.rests: Bools = resting(surface, self.below)
+        self.surface = pinched(surface, self.below, self.rests)
+        self.frame: Structure = structure(self.surface, creases(self.below, self.rests))
+        self.judged: Ints = self.surface.faces[~self.below.pinchable[self.surface.patch_of_face]]
+        self.pressed: Floats = (surface.pressures != 0.0).astype(float)
+        self._rigid = rigid_motions(self.surface)
+        self._backend = backend
+        self._carrier: Carrier | None = None
+        self._travels = bool(((self.frame.kind != SHEET) & ~self.surface.fixed).any())
+        self._dimension: Ints | None = None
+
+    # -- equilibrium ---------------------------------------------------------------------------
+
+    def space(self, X: Floats) -> MotionSpace:
+        """The motion space at X (n,3)."""
+        return motion_space(self.surface, self.frame, X)
+
+    def forces(self, surface: Surface, X: Floats) -> Floats:
+        """B Bᵀ ∇E (n,3) with the frames and the gradient at X."""
+        return self.space(X).project(energy_and_gradient(surface, X)[1])
+
+    def residual(self, surface: Surface, X: Floats) -> float:
+        """‖Bᵀ∇E‖ over the norm of the single triangles' forces, at X."""
+        size = float(np.linalg.norm(self.forces(surface, X)))
+        return size / force_scale(surface, self.frame, X)
+
+    def hessian(self, surface: Surface, space: MotionSpace, X: Floats) -> tuple[Floats, Factor]:
+        """Values of Bᵀ(∂²E)B in the pattern, and its factor. The symbolic work is kept.
+
+        Raises
+        ------
+        SingularMatrix : a pivot is exactly zero.
+        """
+        if self._dimension is None or not np.array_equal(self._dimension, space.dimension):
+            self._dimension = space.dimension
+            self._pattern: Pattern = pattern(self.frame, space)
+            self._factoriser: Factoriser = factoriser(self._pattern, self._backend)
+        data = assemble(surface, self.frame, space, self._pattern, X)
+        return data, self._factoriser.factor(data)
+
+    def stiffness(self, space: MotionSpace, X: Floats, data: Floats, factor: Factor) -> Stiffness:
+        """The Hessian and its inertia, rigid motions set apart."""
+        rigid = rigid_modes(space, self._rigid, X)
+        return Stiffness(
+            space, full_matrix(self._pattern, data), lumped_mass(space, self.frame, X), factor,
+            rigid, negatives_without(factor, rigid),
+        )  # fmt: skip
+
+    # -- quantities ----------------------------------------------------------------------------
+
+    def volume(self, X: Floats) -> float:
+        """Volume under the patches that had a pressure at the start, length³."""
+        return float(patch_volumes(self.surface.moved(X)) @ self.pressed)
+
+    def volume_gradient(self, X: Floats) -> Floats:
+        """(n,3) its gradient, supports applied, length²."""
+        return weighted_gradient(self.surface, X, np.zeros_like(self.pressed), -self.pressed)
+
+    def height(self, X: Floats) -> float:
+        """Height of the highest vertex over Π, length."""
+        return float(self.surface.plane.height(X).max())
+
+    def weights(self, X: Floats) -> Floats:
+        """(n,) the area around each vertex over all area, over size²."""
+        area = area_vectors(X, self.frame.faces)[1]
+        return area / (area.sum() * self.full.size**2)
+
+    # -- contact of walls with Π ---------------------------------------------------------------
+
+    def whole(self, X: Floats) -> Surface:
+        """The full surface, walls that are gone laid on Π."""
+        if not self.rests.any():
+            return self.full.moved(X)
+        return self.full.moved(settled(self.full, self.below, self.rests, X))
+
+    def down(self, X: Floats) -> Bools:
+        """(n,) standing junction vertices that have come down to Π or below."""
+        standing = self.below.can_rest & ~self.rests
+        return standing & (self.below.side * self.surface.plane.height(X) <= 0.0)
+
+    def landed(self, X: Floats) -> Surface:
+        """The full surface with the vertices that came down laid on Π."""
+        X, down = X.copy(), self.down(X)
+        normal = np.array(self.surface.plane.normal)
+        X[down] -= self.surface.plane.height(X[down])[:, None] * normal
+        return self.whole(hung(self.surface, self.below, X))
+
+    def pulled_off(self, surface: Surface, X: Floats) -> bool:
+        """Whether a resting junction vertex is pulled harder than its wall can hold."""
+        if not self.rests.any():
+            return False
+        pull, capacity = pull_and_capacity(surface.moved(X), self.below, self.rests)
+        return bool((pull > capacity * (1.0 + 1e-6)).any())
+
+    # -- triangles -----------------------------------------------------------------------------
+
+    def quality(self, X: Floats) -> float:
+        """Quality of the worst triangle outside walls that may pinch."""
+        return float(triangle_quality(X, self.judged).min())
+
+    def turned(self, before: Floats, after: Floats) -> bool:
+        """Whether a triangle's normal has turned by more than a right angle."""
+        first, second = (_normals(X, self.judged) for X in (before, after))
+        return bool((np.einsum("ij,ij->i", first, second) <= 0.0).any())
+
+    def swept(self, X: Floats, space: MotionSpace) -> Floats:
+        """X (n,3) with the rows of walls brought below their crest, within the wall."""
+        return hung(self.surface, self.below, X, space)
+
+    def motion(self, space: MotionSpace, X: Floats, s: Floats) -> Floats:
+        """Bs (n,3), with the insides of the sheets sliding along after their curves."""
+        if self._carrier is None and self._travels:
+            self._carrier = Carrier(self.surface, self.frame, X, self._backend)
+        d = space.push(s)
+        return d if self._carrier is None else self._carrier.carry(space, d)
+
+    def spread(self, X: Floats, aim: float) -> Floats | None:
+        """X with its vertices spread along the shape until the worst triangle has quality ``aim``.
+
+        The best of the sweeps; None where none is clearly better.
+        """
+        least = worst = self.quality(X)
+        best = None
+        for _ in range(SWEEPS):
+            move = redistribution(self.surface, X, self.frame.curve_edges, self.frame.kind)
+            move[self.rests] = 0.0
+            space = self.space(X)
+            X = self.swept(X + move - space.project(move), space)
+            quality = self.quality(X)
+            if quality > max(worst, CLEAR * least):
+                best, worst = X, quality
+            if quality >= aim:
+                break
+        return best
+
+
+def _normals(X: Floats, F: Ints) -> Floats:
+    return np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]])

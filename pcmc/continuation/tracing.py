@@ -1,0 +1,391 @@
+"""From point to point along a branch: steps, events between them, and the mesh.
+
+A step goes along the tangent, and Newton's method brings it back onto the branch (`point`). Steps
+shorten where the branch bends. Where the number of negative eigenvalues or the sense of λ differs between
+two points, the branch is searched in between, on the mesh of the first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..arrays import Floats
+from ..energy import energy_at
+from ..errors import OptionError, SurfaceError
+from ..remesh import remesh
+from ..solvers import solve
+from ..solvers.result import Callback, Progress
+from ..surface import Surface
+from .direction import Line
+from .options import Ending, FollowOptions
+from .point import (
+    Border,
+    Collapsed,
+    Lost,
+    Solution,
+    Station,
+    Touched,
+    across,
+    at_height,
+    at_parameter,
+    at_volume,
+    correct,
+    examine,
+    transferred,
+)
+from .shape import Shape
+
+AT_REST = 1e-4  # relative residual up to which a surface counts as near enough to start from
+EXACT = 2e-5  # arclength to which events are located, and so λ relative to its scale
+SPOILT = 0.7  # ratio of triangle qualities, new to old, below which a step is refused
+NEAR = 0.02  # length of a step at which new contact, solved for by itself, still counts as the same
+BEND = 0.1  # correction over step length that sets the next step
+BENT = 0.5  # correction over step length above which a step is refused
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A step that succeeded: its length, the correction over it, where it led, what lies between."""
+
+    length: float
+    bend: float
+    there: Station
+    at_goal: bool
+    events: list[dict[str, Any]]
+
+
+class Tracer:
+    """A branch while it is followed; ``here`` is its last point."""
+
+    def __init__(
+        self,
+        surface: Surface,
+        line: Line,
+        goals: Mapping[str, float],
+        options: FollowOptions,
+        callback: Callback | None,
+    ) -> None:
+        self.line, self.goals, self.options, self.callback = line, goals, options, callback
+        self.scale = line.scale
+        self.rows: list[dict[str, Any]] = []
+        self.events: list[dict[str, Any]] = []
+        self.surfaces: dict[int, Surface] = {}
+        self.arclength = 0.0
+        self.here = self.start(Shape(surface, options.backend))
+
+    def start(self, shape: Shape) -> Station:
+        """The first point, on the branch to the tolerance."""
+        X, value = shape.surface.vertices, self.line.value
+        try:
+            residual = shape.residual(shape.surface, X)
+            if not residual <= AT_REST:
+                raise Lost(f"relative residual {residual:.1e}")
+            if not shape.space(X).pull(self.line.gradient(shape.surface, X)).any():
+                raise OptionError(
+                    "the parameter moves nothing: no vertex of the patches it names is free"
+                )
+            border = at_parameter(value, self.scale)
+            found = correct(shape, self.line, X, value, border, self.options.tolerance)
+            return examine(found, self.line, self.scale, math.copysign(1.0, self.options.step))
+        except Lost as why:
+            raise SurfaceError(
+                f"follow: the surface is not at rest ({why}); solve it first, with"
+                " pcmc.solve(surface, target='stationary').surface where it is a saddle"
+            ) from None
+
+    def run(self) -> tuple[Ending, str]:
+        """Follow to the end; why it ended, and the last difficulty."""
+        try:
+            self.record()
+            return self.advance()
+        except (StopIteration, KeyboardInterrupt):
+            return Ending.STOPPED, ""
+
+    def advance(self) -> tuple[Ending, str]:
+        """Step after step."""
+        length, why = min(abs(self.options.step), self.options.largest), ""
+        for _ in range(self.options.steps):
+            step = None
+            while step is None:
+                try:
+                    step = self.step(length)
+                except Lost as lost:
+                    length, why = 0.5 * length, str(lost)
+                    if length < self.options.smallest:
+                        collapsed = isinstance(lost, Collapsed)
+                        return Ending.DEGENERATE if collapsed else Ending.LOST, why
+            self.events += step.events
+            self.arclength += step.length
+            self.here = step.there
+            self.record()
+            if step.at_goal:
+                return Ending.REACHED, ""
+            folds = sum(event["kind"] == "fold" for event in self.events)
+            if self.options.folds is not None and folds >= self.options.folds:
+                return Ending.FOLDS, ""
+            self.tend()
+            longer = min(2.0, max(0.5, BEND / max(step.bend, 1e-9)))
+            length = min(longer * length, self.options.largest)
+        return Ending.STEPS, why
+
+    # -- one step ------------------------------------------------------------------------------
+
+    def step(self, length: float) -> Step:
+        """The next point, at this length or nearer where a goal is."""
+        here = self.here
+        try:
+            found = self.solution(length)
+            if found.shape.pulled_off(self.line.applied(found.shape.surface, found.value), found.X):
+                raise Touched(found.X, found.value)
+        except Touched as touched:
+            found = self.resettled(touched)
+        bend = self.bend(found, length)
+        if here.shape.turned(here.X, found.X):
+            raise Collapsed("triangles turn over")
+        if found.shape.quality(found.X) < SPOILT * min(here.quality, self.options.care):
+            raise Collapsed("triangles collapse")
+        there = examine(found, self.line, self.scale, here)
+        goal = self.goal(there, length)
+        if goal is not None:
+            length, there = goal
+        return Step(length, bend, there, goal is not None, self.search(there, length))
+
+    def bend(self, found: Solution, length: float) -> float:
+        """How far the point found is from the tangent, over the length of the step."""
+        X, value = self.ahead(length)
+        apart = self.here.length(found.X - X, found.value - value, self.scale)
+        if found.shape is not self.here.shape and apart < BENT * NEAR:
+            return BEND
+        if apart > BENT * length:
+            raise Lost("the branch bends too sharply for the step")
+        return apart / length
+
+    def ahead(self, t: float) -> tuple[Floats, float]:
+        """The point of the tangent at arclength t from here."""
+        here = self.here
+        X = here.shape.swept(here.X + t * here.direction, here.shape.space(here.X))
+        return X, here.value + t * here.slope
+
+    def solution(self, t: float) -> Solution:
+        """The point of the branch at arclength t from here."""
+        X, value = self.ahead(t)
+        return correct(
+            self.here.shape, self.line, X, value, self.border(t, X, value), self.options.tolerance
+        )
+
+    def border(self, t: float, X: Floats, value: float) -> Border:
+        """What the control prescribes at arclength t from here."""
+        here, shape = self.here, self.here.shape
+        if self.options.control == "parameter":
+            return at_parameter(value, self.scale)
+        if self.options.control == "volume":
+            growth = float((shape.volume_gradient(here.X) * here.direction).sum())
+            return at_volume(shape, here.volume + t * growth)
+        if self.options.control == "height":
+            height = shape.surface.plane.height(X)
+            top = int(height.argmax())
+            return at_height(shape, top, float(height[top]))
+        return across(X, value, *here.row(self.scale))
+
+    def resettled(self, touched: Touched) -> Solution:
+        """Another contact with Π: solved at a fixed parameter, with a shape of its own."""
+        shape = self.here.shape
+        surface = self.line.applied(shape.landed(touched.X), touched.value)
+        result = solve(
+            surface, "newton", target="stationary", tolerance=self.options.tolerance,
+            backend=self.options.backend,
+        )  # fmt: skip
+        if not result.converged:
+            raise Lost(f"contact of a wall with the plane changes, and {result.message}")
+        again = Shape(result.surface, self.options.backend)
+        X = again.surface.vertices
+        return Solution(
+            again, X, touched.value, again.residual(again.surface, X), result.iterations
+        )
+
+    def tend(self) -> None:
+        """Spread the triangles where they are poor, or remesh, and return to the branch."""
+        aim = self.options.care
+        if self.here.quality < aim:
+            X = self.here.shape.spread(self.here.X, aim)
+            if X is not None:
+                self.settle(self.here, X)
+        if self.options.remesh is not None and self.here.quality < aim:
+            try:
+                shape = Shape(remesh(self.surface(), self.options.remesh), self.options.backend)
+            except SurfaceError:
+                return
+            self.settle(transferred(self.here, shape), shape.surface.vertices)
+
+    def settle(self, near: Station, X: Floats) -> None:
+        """Go to the point of the branch at X, across the tangent of a station of the same mesh.
+
+        Not where that is an event in itself, unless the mesh is very poor: on the old mesh the event
+        will be found in its place.
+        """
+        here = self.here
+        border = across(X, near.value, *near.row(self.scale))
+        try:
+            found = correct(near.shape, self.line, X, near.value, border, self.options.tolerance)
+            after = examine(found, self.line, self.scale, near)
+        except Lost:
+            return
+        events = self.unlocated(here, after, 0.0)
+        if after.quality > here.quality and not (events and here.quality > 0.5 * self.options.care):
+            self.events += events
+            self.here = after
+
+    # -- goals and events ----------------------------------------------------------------------
+
+    def goal(self, there: Station, length: float) -> tuple[float, Station] | None:
+        """Where the first goal between here and there is met."""
+        places = []
+        for name, value in self.goals.items():
+            before, after = getattr(self.here, _FIELD[name]), getattr(there, _FIELD[name])
+            if (before - value) * (after - value) < 0.0:
+                measured = self.measure(name)
+                places.append(_root(lambda t: measured(t) - value, length, 1e-12))  # noqa: B023
+            elif after == value:
+                places.append(length)
+        if not places:
+            return None
+        t = min(places)
+        return t, there if t == length else self.station(t)
+
+    def measure(self, name: str) -> Callable[[float], float]:
+        """A quantity of the branch as a function of arclength from here."""
+        here = self.here
+
+        def of(t: float) -> float:
+            if t == 0.0:
+                return float(getattr(here, _FIELD[name]))
+            found = self.solution(t)
+            if name == "parameter":
+                return found.value
+            if name == "energy":
+                return energy_at(self.line.applied(here.shape.surface, found.value), found.X)
+            return here.shape.volume(found.X) if name == "volume" else here.shape.height(found.X)
+
+        return of
+
+    def station(self, t: float) -> Station:
+        """The point of the branch at arclength t from here, examined."""
+        return examine(self.solution(t), self.line, self.scale, self.here)
+
+    def search(self, there: Station, length: float) -> list[dict[str, Any]]:
+        """The events between here and there, in their order."""
+        here = self.here
+        if there.shape is not here.shape:
+            return [
+                self.event("contact", there, length, here.index, there.index),
+                *self.unlocated(here, there, length),
+            ]
+        if length <= 2.0 * EXACT:
+            return self.unlocated(here, there, length)
+        found = []
+        if here.slope * there.slope < 0.0:
+            t = self.fold(length)
+            found.append((t, self.event("fold", self.station(t), t, here.index, there.index)))
+        sign = 1 if there.index > here.index else -1
+        index = here.index
+        for t, count in self.crossings(there, length):
+            at = self.station(t)
+            found.append((t, self.event("index", at, t, index, index + sign * count)))
+            index += sign * count
+        return [event for _, event in sorted(found, key=lambda pair: pair[0])]
+
+    def fold(self, length: float) -> float:
+        """Arclength from here at which λ is extreme."""
+        from scipy.optimize import minimize_scalar  # here, so that importing pcmc stays quick
+
+        sign = math.copysign(1.0, self.here.slope)
+        value = self.measure("parameter")
+        found = minimize_scalar(
+            lambda t: -sign * value(t), bounds=(0.0, length), method="bounded",
+            options={"xatol": max(EXACT, 1e-3 * length)},
+        )  # fmt: skip
+        return float(found.x)
+
+    def crossings(self, there: Station, length: float) -> list[tuple[float, int]]:
+        """Arclengths at which eigenvalues change sign, with how many do so at each."""
+        here = self.here
+        known = {0.0: here.eigenvalues, length: there.eigenvalues}
+
+        def eigenvalue(t: float, rank: int) -> float:
+            if t not in known:
+                known[t] = self.station(t).eigenvalues
+            values = known[t]
+            return float(values[min(rank, len(values) - 1)])
+
+        low, high = sorted((here.index, there.index))
+        places = sorted(
+            _root(lambda t: eigenvalue(t, rank), length, EXACT)  # noqa: B023
+            for rank in range(low, high)
+        )
+        groups: list[tuple[float, int]] = []
+        for t in places:
+            if groups and t - groups[-1][0] <= 3.0 * EXACT:
+                groups[-1] = (groups[-1][0], groups[-1][1] + 1)
+            else:
+                groups.append((t, 1))
+        return groups
+
+    def unlocated(self, before: Station, after: Station, length: float) -> list[dict[str, Any]]:
+        """Events between two points too near to each other, or too different, to search between."""
+        found = []
+        if before.slope * after.slope < 0.0:
+            found.append(self.event("fold", after, length, before.index, after.index))
+        if before.index != after.index:
+            found.append(self.event("index", after, length, before.index, after.index))
+        return found
+
+    # -- tables --------------------------------------------------------------------------------
+
+    def event(self, kind: str, at: Station, t: float, before: int, after: int) -> dict[str, Any]:
+        """A row of the table of events."""
+        return {
+            "kind": kind, **self.common(at), "arclength": self.arclength + t,
+            "index_before": before, "index_after": after,
+        }  # fmt: skip
+
+    def record(self) -> None:
+        """Write here down as a row of the table of points, and tell the callback."""
+        here, number = self.here, len(self.rows)
+        self.rows.append({
+            **self.common(here), "arclength": self.arclength, "index": here.index,
+            "lowest_eigenvalue": here.eigenvalues[0], "residual": here.residual,
+            "quality": here.quality, "slope": here.slope, "iterations": here.iterations,
+        })  # fmt: skip
+        if (number - 1) % self.options.keep:
+            self.surfaces.pop(number - 1, None)
+        self.surfaces[number] = self.surface()
+        if self.callback is not None:
+            self.callback(Progress(number, self.surface, self.rows[-1]))
+
+    def common(self, at: Station) -> dict[str, Any]:
+        """What both tables show."""
+        return {
+            "parameter": at.value, **self.line.columns(at.shape.full, at.value),
+            "energy": at.energy, "volume": at.volume, "height": at.height,
+        }  # fmt: skip
+
+    def surface(self) -> Surface:
+        """The surface at the last point."""
+        return self.line.applied(self.here.shape.whole(self.here.X), self.here.value)
+
+
+def _root(function: Callable[[float], float], length: float, accuracy: float) -> float:
+    """Where a function changes sign on [0, length]; the end where it does not quite."""
+    from scipy.optimize import brentq
+
+    first, last = function(0.0), function(length)
+    if first * last >= 0.0:
+        return 0.0 if abs(first) < abs(last) else length
+    return float(brentq(function, 0.0, length, xtol=accuracy))
+
+
+_FIELD = {"parameter": "value", "energy": "energy", "volume": "volume", "height": "height"}
+GOALS = tuple(_FIELD)
