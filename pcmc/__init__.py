@@ -2,6 +2,7 @@
 
 from . import explore
 from .certificate import Certificate, Verdict, certify
+from .continuation import Direction, follow
 from .curvature import curvature_error, mean_curvature, target_curvature
 from .design import Design, meet
 from .energy import energy, gradient, hessian
@@ -14,6 +15,7 @@ from .surface import Patch, Plane, Surface
 __all__ = [
     "Certificate",
     "Design",
+    "Direction",
     "Parameter",
     "Patch",
     "Plane",
@@ -24,6 +26,7 @@ __all__ = [
     "curvature_error",
     "energy",
     "explore",
+    "follow",
     "gradient",
     "hessian",
     "mean_curvature",
