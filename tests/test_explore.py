@@ -1,4 +1,4 @@
-"""Explore: designs follow their values, pages get their own, and a real browser shows all of it."""
+"""Explore: drafts follow their values, pages get their own, and a real browser shows all of it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import threading
 
 import numpy as np
 import pytest
-from browsing import BROWSER, DRIVER, SOFTWARE_GL, Explored, browser, changed, until
+from browsing import until
 
 import pcmc
 from generators import bezier_hall, four_fans, spherical_cap
@@ -16,7 +16,7 @@ from pcmc import explore
 from pcmc.certificate import Verdict
 from pcmc.errors import OptionError, SurfaceError
 from pcmc.explore import server
-from pcmc.explore.design import Design, begin, between, reach
+from pcmc.explore.draft import Draft, begin, between, reach
 from pcmc.explore.packing import pack, unpack
 
 CAP = spherical_cap(edge_length=0.25)
@@ -40,14 +40,14 @@ def explorer():
     running.close()
 
 
-# -- designs ---------------------------------------------------------------------------------------
+# -- drafts ---------------------------------------------------------------------------------------
 
 
 def rise(surface):
     return surface.vertices[:, 2].max()
 
 
-def test_a_design_begins_at_rest_and_leaves_the_surface_given_as_it_was(cap):
+def test_a_draft_begins_at_rest_and_leaves_the_surface_given_as_it_was(cap):
     before = CAP.vertices.copy()
     assert cap.found.verdict is Verdict.STABLE
     assert cap.trouble is None
@@ -61,7 +61,7 @@ def test_a_surface_at_rest_is_not_solved_again(cap):
 
 def test_following_gives_the_surface_that_solving_gives(hall):
     values = {"tensions": {"left wall": 12.0}, "pressures": {"middle": 1.02}}
-    state = Design(hall).follow(values)
+    state = Draft(hall).follow(values)
     assert state.trouble is None
     assert [p.tension for p in state.surface.patches] == [30.0, 30.0, 30.0, 12.0, 15.0]
     assert [p.pressure for p in state.surface.patches] == [1.0, 1.02, 1.0, 0.0, 0.0]
@@ -73,13 +73,13 @@ def test_following_gives_the_surface_that_solving_gives(hall):
 
 
 def test_where_no_equilibrium_exists_the_last_surface_stays(cap):
-    design = Design(cap)
-    state = design.follow({"tensions": {"cap": 0.3}})
+    draft = Draft(cap)
+    state = draft.follow({"tensions": {"cap": 0.3}})
     assert state.surface is cap.surface
     assert state.trouble.verdict is Verdict.NO_EQUILIBRIUM
     assert [p.tension for p in state.asked] == [0.3]
     assert (state.undo, state.redo) == (1, 0)
-    back = design.undo()
+    back = draft.undo()
     assert back.trouble is None
     assert back.asked == back.surface.patches
     assert (back.undo, back.redo) == (0, 0)
@@ -96,73 +96,73 @@ def test_settling_goes_as_far_as_there_is_a_way_and_says_why_not_further(cap):
 
 
 def test_settling_is_steps_that_can_be_undone_and_done_again(cap):
-    design = Design(cap)
-    heights = [rise(design.settle({"tensions": {"cap": a}}).surface) for a in (0.7, 0.8, 0.9)]
+    draft = Draft(cap)
+    heights = [rise(draft.settle({"tensions": {"cap": a}}).surface) for a in (0.7, 0.8, 0.9)]
     assert heights == sorted(heights, reverse=True)
-    state = design.undo()
+    state = draft.undo()
     assert rise(state.surface) == heights[1]
     assert [p.tension for p in state.asked] == [0.8]
     assert (state.undo, state.redo) == (2, 1)
-    assert rise(design.redo().surface) == heights[2]
-    design.undo()
-    state = design.settle({"tensions": {"cap": 0.75}})
+    assert rise(draft.redo().surface) == heights[2]
+    draft.undo()
+    state = draft.settle({"tensions": {"cap": 0.75}})
     assert (state.undo, state.redo) == (3, 0)  # a new step ends the old future
-    state = design.reset()
+    state = draft.reset()
     assert state.surface is cap.surface
     assert state.undo == 4
 
 
 def test_steps_kept_are_bounded_and_the_first_stays(cap, monkeypatch):
-    monkeypatch.setattr("pcmc.explore.design.STEPS_KEPT", 4)
-    design = Design(cap)
+    monkeypatch.setattr("pcmc.explore.draft.STEPS_KEPT", 4)
+    draft = Draft(cap)
     for k in range(6):
-        state = design.settle({"tensions": {"cap": 0.7 + 0.01 * k}})
+        state = draft.settle({"tensions": {"cap": 0.7 + 0.01 * k}})
     assert state.undo == 3
     for _ in range(3):
-        state = design.undo()
+        state = draft.undo()
     assert state.surface is cap.surface
 
 
 def test_a_newer_wish_ends_the_work_on_an_older_one(cap):
     turn = threading.Lock()
-    design = Design(cap, turn)
+    draft = Draft(cap, turn)
     states = {}
 
     def ask(name, value):
-        states[name] = design.settle({"tensions": {"cap": value}})
+        states[name] = draft.settle({"tensions": {"cap": value}})
 
     with turn:
         old = threading.Thread(target=ask, args=("old", 0.7))
         old.start()
-        until(lambda: design._asked_for == 1, "the first wish")
+        until(lambda: draft._asked_for == 1, "the first wish")
         new = threading.Thread(target=ask, args=("new", 0.8))
         new.start()
-        until(lambda: design._asked_for == 2, "the second wish")
+        until(lambda: draft._asked_for == 2, "the second wish")
     old.join()
     new.join()
     assert states["old"].superseded
     assert not states["new"].superseded
-    assert [p.tension for p in design.surface.patches] == [0.8]
+    assert [p.tension for p in draft.surface.patches] == [0.8]
     assert states["new"].undo == 1
 
 
 def test_a_saddle_is_followed_and_said_and_becomes_stable_with_weaker_walls():
-    design = Design(begin(four_fans(rings=7)))
-    state = design.state()
+    draft = Draft(begin(four_fans(rings=7)))
+    state = draft.state()
     assert state.found.verdict is Verdict.SADDLE
     assert len(state.found.modes)
-    state = design.settle({"tensions": {f"wall {k}": 0.5 for k in range(1, 5)}})
+    state = draft.settle({"tensions": {f"wall {k}": 0.5 for k in range(1, 5)}})
     assert state.trouble is None
     assert state.found.index < 2 or state.found.verdict is Verdict.STABLE
 
 
 def test_values_that_cannot_be_are_refused_and_change_nothing(cap):
-    design = Design(cap)
+    draft = Draft(cap)
     with pytest.raises(OptionError, match="did you mean 'cap'"):
-        design.follow({"tensions": {"cup": 1.0}})
+        draft.follow({"tensions": {"cup": 1.0}})
     with pytest.raises(SurfaceError, match="tension must be a finite number"):
-        design.settle({"tensions": {"cap": -1.0}})
-    state = design.state()
+        draft.settle({"tensions": {"cap": -1.0}})
+    state = draft.state()
     assert state.asked == cap.surface.patches
     assert state.trouble is None
 
@@ -179,7 +179,7 @@ def test_a_surface_that_nothing_brings_to_rest_is_shown_as_it_was_given():
     begun = begin(CAP.retensioned({"cap": 0.2}))
     np.testing.assert_array_equal(begun.surface.vertices, CAP.vertices)
     assert begun.trouble.verdict is Verdict.NO_EQUILIBRIUM
-    state = Design(begun).settle({"tensions": {"cap": 0.8}})
+    state = Draft(begun).settle({"tensions": {"cap": 0.8}})
     assert state.trouble is None
     assert state.found.verdict is Verdict.STABLE
 
@@ -221,19 +221,19 @@ def client(explorer):
     return Client(explorer)
 
 
-def test_each_page_gets_its_own_design(client):
+def test_each_page_gets_its_own_draft(client):
     first, _ = client.ask("/api/open")
     second, _ = client.ask("/api/open")
-    assert first["design"] != second["design"]
+    assert first["draft"] != second["draft"]
     values = {"tensions": {"left wall": 14.0}}
-    moved, arrays = client.ask(f"/api/{first['design']}/settle", values)
+    moved, arrays = client.ask(f"/api/{first['draft']}/settle", values)
     assert moved["verdict"]["name"] == "stable"
     assert moved["shown"][3]["tension"] == 14.0
-    other, still = client.ask(f"/api/{second['design']}/state")
+    other, still = client.ask(f"/api/{second['draft']}/state")
     assert other["shown"][3]["tension"] == 10.0
     assert np.abs(arrays["vertices"] - still["vertices"]).max() > 0.01
-    again, same = client.ask("/api/open", {"design": first["design"]})
-    assert again["design"] == first["design"]
+    again, same = client.ask("/api/open", {"draft": first["draft"]})
+    assert again["draft"] == first["draft"]
     np.testing.assert_array_equal(same["vertices"], arrays["vertices"])
 
 
@@ -274,7 +274,7 @@ def test_reactions_per_length_balance_the_load(client, explorer):
 
 @pytest.mark.parametrize("suffix", [".obj", ".fe", ".pcmc", ".stl"])
 def test_exports_are_the_surface_shown(client, suffix, tmp_path):
-    name = client.ask("/api/open")[0]["design"]
+    name = client.ask("/api/open")[0]["draft"]
     client.ask(f"/api/{name}/settle", {"tensions": {"right wall": 18.0}})
     answer, body = client.raw("GET", f"/api/{name}/export?suffix={suffix}")
     assert answer.status == 200
@@ -282,19 +282,19 @@ def test_exports_are_the_surface_shown(client, suffix, tmp_path):
     path = tmp_path / f"surface{suffix}"
     path.write_bytes(body)
     read = pcmc.read(path)
-    shown = client.explorer.design(name).surface
+    shown = client.explorer.draft(name).surface
     assert read.m == shown.m
     assert np.isclose(rise(read), rise(shown), rtol=1e-6)
     if suffix != ".stl":
         assert [p.name for p in read.patches] == [p.name for p in shown.patches]
 
 
-def test_the_least_recently_used_design_is_put_away(client, monkeypatch):
-    monkeypatch.setattr(server, "DESIGNS_KEPT", 3)
-    names = [client.ask("/api/open")[0]["design"] for _ in range(3)]
+def test_the_least_recently_used_draft_is_put_away(client, monkeypatch):
+    monkeypatch.setattr(server, "DRAFTS_KEPT", 3)
+    names = [client.ask("/api/open")[0]["draft"] for _ in range(3)]
     client.ask(f"/api/{names[0]}/state")
     client.ask("/api/open")
-    assert len(client.explorer.designs) == 3
+    assert len(client.explorer.drafts) == 3
     assert "reload the page" in client.ask(f"/api/{names[1]}/state", status=410)
     client.ask(f"/api/{names[0]}/state")
 
@@ -317,7 +317,7 @@ def test_the_least_recently_used_design_is_put_away(client, monkeypatch):
     ],
 )
 def test_bad_requests_are_answered_in_one_line(client, path, body, status, line):
-    name = client.ask("/api/open")[0]["design"]
+    name = client.ask("/api/open")[0]["draft"]
     answer, told = client.raw("POST", path.replace("NAME", name), body.encode("latin-1"))
     assert answer.status == status
     error = json.loads(told)["error"]
@@ -337,7 +337,7 @@ def test_only_the_pages_own_files_are_served(client, path):
 
 
 def test_exports_of_unknown_formats_are_refused(client):
-    name = client.ask("/api/open")[0]["design"]
+    name = client.ask("/api/open")[0]["draft"]
     for suffix in (".xyz", "", "/../x.obj"):
         answer, body = client.raw("GET", f"/api/{name}/export?suffix={suffix}")
         assert answer.status == 400
@@ -412,7 +412,7 @@ def test_in_a_notebook_the_page_is_a_frame_and_its_surface_is_at_hand():
         html = view._repr_html_()
         assert f'src="{view.url}"' in html
         assert 'height="500"' in html
-        name = view.url.split("design=")[1]
+        name = view.url.split("draft=")[1]
         Client(view.explorer).ask(f"/api/{name}/settle", {"tensions": {"cap": 0.8}})
         assert view.surface.patches[0].tension == 0.8
     finally:
@@ -426,313 +426,3 @@ def test_importing_pcmc_does_not_import_the_server():
     code = "import sys, pcmc; assert pcmc.explore.serve; print('http.server' in sys.modules)"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert told.stdout.strip() == "False"
-
-
-# -- in a real browser -----------------------------------------------------------------------------
-
-needs_browser = pytest.mark.skipif(
-    not (BROWSER and DRIVER), reason="chromium or chromedriver is not installed"
-)
-
-
-@pytest.fixture(scope="module")
-def driver(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("browser")
-    running = browser(folder, *SOFTWARE_GL)
-    running.downloads = folder / "downloads"
-    yield running
-    running.quit()
-
-
-def newest(explorer):
-    """The design of the page that was opened or used last."""
-    return explorer.designs[next(reversed(explorer.designs))]
-
-
-@pytest.fixture
-def page(driver, explorer):
-    return Explored(driver, f"{explorer.url}?design={explorer.open()[0]}")
-
-
-@needs_browser
-def test_the_page_loads_draws_and_complains_of_nothing(page):
-    assert page.verdict == "stable"
-    assert "At rest" in page.text("#verdict")
-    assert page.text("#title") == "the hall"
-    picture = page.picture()
-    ground = picture[0, 0]
-    assert 0.2 < (np.abs(picture - ground).max(axis=2) > 0.1).mean() < 0.9
-    assert page.complaints() == []
-
-
-@needs_browser
-def test_a_slider_moves_the_surface_and_undo_brings_it_back(page):
-    from selenium.webdriver.common.keys import Keys
-
-    before, words = page.picture(), page.text("#findings")
-    assert page.find("#undo").get_attribute("disabled")
-    page.slider("Tension α of left wall").send_keys(*[Keys.ARROW_RIGHT] * 60)
-    page.idle()
-    after = page.picture()
-    assert changed(before, after) > 0.01
-    assert page.text("#findings") != words
-    assert float(page.number("Tension α of left wall").get_attribute("value")) > 11.0
-    page.driver.execute_script("document.activeElement.blur()")
-    for _ in range(60):
-        if page.find("#undo").get_attribute("disabled"):
-            break
-        page.find("body").send_keys(Keys.CONTROL + "z")
-        page.idle()
-    assert changed(before, page.picture()) == 0.0
-    assert page.text("#findings") == words
-    assert page.number("Tension α of left wall").get_attribute("value") == "10"
-    page.find("#redo").click()
-    page.idle()
-    assert float(page.number("Tension α of left wall").get_attribute("value")) > 10.0
-    assert page.complaints() == []
-
-
-@needs_browser
-def test_dragging_a_slider_with_the_mouse_is_one_step(page):
-    from selenium.webdriver import ActionChains
-
-    before = page.picture()
-    hand = ActionChains(page.driver).click_and_hold(page.slider("Tension α of left wall"))
-    for _ in range(8):
-        hand = hand.move_by_offset(3, 0).pause(0.03)
-    hand.release().perform()
-    page.idle()
-    assert page.verdict == "stable"
-    assert changed(before, page.picture()) > 0.01
-    page.find("#undo").click()
-    page.idle()
-    assert page.find("#undo").get_attribute("disabled")
-    assert changed(before, page.picture()) == 0.0
-
-
-@needs_browser
-def test_the_verdict_says_that_no_equilibrium_exists_and_the_last_surface_stays(driver):
-    running = explore.start(CAP)
-    try:
-        page = Explored(driver, running.url)
-        before = page.picture()
-        page.enter("Tension α of cap", 0.2)
-        assert page.verdict == "no_equilibrium"
-        assert "cannot carry the pressure" in page.text("#verdict")
-        assert "Drawn is the last one at rest" in page.text("#verdict")
-        drawn = newest(running).surface
-        assert 0.47 < drawn.patches[0].tension < 0.6
-        assert changed(before, page.picture()) > 0.01  # it went as far as there was a way
-        page.find("#back").click()
-        page.idle()
-        assert page.verdict == "stable"
-        assert float(page.number("Tension α of cap").get_attribute("value")) > 0.47
-        page.enter("Tension α of cap", -1)
-        assert "must be a finite number" in until(lambda: page.text("#note"), "the note")
-        assert float(page.number("Tension α of cap").get_attribute("value")) > 0.47
-        console = page.complaints()
-        assert all("400 (Bad Request)" in line for line in console)
-    finally:
-        running.close()
-
-
-@needs_browser
-def test_a_saddle_is_named_and_its_motion_shown(driver):
-    running = explore.start(four_fans(rings=5, alpha_aux=6.0))
-    try:
-        page = Explored(driver, running.url)
-        assert page.verdict == "saddle"
-        assert page.find("#stabilise").is_displayed()
-        before = page.picture()
-        page.find("#sway").click()
-        until(lambda: changed(before, page.picture()) > 0.01, "the surface to move")
-        page.find("#sway").click()
-        until(lambda: changed(before, page.picture()) == 0.0, "the surface to be as before")
-        page.find("#together").click()
-        page.enter("Tension α of wall 2", 1.0)
-        numbers = [page.number(f"Tension α of wall {k}") for k in (1, 2, 3, 4)]
-        assert [n.get_attribute("value") for n in numbers] == ["1"] * 4
-        assert page.verdict == "stable"
-        assert not page.find("#stabilise").is_displayed()
-    finally:
-        running.close()
-
-
-@needs_browser
-def test_the_export_downloads_the_surface(page, driver, explorer):
-    page.enter("Tension α of right wall", 12)
-    for suffix in (".obj", ".pcmc", ".png"):
-        page.find("#export summary").click()
-        page.find(f"#export button[value='{suffix}']").click()
-        path = driver.downloads / f"surface{suffix}"
-        until(path.exists, f"the download of {path.name}")
-        if suffix == ".png":
-            assert path.read_bytes().startswith(b"\x89PNG")
-            continue
-        read = pcmc.read(path)
-        shown = newest(explorer).surface
-        assert [p.name for p in read.patches] == [p.name for p in shown.patches]
-        np.testing.assert_allclose(read.vertices, shown.vertices, atol=1e-6 * shown.size)
-    assert read.patches[4].tension == 12.0
-    assert page.complaints() == []
-
-
-@needs_browser
-def test_two_pages_are_two_designs(driver, explorer):
-    one = Explored(driver, explorer.url)
-    first = driver.current_window_handle
-    one.enter("Tension α of left wall", 20)
-    changed_words = one.text("#findings")
-    driver.switch_to.new_window("tab")
-    two = Explored(driver, explorer.url)
-    assert two.number("Tension α of left wall").get_attribute("value") == "10"
-    assert two.text("#findings") != changed_words
-    driver.close()
-    driver.switch_to.window(first)
-    assert one.text("#findings") == changed_words
-    driver.refresh()
-    one.idle()
-    assert one.text("#findings") == changed_words  # the same tab finds its design again
-
-
-@needs_browser
-def test_colours_come_with_their_scale(page):
-    before = page.picture()
-    assert not page.find("#legend").is_displayed()
-    for name, words in (
-        ("curvature", "1/length"), ("error", "%"), ("reactions", "force/length"),
-    ):  # fmt: skip
-        page.find(f"#colours input[value={name}]").click()
-        page.idle()
-        assert words in page.text("#legend .name")
-        low, high = (float(page.text(f"#legend .{end}")) for end in ("low", "high"))
-        assert low < high
-        assert changed(before, page.picture()) > 0.1
-    page.find("#colours input[value=patches]").click()
-    page.idle()
-    assert changed(before, page.picture()) == 0.0
-    for name in ("mesh", "supports", "smooth", "grid"):
-        page.find(f"#shows input[value={name}]").click()
-        page.idle()
-        assert changed(before, page.picture(), by=0.01) > 0.005, name
-        page.find(f"#shows input[value={name}]").click()
-        page.idle()
-    assert page.complaints() == []
-
-
-@needs_browser
-def test_the_view_turns_by_keys_mouse_and_fingers(page):
-    from selenium.webdriver import ActionChains
-    from selenium.webdriver.common.keys import Keys
-
-    canvas, before = page.find("#canvas"), page.picture()
-
-    def home():
-        page.find("[data-view=diagonal]").click()
-        page.idle()
-        assert changed(before, page.picture()) == 0.0
-
-    for keys in (Keys.ARROW_LEFT, Keys.ARROW_UP, "+"):
-        canvas.send_keys(keys)
-        page.idle()
-        assert changed(before, page.picture()) > 0.01
-        home()
-    ActionChains(page.driver).drag_and_drop_by_offset(canvas, 60, 20).perform()
-    page.idle()
-    turned = page.picture()
-    assert changed(before, turned) > 0.01
-    home()
-    box = canvas.rect
-    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    touch(page.driver, [middle], [(middle[0] + 60, middle[1] + 20)])
-    page.idle()
-    assert changed(turned, page.picture()) < 0.02
-    home()
-    apart = [(middle[0] - d, middle[1]) for d in (-40, 40)]
-    touch(page.driver, apart, [(middle[0] - d, middle[1]) for d in (-90, 90)])
-    page.idle()
-    assert changed(before, page.picture()) > 0.05  # a pinch comes nearer
-    home()
-    for name in ("elevation", "plan"):
-        page.find(f"[data-view={name}]").click()
-        page.idle()
-        assert changed(before, page.picture()) > 0.05
-    assert page.complaints() == []
-
-
-def touch(driver, start, end):
-    """Put fingers down, move them and lift them."""
-
-    def points(part):
-        return [
-            {"x": a[0] + part * (b[0] - a[0]), "y": a[1] + part * (b[1] - a[1]), "id": k}
-            for k, (a, b) in enumerate(zip(start, end, strict=True))
-        ]
-
-    steps = [("touchStart", points(0.0)), *(("touchMove", points(k / 5)) for k in range(1, 6))]
-    for kind, where in (*steps, ("touchEnd", [])):
-        driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": where})
-
-
-@needs_browser
-def test_every_control_has_a_name_and_the_keyboard_reaches_it(page):
-    nameless = page.driver.execute_script("""
-        return [...document.querySelectorAll("button, input, summary, canvas")].filter((e) => !(
-          e.getAttribute("aria-label") || e.textContent.trim() || [...(e.labels || [])].some(
-            (l) => l.textContent.trim()))).map((e) => e.outerHTML)""")
-    assert nameless == []
-    unreachable = page.driver.execute_script(
-        "return [...document.querySelectorAll('button, input, summary, canvas')]"
-        ".filter((e) => e.tabIndex < 0).length"
-    )
-    assert unreachable == 0
-    doubled = page.driver.execute_script(
-        "const ids = [...document.querySelectorAll('[id]')].map((e) => e.id);"
-        "return ids.filter((id, i) => ids.indexOf(id) !== i)"
-    )
-    assert doubled == []
-
-
-@needs_browser
-def test_on_a_small_screen_the_verdict_stays_in_view(page):
-    page.driver.execute_cdp_cmd(
-        "Emulation.setDeviceMetricsOverride",
-        {"width": 360, "height": 700, "deviceScaleFactor": 1, "mobile": True},
-    )
-    try:
-        page.idle()
-        page.driver.execute_script("window.scrollTo(0, document.body.scrollHeight)")
-        page.idle()
-        scrolled, wide, top, bottom = page.driver.execute_script("""
-            const box = document.querySelector("#verdict").getBoundingClientRect();
-            return [scrollY, document.documentElement.scrollWidth, box.top, box.bottom]""")
-        assert scrolled > 200
-        assert wide <= 360
-        assert top >= 0
-        assert bottom <= 700
-    finally:
-        page.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-
-
-@needs_browser
-def test_without_webgl_the_page_says_so_in_one_line_and_works(explorer, tmp_path):
-    running = browser(tmp_path, "--disable-3d-apis")
-    try:
-        page = Explored(running, explorer.url)
-        assert "WebGL 2 is missing" in page.text("#no-graphics")
-        words = page.text("#findings")
-        page.enter("Tension α of left wall", 14)
-        assert page.verdict == "stable"
-        assert page.text("#findings") != words
-    finally:
-        running.quit()
-
-
-@needs_browser
-def test_when_the_program_has_ended_the_page_says_so(driver):
-    running = explore.start(CAP)
-    page = Explored(driver, running.url)
-    running.close()
-    page.enter("Tension α of cap", 0.7)
-    assert "has ended" in until(lambda: page.text("#note"), "the note")
-    page.complaints()

@@ -25,7 +25,7 @@ def serve(
 ) -> None:
     """Explore a surface in the browser; returns when Ctrl-C is pressed.
 
-    Every page that is opened, in however many browsers, gets a design of its own. The surface is solved
+    Every page that is opened, in however many browsers, gets a draft of its own. The surface is solved
     first, unless it is at rest already.
 
     Parameters

@@ -1,4 +1,4 @@
-"""The server behind the page: files, and a design for each page that asks for one."""
+"""The server behind the page: files, and a draft for each page that asks for one."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from ..curvature import curvature_error, mean_curvature
 from ..errors import MissingExtra, OptionError, PcmcError, SurfaceError
 from ..io import FORMATS, write
 from ..surface import Patch, Surface
-from .design import Design, State, begin
+from .draft import Draft, State, begin
 from .drawing import centre, fields, findings, outline
 from .packing import pack, plain
 
-DESIGNS_KEPT = 32  # the least recently used is put away when another page opens
+DRAFTS_KEPT = 32  # the least recently used is put away when another page opens
 SOLVES_AT_ONCE = 2
 LONGEST_REQUEST = 1_000_000  # bytes
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
@@ -50,7 +50,7 @@ class Refused(Exception):
 class Explorer:
     """A running server. ``url`` is the page; ``close`` ends it.
 
-    Each page has a design of its own; ``designs`` are those of the pages opened last.
+    Each page has a draft of its own; ``drafts`` are those of the pages opened last.
     """
 
     def __init__(self, surface: Surface, host: str, port: int, title: str) -> None:
@@ -62,7 +62,7 @@ class Explorer:
         self.local = host in LOOPBACK
         self.origin = centre(surface)
         self.beginning = begin(surface)
-        self.designs: OrderedDict[str, Design] = OrderedDict()
+        self.drafts: OrderedDict[str, Draft] = OrderedDict()
         self._turn = threading.Semaphore(SOLVES_AT_ONCE)
         self._lock = threading.Lock()
         self.port = int(self._server.server_address[1])
@@ -71,26 +71,26 @@ class Explorer:
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self._thread.start()
 
-    def open(self) -> tuple[str, Design]:
-        """A new design and the name it is asked for by."""
-        name, design = secrets.token_urlsafe(12), Design(self.beginning, self._turn)
+    def open(self) -> tuple[str, Draft]:
+        """A new draft and the name it is asked for by."""
+        name, draft = secrets.token_urlsafe(12), Draft(self.beginning, self._turn)
         with self._lock:
-            self.designs[name] = design
-            while len(self.designs) > DESIGNS_KEPT:
-                self.designs.popitem(last=False)
-        return name, design
+            self.drafts[name] = draft
+            while len(self.drafts) > DRAFTS_KEPT:
+                self.drafts.popitem(last=False)
+        return name, draft
 
-    def design(self, name: str) -> Design:
-        """The design of that name."""
+    def draft(self, name: str) -> Draft:
+        """The draft of that name."""
         with self._lock:
-            if name not in self.designs:
+            if name not in self.drafts:
                 raise Refused(
                     HTTPStatus.GONE,
-                    f"this design was put away, as {DESIGNS_KEPT} others were opened since or the"
+                    f"this draft was put away, as {DRAFTS_KEPT} others were opened since or the"
                     " server was started anew; reload the page to begin again",
                 )
-            self.designs.move_to_end(name)
-            return self.designs[name]
+            self.drafts.move_to_end(name)
+            return self.drafts[name]
 
     def wait(self) -> None:
         """Until the server is closed."""
@@ -110,18 +110,18 @@ class View:
 
     def __init__(self, surface: Surface, height: int, title: str) -> None:
         self.explorer = Explorer(surface, "127.0.0.1", 0, title)
-        self._name, self._design = self.explorer.open()
+        self._name, self._draft = self.explorer.open()
         self.height = int(height)
 
     @property
     def surface(self) -> Surface:
         """The surface as it is shown now."""
-        return self._design.surface
+        return self._draft.surface
 
     @property
     def url(self) -> str:
         """The page's address, for a window of its own."""
-        return f"{self.explorer.url}?design={self._name}"
+        return f"{self.explorer.url}?draft={self._name}"
 
     def close(self) -> None:
         """End the server behind the page."""
@@ -215,7 +215,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._send_file(steps[1])
         elif steps[0] == "api" and len(steps) == 3 and steps[2] == "export":
             suffix = parse_qs(parts.query).get("suffix", [""])[0]
-            self._export(self.server.explorer.design(steps[1]), suffix)
+            self._export(self.server.explorer.draft(steps[1]), suffix)
         else:
             raise Refused(HTTPStatus.NOT_FOUND, f"there is nothing at {parts.path}")
 
@@ -224,15 +224,15 @@ class _Handler(BaseHTTPRequestHandler):
         steps = urlsplit(self.path).path.strip("/").split("/")
         explorer = self.server.explorer
         if steps == ["api", "open"]:
-            name = asked.get("design")
-            name, design = (name, explorer.design(name)) if name else explorer.open()
-            header, arrays = outline(design.surface)
-            first = {"design": name, "title": explorer.title, "formats": list(FORMATS), **header}
-            self._send_state(design.state(), first, arrays)
+            name = asked.get("draft")
+            name, draft = (name, explorer.draft(name)) if name else explorer.open()
+            header, arrays = outline(draft.surface)
+            first = {"draft": name, "title": explorer.title, "formats": list(FORMATS), **header}
+            self._send_state(draft.state(), first, arrays)
         elif len(steps) == 3 and steps[0] == "api" and steps[2] in ACTS:
-            design = explorer.design(steps[1])
+            draft = explorer.draft(steps[1])
             given = (_values(asked),) if steps[2] in ("follow", "settle") else ()
-            self._send_state(getattr(design, steps[2])(*given))
+            self._send_state(getattr(draft, steps[2])(*given))
         else:
             raise Refused(HTTPStatus.NOT_FOUND, f"there is nothing at {self.path}")
 
@@ -272,8 +272,8 @@ class _Handler(BaseHTTPRequestHandler):
             drawn |= fields(state.surface, state.found, self.server.explorer.origin)
         self._send(pack(header, drawn), "application/octet-stream")
 
-    def _export(self, design: Design, suffix: str) -> None:
-        state = design.state()
+    def _export(self, draft: Draft, suffix: str) -> None:
+        state = draft.state()
         if suffix not in FORMATS:
             raise Refused(HTTPStatus.BAD_REQUEST, f"no format {suffix!r}")
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():

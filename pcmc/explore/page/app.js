@@ -14,13 +14,13 @@ const KINDS = {
 
 class Page {
   async open() {
-    const known = new URLSearchParams(location.search).get("design") || sessionStorage.getItem("design");
-    // a copy of this tab must not take this tab's design along
-    sessionStorage.removeItem("design");
-    addEventListener("pagehide", () => sessionStorage.setItem("design", this.name));
-    const { header, arrays } = await ask("api/open", known ? { design: known } : {})
+    const known = new URLSearchParams(location.search).get("draft") || sessionStorage.getItem("draft");
+    // a copy of this tab must not take this tab's draft along
+    sessionStorage.removeItem("draft");
+    addEventListener("pagehide", () => sessionStorage.setItem("draft", this.name));
+    const { header, arrays } = await ask("api/open", known ? { draft: known } : {})
       .catch((error) => (known && !location.search ? ask("api/open") : Promise.reject(error)));
-    this.name = header.design;
+    this.name = header.draft;
     this.size = header.size;
     this.choice = "patches";
     find("#title").textContent = header.title || "pcmc explore";

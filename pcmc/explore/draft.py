@@ -1,4 +1,4 @@
-"""One page's design: the surface it shows, the values it asks for, and the way back.
+"""One page's draft: the surface it shows, the values it asks for, and the way back.
 
 Only surfaces at rest are shown. Where the values asked for have none, the last one stays, and the certificate
 of the attempt says why.
@@ -53,7 +53,7 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """The surface that every design begins with, its certificate, and what went wrong with it, if so."""
+    """The surface that every draft begins with, its certificate, and what went wrong with it, if so."""
 
     surface: Surface
     found: Certificate
@@ -75,7 +75,7 @@ def begin(surface: Surface) -> Beginning:
     return Beginning(surface, found, trouble)
 
 
-class Design:
+class Draft:
     """A surface that follows its values; every method is safe to call from any thread.
 
     A newer call ends the work on an older one. ``turn`` is held while there is work to do.

@@ -1,0 +1,315 @@
+"""Explore in a real browser: what is drawn, what is said, and what every control does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from browsing import BROWSER, DRIVER, SOFTWARE_GL, Explored, browser, changed, until
+
+import pcmc
+from generators import bezier_hall, four_fans, spherical_cap
+from pcmc import explore
+
+CAP = spherical_cap(edge_length=0.25)
+HALL = bezier_hall(edge_length=10.0)
+
+pytestmark = pytest.mark.skipif(
+    not (BROWSER and DRIVER), reason="chromium or chromedriver is not installed"
+)
+
+
+@pytest.fixture(scope="module")
+def explorer():
+    running = explore.start(HALL, title="the hall")
+    yield running
+    running.close()
+
+
+@pytest.fixture(scope="module")
+def driver(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("browser")
+    running = browser(folder, *SOFTWARE_GL)
+    running.downloads = folder / "downloads"
+    yield running
+    running.quit()
+
+
+def newest(explorer):
+    """The draft of the page that was opened or used last."""
+    return explorer.drafts[next(reversed(explorer.drafts))]
+
+
+@pytest.fixture
+def page(driver, explorer):
+    return Explored(driver, f"{explorer.url}?draft={explorer.open()[0]}")
+
+
+def test_the_page_loads_draws_and_complains_of_nothing(page):
+    assert page.verdict == "stable"
+    assert "At rest" in page.text("#verdict")
+    assert page.text("#title") == "the hall"
+    picture = page.picture()
+    ground = picture[0, 0]
+    assert 0.2 < (np.abs(picture - ground).max(axis=2) > 0.1).mean() < 0.9
+    assert page.complaints() == []
+
+
+def test_a_slider_moves_the_surface_and_undo_brings_it_back(page):
+    from selenium.webdriver.common.keys import Keys
+
+    before, words = page.picture(), page.text("#findings")
+    assert page.find("#undo").get_attribute("disabled")
+    page.slider("Tension α of left wall").send_keys(*[Keys.ARROW_RIGHT] * 60)
+    page.idle()
+    after = page.picture()
+    assert changed(before, after) > 0.01
+    assert page.text("#findings") != words
+    assert float(page.number("Tension α of left wall").get_attribute("value")) > 11.0
+    page.driver.execute_script("document.activeElement.blur()")
+    for _ in range(60):
+        if page.find("#undo").get_attribute("disabled"):
+            break
+        page.find("body").send_keys(Keys.CONTROL + "z")
+        page.idle()
+    assert changed(before, page.picture()) == 0.0
+    assert page.text("#findings") == words
+    assert page.number("Tension α of left wall").get_attribute("value") == "10"
+    page.find("#redo").click()
+    page.idle()
+    assert float(page.number("Tension α of left wall").get_attribute("value")) > 10.0
+    assert page.complaints() == []
+
+
+def test_dragging_a_slider_with_the_mouse_is_one_step(page):
+    from selenium.webdriver import ActionChains
+
+    before = page.picture()
+    hand = ActionChains(page.driver).click_and_hold(page.slider("Tension α of left wall"))
+    for _ in range(8):
+        hand = hand.move_by_offset(3, 0).pause(0.03)
+    hand.release().perform()
+    page.idle()
+    assert page.verdict == "stable"
+    assert changed(before, page.picture()) > 0.01
+    page.find("#undo").click()
+    page.idle()
+    assert page.find("#undo").get_attribute("disabled")
+    assert changed(before, page.picture()) == 0.0
+
+
+def test_the_verdict_says_that_no_equilibrium_exists_and_the_last_surface_stays(driver):
+    running = explore.start(CAP)
+    try:
+        page = Explored(driver, running.url)
+        before = page.picture()
+        page.enter("Tension α of cap", 0.2)
+        assert page.verdict == "no_equilibrium"
+        assert "cannot carry the pressure" in page.text("#verdict")
+        assert "Drawn is the last one at rest" in page.text("#verdict")
+        drawn = newest(running).surface
+        assert 0.47 < drawn.patches[0].tension < 0.6
+        assert changed(before, page.picture()) > 0.01  # it went as far as there was a way
+        page.find("#back").click()
+        page.idle()
+        assert page.verdict == "stable"
+        assert float(page.number("Tension α of cap").get_attribute("value")) > 0.47
+        page.enter("Tension α of cap", -1)
+        assert "must be a finite number" in until(lambda: page.text("#note"), "the note")
+        assert float(page.number("Tension α of cap").get_attribute("value")) > 0.47
+        console = page.complaints()
+        assert all("400 (Bad Request)" in line for line in console)
+    finally:
+        running.close()
+
+
+def test_a_saddle_is_named_and_its_motion_shown(driver):
+    running = explore.start(four_fans(rings=5, alpha_aux=6.0))
+    try:
+        page = Explored(driver, running.url)
+        assert page.verdict == "saddle"
+        assert page.find("#stabilise").is_displayed()
+        before = page.picture()
+        page.find("#sway").click()
+        until(lambda: changed(before, page.picture()) > 0.01, "the surface to move")
+        page.find("#sway").click()
+        until(lambda: changed(before, page.picture()) == 0.0, "the surface to be as before")
+        page.find("#together").click()
+        page.enter("Tension α of wall 2", 1.0)
+        numbers = [page.number(f"Tension α of wall {k}") for k in (1, 2, 3, 4)]
+        assert [n.get_attribute("value") for n in numbers] == ["1"] * 4
+        assert page.verdict == "stable"
+        assert not page.find("#stabilise").is_displayed()
+    finally:
+        running.close()
+
+
+def test_the_export_downloads_the_surface(page, driver, explorer):
+    page.enter("Tension α of right wall", 12)
+    for suffix in (".obj", ".pcmc", ".png"):
+        page.find("#export summary").click()
+        page.find(f"#export button[value='{suffix}']").click()
+        path = driver.downloads / f"surface{suffix}"
+        until(path.exists, f"the download of {path.name}")
+        if suffix == ".png":
+            assert path.read_bytes().startswith(b"\x89PNG")
+            continue
+        read = pcmc.read(path)
+        shown = newest(explorer).surface
+        assert [p.name for p in read.patches] == [p.name for p in shown.patches]
+        np.testing.assert_allclose(read.vertices, shown.vertices, atol=1e-6 * shown.size)
+    assert read.patches[4].tension == 12.0
+    assert page.complaints() == []
+
+
+def test_two_pages_are_two_drafts(driver, explorer):
+    one = Explored(driver, explorer.url)
+    first = driver.current_window_handle
+    one.enter("Tension α of left wall", 20)
+    changed_words = one.text("#findings")
+    driver.switch_to.new_window("tab")
+    two = Explored(driver, explorer.url)
+    assert two.number("Tension α of left wall").get_attribute("value") == "10"
+    assert two.text("#findings") != changed_words
+    driver.close()
+    driver.switch_to.window(first)
+    assert one.text("#findings") == changed_words
+    driver.refresh()
+    one.idle()
+    assert one.text("#findings") == changed_words  # the same tab finds its draft again
+
+
+def test_colours_come_with_their_scale(page):
+    before = page.picture()
+    assert not page.find("#legend").is_displayed()
+    for name, words in (
+        ("curvature", "1/length"), ("error", "%"), ("reactions", "force/length"),
+    ):  # fmt: skip
+        page.find(f"#colours input[value={name}]").click()
+        page.idle()
+        assert words in page.text("#legend .name")
+        low, high = (float(page.text(f"#legend .{end}")) for end in ("low", "high"))
+        assert low < high
+        assert changed(before, page.picture()) > 0.1
+    page.find("#colours input[value=patches]").click()
+    page.idle()
+    assert changed(before, page.picture()) == 0.0
+    for name in ("mesh", "supports", "smooth", "grid"):
+        page.find(f"#shows input[value={name}]").click()
+        page.idle()
+        assert changed(before, page.picture(), by=0.01) > 0.005, name
+        page.find(f"#shows input[value={name}]").click()
+        page.idle()
+    assert page.complaints() == []
+
+
+def test_the_view_turns_by_keys_mouse_and_fingers(page):
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    canvas, before = page.find("#canvas"), page.picture()
+
+    def home():
+        page.find("[data-view=diagonal]").click()
+        page.idle()
+        assert changed(before, page.picture()) == 0.0
+
+    for keys in (Keys.ARROW_LEFT, Keys.ARROW_UP, "+"):
+        canvas.send_keys(keys)
+        page.idle()
+        assert changed(before, page.picture()) > 0.01
+        home()
+    ActionChains(page.driver).drag_and_drop_by_offset(canvas, 60, 20).perform()
+    page.idle()
+    turned = page.picture()
+    assert changed(before, turned) > 0.01
+    home()
+    box = canvas.rect
+    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    touch(page.driver, [middle], [(middle[0] + 60, middle[1] + 20)])
+    page.idle()
+    assert changed(turned, page.picture()) < 0.02
+    home()
+    apart = [(middle[0] - d, middle[1]) for d in (-40, 40)]
+    touch(page.driver, apart, [(middle[0] - d, middle[1]) for d in (-90, 90)])
+    page.idle()
+    assert changed(before, page.picture()) > 0.05  # a pinch comes nearer
+    home()
+    for name in ("elevation", "plan"):
+        page.find(f"[data-view={name}]").click()
+        page.idle()
+        assert changed(before, page.picture()) > 0.05
+    assert page.complaints() == []
+
+
+def touch(driver, start, end):
+    """Put fingers down, move them and lift them."""
+
+    def points(part):
+        return [
+            {"x": a[0] + part * (b[0] - a[0]), "y": a[1] + part * (b[1] - a[1]), "id": k}
+            for k, (a, b) in enumerate(zip(start, end, strict=True))
+        ]
+
+    steps = [("touchStart", points(0.0)), *(("touchMove", points(k / 5)) for k in range(1, 6))]
+    for kind, where in (*steps, ("touchEnd", [])):
+        driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": where})
+
+
+def test_every_control_has_a_name_and_the_keyboard_reaches_it(page):
+    nameless = page.driver.execute_script("""
+        return [...document.querySelectorAll("button, input, summary, canvas")].filter((e) => !(
+          e.getAttribute("aria-label") || e.textContent.trim() || [...(e.labels || [])].some(
+            (l) => l.textContent.trim()))).map((e) => e.outerHTML)""")
+    assert nameless == []
+    unreachable = page.driver.execute_script(
+        "return [...document.querySelectorAll('button, input, summary, canvas')]"
+        ".filter((e) => e.tabIndex < 0).length"
+    )
+    assert unreachable == 0
+    doubled = page.driver.execute_script(
+        "const ids = [...document.querySelectorAll('[id]')].map((e) => e.id);"
+        "return ids.filter((id, i) => ids.indexOf(id) !== i)"
+    )
+    assert doubled == []
+
+
+def test_on_a_small_screen_the_verdict_stays_in_view(page):
+    page.driver.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride",
+        {"width": 360, "height": 700, "deviceScaleFactor": 1, "mobile": True},
+    )
+    try:
+        page.idle()
+        page.driver.execute_script("window.scrollTo(0, document.body.scrollHeight)")
+        page.idle()
+        scrolled, wide, top, bottom = page.driver.execute_script("""
+            const box = document.querySelector("#verdict").getBoundingClientRect();
+            return [scrollY, document.documentElement.scrollWidth, box.top, box.bottom]""")
+        assert scrolled > 200
+        assert wide <= 360
+        assert top >= 0
+        assert bottom <= 700
+    finally:
+        page.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_without_webgl_the_page_says_so_in_one_line_and_works(explorer, tmp_path):
+    running = browser(tmp_path, "--disable-3d-apis")
+    try:
+        page = Explored(running, explorer.url)
+        assert "WebGL 2 is missing" in page.text("#no-graphics")
+        words = page.text("#findings")
+        page.enter("Tension α of left wall", 14)
+        assert page.verdict == "stable"
+        assert page.text("#findings") != words
+    finally:
+        running.quit()
+
+
+def test_when_the_program_has_ended_the_page_says_so(driver):
+    running = explore.start(CAP)
+    page = Explored(driver, running.url)
+    running.close()
+    page.enter("Tension α of cap", 0.7)
+    assert "has ended" in until(lambda: page.text("#note"), "the note")
+    page.complaints()
