@@ -1,0 +1,331 @@
+"""The geometric solver when it is stopped, asked wrongly, or given what it cannot solve."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from shapes import pyramid
+
+from generators import four_fans, sphere, spherical_cap, two_caps, two_squares
+from pcmc import Patch, Surface, certify, energy, solve
+from pcmc.certificate import Verdict
+from pcmc.errors import MissingExtra, OptionError, SurfaceError
+from pcmc.factor import available
+from pcmc.quality import triangle_quality
+from pcmc.solvers.newton import NewtonOptions
+from pcmc.solvers.result import Status
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning"),
+    pytest.mark.parametrize("backend", available()),
+]
+TARGETS = pytest.mark.parametrize("target", ["minimum", "stationary"])
+
+
+def stop_at(iteration, error):
+    """A callback that raises at an iteration, and the surfaces it has been shown."""
+    seen = []
+
+    def callback(progress):
+        seen.append(progress.surface())
+        if progress.iteration == iteration:
+            raise error
+
+    return callback, seen
+
+
+@pytest.mark.parametrize("error", [StopIteration, KeyboardInterrupt])
+@pytest.mark.parametrize("iteration", [0, 3])
+def test_stopped_on_request(backend, error, iteration):
+    callback, seen = stop_at(iteration, error)
+    result = solve(two_caps(0.8), callback=callback, backend=backend)
+    assert result.status is Status.STOPPED
+    assert "stopped on request" in result.message
+    assert not result.converged
+    assert result.iterations == iteration
+    assert len(result.history) == len(seen) == iteration + 1
+    np.testing.assert_array_equal(result.surface.vertices, seen[-1].vertices)
+    assert result.energy == result.history["energy"].iloc[-1]
+    assert result.energy == pytest.approx(energy(result.surface), rel=1e-14)
+    assert result.certificate.verdict is Verdict.NOT_CONVERGED
+
+
+def test_stopped_on_a_refined_level(backend):
+    def callback(progress):
+        if progress.row["level"] == 1:
+            raise StopIteration
+
+    surface = spherical_cap(0.5)
+    result = solve(surface, callback=callback, levels=2, backend=backend)
+    assert result.status is Status.STOPPED
+    assert result.surface.m == 4 * surface.m
+    assert result.history["level"].iloc[-1] == 1
+
+
+def test_other_exceptions_pass_through(backend):
+    callback, seen = stop_at(2, ZeroDivisionError("mine"))
+    with pytest.raises(ZeroDivisionError, match="mine"):
+        solve(two_squares(4), callback=callback, backend=backend)
+    assert len(seen) == 3
+
+
+def test_the_callback_is_shown_each_row(backend):
+    rows = []
+    result = solve(
+        two_squares(4), callback=lambda p: rows.append((p.iteration, dict(p.row))), backend=backend
+    )
+    assert [i for i, _ in rows] == list(range(len(result.history)))
+    assert [row["energy"] for _, row in rows] == result.history["energy"].tolist()
+
+
+@pytest.mark.parametrize("iterations", [0, 1, 2])
+def test_the_iteration_limit(backend, iterations):
+    surface = two_caps(0.8)
+    result = solve(surface, iterations=iterations, backend=backend)
+    assert result.status is Status.ITERATION_LIMIT
+    assert result.iterations == iterations
+    assert result.energy == pytest.approx(energy(result.surface), rel=1e-14)
+    if iterations == 0:
+        np.testing.assert_array_equal(result.surface.vertices, surface.vertices)
+
+
+def test_a_tolerance_that_rounding_cannot_meet_ends_all_the_same(backend):
+    result = solve(two_squares(4, alpha_aux=1.0), tolerance=1e-30, backend=backend)
+    assert result.iterations < 60
+    assert result.status in (Status.CONVERGED, Status.STALLED)
+    assert result.certificate.residual < 1e-12
+
+
+def test_a_loose_tolerance_ends_early(backend):
+    tight = solve(two_caps(0.8), backend=backend)
+    loose = solve(two_caps(0.8), tolerance=1e-3, backend=backend)
+    assert loose.converged
+    assert loose.iterations < tight.iterations
+    assert tight.certificate.residual < loose.certificate.residual <= 1e-3
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ({"tolerance": 0.0}, "tolerance: expected a finite number > 0, found 0.0"),
+        ({"tolerance": float("nan")}, "tolerance: expected a finite number > 0, found nan"),
+        ({"iterations": -1}, "iterations: expected a whole number ≥ 0, found -1"),
+        ({"iterations": 2.5}, "iterations: expected a whole number ≥ 0, found 2.5"),
+        ({"target": "minimal"}, "unknown target 'minimal'; did you mean 'minimum'"),
+        ({"levels": -1}, "levels: expected a whole number ≥ 0, found -1"),
+        ({"levles": 1}, "unknown option of method 'newton' 'levles'; did you mean 'levels'"),
+        (
+            {"backend": "pardisso"},
+            "unknown factorisation backend 'pardisso'; did you mean 'pardiso'",
+        ),
+    ],
+)
+def test_options_are_checked_by_name(backend, option, message):
+    with pytest.raises(OptionError, match=f"^{message}"):
+        solve(two_squares(4), **{"backend": backend} | option)
+
+
+def test_a_backend_that_is_not_installed_is_said_so(backend, monkeypatch):
+    monkeypatch.setattr("pcmc.factor.available", lambda: ("superlu",))
+    with pytest.raises(MissingExtra, match="pypardiso is not installed"):
+        solve(two_squares(4), backend="pardiso")
+    assert solve(two_squares(4)).converged
+
+
+def test_options_are_values(backend):
+    assert NewtonOptions(backend=backend) == NewtonOptions(backend=backend)
+    assert NewtonOptions().target == "minimum"
+
+
+@pytest.mark.parametrize(
+    "make", [partial(two_squares, 6), partial(two_caps, 0.8), partial(four_fans, 5)]
+)
+def test_every_backend_gives_the_same(backend, make):
+    first = solve(make(), target="stationary", backend=available()[0])
+    other = solve(make(), target="stationary", backend=backend)
+    assert other.status is first.status
+    assert abs(other.iterations - first.iterations) <= 1
+    assert other.energy == pytest.approx(first.energy, rel=1e-9)
+    assert other.certificate.index == first.certificate.index
+
+
+def cap_with(move):
+    """A cap on which one free vertex next to the middle is moved first."""
+    surface = spherical_cap(0.25)
+    X = surface.vertices.copy()
+    move(surface, X)
+    return surface.moved(X)
+
+
+def thrown(fraction):
+    """Vertex 3 towards, and beyond, the farthest of its neighbours."""
+
+    def move(surface, X):
+        near = np.unique(surface.faces[(surface.faces == 3).any(axis=1)])
+        far = near[np.linalg.norm(X[near] - X[3], axis=1).argmax()]
+        X[3] += fraction * (X[far] - X[3])
+
+    return move
+
+
+def flattened(surface, X):
+    a, b, c = surface.faces[40]
+    X[c] = 0.5 * (X[a] + X[b])
+
+
+def merged(surface, X):
+    a, b, _ = surface.faces[20]
+    X[a] = X[b]
+
+
+@TARGETS
+@pytest.mark.parametrize("move", [thrown(1.5), thrown(4.0), flattened, merged],
+                         ids=["inverted", "inverted far", "zero area", "merged"])  # fmt: skip
+def test_bad_triangles_at_the_start_are_mended(backend, target, move):
+    start = cap_with(move)
+    normal = np.cross(
+        *np.moveaxis(start.vertices[start.faces[:, 1:]] - start.vertices[start.faces[:, :1]], 1, 0)
+    )
+    assert normal[:, 2].min() <= 1e-9
+    result = solve(start, target=target, backend=backend)
+    assert result.converged
+    assert result.certificate.verdict is Verdict.STABLE
+    corners = result.surface.vertices[start.faces]
+    assert np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2].min() > 0.0
+    assert result.certificate.quality > 0.4
+    assert result.energy == pytest.approx(solve(spherical_cap(0.25)).energy, rel=2e-2)
+
+
+@TARGETS
+def test_a_mesh_that_cannot_be_mended_is_named(backend, target):
+    """A needle a million times as high as wide."""
+    result = solve(pyramid(height=1e6), target=target, backend=backend)
+    assert result.status is Status.DEGENERATE
+    assert result.certificate.verdict is Verdict.DEGENERATE
+    assert "of patch 'roof' near [" in result.certificate.detail
+    assert np.isfinite(result.surface.vertices).all()
+
+
+def test_zero_area_is_refused_with_the_face(backend):
+    X = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]]
+    with pytest.raises(SurfaceError, match=r"face 0 = \[0, 1, 2\] of patch 'roof' has zero area"):
+        solve(
+            Surface(X, [[0, 1, 2], [0, 2, 3]], [0, 0], [Patch("roof", 1.0)], fixed=[0]),
+            backend=backend,
+        )
+
+
+def together(one, two, held=True):
+    """Two surfaces as one; the second without its supports unless ``held``."""
+    patches = [*one.patches, *(Patch(p.name + " too", p.tension, p.pressure) for p in two.patches)]
+    return Surface(
+        np.concatenate([one.vertices, two.vertices]),
+        np.concatenate([one.faces, two.faces + one.n]),
+        np.concatenate([one.patch_of_face, two.patch_of_face + len(one.patches)]),
+        patches,
+        fixed=np.concatenate([one.fixed, two.fixed & held]),
+        on_plane=np.concatenate([one.on_plane, two.on_plane & held]),
+    )
+
+
+def beside(surface):
+    return surface.moved(surface.vertices + np.array([10.0, 0.0, 5.0]))
+
+
+@TARGETS
+def test_a_part_that_nothing_holds_is_named(backend, target):
+    loose = together(spherical_cap(0.25), beside(spherical_cap(0.25)), held=False)
+    with pytest.raises(
+        SurfaceError, match=r"around vertex 61 \(patch 'cap too'\).*no support; hold it"
+    ):
+        solve(loose, target=target, backend=backend)
+
+
+def test_two_parts_that_are_held(backend):
+    both = solve(
+        together(two_squares(4, alpha_aux=1.0), beside(spherical_cap(0.25))), backend=backend
+    )
+    assert both.certificate.verdict is Verdict.STABLE
+    alone = [
+        solve(two_squares(4, alpha_aux=1.0), backend=backend),
+        solve(spherical_cap(0.25), backend=backend),
+    ]
+    area = [result.certificate.patches["area"] for result in (both, *alone)]
+    np.testing.assert_allclose(area[0], np.concatenate(area[1:]), rtol=1e-5)
+
+
+def test_a_bubble_beside_a_roof(backend):
+    """The bubble floats: its translations cost nothing, and are no way down."""
+    surface = together(spherical_cap(0.25), beside(sphere(0.8)))
+    result = solve(surface, target="stationary", backend=backend)
+    assert result.converged
+    assert result.certificate.verdict is Verdict.SADDLE
+    assert result.certificate.index == 1
+
+
+@TARGETS
+@pytest.mark.parametrize(("right", "wall"), [(1.0, 0.0), (2.0, 1.0)])
+def test_tensions_that_cannot_balance_are_named(backend, target, right, wall):
+    surface = two_squares(4, alpha_aux=wall).retensioned({"left": 4.0, "right": right})
+    result = solve(surface, target=target, backend=backend)
+    assert np.isfinite(result.surface.vertices).all()
+    found = result.certificate
+    assert found.verdict is Verdict.NO_EQUILIBRIUM
+    names = "the tensions at the junction left | right | wall cannot balance: 4 > "
+    assert names in found.detail
+
+
+@TARGETS
+def test_a_wall_that_outweighs_its_sheets_comes_down(backend, target):
+    """No angle balances 9 against 4 and 4, but Π takes the rest."""
+    surface = two_squares(4, alpha_aux=9.0).retensioned({"left": 4.0, "right": 4.0})
+    found = solve(surface, target=target, backend=backend).certificate
+    assert found.verdict is Verdict.STABLE
+    assert len(found.pinched) == 3
+
+
+def test_walls_without_tension_meet_in_a_line(backend):
+    """A junction of sheets none of which pulls has no say: the roof over it is the cap."""
+    result = solve(four_fans(5, alpha_aux=0.0), backend=backend)
+    assert result.certificate.verdict is Verdict.STABLE
+    assert np.isfinite(result.surface.vertices).all()
+    cap = solve(spherical_cap(4.0, radius=20.0, alpha=10.0), target="stationary", backend=backend)
+    assert result.surface.vertices[:, 2].max() == pytest.approx(
+        cap.surface.vertices[:, 2].max(), rel=0.1
+    )
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [pyramid(fixed=range(5)), pyramid(), pyramid(height=0.0), pyramid(height=-3.0)],
+    ids=["nothing moves", "one vertex", "flat", "hanging"],
+)
+def test_the_smallest_surfaces(backend, surface):
+    result = solve(surface, backend=backend)
+    assert result.converged
+    assert result.certificate.verdict is Verdict.STABLE
+    if surface.free.any():
+        assert result.surface.vertices[4, 2] == pytest.approx(8**-0.5, abs=1e-9)
+    else:
+        assert result.iterations == 0
+
+
+@TARGETS
+@pytest.mark.parametrize("seed", range(3))
+def test_a_start_of_pure_noise_ends_and_says_how(backend, target, seed):
+    surface = spherical_cap(0.25)
+    X = surface.vertices + np.where(surface.free[:, None], 1.0, 0.0) * np.random.default_rng(
+        seed
+    ).standard_normal((surface.n, 3))
+    result = solve(surface.moved(X), target=target, iterations=60, backend=backend)
+    assert np.isfinite(result.surface.vertices).all()
+    assert np.isfinite(result.energy)
+    assert result.energy == pytest.approx(energy(result.surface), rel=1e-12)
+    assert (result.surface.vertices[surface.fixed] == surface.vertices[surface.fixed]).all()
+    found = certify(result.surface, status=result.status.name)
+    if result.converged:
+        assert found.verdict in (Verdict.STABLE, Verdict.SADDLE)
+    else:
+        assert found.verdict in (Verdict.DEGENERATE, Verdict.NOT_CONVERGED, Verdict.NO_EQUILIBRIUM)
+        assert found.detail
+    assert triangle_quality(result.surface.vertices, surface.faces).min() >= 0.0
