@@ -70,7 +70,7 @@ def follow(
 
     Parameters
     ----------
-    surface : at rest (a minimum or a saddle); where the branch starts.
+    surface : at rest (a minimum or a saddle), held against rigid motions; where the branch starts.
     parameter : a patch's name for its tension; a ``Parameter``, whose bounds play no part here; or a
         ``Direction``, for several tensions and pressures that change together.
     stop : end where the parameter has this value; the branch starts towards it.
@@ -87,7 +87,7 @@ def follow(
     Raises
     ------
     OptionError : an unknown patch, option or column, or a value that it may not have.
-    SurfaceError : the surface is not at rest.
+    SurfaceError : the surface is not at rest, or not held.
 
     Examples
     --------

@@ -21,7 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import eigh, null_space
+from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator, gmres
 from scipy.spatial import cKDTree
 
@@ -148,9 +148,7 @@ class Bordered:
     def times(self, z: Floats) -> Floats:
         """The matrix times a vector (N+1,), by a central difference."""
         d = self.shape.motion(self.space, self.X, z[:-1])
-        length = float(np.abs(d).max())
-        if length == 0.0:
-            return np.append(self.f, self.unit * self.rate) * z[-1]
+        length = float(np.abs(d).max()) or 1.0
         t = DIFFERENCE * self.shape.full.size / length
         ahead, behind = (self.shape.swept(self.X + e * d, self.space) for e in (t, -t))
         change = self.shape.forces(self.surface, ahead) - self.shape.forces(self.surface, behind)
@@ -209,7 +207,7 @@ class Station:
     X, value, residual, iterations : of its ``Solution``.
     energy, volume, height, quality : what a table shows; height is the highest vertex's.
     eigenvalues : all negative ones and at least one more, ascending, force/length³.
-    index : negative eigenvalues, rigid motions not counted.
+    index : number of negative eigenvalues.
     weights : (n,) of the metric  ds² = Σ weights |dX|² + (dλ/scale)², 1/length²: its first part is
         the mean square displacement over the surface in units of its size.
     direction, slope : dX/ds (n,3) and dλ/ds along the branch.
@@ -302,11 +300,7 @@ def _eigenvalues(system: Stiffness) -> Floats:
     """All negative eigenvalues and at least one more, ascending."""
     size = len(system.mass)
     if size < SMALL:
-        free = null_space(system.rigid.T) if system.rigid.shape[1] else np.eye(size)
-        pair = [
-            free.T @ matrix @ free for matrix in (system.matrix.toarray(), np.diag(system.mass))
-        ]
-        return np.asarray(eigh(*pair, eigvals_only=True))
+        return np.asarray(eigh(system.matrix.toarray(), np.diag(system.mass), eigvals_only=True))
     count = system.negative + 2
     while True:
         values = lowest(system, min(count, size - 1))[0]

@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..assemble import Pattern, assemble, pattern
-from ..contact import Walls, creases, hung, pinched, pull_and_capacity, resting, settled, walls
+from ..contact import (
+    Walls,
+    hung,
+    pinched,
+    pull_and_capacity,
+    resting,
+    settled,
+    standing_structure,
+    walls,
+)
 from ..descent import Carrier
 from ..energy import energy_and_gradient, patch_volumes
 from ..factor import Factor, Factoriser, factoriser
 from ..kernels import area_vectors
-from ..modes import Stiffness, full_matrix, lumped_mass, negatives_without
-from ..motion import MotionSpace, Structure, force_scale, motion_space, structure
+from ..modes import Stiffness, full_matrix, lumped_mass
+from ..motion import MotionSpace, Structure, force_scale, motion_space
 from ..quality import redistribution, triangle_quality
-from ..rigid import rigid_modes, rigid_motions
 from ..surface import Surface
 from ..topology import SHEET
-from .direction import weighted_gradient
+from .direction import Line, weighted_gradient
 
 SWEEPS = 20  # of redistribution at most
 CLEAR = 1.02  # ratio of qualities that counts as better
@@ -38,10 +48,9 @@ class Shape:
         self.below: Walls = walls(surface)
         self.rests: Bools = resting(surface, self.below)
         self.surface = pinched(surface, self.below, self.rests)
-        self.frame: Structure = structure(self.surface, creases(self.below, self.rests))
+        self.frame: Structure = standing_structure(self.surface, self.below, self.rests)
         self.judged: Ints = self.surface.faces[~self.below.pinchable[self.surface.patch_of_face]]
         self.pressed: Floats = (surface.pressures != 0.0).astype(float)
-        self._rigid = rigid_motions(self.surface)
         self._backend = backend
         self._carrier: Carrier | None = None
         self._travels = bool(((self.frame.kind != SHEET) & ~self.surface.fixed).any())
@@ -77,11 +86,10 @@ class Shape:
         return data, self._factoriser.factor(data)
 
     def stiffness(self, space: MotionSpace, X: Floats, data: Floats, factor: Factor) -> Stiffness:
-        """The Hessian and its inertia, rigid motions set apart."""
-        rigid = rigid_modes(space, self._rigid, X)
+        """The Hessian, its mass and its inertia."""
         return Stiffness(
             space, full_matrix(self._pattern, data), lumped_mass(space, self.frame, X), factor,
-            rigid, negatives_without(factor, rigid),
+            np.zeros((space.size, 0)), factor.negative,
         )  # fmt: skip
 
     # -- quantities ----------------------------------------------------------------------------
@@ -123,11 +131,13 @@ class Shape:
         X[down] -= self.surface.plane.height(X[down])[:, None] * normal
         return self.whole(hung(self.surface, self.below, X))
 
-    def pulled_off(self, surface: Surface, X: Floats) -> bool:
-        """Whether a resting junction vertex is pulled harder than its wall can hold."""
+    def pulled_off(self, line: Line, value: float, X: Floats) -> bool:
+        """Whether a resting junction vertex is pulled harder than its wall can hold at λ."""
         if not self.rests.any():
             return False
-        pull, capacity = pull_and_capacity(surface.moved(X), self.below, self.rests)
+        below = replace(self.below, tension=walls(line.applied(self.full, value)).tension)
+        surface = line.applied(self.surface, value).moved(X)
+        pull, capacity = pull_and_capacity(surface, below, self.rests)
         return bool((pull > capacity * (1.0 + 1e-6)).any())
 
     # -- triangles -----------------------------------------------------------------------------

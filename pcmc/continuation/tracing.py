@@ -16,6 +16,7 @@ from ..arrays import Floats
 from ..energy import energy_at
 from ..errors import OptionError, SurfaceError
 from ..remesh import remesh
+from ..rigid import rigid_modes, rigid_motions
 from ..solvers import solve
 from ..solvers.result import Callback, Progress
 from ..surface import Surface
@@ -79,14 +80,19 @@ class Tracer:
     def start(self, shape: Shape) -> Station:
         """The first point, on the branch to the tolerance."""
         X, value = shape.surface.vertices, self.line.value
+        space = shape.space(X)
+        drifts = rigid_modes(space, rigid_motions(shape.surface), X).shape[1]
+        if drifts:
+            raise SurfaceError(
+                f"follow: nothing holds the surface against {drifts} rigid motions, and it would"
+                " drift instead of following the parameter; hold it with fixed= or on_plane="
+            )
+        if not space.pull(self.line.gradient(shape.surface, X)).any():
+            raise OptionError("the parameter moves nothing: no vertex of what it names is free")
         try:
             residual = shape.residual(shape.surface, X)
             if not residual <= AT_REST:
                 raise Lost(f"relative residual {residual:.1e}")
-            if not shape.space(X).pull(self.line.gradient(shape.surface, X)).any():
-                raise OptionError(
-                    "the parameter moves nothing: no vertex of the patches it names is free"
-                )
             border = at_parameter(value, self.scale)
             found = correct(shape, self.line, X, value, border, self.options.tolerance)
             return examine(found, self.line, self.scale, math.copysign(1.0, self.options.step))
@@ -100,6 +106,8 @@ class Tracer:
         """Follow to the end; why it ended, and the last difficulty."""
         try:
             self.record()
+            if any(getattr(self.here, _FIELD[name]) == v for name, v in self.goals.items()):
+                return Ending.REACHED, ""
             return self.advance()
         except (StopIteration, KeyboardInterrupt):
             return Ending.STOPPED, ""
@@ -138,7 +146,7 @@ class Tracer:
         here = self.here
         try:
             found = self.solution(length)
-            if found.shape.pulled_off(self.line.applied(found.shape.surface, found.value), found.X):
+            if found.shape.pulled_off(self.line, found.value, found.X):
                 raise Touched(found.X, found.value)
         except Touched as touched:
             found = self.resettled(touched)
