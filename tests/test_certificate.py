@@ -4,16 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from shapes import pyramid, shaken, three_patches
+from starts import double_bubble, four_fans, joined_caps, sphere, spherical_cap, two_squares
 
-from generators import (
-    double_bubble,
-    four_fans,
-    joined_caps,
-    sphere,
-    spherical_cap,
-    spherical_cap_exact,
-    two_squares,
-)
+from generators import spherical_cap_exact
 from pcmc import (
     Patch,
     Surface,

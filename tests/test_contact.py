@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from shapes import rotation, shaken
+from starts import double_bubble, four_fans, two_caps, two_squares
 
-from generators import double_bubble, four_fans, two_caps, two_squares
 from pcmc import Plane, Surface, energy, solve
 from pcmc.contact import (
     beside,

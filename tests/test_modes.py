@@ -5,8 +5,8 @@ import pytest
 import scipy.linalg
 from motion_cases import SURFACES, TILTED
 from shapes import disc, pyramid, rotation, shaken, three_patches
+from starts import double_bubble, sphere, two_squares
 
-from generators import double_bubble, sphere, two_squares
 from pcmc import Patch, Surface, hessian
 from pcmc.assemble import Pattern
 from pcmc.factor import factoriser

@@ -4,18 +4,19 @@ from functools import partial
 
 import numpy as np
 import pytest
-
-from generators import (
+from starts import (
     bezier_hall,
     double_bubble,
     four_fans,
     joined_caps,
     sphere,
     spherical_cap,
+    stationary,
     three_patches,
     two_caps,
     two_squares,
 )
+
 from pcmc import solve
 from studies import evolver
 
@@ -36,7 +37,7 @@ CASES = {
     "four fans, stable": (partial(four_fans, 4, alpha_aux=2.0), 0),
     "four fans": (partial(four_fans, 7), 2),
     "hall": (partial(bezier_hall, 8.0), 0),
-    "Fig. 4": (three_patches, 2),
+    "Fig. 4": (partial(three_patches, 8), 2),
     "cap, 0.5": (partial(spherical_cap, 0.5), 0),
     "cap, 0.25": (partial(spherical_cap, 0.25), 0),
     "joined caps": (partial(joined_caps, 1.0), 0),
@@ -47,7 +48,7 @@ CASES = {
 FINER = {
     "two squares": (partial(two_squares, 32, alpha_aux=1.0), 0),
     "four fans": (partial(four_fans, 14), 2),
-    "hall": (bezier_hall, 0),
+    "hall": (partial(bezier_hall), 0),
     "joined caps": (partial(joined_caps, 0.5), 0),
     "joined caps, weak wall": (partial(joined_caps, 0.5, **WEAK), 1),
     "cap": (partial(spherical_cap, 0.05), 0),
@@ -55,7 +56,7 @@ FINER = {
 
 
 def agrees(make, index):
-    result = solve(make(), target="stationary")
+    result = stationary(make)
     assert result.converged
     assert result.certificate.index == index
     before = evolver.energy(result.surface)

@@ -5,8 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 from shapes import pyramid
+from starts import four_fans, sphere, spherical_cap, two_caps, two_squares
 
-from generators import four_fans, sphere, spherical_cap, two_caps, two_squares
 from pcmc import Patch, Surface, certify, energy, solve
 from pcmc.certificate import Verdict
 from pcmc.errors import MissingExtra, OptionError, SurfaceError

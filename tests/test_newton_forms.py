@@ -2,17 +2,9 @@
 
 import numpy as np
 import pytest
+from starts import double_bubble, joined_caps, sphere, spherical_cap
 
-from generators import (
-    double_bubble,
-    double_bubble_exact,
-    joined_caps,
-    joined_caps_exact,
-    sphere,
-    sphere_exact,
-    spherical_cap,
-    spherical_cap_exact,
-)
+from generators import double_bubble_exact, joined_caps_exact, sphere_exact, spherical_cap_exact
 from pcmc import certify, energy, solve
 from pcmc.certificate import Verdict
 from pcmc.energy import volume
@@ -154,9 +146,7 @@ def test_joined_caps_are_stable_at_every_refinement(edge):
     assert joined_caps_exact().distance(result.surface).max() < 0.12 * edge**2
 
 
-@pytest.mark.parametrize(
-    "edge", [1.0, 0.5, pytest.param(0.25, marks=slow)]
-)
+@pytest.mark.parametrize("edge", [1.0, 0.5, pytest.param(0.25, marks=slow)])
 def test_joined_caps_with_a_weak_wall_are_a_saddle_of_index_one(edge):
     tensions = {"alpha_left": 4.0, "alpha_right": 4.0, "alpha_aux": 1.0, "depth": 5.0}
     result = solve(joined_caps(edge, **tensions), target="stationary")
@@ -208,7 +198,11 @@ def test_the_bubble_is_a_sphere_and_a_saddle_of_index_one(alpha):
 
 
 @pytest.mark.parametrize(
-    ("tensions", "edges"), [((1.0, 1.0, 1.0), (0.8, 0.4, 0.2)), ((1.0, 0.8, 0.6), (0.8, 0.6, 0.4))]
+    ("tensions", "edges"),
+    [
+        pytest.param((1.0, 1.0, 1.0), (0.8, 0.4, 0.2), marks=slow),
+        ((1.0, 0.8, 0.6), (0.8, 0.6, 0.4)),
+    ],
 )
 def test_the_double_bubble_is_two_spheres_and_a_flat_disc(tensions, edges):
     left, right, wall = tensions

@@ -5,8 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 from shapes import rotation
+from starts import joined_caps, spherical_cap, two_squares
 
-from generators import joined_caps, spherical_cap, two_squares
 from pcmc import Patch, Plane, Surface, mean_curvature, solve
 
 SURFACES = {
