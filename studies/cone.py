@@ -59,7 +59,7 @@ def cone(tensions: tuple[float, float, float], opening: float) -> Cone | None:
 
     >>> found = cone((4.0, 3.0, 4.0), math.radians(284.4))
     >>> round(math.degrees(found.height)), found.exponent < 1.0
-    (30, True)
+    (29, True)
     """
     one, two, wall = tensions
     if not abs(one - two) < wall < one + two:

@@ -15,19 +15,34 @@ from . import (
     example3,
     example4,
     mesh_search,
+    refinement,
+    stability,
 )
 from .study import Study
 
-MODULES = (example1, example2, example3, example4, alpha_grid, calibration, mesh_search, equilibria)
+MODULES = (
+    example1, example2, example3, example4, alpha_grid, calibration, mesh_search, equilibria,
+    stability, refinement,
+)  # fmt: skip
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
+EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out
 
 
 def chosen(names: Iterable[str]) -> list[Study]:
-    """The studies of these names, in the order given."""
+    """The studies of these names, in the order given, each once.
+
+    >>> [study.name for study in chosen(["extras", "stability"])][:2]
+    ['stability', 'refinement']
+    """
+    found: dict[str, Study] = {}
     for name in names:
-        if name not in STUDIES:
-            raise OptionError(unknown("study", name, STUDIES))
-    return [STUDIES[name] for name in names]
+        if name == EXTRAS:
+            found |= {study.name: study for study in STUDIES.values() if not study.paper}
+        elif name in STUDIES:
+            found[name] = STUDIES[name]
+        else:
+            raise OptionError(unknown("study", name, [*STUDIES, EXTRAS]))
+    return list(found.values())
 
 
 def of_the_paper() -> list[Study]:

@@ -251,7 +251,7 @@ def figure(folder: Folder) -> None:
             )  # fmt: skip
     titles = {family.name: family.title for family in FAMILIES}
     lines(
-        {titles[name]: (one.edge_length, one.critical_wall.replace([0.0, math.inf], np.nan))
+        {titles[str(name)]: (one.edge_length, one.critical_wall.replace([0.0, math.inf], np.nan))
          for name, one in critical.groupby("family", sort=False)},
         folder.figure("critical"), x="edge length", y="wall tension above which it is a saddle",
         xscale="log", markers=True,
@@ -263,7 +263,7 @@ def _draw_crest(folder: Folder) -> None:
     from pcmc.plot import lines
 
     crest, balanced = folder.read_table("crest"), folder.read_table("cone").iloc[0]
-    curves = {
+    curves: dict[str, Any] = {
         f"edge length {length:g}": (one.distance, one.from_large)
         for length, one in crest.groupby("edge_length", sort=False)
     }
