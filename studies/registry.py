@@ -14,15 +14,17 @@ from . import (
     example2,
     example3,
     example4,
+    existence,
     mesh_search,
     refinement,
+    solvers,
     stability,
 )
 from .study import Study
 
 MODULES = (
     example1, example2, example3, example4, alpha_grid, calibration, mesh_search, equilibria,
-    stability, refinement,
+    stability, refinement, solvers, existence,
 )  # fmt: skip
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out
