@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import eigh
@@ -146,17 +147,20 @@ class Bordered:
         return z[:-1], float(z[-1])
 
     def times(self, z: Floats) -> Floats:
-        """The matrix times a vector (N+1,), by a central difference."""
+        """The matrix times a vector (N+1,), by a difference."""
         d = self.shape.motion(self.space, self.X, z[:-1])
-        length = float(np.abs(d).max()) or 1.0
-        t = DIFFERENCE * self.shape.full.size / length
-        ahead, behind = (self.shape.swept(self.X + e * d, self.space) for e in (t, -t))
-        change = self.shape.forces(self.surface, ahead) - self.shape.forces(self.surface, behind)
-        along = float((self.row * (ahead - behind)).sum()) / (2.0 * t)
-        return np.append(
-            self.space.pull(change) / (2.0 * t) + self.f * z[-1],
-            self.unit * (along + self.rate * z[-1]),
-        )
+        t = DIFFERENCE * self.shape.full.size / (float(np.abs(d).max()) or 1.0)
+        here, forces = self.base
+        there = self.shape.swept(self.X + t * d, self.space)
+        change = self.space.pull(self.shape.forces(self.surface, there) - forces) / t
+        along = float((self.row * (there - here)).sum()) / t
+        return np.append(change + self.f * z[-1], self.unit * (along + self.rate * z[-1]))
+
+    @cached_property
+    def base(self) -> tuple[Floats, Floats]:
+        """Where differences start (n,3), and the forces there (n,3)."""
+        here = self.shape.swept(self.X, self.space)
+        return here, self.shape.forces(self.surface, here)
 
 
 def correct(
