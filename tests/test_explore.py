@@ -87,12 +87,30 @@ def test_where_no_equilibrium_exists_the_last_surface_stays(cap):
 
 def test_settling_goes_as_far_as_there_is_a_way_and_says_why_not_further(cap):
     wanted = cap.surface.retensioned({"cap": 0.4})
-    surface, failed = reach(cap.surface, wanted, lambda: False)
-    alpha = surface.patches[0].tension
+    way = reach(cap.surface, wanted, lambda: False, iterations=40)
+    alpha = way.surface.patches[0].tension
     assert 0.47 < alpha < 0.51  # the hemisphere is at 0.5; a coarse mesh goes a little further
-    assert rise(surface) > 0.75
-    assert failed.verdict not in (Verdict.STABLE, Verdict.SADDLE)
-    assert pcmc.certify(surface).verdict is Verdict.STABLE
+    assert rise(way.surface) > 0.75
+    assert way.failed.verdict not in (Verdict.STABLE, Verdict.SADDLE)
+    assert way.found.verdict is pcmc.certify(way.surface).verdict is Verdict.STABLE
+
+
+def test_reaching_stops_when_told_and_after_its_attempts(cap):
+    wanted = cap.surface.retensioned({"cap": 0.3})
+    way = reach(cap.surface, wanted, lambda: True)
+    assert way.surface is cap.surface
+    assert way.found is None
+    halfway = reach(cap.surface, cap.surface.retensioned({"cap": 0.45}), lambda: False, attempts=2)
+    assert [p.tension for p in halfway.surface.patches] == pytest.approx([0.525])
+    assert halfway.failed is not None
+
+
+def test_following_goes_halfway_where_the_whole_way_fails(cap):
+    draft = Draft(cap)
+    state = draft.follow({"tensions": {"cap": 0.45}})
+    assert state.trouble is None
+    assert state.surface.patches[0].tension == pytest.approx(0.525)
+    assert state.asked[0].tension == 0.45
 
 
 def test_settling_is_steps_that_can_be_undone_and_done_again(cap):

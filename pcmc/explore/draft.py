@@ -100,12 +100,16 @@ class Draft:
             return self._state()
 
     def follow(self, values: Values) -> State:
-        """Towards these tensions and pressures while a slider moves: one quick attempt."""
+        """Towards these tensions and pressures while a slider moves: as far as two quick attempts lead."""
 
         def act(stop: Callable[[], bool]) -> None:
-            result, found = self._solved(self._wanted(values), stop, modes=0, **FOLLOW)
-            if not stop():
-                self._accept(result.surface, found)
+            way = reach(self.surface, self._wanted(values), stop, attempts=2, **FOLLOW)
+            if stop():
+                return
+            if way.found is not None:
+                self.surface, self._found, self._trouble = way.surface, way.found, None
+            else:
+                self._trouble = way.failed
 
         return self._run(act)
 
@@ -116,14 +120,13 @@ class Draft:
         """
 
         def act(stop: Callable[[], bool]) -> None:
-            asked = self._wanted(values)
-            end = time.monotonic() + PATIENCE
-            surface, failed = reach(self.surface, asked, lambda: stop() or time.monotonic() > end)
+            asked, end = self._wanted(values), time.monotonic() + PATIENCE
+            way = reach(self.surface, asked, lambda: stop() or time.monotonic() > end, **SETTLE)
             if stop():
                 return
-            if surface is not self.surface:
-                self._show(surface)
-            self._trouble = failed
+            if way.found is not None:
+                self._show(way.surface)
+            self._trouble = way.failed
             self._keep()
 
         return self._run(act)
@@ -133,13 +136,17 @@ class Draft:
 
         def act(stop: Callable[[], bool]) -> None:
             end = time.monotonic() + PATIENCE
-            wanted = self.surface
-            result, found = self._solved(
-                wanted, lambda: stop() or time.monotonic() > end, target="minimum"
+            result = attempt(
+                self.surface, lambda: stop() or time.monotonic() > end, target="minimum"
             )
-            if not stop():
-                self._accept(result.surface, found)
+            found = certify(result.surface, status=result.status.name)
+            if stop():
+                return
+            if found.verdict in AT_REST:
+                self.surface, self._found, self._trouble = result.surface, found, None
                 self._keep()
+            else:
+                self._trouble = found
 
         return self._run(act)
 
@@ -187,19 +194,6 @@ class Draft:
         self._asked = wanted.patches
         return wanted
 
-    def _solved(
-        self, surface: Surface, stop: Callable[[], bool], *, target: str = "stationary",
-        modes: int = 1, **options: Any,
-    ) -> tuple[Result, Certificate]:  # fmt: skip
-        result = attempt(surface, stop, target=target, **(options or SETTLE))
-        return result, certify(result.surface, modes=modes, status=result.status.name)
-
-    def _accept(self, surface: Surface, found: Certificate) -> None:
-        if found.verdict in AT_REST:
-            self.surface, self._found, self._trouble = surface, found, None
-        else:
-            self._trouble = found
-
     def _show(self, surface: Surface) -> None:
         self.surface, self._found = surface, certify(surface)
 
@@ -242,30 +236,38 @@ def attempt(surface: Surface, stop: Callable[[], bool], **options: Any) -> Resul
     return solve(surface, callback=check, **options)
 
 
-def reach(
-    start: Surface, asked: Surface, stop: Callable[[], bool]
-) -> tuple[Surface, Certificate | None]:
-    """Follow the equilibrium from ``start`` to the values of ``asked``, in steps halved where one fails.
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """How far a way of changing values led: the last surface at rest, and what ended it, if anything did.
 
-    Returns
-    -------
-    The last surface at rest on the way (``start`` itself, if there is none) and, where that is not
-    the end of it, the certificate of the shortest attempt beyond.
+    ``found`` is the surface's certificate without modes; None where there was no step at all.
     """
-    here, done, step = start, 0.0, 1.0
-    failed: Certificate | None = None
-    while done < 1.0:
+
+    surface: Surface
+    found: Certificate | None
+    failed: Certificate | None
+
+
+def reach(
+    start: Surface, asked: Surface, stop: Callable[[], bool], attempts: int = 100, **options: Any
+) -> Reached:
+    """Follow the equilibrium from ``start`` to the values of ``asked``, in steps halved where one fails."""
+    here, found, done, step = start, None, 0.0, 1.0
+    failed = None
+    for _ in range(attempts):
         ahead = min(1.0, done + step)
-        result = attempt(between(start, asked, ahead).moved(here.vertices), stop, target="stationary",
-                         **SETTLE)  # fmt: skip
-        found = certify(result.surface, modes=0, status=result.status.name)
-        if found.verdict in AT_REST:
-            here, done, step = result.surface, ahead, 2.0 * step
-            continue
-        failed, step = found, 0.5 * (ahead - done)
+        aim = between(start, asked, ahead).moved(here.vertices)
+        result = attempt(aim, stop, target="stationary", **options)
+        ended = certify(result.surface, modes=0, status=result.status.name)
+        if ended.verdict in AT_REST:
+            here, found, done, step = result.surface, ended, ahead, 2.0 * step
+            if done == 1.0:
+                return Reached(here, found, None)
+        else:
+            failed, step = ended, 0.5 * (ahead - done)
         if step < SMALLEST or stop():
-            return here, failed
-    return here, None
+            break
+    return Reached(here, found, failed)
 
 
 def between(start: Surface, end: Surface, part: float) -> Surface:
