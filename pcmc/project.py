@@ -1,0 +1,1 @@
+"""A whole design in one TOML file: plan, solver, targets, output."""
