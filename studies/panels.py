@@ -88,7 +88,7 @@ def category_panels(
     colors = ListedColormap(list(categories.values()))
     rows = math.ceil(len(tables) / columns)
     side = (width - 70.0) / columns - 24.0
-    total = rows * (side + 46.0) + 130.0
+    total = rows * (side + 46.0) + 170.0
     figure = new(width, total)
     for k, (title, table) in enumerate(tables.items()):
         row, column = divmod(k, columns)

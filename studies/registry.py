@@ -8,6 +8,7 @@ from pcmc.errors import OptionError, unknown
 
 from . import (
     alpha_grid,
+    alpha_grid_geometric,
     calibration,
     equilibria,
     example1,
@@ -24,7 +25,7 @@ from .study import Study
 
 MODULES = (
     example1, example2, example3, example4, alpha_grid, calibration, mesh_search, equilibria,
-    stability, refinement, solvers, existence,
+    alpha_grid_geometric, stability, refinement, solvers, existence,
 )  # fmt: skip
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out
@@ -33,8 +34,8 @@ EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out
 def chosen(names: Iterable[str]) -> list[Study]:
     """The studies of these names, in the order given, each once.
 
-    >>> [study.name for study in chosen(["extras", "stability"])][:2]
-    ['stability', 'refinement']
+    >>> [study.name for study in chosen(["stability", "example1", "stability"])]
+    ['stability', 'example1']
     """
     found: dict[str, Study] = {}
     for name in names:
