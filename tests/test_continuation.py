@@ -293,6 +293,16 @@ def test_wall_that_comes_down_to_the_plane_on_the_way_changes_the_contact():
     assert after.residual <= 1e-9
 
 
+def test_junction_that_rests_on_the_plane_is_lifted_when_its_wall_pulls_less():
+    start = solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
+    branch = follow(start, "wall", 2.53)
+    assert branch.ending is Ending.REACHED
+    assert set(branch.events.kind) == {"contact"}
+    before, after = certify(start), certify(branch.last)
+    assert len(before.pinched) == 5 > len(after.pinched) > 0
+    assert after.residual <= 1e-9
+
+
 @pytest.mark.slow
 def test_new_mesh_on_the_way_keeps_to_the_branch(small_cap):
     pytest.importorskip("mmgpy")

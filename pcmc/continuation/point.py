@@ -282,7 +282,7 @@ def _bordered(
     row: Floats, rate: float,
 ) -> Bordered:  # fmt: skip
     f = space.pull(line.gradient(surface, X))
-    unit = float(np.linalg.norm(f)) / float(np.linalg.norm(row) + abs(rate))
+    unit = (float(np.linalg.norm(f)) or 1.0) / float(np.linalg.norm(row) + abs(rate))
     return Bordered(shape, surface, space, X, factor, f, row, rate, unit)
 
 

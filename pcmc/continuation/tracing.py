@@ -87,7 +87,8 @@ class Tracer:
                 f"follow: nothing holds the surface against {drifts} rigid motions, and it would"
                 " drift instead of following the parameter; hold it with fixed= or on_plane="
             )
-        if not space.pull(self.line.gradient(shape.surface, X)).any():
+        moves = space.pull(self.line.gradient(shape.surface, X)).any()
+        if not (moves or shape.rests.any()):  # a wall that is gone may come back
             raise OptionError("the parameter moves nothing: no vertex of what it names is free")
         try:
             residual = shape.residual(shape.surface, X)
