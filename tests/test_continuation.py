@@ -295,7 +295,7 @@ def test_wall_that_comes_down_to_the_plane_on_the_way_changes_the_contact():
 
 def test_junction_that_rests_on_the_plane_is_lifted_when_its_wall_pulls_less():
     start = solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
-    branch = follow(start, "wall", 2.53)
+    branch = follow(start, "wall", 2.51)
     assert branch.ending is Ending.REACHED
     assert set(branch.events.kind) == {"contact"}
     before, after = certify(start), certify(branch.last)

@@ -30,6 +30,7 @@ from ..topology import SHEET
 from .direction import Line, weighted_gradient
 
 SWEEPS = 20  # of redistribution at most
+SLACK = 1.01  # pull over capacity: nearer than that, what rests and what stands off is the same
 CLEAR = 1.02  # ratio of qualities that counts as better
 
 
@@ -138,7 +139,7 @@ class Shape:
         below = replace(self.below, tension=walls(line.applied(self.full, value)).tension)
         surface = line.applied(self.surface, value).moved(X)
         pull, capacity = pull_and_capacity(surface, below, self.rests)
-        return bool((pull > capacity * (1.0 + 1e-6)).any())
+        return bool((pull > SLACK * capacity).any())
 
     # -- triangles -----------------------------------------------------------------------------
 

@@ -159,6 +159,8 @@ class Tracer:
         there = examine(found, self.line, self.scale, here)
         goal = self.goal(there, length)
         if goal is not None:
+            if there.shape is not here.shape:
+                raise Lost("the contact of a wall with the plane changes just before the goal")
             length, there = goal
         return Step(length, bend, there, goal is not None, self.search(there, length))
 
