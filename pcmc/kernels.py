@@ -17,6 +17,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from math import sqrt
 
 import numba
@@ -190,7 +191,7 @@ def blocks(count: int, workers: int) -> list[tuple[int, int]]:
     """
     parts = max(1, min(workers, count // BLOCK))
     edges = np.linspace(0, count, parts + 1).astype(int)
-    return [(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [(int(a), int(b)) for a, b in pairwise(edges)]
 
 
 def run_blocks(work: Callable[[int, int, int], None], count: int, workers: int | None) -> int:
