@@ -22,11 +22,11 @@ from . import kernels
 from .arrays import Floats
 from .assemble import assemble, pattern
 from .certificate import TOLERANCE
-from .contact import Walls, creases, hung, pinched, resting, walls
+from .contact import Walls, hung, pinched, resting, standing_structure, walls
 from .energy import energy_and_gradient
 from .errors import OptionError, SurfaceError
 from .factor import Factor, SingularMatrix, factoriser
-from .motion import MotionSpace, Structure, force_scale, motion_space, structure
+from .motion import MotionSpace, Structure, force_scale, motion_space
 from .quantities import Measure, Parameter, Target, measure
 from .surface import Surface
 
@@ -145,7 +145,7 @@ class _AtRest:
         below = walls(surface)
         rests = resting(surface, below)
         standing = pinched(surface, below, rests)
-        frame = structure(standing, creases(below, rests))
+        frame = standing_structure(standing, below, rests)
         X = standing.vertices
         space = motion_space(standing, frame, X)
         left = np.linalg.norm(space.pull(energy_and_gradient(standing, X)[1]))
