@@ -3,14 +3,17 @@
 Each case of ``alpha_grid`` is solved for a stationary point on the same mesh. Where none is found, the
 reason is looked for in this order:
 
-- *balance*: three tensions of which one is no less than the other two's sum or difference cannot balance
-  along a junction, at whatever angles (7). A wall stronger than both patches comes to lie on Π, and holds;
-  but patches whose tensions differ by no less than the wall's cannot be in balance, there or anywhere.
-- *fold*: from the nearest combinations of tensions that have an equilibrium (of different patch tensions,
-  nearest first) the branch is followed along a straight line in the tensions. Where it turns back before
-  it arrives, the equilibria on both sides of the fold are all there is of it.
-- *slip*: the branch ends without a fold, since the junction runs into a corner of the outline, where the
-  triangles collapse (``stability`` tells why corners do not hold it).
+- *patch*: a patch over its part of the plan, held all around and along the chord between the corners too,
+  folds at a tension a little below half its radius (``patch_folds``). A patch that is weaker inflates even
+  so, and a wall holds it less than that.
+- *balance*: where the patches' tensions differ by no less than the wall's, no angles at the junction are
+  in balance (7), whether it stands free or rests on Π.
+- *fold*: from the nearest equilibria of the grid (no two of the same patches' tensions, nearest first) the
+  branch is followed along a straight line in the tensions, and folds before it arrives: it turns back, and
+  a way down opens (its index grows) as it does.
+- *slip*: the branch ends otherwise. The junction runs into a corner of the outline and the triangles there
+  collapse, or the branch turns back a long way before any way down opens: that is the mesh, not the
+  surface (``stability`` tells why corners do not hold a crest).
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ from generators import two_caps
 from pcmc import Surface, solve
 from pcmc.arrays import Floats
 from pcmc.continuation import Direction, Ending, follow
+from pcmc.solvers.result import Progress
 from pcmc.sweep import Sweep, solve_case
 
 from .alpha_grid import AXES, CONVERGED, EDGE_LENGTH, FAILED, TENSIONS, flow_grid
@@ -37,7 +41,9 @@ from .study import Study
 PATCHES = ("wall", "large", "small")
 SOUND = 0.2  # triangle quality of an equilibrium from which a branch may start
 TRIES, STEPS = 3, 25
-REACHED, FOLD, SLIP, BALANCE = "reached", "fold", "slip", "balance"
+BACK = 0.03  # of the way: how far behind its turn a branch may open a way down and still count as folded
+REACHED, FOLD, SLIP = "reached", "fold", "slip"
+FOLD_LENGTHS = (EDGE_LENGTH, 0.6, 0.3)  # of the meshes on which the patches' folds are sought
 NUMBERS = {
     "verdict": "verdict", "index": "index", "curvature_error": "curvature_error",
     "curvature_error_cotangent": "curvature_error_cotangent", "quality": "quality",
@@ -49,8 +55,9 @@ CATEGORIES = {
     "a minimum; the flow does not": "#9ECAE1",
     "a saddle": "#CC79A7",
     "one, found along a branch": "#41B6A4",
+    "none: a patch below its fold": "#D6604D",
     "none: tensions cannot balance": "#E6E6E6",
-    "none: a fold before it": "#F4A582",
+    "none: a fold on the way": "#F4A582",
     "none: the junction slips": "#FFF2AE",
     "none found": "#BDBDBD",
 }
@@ -68,6 +75,11 @@ def data(folder: Folder, short: bool) -> None:
     flow = _flow(folder, short).set_index(list(AXES))
     records = records.join(flow[["status", "gradient_squared"]].add_prefix("flow_"), on=list(AXES))
     folder.write_table("records", records)
+    lengths = FOLD_LENGTHS[: 1 if short else None]
+    rows = [
+        {"edge_length": h, **{name: patch_fold(h, name) for name in PATCHES[1:]}} for h in lengths
+    ]
+    folder.write_table("patch_folds", pd.DataFrame(rows))
     folder.write_table("branches", _branches(folder, folder.read_table("records")))
 
 
@@ -84,7 +96,7 @@ def _branches(folder: Folder, records: pd.DataFrame) -> pd.DataFrame:
     triples = records[list(AXES)].to_numpy()
     at_rest = (records.status == "converged").to_numpy()
     sound = triples[at_rest & (records.quality > SOUND).to_numpy()]
-    open_cases = ~at_rest & balanced(triples)
+    open_cases = ~at_rest & balanced(triples) & ~_weak(folder, triples)
     targets = triples[open_cases]
     tries = np.where(records.flow_status.isin(FAILED)[open_cases], TRIES, 1).tolist()
     columns = [*AXES, "ending", "share", "from_wall", "from_large", "from_small"]
@@ -101,8 +113,29 @@ def _branches(folder: Folder, records: pd.DataFrame) -> pd.DataFrame:
     return found[columns]
 
 
+def patch_fold(edge_length: float, name: str) -> float:
+    """The least tension of a patch that is held all around, its junction on the chord, on Π."""
+    whole = _initial(edge_length)
+    faces = whole.faces[whole.patch_faces([whole.patch_index(name)])]
+    used, local = np.unique(faces, return_inverse=True)
+    X, seam = whole.vertices[used].copy(), whole.topology.on_junction[used]
+    X[seam] *= [0.0, 1.0, 0.0]
+    X[seam, 0] = whole.vertices[whole.fixed & whole.topology.on_junction, 0].mean()
+    patch = whole.patches[whole.patch_index(name)]
+    held = whole.fixed[used] | seam
+    part = Surface(X, local.reshape(-1, 3), np.zeros(len(faces), int), (patch,), fixed=held)
+    branch = follow(solve(part).surface, name, 0.1 * patch.tension, folds=1)
+    return float(branch.folds.parameter.iloc[0])
+
+
+def _weak(folder: Folder, triples: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """(k,) whether a patch has less tension than where it folds on this mesh."""
+    folds = folder.read_table("patch_folds").iloc[0]
+    return np.asarray((triples[:, 1] < folds.large) | (triples[:, 2] < folds.small))
+
+
 def balanced(triples: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """(k,) whether tensions (wall, large, small) can balance, or the wall lies on Π and holds.
+    """(k,) whether tensions (wall, large, small) can balance, or the wall rests on Π and holds.
 
     >>> balanced(np.array([[4.0, 4.0, 3.0], [1.0, 4.0, 2.0], [9.0, 4.0, 3.0]])).tolist()
     [True, False, True]
@@ -150,9 +183,19 @@ def _follow(target: Floats, start: Floats, edge_length: float) -> tuple[str, flo
     named = dict(zip(PATCHES, start.tolist(), strict=True))
     at_rest = solve(_initial(edge_length).retensioned(named), "newton", target="stationary").surface
     line = {name: v for name, v in zip(PATCHES, (target - start).tolist(), strict=True) if v}
-    branch = follow(at_rest, Direction(line, relative=True), 1.0, folds=1, steps=STEPS)
-    share = float(branch.points.parameter.max())
-    return {Ending.REACHED: REACHED, Ending.FOLDS: FOLD}.get(branch.ending, SLIP), share
+    points: list[tuple[float, int]] = []
+
+    def watch(progress: Progress) -> None:
+        points.append((progress.row["parameter"], progress.row["index"]))
+        if points[-1][1] > points[0][1] or points[-1][0] < max(points)[0] - BACK:
+            raise StopIteration
+
+    branch = follow(at_rest, Direction(line, relative=True), 1.0, callback=watch, steps=STEPS)
+    if branch.ending is Ending.REACHED:
+        return REACHED, 1.0
+    opened = branch.events[(branch.events.kind == "index")]
+    behind = branch.folds.parameter.max() - opened.parameter
+    return FOLD if (behind <= BACK).any() else SLIP, max(points)[0]
 
 
 @cache
@@ -177,6 +220,7 @@ def table(folder: Folder) -> dict[str, float]:
         "crosses_with_equilibrium": float(crossed.equilibrium.sum()),
         "crosses_unexplained": float((crossed.category == "none found").sum()),
         "equilibria": float(cases.equilibrium.sum()),
+        **{f"fold_{k}": float(v) for k, v in folder.read_table("patch_folds").iloc[-1].items()},
         "sentences_confirmed": float((said.verdict == "confirmed").sum()),
     }
 
@@ -189,21 +233,23 @@ def explained(folder: Folder) -> pd.DataFrame:
     cases["crossed"] = cases.flow_status.isin(FAILED)
     cases["near"] = ~cases.crossed & (cases.flow_gradient_squared < CONVERGED)
     cases["equilibrium"] = (cases.status == "converged") | (cases.ending == REACHED)
-    cases["balanced"] = balanced(cases[list(AXES)].to_numpy())
+    triples = cases[list(AXES)].to_numpy()
+    cases["balanced"], cases["weak"] = balanced(triples), _weak(folder, triples)
     names = list(CATEGORIES)
     tests = [
         cases.equilibrium & (cases.verdict == "saddle"),
         cases.ending == REACHED,
         cases.equilibrium & cases.near,
         cases.equilibrium,
+        cases.weak,
         ~cases.balanced,
         cases.ending == FOLD,
         cases.ending == SLIP,
     ]
-    cases["category"] = np.select(tests, [names[k] for k in (2, 3, 0, 1, 4, 5, 6)], names[7])
+    cases["category"] = np.select(tests, [names[k] for k in (2, 3, 0, 1, 4, 5, 6, 7)], names[8])
     return cases[
-        [*AXES, "crossed", "near", "equilibrium", "balanced", "category", "ending", "share",
-         "verdict", "index", "pinched", "wall_area"]
+        [*AXES, "crossed", "near", "equilibrium", "balanced", "weak", "category", "ending",
+         "share", "verdict", "index", "pinched", "wall_area"]
     ]  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import curve_fit
 from scipy.stats import linregress
 
 from pcmc.arrays import Floats
@@ -53,9 +53,10 @@ def slope(h: Floats, error: Floats) -> Order:
 
 
 def limit_order(h: Floats, values: Floats) -> Order:
-    """p, and the limit Q of Q + C h^p, by least squares on relative steps (Richardson).
+    """p, and the limit Q of Q + C h^p, by least squares (Richardson).
 
-    Values weigh by h^-2, so that coarse meshes, where higher terms count, do not rule the fit.
+    Deviations count relative to h², so that coarse meshes, where higher terms enter, do not rule
+    the fit.
 
     >>> h = 0.5 ** np.arange(5)
     >>> found = limit_order(h, 7.0 - 3.0 * h**2)
@@ -66,24 +67,17 @@ def limit_order(h: Floats, values: Floats) -> Order:
     h, values = h[good] / h[good].max(), values[good]
     if len(h) < 4:
         return UNKNOWN
-    weight = h**-2
+    spread = float(np.ptp(values)) or 1.0
 
-    def parts(p: float) -> tuple[Floats, Floats]:
-        design = np.column_stack([np.ones_like(h), h**p]) * weight[:, None]
-        found: Floats = np.asarray(np.linalg.lstsq(design, values * weight, rcond=None)[0], float)
-        return found, design @ found - values * weight
+    def model(h: Floats, p: float, limit: float, factor: float) -> Floats:
+        return np.asarray(limit + factor * h**p)
 
-    spread = max(float(np.ptp(values)), 1e-300)
-
-    def misfit(p: Floats) -> Floats:
-        return parts(float(p[0]))[1] / spread
-
-    fit = least_squares(misfit, [2.0], bounds=(0.05, 6.0))
-    limit, factor = parts(float(fit.x[0]))[0]
-    # of all three parameters, p's share of the covariance
-    p = float(fit.x[0])
-    jacobian = np.column_stack([np.ones_like(h), h**p, factor * h**p * np.log(h)]) * weight[:, None]
-    scatter = parts(p)[1]
-    variance = float(scatter @ scatter) / (len(h) - 3)
-    covariance = np.linalg.pinv(jacobian.T @ jacobian) * variance
-    return Order(p, float(np.sqrt(covariance[2, 2])), len(h), float(limit))
+    guess = [2.0, values[-1] / spread, (values[0] - values[-1]) / spread]
+    try:
+        found, covariance = curve_fit(
+            model, h, values / spread, guess, sigma=h**2, maxfev=20_000, xtol=1e-14, ftol=1e-14
+        )
+    except RuntimeError:  # no least within so many evaluations: the values follow no such law
+        return UNKNOWN
+    error = float(np.sqrt(covariance[0, 0]))
+    return Order(float(found[0]), error, len(h), float(found[1]) * spread)

@@ -1,0 +1,342 @@
+"""The studies of solvers, stability, refinement and existence: fits, cones, categories, small runs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from generators import four_fans, two_squares
+from pcmc import solve, sweep
+from pcmc.errors import OptionError, SweepError
+from pcmc.quality import triangle_quality
+from pcmc.refine import refine
+from pcmc.solvers.result import Status
+from studies import alpha_grid, alpha_grid_geometric, cases, refinement, solvers, stability
+from studies.alpha_grid_geometric import CATEGORIES, explained, nearest, sentences
+from studies.cases import run_sweep
+from studies.cone import cone
+from studies.folder import Folder
+from studies.orders import limit_order, slope
+from studies.registry import STUDIES, chosen, of_the_paper
+from studies.study import perform
+
+# ------------------------------------------------------------------------------------ registry
+
+
+def test_extras_are_all_that_reproduce_leaves_out():
+    extras, paper = {s.name for s in chosen(["extras"])}, {s.name for s in of_the_paper()}
+    assert extras | paper == set(STUDIES)
+    assert not extras & paper
+    assert {"solvers", "stability", "refinement", "alpha_grid_geometric"} <= extras
+    assert "alpha_grid" in paper
+    with pytest.raises(OptionError, match="did you mean 'extras'"):
+        chosen(["extra"])
+
+
+# -------------------------------------------------------------------------------------- sweeps
+
+HALVES = sweep.Sweep("pcmc.sweep.examples:ratio", {"over": [1, 2, 3]}, {"under": 2})
+
+
+def test_a_sweep_that_was_stopped_goes_on_and_leaves_no_store(tmp_path):
+    folder = Folder(tmp_path)
+    store = tmp_path / "build" / f"halves-{HALVES.fingerprint[:8]}.jsonl"
+    store.parent.mkdir()
+
+    def stop(progress):
+        raise StopIteration
+
+    assert len(sweep.run(HALVES, store, workers=1, on_record=stop)) == 1
+    first = sweep.read_store(store)[0]
+    found = run_sweep(folder, "halves", HALVES, workers=1)
+    assert found["value"].tolist() == [0.5, 1.0, 1.5]
+    times = folder.read_table("halves_times")
+    assert times.wall_time[first.case] == pytest.approx(first.wall_time, abs=6e-4)  # not run again
+    assert not store.parent.exists()
+
+
+def test_an_incomplete_sweep_is_an_error_that_says_how_to_go_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(cases, "run", lambda *_, **__: pd.DataFrame({"value": [0.5]}))
+    with pytest.raises(SweepError, match=r"1 of 3 cases .* run the study again"):
+        run_sweep(Folder(tmp_path), "halves", HALVES)
+
+
+# -------------------------------------------------------------------------------------- orders
+
+
+def test_fitted_slope_and_its_standard_error():
+    h = 0.5 ** np.arange(6)
+    noise = np.exp(0.1 * np.array([1, -1, 1, 1, -1, -1]))
+    found = slope(h, 2.0 * h**1.5 * noise)
+    assert abs(found.order - 1.5) < 3.0 * found.standard_error < 0.3
+    # by the textbook: residual variance over the spread of log h
+    x, y = np.log(h), np.log(2.0 * h**1.5 * noise)
+    left = y - np.polyval(np.polyfit(x, y, 1), x)
+    error = math.sqrt((left @ left) / 4 / ((x - x.mean()) ** 2).sum())
+    assert found.standard_error == pytest.approx(error, rel=1e-9)
+    assert math.isnan(slope(h[:2], h[:2]).order)
+    assert slope(h, np.where(h < 0.1, 0.0, h**2)).points == 4
+
+
+def test_order_towards_an_unknown_limit():
+    h = 0.5 ** np.arange(6)
+    found = limit_order(h, 5.0 + 0.3 * h**1.3)
+    assert found.order == pytest.approx(1.3, abs=1e-5)
+    assert found.limit == pytest.approx(5.0, abs=1e-7)
+    noise = 1.0 + 0.05 * np.random.default_rng(0).standard_normal(6)
+    rough = limit_order(h, 5.0 + 0.3 * h**2 * noise)
+    assert 0.0 < abs(rough.order - 2.0) < 3.0 * rough.standard_error < 0.2
+    assert math.isnan(limit_order(h[:3], h[:3]).order)
+
+
+# ---------------------------------------------------------------------------------------- cone
+
+
+@pytest.mark.parametrize("tensions", [(4.0, 3.0, 4.0), (4.0, 4.0, 2.0), (6.0, 4.0, 6.0)])
+def test_cone_is_in_balance_at_its_crest(tensions):
+    found = cone(tensions, stability.opening())
+    assert found is not None
+    assert sum(found.azimuths) == pytest.approx(stability.opening())
+    crest = np.array([math.cos(found.height), 0.0, math.sin(found.height)])
+    total = np.zeros(3)
+    for sign, azimuth, arc, tension in zip(
+        (1, -1), found.azimuths, found.arcs, tensions, strict=False
+    ):
+        outline = np.array([math.cos(azimuth), sign * math.sin(azimuth), 0.0])
+        assert math.acos(crest @ outline) == pytest.approx(arc)
+        along = outline - (outline @ crest) * crest
+        total += tension * along / np.linalg.norm(along)
+    total += tensions[2] * np.array([math.sin(found.height), 0.0, -math.cos(found.height)])
+    assert np.abs(total).max() < 1e-9
+    assert found.length > max(found.slip)
+
+
+def test_cone_of_equal_patches_has_the_smaller_exponent_of_two():
+    found = cone((4.0, 4.0, 2.0), stability.opening())
+    assert found is not None
+    arc, nu, h = found.arcs[0], found.exponent, found.height
+    sideways = 8.0 * math.cos(found.angles[0]) ** 2 / math.tan(nu * arc) - 2.0 * math.tan(nu * h)
+    assert sideways == pytest.approx(0.0, abs=1e-9)
+    assert nu < math.pi / (2.0 * arc)  # the crest's motion up and down
+
+
+def test_no_cone_without_balance():
+    assert cone((4.0, 3.0, 0.5), stability.opening()) is None
+    assert cone((4.0, 3.0, 7.5), stability.opening()) is None
+    assert cone((6.0, 4.0, 4.0), stability.opening()) is None
+
+
+# ----------------------------------------------------------------------------------- stability
+
+
+def test_critical_wall_is_zero_or_infinite_where_the_sign_does_not_change():
+    walls = np.array([1.0, 2.0, 3.0])
+    assert stability.critical_wall(walls, np.array([-1.0, -2.0, -3.0])) == 0.0
+    assert stability.critical_wall(walls, np.array([3.0, 2.0, 1.0])) == math.inf
+    assert stability.critical_wall(walls, np.array([3.0, np.nan, -1.0])) == pytest.approx(2.5)
+
+
+def test_corner_of_example_2():
+    assert math.degrees(stability.opening()) == pytest.approx(284.478, abs=1e-3)
+    for patch in stability.OUTLINES:
+        centre, radius = stability.OUTLINES[patch]
+        out = np.array(stability.CORNER) - centre
+        assert np.linalg.norm(out) == pytest.approx(radius)
+        assert out @ stability.tangent(patch) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_example_3_turns_into_a_saddle_as_its_walls_pull_harder(tmp_path, monkeypatch):
+    family = stability.Family("fans", "Fans", four_fans, (5,), 20.0, (0.5, 3.0), (5, 3.0))
+    monkeypatch.setattr(stability, "FAMILIES", (family,))
+    monkeypatch.setattr(stability, "CORNER_LENGTHS", (1.2,))
+    perform(stability.STUDY, tmp_path, short=True)
+    folder = Folder(tmp_path / "stability")
+    records = folder.read_table("records")
+    assert records["index"].tolist() == [0, 2]
+    assert folder.read_table("critical").critical_wall.between(2.0, 3.0).all()
+    pushed = folder.read_mesh("fans")["at rest"]
+    assert triangle_quality(pushed.vertices, pushed.faces).min() > 0.5
+    crest = folder.read_table("crest")
+    assert crest.status.eq("converged").all()
+    # the crest is symmetric only if the patches are: here it leans to one side, and is over Π
+    assert crest.height[0] > 20.0
+    for name in ("eigenvalues-fans", "mode-fans", "critical", "crest"):
+        assert folder.figure(name).is_file()
+
+
+# ---------------------------------------------------------------------------------- refinement
+
+
+def test_outline_points_go_to_the_nearest_circle():
+    family = refinement.FAMILIES[1]
+    (xl, _, rl), (xr, _, rr) = family.circles
+    points = np.array([[xl - 1.1 * rl, 0.0, 0.0], [xr + 0.9 * rr, 0.0, 0.0]])
+    found = family.rounded(points)
+    assert np.allclose(found, [[xl - rl, 0, 0], [xr + rr, 0, 0]])
+
+
+def test_moved_is_the_normal_part_only():
+    coarse = two_squares(4, height=1e-9)
+    fine = refine(coarse)
+    assert refinement._moved(coarse, fine) == 0.0
+    up = fine.moved(fine.vertices + np.array([0.3, 0.0, 0.1]))
+    # the wall is upright, its vertices see the move along x; the roofs' see the one along z
+    inside = coarse.topology.interior & ~coarse.fixed
+    wall = np.zeros(coarse.n, dtype=bool)
+    wall[coarse.faces[coarse.patch_of_face == 2]] = True
+    share = wall[inside].mean()
+    expected = math.sqrt(share * 0.3**2 + (1.0 - share) * 0.1**2)
+    assert refinement._moved(coarse, up) == pytest.approx(expected, rel=1e-6)
+
+
+def test_closed_forms_are_met_with_second_order(tmp_path, monkeypatch):
+    monkeypatch.setattr(refinement, "FAMILIES", refinement.FAMILIES[:3])
+    monkeypatch.setattr(refinement, "_alone", refinement.run_family)
+    perform(refinement.STUDY, tmp_path, short=True, steps=["data", "table"])
+    folder = Folder(tmp_path / "refinement")
+    orders = folder.read_table("orders").set_index(["family", "quantity"])
+    for family in ("cap", "joined_caps"):
+        for quantity in ("energy", "position"):
+            assert orders.order[family, quantity] == pytest.approx(2.0, abs=0.2)
+    records = folder.read_table("records")
+    assert records.largest_error_variational.max() < 1e-9
+    assert "seconds" not in records.columns
+    claim = folder.read_table("fig09")
+    assert claim.verdict.tolist() == ["confirmed"]
+    worse = records.assign(largest_error_cotangent=1.0 + records.level)
+    assert refinement._claim(worse)["verdict"] == "not confirmed"
+
+
+# ------------------------------------------------------------------------------------- solvers
+
+
+def test_solvers_side_by_side_on_one_small_mesh(tmp_path, monkeypatch):
+    example = solvers.Example(
+        "small", "Small", lambda n: two_squares(n, alpha_aux=1.0), (4,), 0.005
+    )
+    monkeypatch.setattr(solvers, "EXAMPLES", (example,))
+    perform(solvers.STUDY, tmp_path, short=True)
+    folder = Folder(tmp_path / "solvers")
+    summary = folder.read_table("summary").set_index("method")
+    assert summary.at_rest[solvers.GEOMETRIC] == 1
+    assert summary.at_rest.drop(solvers.GEOMETRIC).eq(0).all()
+    histories = folder.read_table("histories")
+    for _, mine in histories.groupby("method"):
+        assert mine.evaluation.is_monotonic_increasing
+    ends = histories.groupby("method").residual.last()
+    records = folder.read_table("records").set_index("method").residual
+    assert np.allclose(ends[records.index], records, rtol=1e-9)
+    for column in ("seconds", "wall_time"):
+        assert column not in histories.columns
+    assert folder.figure("residual-time").is_file()
+
+
+# ------------------------------------------------------------------------------------- Fig. 16
+
+
+def test_flow_at_three_triples():
+    near = alpha_grid.flow_case(4.0, 4.0, 3.0, 1.2, 200)
+    assert near["status"] == "iteration_limit"
+    assert near["gradient_squared"] < alpha_grid.CONVERGED
+    assert alpha_grid.flow_case(1.0, 1.0, 1.0, 1.2, 200)["status"] == "diverged"
+
+
+def test_branches_start_from_the_nearest_and_no_two_from_the_same_patches():
+    sound = np.array([[8.0, 4.0, 3.0], [6.0, 4.0, 3.0], [1.0, 6.0, 6.0], [12.0, 3.0, 2.0]])
+    chosen_starts = nearest(np.array([6.0, 4.0, 2.0]), sound)
+    # the wall of 12 counts as 3 + 2; log ratios 5/6, 3/4, 1 are less than 1, 1, 3/2
+    assert chosen_starts == [[12.0, 3.0, 2.0], [6.0, 4.0, 3.0], [1.0, 6.0, 6.0]]
+
+
+def test_a_patch_held_all_around_folds_below_half_its_radius():
+    fold = alpha_grid_geometric.patch_fold(1.2, "small")
+    assert 1.7 < fold < 2.0
+    weak = alpha_grid_geometric._initial(1.2).retensioned({"small": 0.9 * fold})
+    assert solve(weak, target="stationary").status is not Status.CONVERGED
+
+
+def test_branches_arrive_or_fold_with_a_way_down_opening():
+    found = alpha_grid_geometric.branch_case([[3.0, 3.0, 2.0], [4.0, 3.0, 2.0]], 1.2)
+    assert found["ending"] == "fold"
+    assert 0.1 < found["share"] < 0.3
+    arrived = alpha_grid_geometric.branch_case([[2.0, 4.0, 4.0], [3.0, 4.0, 4.0]], 1.2)
+    assert arrived["ending"] == "reached"
+    assert [arrived[f"from_{name}"] for name in ("wall", "large", "small")] == [3.0, 4.0, 4.0]
+    # here the branch turns although all ways lead up: the mesh's doing
+    turned = alpha_grid_geometric.branch_case([[3.0, 4.0, 4.0], [2.0, 4.0, 4.0]], 1.2)
+    assert turned["ending"] == "slip"
+
+
+def _records(rows):
+    columns = [*alpha_grid.AXES, "status", "verdict", "flow_status", "flow_gradient_squared"]
+    return pd.DataFrame(rows, columns=columns).assign(
+        index=0, pinched=0, wall_area=1.0, quality=0.5
+    )
+
+
+def test_reason_of_each_case(tmp_path):
+    rest, open_case = ("converged", "stable"), ("stalled", "not_converged")
+    rows = [
+        (4, 4, 3, *rest, "iteration_limit", 1e-3),
+        (4, 4, 4, *rest, "diverged", 1e-3),
+        (4, 6, 6, "converged", "saddle", "iteration_limit", 1e-3),
+        (1, 4, 2, *open_case, "diverged", 1e9),
+        (1, 1, 4, *open_case, "diverged", 1e9),
+        (4, 4, 2, *open_case, "diverged", 1e9),
+        (8, 3, 8, *open_case, "diverged", 1e9),
+        (8, 8, 6, *open_case, "diverged", 1e9),
+        (8, 12, 12, *open_case, "iteration_limit", 5.0),
+    ]
+    folder = Folder(tmp_path)
+    folder.write_table("records", _records(rows))
+    folder.write_table("patch_folds", pd.DataFrame([{"large": 2.9, "small": 1.8}]))
+    branches = [(4, 4, 2, "fold", 0.5), (8, 3, 8, "slip", 0.1), (8, 12, 12, "reached", 1.0)]
+    columns = [*alpha_grid.AXES, "ending", "share"]
+    folder.write_table("branches", pd.DataFrame(branches, columns=columns))
+    found, names = explained(folder), list(CATEGORIES)
+    assert found.category.tolist() == [names[k] for k in (0, 1, 2, 5, 4, 6, 7, 8, 3)]
+    assert found.crossed.sum() == 6
+    assert found.equilibrium.sum() == 4
+
+
+def test_sentences_follow_from_the_cases():
+    def case(wall, large, small, near, crossed=False, there=True, pinched=0):
+        return {"alpha_wall": wall, "alpha_large": large, "alpha_small": small, "near": near,
+                "crossed": crossed, "equilibrium": there, "balanced": abs(large - small) < wall,
+                "pinched": pinched}  # fmt: skip
+
+    listed = [
+        case(1.0, 4.0, 4.0, near=False), case(2.0, 4.0, 3.0, near=True),
+        case(8.0, 8.0, 8.0, near=False, pinched=3),
+        case(1.0, 16.0, 4.0, near=False, there=False),
+        case(4.0, 1.0, 1.0, near=False, crossed=True, there=False),
+    ]  # fmt: skip
+    said = sentences(pd.DataFrame(listed))
+    words = said.verdict.tolist()
+    assert words[3] == words[1] == words[6] == "confirmed"
+    listed[1]["near"], listed[0]["near"] = False, True
+    listed[4]["crossed"], listed[2]["pinched"] = False, 0
+    turned = sentences(pd.DataFrame(listed))
+    assert [turned.verdict[k] for k in (1, 3, 6)] == ["corrected"] * 3
+    assert turned.instead[3]
+
+
+@pytest.mark.slow
+def test_grid_by_the_geometric_solver_end_to_end(tmp_path, monkeypatch):
+    for module in (alpha_grid, alpha_grid_geometric):
+        monkeypatch.setattr(module, "TENSIONS", (1.0, 4.0))
+    monkeypatch.setattr(alpha_grid, "SHORT_ITERATIONS", 200)
+    study = alpha_grid_geometric.STUDY
+    monkeypatch.setattr(
+        alpha_grid_geometric, "_flow", lambda folder, short: alpha_grid.flow_grid(folder, True)
+    )
+    perform(study, tmp_path)
+    folder = Folder(tmp_path / study.name)
+    assert len(folder.read_table("explained")) == 8
+    assert folder.read_table("measured").set_index("key").value[f"{study.name}.crosses"] > 0
+    assert folder.read_table("sentences").verdict.isin(["confirmed", "corrected"]).all()
+    assert folder.figure("existence").stat().st_size <= 150_000
+    assert not (folder.path / "build").exists()
