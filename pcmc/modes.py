@@ -86,7 +86,7 @@ def stiffness(
 def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, ascending, and their modes (k,n,3).
 
-    All negative ones are among them as long as ``count`` exceeds the index by a few. Modes have unit
+    The negative ones are among those sought, so the first is the lowest of all. Modes have unit
     mass: Σ M |v|² = 1. Rigid motions are left out.
     """
     size = len(system.mass)
@@ -104,11 +104,15 @@ def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
     scaled = diags_array(1.0 / root) @ system.matrix @ diags_array(1.0 / root)
     operator = LinearOperator((size, size), inverse, dtype=float)
     start = inverse(np.cos(np.arange(size) * 1.618))  # fixed, so that runs repeat
-    try:
-        vectors = eigsh(operator, k=k, which="LM", v0=start)[1]
-    except ArpackNoConvergence as partial:
-        vectors = np.asarray(partial.eigenvectors, dtype=float)
-    values = np.einsum("ik,ik->k", vectors, scaled @ vectors)
+    while True:
+        try:
+            vectors = eigsh(operator, k=k, which="LM", v0=start)[1]
+        except ArpackNoConvergence as partial:
+            vectors = np.asarray(partial.eigenvectors, dtype=float)
+        values = np.einsum("ik,ik->k", vectors, scaled @ vectors)
+        if np.count_nonzero(values < 0.0) >= system.negative or 2 * k >= size:
+            break
+        k *= 2  # a strongly negative one is farther from zero than some positive ones
     order = np.argsort(values)[:count]
     fields = [system.space.push(vectors[:, i] / root) for i in order]
     return values[order], np.array(fields).reshape(len(order), len(system.space.dimension), 3)
