@@ -9,7 +9,7 @@ import pytest
 from shapes import pyramid
 
 import pcmc
-from generators import double_bubble, joined_caps, spherical_cap
+from generators import double_bubble, joined_caps, spherical_cap, two_caps
 from pcmc import Design, Parameter, Patch, Target, meet, sensitivities
 from pcmc.design import Reach
 from pcmc.errors import OptionError, SurfaceError
@@ -210,6 +210,17 @@ def test_two_apexes_from_wrong_tensions(roof):
     assert len(design.history) == design.solves
     assert design.history["misfit"].iloc[-1] < 1e-6
     assert dataclasses.is_dataclass(design)
+
+
+def test_two_apexes_over_a_wall_that_slides():
+    """Example 2: near the goal the solver stalls on a start that is almost at rest."""
+    targets = [Target("apex", "large", 3.0), Target("apex", "small", 2.0)]
+    design = meet(two_caps(1.2), targets, ["large", "small"])
+    assert design.met
+    assert design.solves <= 15
+    assert design.certificate.certified
+    for target in targets:
+        assert abs(measure(design.surface, target).value - target.value) < 1e-6
 
 
 def test_tensions_too_low_for_any_equilibrium_are_raised_first(roof):
