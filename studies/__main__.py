@@ -44,7 +44,9 @@ def _parser() -> argparse.ArgumentParser:
     act = acts.add_parser("reproduce", help="every study of the paper, then the comparison")
     _running(act)
     act.set_defaults(act=lambda asked: _run(of_the_paper(), asked, STEPS))
-    act = acts.add_parser("benchmark", help="how fast it is on this machine")
+    act = acts.add_parser("benchmark", help="how fast it is on this machine, evolver beside it")
+    act.add_argument("--quick", action="store_true", help="small meshes; within a minute")
+    act.add_argument("--results", type=Path, help="where to write (default: results/)")
     act.set_defaults(act=_benchmark)
     act = acts.add_parser("readme", help="bring the README's tables up to date with results/")
     act.set_defaults(act=_readme)
@@ -88,7 +90,7 @@ def _run(studies: Sequence[Study], asked: argparse.Namespace, steps: Sequence[st
 def _benchmark(asked: argparse.Namespace) -> int:
     from .benchmark import main as benchmark
 
-    return benchmark()
+    return benchmark(asked.results or HOME / "results", asked.quick)
 
 
 def _readme(asked: argparse.Namespace) -> int:

@@ -1,19 +1,20 @@
-"""How fast the compiled loops are on this machine, with vectorised numpy beside them.
+"""How fast everything is on this machine: the compiled loops here, the geometric solver beside.
 
-Each function of ``BENCHMARKS`` returns rows; a new benchmark is a new function and its name there.
+Each function of ``BENCHMARKS`` returns rows, of small cases if asked to be quick; a new benchmark is a
+new function and its name there.
 """
 
 from __future__ import annotations
 
 import os
-import statistics
+import platform
 import sys
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from rich.console import Console
 from rich.table import Table
 
@@ -22,30 +23,27 @@ from pcmc import Surface
 from pcmc.arrays import Floats
 from pcmc.energy import energy_and_gradient
 
-SQUARES = 255  # a side: 260 100 triangles in the two patches
+from .benchmark_solver import SOLVER
+from .folder import Folder, write_json
+from .timing import Row, median_seconds
+
+SQUARES, FEW = 255, 64  # a side: 260 100 triangles in the two patches, or 16 384
 REPEATS = 15
+COLUMNS = ("what", "median", "unit", "asked", "met", "remark")
 
 
-@dataclass(frozen=True)
-class Row:
-    """One line: what was measured, the median of its repeats, and a remark."""
-
-    what: str
-    value: float
-    unit: str
-    remark: str = ""
-
-
-def energy_rate() -> list[Row]:
+def energy_rate(quick: bool) -> list[Row]:
     """Triangles per second of energy and gradient together, on one and on two threads."""
-    surface = two_squares(SQUARES, alpha_aux=1.0)
+    surface = two_squares(FEW if quick else SQUARES, alpha_aux=1.0)
     expected = numpy_energy_and_gradient(surface)
     rows, seconds = [], {}
     for workers in (1, 2):
         found = energy_and_gradient(surface, workers=workers)
         assert np.isclose(found[0], expected[0], rtol=1e-12)
         assert np.allclose(found[1], expected[1], atol=1e-12)
-        seconds[workers] = median_seconds(partial(energy_and_gradient, surface, workers=workers))
+        seconds[workers] = median_seconds(
+            partial(energy_and_gradient, surface, workers=workers), REPEATS
+        )
         rows.append(_rate(f"energy and gradient, {workers} thread(s)", surface, seconds[workers]))
     slow = median_seconds(partial(numpy_energy_and_gradient, surface), repeats=5)
     rows.append(_rate("the same in vectorised numpy", surface, slow))
@@ -54,7 +52,7 @@ def energy_rate() -> list[Row]:
     return rows
 
 
-BENCHMARKS: list[Callable[[], list[Row]]] = [energy_rate]
+BENCHMARKS: list[Callable[[bool], list[Row]]] = [energy_rate, *SOLVER]
 
 
 def numpy_energy_and_gradient(surface: Surface) -> tuple[float, Floats]:
@@ -81,27 +79,35 @@ def numpy_energy_and_gradient(surface: Surface) -> tuple[float, Floats]:
     return energy, gradient
 
 
-def median_seconds(call: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Median wall time of a call, after one that is not counted."""
-    call()
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - start)
-    return statistics.median(times)
-
-
-def main() -> int:
-    """Print every benchmark's rows."""
-    console = Console(width=None if sys.stdout.isatty() else 120)
-    table = Table("what", "median", "unit", "remark")
+def main(results: Path, quick: bool = False) -> int:
+    """Print every benchmark's rows and write them to ``results / "benchmark"``; 1 if one is missed."""
+    console = Console(width=None if sys.stdout.isatty() else 140)
+    console.print(f"{machine()}; wall time, medians of repeats")
+    rows = []
     for benchmark in BENCHMARKS:
-        for row in benchmark():
-            table.add_row(row.what, f"{row.value:.4g}", row.unit, row.remark)
-    console.print(table)
-    console.print(f"{os.cpu_count()} processors; wall time, medians of repeats")
-    return 0
+        found = benchmark(quick)
+        shown = Table(*COLUMNS, title=benchmark.__name__.replace("_", " "))
+        for row in found:
+            shown.add_row(row.what, f"{row.value:.4g}", row.unit, row.asked, row.met, row.remark)
+        console.print(shown)
+        rows += [[row.what, row.value, row.unit, row.asked, row.met, row.remark] for row in found]
+    table = pd.DataFrame(rows, columns=list(COLUMNS))
+    folder, name = Folder(results / "benchmark"), "quick" if quick else "full"
+    folder.write_table(name, table)
+    write_json(folder.path / f"{name}.json", {"machine": machine()})
+    return int((table["met"] == "no").any())
+
+
+def machine() -> str:
+    """Processor, how many, and how busy they are: what times depend on."""
+    load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
+    name = platform.machine()
+    try:
+        with open("/proc/cpuinfo") as file:
+            name = next(line.split(":")[1].strip() for line in file if "model name" in line)
+    except (OSError, StopIteration):
+        pass
+    return f"{os.cpu_count()} × {name}{load}"
 
 
 def _rate(what: str, surface: Surface, seconds: float) -> Row:

@@ -30,11 +30,18 @@ def available() -> bool:
     return shutil.which(PROGRAM) is not None
 
 
-def run(surface: pcmc.Surface, commands: str, timeout: float = 600.0) -> str:
-    """What the program prints for commands (one or more lines) given on the surface."""
+def run(surface: pcmc.Surface, commands: str, timeout: float = 600.0, upright: bool = False) -> str:
+    """What the program prints for commands (one or more lines) given on the surface.
+
+    With ``upright`` volumes are ∫ z dA instead of a third of ∫ ⟨x, ν⟩ dA: the same number where Π is
+    z = 0 and holds the whole boundary, and a Newton step ten times as fast.
+    """
     with tempfile.TemporaryDirectory() as folder:
         datafile = Path(folder) / "surface.fe"
         pcmc.write(datafile, surface)
+        if upright:
+            text = datafile.read_text()
+            datafile.write_text(text.replace("SYMMETRIC_CONTENT\n", "", 1))
         with datafile.open("a") as file:
             file.write(f"\nautodisplay off\n{commands}\nquit\nquit\n")
         try:
@@ -52,9 +59,9 @@ def run(surface: pcmc.Surface, commands: str, timeout: float = 600.0) -> str:
     return done.stdout
 
 
-def energy(surface: pcmc.Surface, commands: str = "") -> float:
+def energy(surface: pcmc.Surface, commands: str = "", upright: bool = False) -> float:
     """The program's ``total_energy``, E of Eq. (20), after the commands, if any."""
-    out = run(surface, commands + '\nprintf "E %.17g\\n", total_energy')
+    out = run(surface, commands + '\nprintf "E %.17g\\n", total_energy', upright=upright)
     return float(_answers(out, "E", 1)[-1, 0])
 
 
@@ -74,9 +81,10 @@ def gradient(surface: pcmc.Surface) -> Floats:
     return apply_supports(surface, -_answers(out, "F", 3))
 
 
-def positions(surface: pcmc.Surface, commands: str) -> Floats:
+def positions(surface: pcmc.Surface, commands: str, upright: bool = False) -> Floats:
     """(n,3) vertices after the commands, which must keep the mesh."""
-    out = run(surface, commands + '\nforeach vertex vv do printf "X %.17g %.17g %.17g\\n", x, y, z')
+    show = '\nforeach vertex vv do printf "X %.17g %.17g %.17g\\n", x, y, z'
+    out = run(surface, commands + show, upright=upright)
     return _answers(out, "X", 3) + np.array(surface.plane.point)
 
 
@@ -103,13 +111,16 @@ def inertia(surface: pcmc.Surface, probe: float = 0.0, normal: bool = True) -> I
     return Inertia(*map(int, found.groups()))
 
 
-def seconds(surface: pcmc.Surface, commands: str, before: str = "", repeat: int = 1) -> Floats:
+def seconds(
+    surface: pcmc.Surface, commands: str, before: str = "", repeat: int = 1, upright: bool = False
+) -> Floats:
     """(repeat,) processor seconds of the commands, by the program's own clock.
 
     ``before`` runs first, untimed. Reading the file is not counted.
     """
     timed = f'clock_was := clock\n{commands}\nprintf "T %.17g\\n", clock - clock_was\n'
-    out = run(surface, "clock_was := 0.0\n" + before + "\n" + timed * repeat, timeout=3600.0)
+    told = "clock_was := 0.0\n" + before + "\n" + timed * repeat
+    out = run(surface, told, timeout=3600.0, upright=upright)
     return _answers(out, "T", 1)[:, 0]
 
 
