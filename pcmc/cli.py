@@ -1,8 +1,84 @@
-"""The pcmc command."""
+"""The ``pcmc`` command: runs one of ``commands``, says errors in a line, and gives the exit code."""
 
 from __future__ import annotations
 
+import os
+import sys
+import warnings
+from collections.abc import Sequence
 
-def main() -> None:
-    """Run the command."""
-    raise SystemExit(2)
+from .errors import FileWarning, FreeSurfaceWarning, MissingExtra, PcmcError
+
+OK, NOT_CERTIFIED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Parameters
+    ----------
+    arguments : of the command line, without the command's own name; by default those given to it.
+
+    Returns
+    -------
+    int : the exit code. 0 for a certified result (or, of a command that certifies nothing, for one that
+        did its work), 1 for a result that is not certified, 2 for bad input, 130 after Ctrl-C.
+
+    >>> main(["certify", "roof.obk"])
+    2
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for kind in (FileWarning, FreeSurfaceWarning):
+            warnings.simplefilter("always", kind)
+        warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")
+        return _run(sys.argv[1:] if arguments is None else list(arguments))
+
+
+def _run(arguments: list[str]) -> int:
+    try:
+        command, exits = _command()
+        code = command(args=arguments, prog_name="pcmc", standalone_mode=False)
+        sys.stdout.flush()
+        return _interrupted() if code == INTERRUPTED else int(code or OK)
+    except KeyboardInterrupt:
+        return _interrupted()
+    except BrokenPipeError:  # the reader of a pipe has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return NOT_CERTIFIED
+    except (PcmcError, MissingExtra, OSError) as error:
+        _say(f"error: {error}")
+        return BAD_INPUT
+    except Exception as error:
+        if isinstance(error, exits.Abort):
+            return _interrupted()
+        if isinstance(error, exits.Exit):
+            return int(error.exit_code)
+        if not hasattr(error, "format_message"):  # those of the command line have it
+            raise
+        _say(f"error: {error.format_message()} (pcmc --help shows what there is)")
+        return BAD_INPUT
+
+
+def _command():  # type: ignore[no-untyped-def]
+    """The command line, and the module with the exceptions that end it."""
+    for library in ("typer", "rich"):
+        try:
+            __import__(library)
+        except ModuleNotFoundError as error:
+            raise MissingExtra(error.name or library, "cli") from None
+    import typer
+
+    from .commands import app
+
+    return typer.main.get_command(app), typer
+
+
+def _interrupted() -> int:
+    _say("stopped")
+    return INTERRUPTED
+
+
+def _say(text: str) -> None:
+    """One line on stderr."""
+    print("pcmc: " + " ".join(text.split()), file=sys.stderr)

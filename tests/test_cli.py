@@ -1,0 +1,227 @@
+"""The command: what it does, says and returns."""
+
+from __future__ import annotations
+
+import builtins
+import subprocess
+import sys
+
+import pandas as pd
+import pytest
+
+import pcmc
+from pcmc import cli
+from tests.test_project import SMALL
+
+COMMANDS = ["solve", "certify", "remesh", "convert", "plot", "sweep", "explore"]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "roof.toml").write_text(SMALL, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture
+def solved(folder, capsys):
+    assert cli.main(["solve", "roof.toml"]) == 0
+    capsys.readouterr()
+    return folder
+
+
+def test_help_shows_every_command(capsys):
+    assert cli.main(["--help"]) == 0
+    out = capsys.readouterr().out
+    assert all(f"  {name} " in out for name in COMMANDS)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_shows_an_example(name, capsys):
+    assert cli.main([name, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert f"    pcmc {name} " in out
+    assert "\x1b" not in out
+    assert "─" not in out
+
+
+def test_solve_a_project(folder, capsys):
+    assert cli.main(["solve", "roof.toml", "--picture", "roof.png"]) == 0
+    out, err = capsys.readouterr()
+    assert "stable: at rest" in out
+    assert "written: roof.pcmc, roof.obj, roof.png" in out
+    assert err == ""
+    assert sorted(p.name for p in folder.iterdir()) == [
+        "roof.obj",
+        "roof.pcmc",
+        "roof.png",
+        "roof.toml",
+    ]
+
+
+def test_solve_a_surface_with_other_tensions(solved, capsys):
+    assert (
+        cli.main(["solve", "roof.pcmc", "--tension", "9", "--tension", "roof=3", "-o", "b.pcmc"])
+        == 0
+    )
+    low, high = pcmc.read("b.pcmc"), pcmc.read("roof.pcmc")
+    assert low.patches[0].tension == 3.0
+    assert low.vertices[:, 2].max() < high.vertices[:, 2].max()
+    assert cli.main(["solve", "b.pcmc", "--pressure", "roof=1.5", "--method", "lbfgs"]) in (0, 1)
+    assert "lbfgs: " in capsys.readouterr().out
+
+
+def test_not_certified_is_1_and_writes_nothing_unless_asked(folder, capsys):
+    arguments = ["solve", "roof.toml", "--tension", "0.3", "-o", "x.obj"]
+    assert cli.main(arguments) == 1
+    assert "nothing written" in capsys.readouterr().out
+    assert not (folder / "x.obj").exists()
+    assert cli.main([*arguments, "--anyway"]) == 1
+    assert (folder / "x.obj").exists()
+
+
+def test_certify(solved, capsys):
+    assert cli.main(["certify", "roof.pcmc"]) == 0
+    assert "Morse index" in capsys.readouterr().out
+    assert cli.main(["certify", "roof.pcmc", "--tension", "2.5"]) == 1
+    assert "not converged" in capsys.readouterr().out
+
+
+def test_remesh_solves_again(solved, capsys):
+    assert cli.main(["remesh", "roof.pcmc", "--edge-length", "0.5", "-o", "fine.pcmc"]) == 0
+    assert pcmc.certify(pcmc.read("fine.pcmc")).certified
+    assert pcmc.read("fine.pcmc").m > 2 * pcmc.read("roof.pcmc").m
+    assert (
+        cli.main(["remesh", "roof.pcmc", "--edge-length", "0.5", "--no-solve", "-o", "f.ply"]) == 0
+    )
+    assert "not solved" in capsys.readouterr().out
+
+
+def test_convert_and_plot(solved, capsys):
+    assert cli.main(["convert", "roof.pcmc", "roof.ply"]) == 0
+    assert pcmc.read("roof.ply").m == pcmc.read("roof.pcmc").m
+    for more in (["--colour", "error"], ["--view", "30,20", "--color", "curvature"], []):
+        (solved / "p.png").unlink(missing_ok=True)
+        assert cli.main(["plot", "roof.pcmc", "p.png", *more]) == 0
+        assert (solved / "p.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_sweep(folder, capsys):
+    given = [
+        "sweep",
+        "generators:two_squares",
+        "alpha_aux=0.5,1",
+        "--workers",
+        "1",
+        "--csv",
+        "t.csv",
+    ]
+    assert cli.main([*given, "--store", "s.jsonl"]) == 0
+    assert pd.read_csv("t.csv")["alpha_aux"].tolist() == [0.5, 1.0]
+    assert cli.main([*given, "--store", "s.jsonl"]) == 0  # nothing is left to do
+    assert cli.main([*given, "--method", "nesterov", "iterations=2"]) == 1
+    assert "stable" in capsys.readouterr().out
+
+
+def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
+    seen = []
+    monkeypatch.setattr("pcmc.explore.serve", lambda *given: seen.append(given))
+    assert cli.main(["explore", "roof.pcmc", "--no-browser"]) == 0
+    assert (
+        cli.main(["explore", "--example", "two_squares", "--set", "alpha_aux=1", "--port", "8"])
+        == 0
+    )
+    assert seen[0][1:] == ("127.0.0.1", 0, False, "roof.pcmc")
+    assert seen[1][1:] == ("127.0.0.1", 8, True, "two_squares")
+    assert seen[1][0].patches
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "Missing command"),
+        (["slove"], "No such command"),
+        (["solve"], "Missing argument"),
+        (["solve", "none.obj"], "none.obj: cannot be read"),
+        (["solve", "none.toml"], "none.toml: cannot be read"),
+        (["solve", "roof.toml", "-o", "x.obk"], "did you mean '.obj'"),
+        (["solve", "roof.toml", "--method", "newtn"], "did you mean 'newton'"),
+        (["solve", "roof.toml", "--target", "minimal"], "minimum"),
+        (["solve", "roof.toml", "--tension", "rof=1"], "did you mean 'roof'"),
+        (["solve", "roof.toml", "--tension", "roof=x"], "--tension: expected NAME=NUMBER"),
+        (["remesh", "roof.toml", "--edge-length", "-1", "-o", "x.obj"], "edge_length"),
+        (["convert", "roof.toml", "away/x.obj"], "cannot be written"),
+        (["plot", "roof.toml", "x.jpg"], ".png"),
+        (["plot", "roof.toml", "x.png", "--colour", "eror"], "did you mean 'error'"),
+        (["sweep", "generators:two_squares", "alpha_aux"], "expected NAME=VALUE"),
+        (["sweep", "generators:two_square", "alpha_aux=1,2"], "cannot be found"),
+        (["sweep", "generators:two_squares", "alpa=1,2"], "unknown parameter"),
+        (
+            ["sweep", "generators:two_squares", "alpha_aux=1,2", "--csv", "x.txt"],
+            ".csv or .parquet",
+        ),
+        (["explore"], "give a file or --example"),
+        (["explore", "--example", "two_square"], "two_square"),
+        (["explore", "--example", "two_squares", "--set", "a=1"], "'a'"),
+    ],
+)
+def test_bad_input_is_2_in_one_line(folder, capsys, arguments, message):
+    assert cli.main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("pcmc: error: ")
+    assert err.count("\n") == 1
+    assert message in err
+    assert [p.name for p in folder.iterdir()] == ["roof.toml"]
+
+
+def test_notes_are_one_line(solved, capsys):
+    (solved / "q.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", encoding="utf-8"
+    )
+    assert cli.main(["convert", "q.obj", "q.ply"]) == 0
+    err = capsys.readouterr().err
+    assert err.startswith("pcmc: note: q.obj: ")
+    assert err.count("\n") == 1
+
+
+def test_interrupted_is_130(folder, monkeypatch, capsys):
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pcmc.project.solve", stop)
+    assert cli.main(["solve", "roof.toml"]) == 130
+    assert capsys.readouterr().err.strip().endswith("pcmc: stopped")
+    assert [p.name for p in folder.iterdir()] == ["roof.toml"]
+
+
+def test_without_typer_the_extra_is_named(monkeypatch, capsys):
+    real = builtins.__import__
+
+    def without(name, *rest, **more):
+        if name == "typer":
+            raise ModuleNotFoundError("No module named 'typer'", name="typer")
+        return real(name, *rest, **more)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    assert cli.main(["--help"]) == 2
+    err = capsys.readouterr().err
+    assert "pcmc[cli]" in err
+    assert err.count("\n") == 1
+
+
+def test_a_mistake_of_our_own_is_not_hidden(folder, monkeypatch):
+    def broken(*_, **__):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("pcmc.project.solve", broken)
+    with pytest.raises(ZeroDivisionError):
+        cli.main(["solve", "roof.toml"])
+
+
+def test_as_a_process(folder):
+    code = "import sys; from pcmc.cli import main; sys.exit(main())"
+    run = [sys.executable, "-c", code, "certify", "none.obj"]
+    done = subprocess.run(run, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "pcmc: error: none.obj: cannot be read (No such file or directory)\n"

@@ -1,0 +1,219 @@
+"""Project files: a whole design from one file, every key and value checked, output whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import pcmc
+from pcmc.errors import FileError, OptionError
+from pcmc.project import build, check_outputs, load, run
+
+ROOF = Path(__file__).resolve().parent.parent / "notebooks" / "roof.toml"
+SMALL = """
+[plan]
+edge_length = 1.0
+outline = [[0, 0], [4, 0], [4, 3], [0, 3]]
+patches = {roof = {tension = 2.0}}
+
+[solve]
+method = "newton"
+
+[output]
+files = ["roof.pcmc", "roof.obj"]
+"""
+
+
+@pytest.fixture
+def small(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL, encoding="utf-8")
+    return path
+
+
+def changed(path, old, new):
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return path
+
+
+@pytest.mark.slow
+def test_the_example_gives_certified_files_and_a_picture(tmp_path):
+    assert len(ROOF.read_text(encoding="utf-8").splitlines()) <= 30
+    steps = []
+    outcome = run(ROOF, tmp_path / "out", steps.append)
+    assert outcome.good
+    assert outcome.certificate.verdict is pcmc.Verdict.STABLE
+    found = sorted(p.name for p in (tmp_path / "out").iterdir())
+    assert found == ["roof.3dm", "roof.glb", "roof.obj", "roof.png"]
+    assert sorted(p.name for p in outcome.files) == found
+    names = [p.name for p in outcome.surface.patches]
+    assert names == ["corner", "north", "east", "wall 1", "wall 2", "wall 3"]
+    for name in ("roof.3dm", "roof.obj", "roof.glb"):
+        back = pcmc.read(tmp_path / "out" / name)
+        assert sorted(p.name for p in back.patches) == sorted(names)
+        assert back.m == outcome.surface.m
+    assert {s.split()[0] for s in steps} >= {
+        "meshing",
+        "solving:",
+        "certifying",
+        "writing",
+        "drawing",
+    }
+
+
+def test_the_native_file_keeps_supports_and_tensions(small):
+    outcome = run(small)
+    back = pcmc.read(small.parent / "roof.pcmc")
+    assert back.patches == outcome.surface.patches
+    assert (back.fixed == outcome.surface.fixed).all()
+    assert pcmc.certify(back).certified
+
+
+def test_build_only_meshes(small):
+    assert pcmc.certify(build(small)).verdict is pcmc.Verdict.NOT_CONVERGED
+    assert [p.name for p in small.parent.iterdir()] == ["small.toml"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "near"),
+    [
+        ("[output]", "[outptu]", 10, "output"),
+        ("edge_length", "edge_lenght", 3, "edge_length"),
+        ("method =", "metod =", 8, "method"),
+        ('"newton"', '"newton"\ntoleranse = 1e-9', 9, "tolerance"),
+        ("files =", "file =", 11, "files"),
+        ("tension =", "tensoin =", 5, "tension"),
+        ("[solve]", "[[plan.holes]]\ncurve = []\nedg = 1\n[solve]", 9, "edge"),
+        ("[solve]", "[[plan.dividers]]\ncurve = []\nbotom = 1\n[solve]", 9, "bottom"),
+        ("[solve]", "[plan.plane]\nnormall = [0, 0, 1]\n[solve]", 8, "normal"),
+    ],
+)
+def test_an_unknown_key_is_named_with_its_line_and_the_nearest(small, old, new, line, near):
+    with pytest.raises(FileError) as caught:
+        load(changed(small, old, new))
+    text = str(caught.value)
+    assert text.startswith(f"{small}: line {line}: unknown ")
+    assert f"did you mean '{near}'?" in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[plan]", "[plan", "at line 2"),
+        ('"newton"', '"newtn"', "did you mean 'newton'"),
+        ('"newton"', '"newton"\niterations = -1', "iterations"),
+        ("edge_length = 1.0", "edge_length = -1.0", "edge_length"),
+        ("outline = [[0, 0], [4, 0], [4, 3], [0, 3]]", "", "needs an outline"),
+        ('files = ["roof.pcmc", "roof.obj"]', 'files = "roof.obj"', "list of names"),
+        ("files =", "picture = 3\nfiles =", "picture"),
+        ("files =", 'colour = "eror"\nfiles =', "did you mean 'error'"),
+        ("[output]", "[output.files]", "list of names|unknown"),
+        ("[plan]", "solve = 3\n[plan]", "twice|must be a table|Cannot"),
+    ],
+)
+def test_a_bad_value_is_told_in_a_line(small, old, new, message):
+    with pytest.raises(FileError, match=message) as caught:
+        load(changed(small, old, new))
+    assert str(caught.value).startswith(f"{small}: ")
+
+
+def test_a_section_that_is_no_table(tmp_path):
+    path = tmp_path / "p.toml"
+    path.write_text("plan = 3", encoding="utf-8")
+    with pytest.raises(FileError, match="line 1: plan must be a table"):
+        load(path)
+
+
+def test_files_that_are_none(tmp_path):
+    with pytest.raises(FileError, match="cannot be read"):
+        load(tmp_path / "none.toml")
+    (tmp_path / "p.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(FileError, match="byte 0 is not text"):
+        load(tmp_path / "p.toml")
+    (tmp_path / "p.toml").write_text("", encoding="utf-8")
+    with pytest.raises(FileError, match=r"needs a \[plan\]"):
+        load(tmp_path / "p.toml")
+
+
+def test_a_crossing_outline_names_the_file(small):
+    changed(small, "[4, 3], [0, 3]", "[0, 3], [4, 3]")
+    with pytest.raises(pcmc.errors.PlanError, match=r"small\.toml: "):
+        build(small)
+
+
+def test_nothing_is_written_when_a_later_file_fails(small, monkeypatch):
+    (small.parent / "roof.pcmc").write_text("as before", encoding="utf-8")
+    from pcmc.io import obj
+
+    def broken(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(obj, "write", broken)
+    with pytest.raises(FileError, match=r"roof\.obj: cannot be written \(No space left"):
+        run(small)
+    assert sorted(p.name for p in small.parent.iterdir()) == ["roof.pcmc", "small.toml"]
+    assert (small.parent / "roof.pcmc").read_text(encoding="utf-8") == "as before"
+
+
+def test_nothing_is_written_when_not_certified_unless_asked(small):
+    changed(small, "tension = 2.0", "tension = 0.3")
+    outcome = run(small)
+    assert not outcome.good
+    assert outcome.files == ()
+    assert [p.name for p in small.parent.iterdir()] == ["small.toml"]
+    assert len(run(small, anyway=True).files) == 2
+
+
+def test_output_names_are_checked_before_any_work(tmp_path):
+    (tmp_path / "a.obj").mkdir()
+    with pytest.raises(FileError, match="is a folder"):
+        check_outputs([tmp_path / "a.obj"])
+    with pytest.raises(FileError, match="named twice"):
+        check_outputs([tmp_path / "b.obj", tmp_path / "b.obj"])
+    with pytest.raises(FileError, match=r"did you mean '.obj'"):
+        check_outputs([tmp_path / "b.obk"])
+
+
+def test_a_folder_that_is_not_there(small):
+    changed(small, '"roof.obj"', '"away/roof.obj"')
+    with pytest.raises(FileError, match="there is no folder"):
+        run(small)
+    assert [p.name for p in small.parent.iterdir()] == ["small.toml"]
+
+
+def test_targets_are_met(small):
+    aim = '[targets]\nmeet = [{quantity = "apex", of = "roof", value = 0.6}]\nvary = ["roof"]\n\n[output]'
+    outcome = run(changed(small, "[output]", aim))
+    assert outcome.design is not None
+    assert outcome.good
+    assert outcome.surface.vertices[:, 2].max() == pytest.approx(0.6, abs=1e-6)
+    assert pcmc.read(small.parent / "roof.pcmc").patches == outcome.surface.patches
+
+
+@pytest.mark.parametrize(
+    ("targets", "message"),
+    [
+        ('meet = [{quantity = "apex", value = 1.0}]', "needs both"),
+        ('meet = [{of = "roof", value = 1.0}]\nvary = ["roof"]', "needs the key 'quantity'"),
+        ('meet = [{quantity = "apx"}]\nvary = ["roof"]', "did you mean 'apex'"),
+        ('meet = [{quantity = "apex", valu = 1.0}]\nvary = ["roof"]', "line 11: .*'value'"),
+        ('meet = []\nvaryy = ["roof"]', "line 12: .*did you mean 'vary'"),
+    ],
+)
+def test_bad_targets(small, targets, message):
+    with pytest.raises(FileError, match=message):
+        load(changed(small, "[output]", f"[targets]\n{targets}\n[output]"))
+
+
+def test_targets_for_a_patch_that_is_not_there_and_another_method(small):
+    aim = '[targets]\nmeet = [{quantity = "apex", of = "rof", value = 0.6}]\nvary = ["roof"]\n[output]'
+    changed(small, "[output]", aim)
+    with pytest.raises(OptionError, match=r"small\.toml: unknown patch 'rof'; did you mean 'roof'"):
+        run(small)
+    changed(small, '"newton"', '"lbfgs"')
+    with pytest.raises(OptionError, match="with method 'newton' only"):
+        run(small)
