@@ -396,7 +396,7 @@ def _example(name: str, parameters: dict[str, Any]) -> Surface:
 
 
 def _report(found: Certificate, written: list[Path]) -> None:
-    print(f"{found.verdict.value}\n{found.detail}")
+    print(*filter(None, (found.verdict.value, found.detail)), sep="\n")
     if written:
         print(f"written: {_names(written)}")
 
