@@ -1,0 +1,94 @@
+"""The benchmarks run and describe themselves; their times are not judged here."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from generators import two_squares
+from pcmc import hessian
+from pcmc.motion import motion_space, structure
+from studies import benchmark, benchmark_solver, evolver
+from studies.__main__ import main
+from studies.benchmark_solver import Step
+from studies.timing import Row, median, median_seconds
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Every benchmark at its least."""
+    monkeypatch.setattr(benchmark, "FEW", 3)
+    monkeypatch.setattr(benchmark, "REPEATS", 1)
+    monkeypatch.setattr(benchmark_solver, "QUICK", 4)
+    monkeypatch.setattr(benchmark_solver, "DESIGN", 3)
+    monkeypatch.setattr(benchmark_solver, "SCRIPT_STEPS", 1)
+
+
+@pytest.mark.slow
+def test_the_quick_form_prints_and_writes(small, tmp_path, capsys):
+    code = main(["benchmark", "--quick", "--results", str(tmp_path)])
+    table = pd.read_csv(tmp_path / "benchmark" / "quick.csv", keep_default_na=False)
+    assert list(table.columns) == ["what", "median", "unit", "asked", "met", "remark"]
+    assert code == int((table["met"] == "no").any())
+    shown = capsys.readouterr().out
+    for what in table["what"]:
+        assert what.split(",")[0].split(":")[0] in shown
+    assert {"Newton step, superlu", "peak memory", "initial shape to rest"} <= set(table["what"])
+    numbers = pd.to_numeric(table["median"], errors="coerce")
+    assert (numbers.dropna() > 0.0).all()
+    if evolver.available():
+        assert numbers.notna().all()
+    assert "machine" in json.loads((tmp_path / "benchmark" / "quick.json").read_text())
+
+
+def test_a_step_is_newtons():
+    surface = two_squares(4, alpha_aux=1.0)
+    space = motion_space(surface, structure(surface), surface.vertices)
+    B = np.stack([space.push(e).ravel() for e in np.eye(space.size)], axis=1)
+    forces = benchmark_solver.energy_and_gradient(surface, surface.vertices)[1].ravel()
+    expected = -B @ np.linalg.solve(B.T @ hessian(surface).toarray() @ B, B.T @ forces)
+    for backend in benchmark_solver.available():
+        step = Step(surface, backend)
+        np.testing.assert_allclose(step().ravel(), expected, atol=1e-10 * np.abs(expected).max())
+        np.testing.assert_array_equal(step(), step())
+
+
+@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+def test_the_programs_faster_form_has_the_same_energy_and_steps():
+    surface = two_squares(4, alpha_aux=1.0)
+    for commands in ("", "g 5", "hessian_normal on\nhessian"):
+        plain = evolver.energy(surface, commands)
+        assert evolver.energy(surface, commands, upright=True) == pytest.approx(plain, rel=1e-12)
+
+
+def test_without_the_program_the_rows_say_so(small, monkeypatch):
+    monkeypatch.setattr(evolver, "PROGRAM", "no-such-program")
+    rows = benchmark_solver.newton_steps(True) + benchmark_solver.from_start_to_rest(True)
+    theirs = [row for row in rows if "no-such-program" in row.what or "script" in row.what]
+    assert theirs
+    assert all(np.isnan(row.value) for row in theirs)
+    assert "evolver is not installed" in theirs[-1].remark
+
+
+def test_without_the_fast_backend_the_rows_say_so(small, monkeypatch):
+    monkeypatch.setattr(benchmark_solver, "available", lambda: ("superlu",))
+    rows = {row.what: row for row in benchmark_solver.newton_steps(True)}
+    assert rows["Newton step, pardiso"].remark == "not installed"
+    assert rows["Newton step, superlu"].value > 0.0
+
+
+def test_rows_know_what_is_asked():
+    assert Row("a", 2.0, "s").met == Row("a", 2.0, "s").asked == ""
+    assert Row("a", 2.0, "s", least=2.0).met == "yes"
+    assert Row("a", 1.9, "s", least=2.0).met == "no"
+    assert Row("a", 1.9, "s", most=2.0).asked == "≤ 2"
+    assert Row("a", np.nan, "s", most=2.0).met == ""
+    assert median([3.0, 1.0, 2.0]) == 2.0
+    calls = []
+    assert median_seconds(lambda: calls.append(1), 4) >= 0.0
+    assert len(calls) == 5  # the first is not counted
+
+
+def test_memory_of_this_process_is_known():
+    assert 1e7 < benchmark_solver._peak_bytes() < 1e12
