@@ -165,7 +165,7 @@ def remesh_(
                 write(path, surface)
             print(f"{surface.m} triangles, not solved; written: {_names(output)}")
             return OK
-        result = solve(surface, callback=projects.reporter(say))
+        result = projects.uninterrupted(solve(surface, callback=projects.reporter(say)))
         say("certifying")
         written = (
             projects.save(result, output, progress=say) if result.certificate.certified else []

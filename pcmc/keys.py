@@ -47,13 +47,22 @@ def check_keys(path: Path, text: str, data: Mapping[str, Any]) -> None:
     for section in data:
         check((section,), data[section], _section_keys(section, data[section]))
     plan = data.get("plan", {})
+    for name in ("dividers", "holes", "supports"):
+        _check_list(path, text, ("plan",), plan, name)
+    for name in ("meet", "vary"):
+        _check_list(path, text, ("targets",), data.get("targets", {}), name)
+    if "patches" in plan:
+        check(
+            ("plan", "patches"),
+            plan["patches"],
+            list(plan["patches"]) if isinstance(plan["patches"], Mapping) else [],
+        )
     for name, kind in (("dividers", Divider), ("holes", Hole)):
         for entry in tables(plan.get(name)):
             if "curve" in entry:  # else it is a curve itself
                 check(("plan", name), entry, _keys(kind))
-    if isinstance(plan.get("patches"), Mapping):
-        for name, area in plan["patches"].items():
-            check(("plan", "patches", name), area, [k for k in _keys(Area) if k != "name"])
+    for name, area in plan.get("patches", {}).items():
+        check(("plan", "patches", name), area, [k for k in _keys(Area) if k != "name"])
     if "plane" in plan:
         check(("plan", "plane"), plan["plane"], _keys(Plane))
     if "targets" in data:
@@ -62,6 +71,14 @@ def check_keys(path: Path, text: str, data: Mapping[str, Any]) -> None:
         for name, aim in (("meet", Target), ("vary", Parameter)):
             for entry in tables(data["targets"].get(name)):
                 check(("targets", name), entry, _keys(aim))
+
+
+def _check_list(
+    path: Path, text: str, place: tuple[str, ...], table: Mapping[str, Any], key: str
+) -> None:
+    if not isinstance(table.get(key, []), list):
+        line = _line(text, place, key)
+        raise FileError(f"{path}: line {line}: {key} must be a list, found {table[key]!r:.60}")
 
 
 def _section_keys(section: str, table: Any) -> list[str]:

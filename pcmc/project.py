@@ -39,7 +39,7 @@ from .files import whole
 from .keys import check_keys, options_of, tables
 from .plan import Plan, plan_from
 from .solvers import solve
-from .solvers.result import Progress, Result
+from .solvers.result import Progress, Result, Status
 from .surface import Surface
 
 if TYPE_CHECKING:
@@ -48,6 +48,11 @@ if TYPE_CHECKING:
 
 PathLike = str | os.PathLike[str]
 Say = Callable[[str], object]
+WRONG_KIND = (
+    TypeError,
+    ValueError,
+    AttributeError,
+)  # what a text for a number and the like lead to
 COLOURS = ("patches", "curvature", "error")
 
 
@@ -127,6 +132,8 @@ def load(path: PathLike) -> Project:
         return _project(path, data)
     except PcmcError as error:
         raise FileError(f"{path}: {error}") from None
+    except WRONG_KIND as error:
+        raise FileError(f"{path}: a value of the wrong kind ({error})") from None
 
 
 def build(path: PathLike) -> Surface:
@@ -142,6 +149,8 @@ def surface_of(project: Project) -> Surface:
         return project.plan.surface()
     except PcmcError as error:
         raise type(error)(f"{project.path}: {error}") from None
+    except WRONG_KIND as error:
+        raise FileError(f"{project.path}: a value of the wrong kind ({error})") from None
 
 
 def run(
@@ -193,12 +202,19 @@ def settle(
             design = _aim(project, surface, say)
             result = design.result
         else:
-            result = solve(surface, project.method, reporter(say), **project.options)
+            result = uninterrupted(solve(surface, project.method, reporter(say), **project.options))
     except PcmcError as error:
         raise type(error)(f"{project.path}: {error}") from None
     say("certifying")
     result.certificate  # noqa: B018 — computed here, while the progress is shown
     return result, design
+
+
+def uninterrupted(result: Result) -> Result:
+    """The result; a solver answers Ctrl-C with the best surface so far, a command is to end."""
+    if result.status is Status.STOPPED:
+        raise KeyboardInterrupt
+    return result
 
 
 def reporter(say: Say) -> Callable[[Progress], None]:

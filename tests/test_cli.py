@@ -225,3 +225,20 @@ def test_as_a_process(folder):
     done = subprocess.run(run, capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "pcmc: error: none.obj: cannot be read (No such file or directory)\n"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["solve", "roof.toml"], ["remesh", "roof.toml", "--edge-length", "0.8", "-o", "a.obj"]],
+)
+def test_ctrl_c_while_solving_is_130_and_writes_nothing(folder, monkeypatch, capsys, command):
+    def pressed(say):
+        def report(state):
+            raise KeyboardInterrupt  # solvers keep it and return their best surface
+
+        return report
+
+    monkeypatch.setattr("pcmc.project.reporter", pressed)
+    assert cli.main(command) == 130
+    assert capsys.readouterr() == ("", "pcmc: stopped\n")
+    assert [p.name for p in folder.iterdir()] == ["roof.toml"]

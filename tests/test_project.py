@@ -121,6 +121,37 @@ def test_a_bad_value_is_told_in_a_line(small, old, new, message):
     assert str(caught.value).startswith(f"{small}: ")
 
 
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("dividers = 3", r"line 3: dividers must be a list, found 3"),
+        ("holes = {curve = 3}", r"line 3: holes must be a list"),
+        ('supports = "x"', r"line 3: supports must be a list"),
+        ("patches = 3", r"line 3: plan\.patches must be a table, found 3"),
+        ("patches = {roof = 3}", r"plan\.patches\.roof must be a table, found 3"),
+        ('patches = {roof = {tension = 2.0, at = "b"}}', "wrong kind"),
+        ('patches = {roof = {tension = "b"}}', "tension must be a number"),
+        ('holes = [{curve = {circle = {centre = [1, 1], radius = "x"}}}]', "wrong kind"),
+        ('dividers = [{curve = [[2, 0], [2, 3]], wall = "a"}]\ntension = 2.0', "tension"),
+        ("outline = 3", "outline"),
+        ('rise = "x"', "rise"),
+        ("plane = {normal = 3}", "normal"),
+    ],
+)
+def test_values_of_the_wrong_kind(tmp_path, line, message):
+    path = tmp_path / "p.toml"
+    rest = ["edge_length = 1.0"]
+    if not line.startswith("outline"):
+        rest.append("outline = [[0, 0], [4, 0], [4, 3], [0, 3]]")
+    if not line.startswith(("patches", "dividers = [")):
+        rest.append("patches = {roof = {tension = 2.0}}")
+    path.write_text("\n".join(["[plan]", "edge = 'fixed'", line, *rest]), encoding="utf-8")
+    with pytest.raises(pcmc.errors.PcmcError, match=message) as caught:
+        build(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)
+
+
 def test_a_section_that_is_no_table(tmp_path):
     path = tmp_path / "p.toml"
     path.write_text("plan = 3", encoding="utf-8")
