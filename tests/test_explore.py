@@ -255,6 +255,32 @@ def test_each_page_gets_its_own_draft(client):
     np.testing.assert_array_equal(same["vertices"], arrays["vertices"])
 
 
+def test_many_pages_at_once_do_not_mix(client, explorer):
+    wanted = [11.0, 12.0, 13.0, 14.0, 15.0, 16.0]
+    seen = {}
+
+    def user(value):
+        name = client.ask("/api/open")[0]["draft"]
+        for part in (0.3, 0.6):
+            step = 10.0 + part * (value - 10.0)
+            client.ask(f"/api/{name}/follow", {"tensions": {"left wall": step}})
+        seen[value] = client.ask(f"/api/{name}/settle", {"tensions": {"left wall": value}})
+
+    users = [threading.Thread(target=user, args=(value,)) for value in wanted]
+    for thread in users:
+        thread.start()
+    for thread in users:
+        thread.join()
+    for value in wanted:
+        header, _ = seen[value]
+        assert header["shown"][3]["tension"] == value
+        assert header["verdict"]["name"] == "stable"
+        alone = pcmc.solve(explorer.beginning.surface.retensioned({"left wall": value}))
+        assert header["findings"]["energy"] == pytest.approx(alone.energy, rel=1e-4)
+    energies = [seen[value][0]["findings"]["energy"] for value in wanted]
+    assert energies == sorted(energies)  # a stronger wall costs more
+
+
 def test_what_is_drawn_is_the_surface(client, explorer):
     header, arrays = client.ask("/api/open")
     surface = explorer.beginning.surface

@@ -21,6 +21,7 @@ from ..surface import Patch, Surface
 AT_REST = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.SADDLE)
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
 SETTLE: dict[str, Any] = {"iterations": 40, "tolerance": 1e-11}  # when it is let go
+GLANCE = 1.0  # seconds that following may take, and as many again for each 50 000 triangles
 PATIENCE = 6.0  # seconds that settling may take
 SMALLEST = 1.0 / 64.0  # part of the way below which settling is not cut up further
 STEPS_KEPT = 200
@@ -103,7 +104,9 @@ class Draft:
         """Towards these tensions and pressures while a slider moves: as far as two quick attempts lead."""
 
         def act(stop: Callable[[], bool]) -> None:
-            way = reach(self.surface, self._wanted(values), stop, attempts=2, **FOLLOW)
+            asked = self._wanted(values)
+            end = time.monotonic() + GLANCE * (1.0 + asked.m / 50_000)
+            way = reach(self.surface, asked, until(stop, end), attempts=2, **FOLLOW)
             if stop():
                 return
             if way.found is not None:
@@ -121,7 +124,7 @@ class Draft:
 
         def act(stop: Callable[[], bool]) -> None:
             asked, end = self._wanted(values), time.monotonic() + PATIENCE
-            way = reach(self.surface, asked, lambda: stop() or time.monotonic() > end, **SETTLE)
+            way = reach(self.surface, asked, until(stop, end), **SETTLE)
             if stop():
                 return
             if way.found is not None:
@@ -136,9 +139,7 @@ class Draft:
 
         def act(stop: Callable[[], bool]) -> None:
             end = time.monotonic() + PATIENCE
-            result = attempt(
-                self.surface, lambda: stop() or time.monotonic() > end, target="minimum"
-            )
+            result = attempt(self.surface, until(stop, end), target="minimum")
             found = certify(result.surface, status=result.status.name)
             if stop():
                 return
@@ -224,6 +225,11 @@ class Draft:
             self.surface, self._found, self._asked, self._trouble, self._place + self._astray, after,
             superseded,
         )  # fmt: skip
+
+
+def until(stop: Callable[[], bool], end: float) -> Callable[[], bool]:
+    """When to stop: as told, or when the monotonic clock shows ``end``."""
+    return lambda: stop() or time.monotonic() > end
 
 
 def attempt(surface: Surface, stop: Callable[[], bool], **options: Any) -> Result:

@@ -5,7 +5,7 @@ import { digits, Panel } from "./panel.js";
 import { Viewer } from "./viewer.js";
 import { ask, fetchFile } from "./wire.js";
 
-const OVERTAKE = 400; // milliseconds after which a newer wish ends the work on an older one
+const OVERTAKE = 400; // milliseconds, at least, after which a newer wish ends the work on an older one
 const find = (selector) => document.querySelector(selector);
 const KINDS = {
   ".pcmc": "everything", ".3dm": "Rhino", ".obj": "most programs", ".glb": "viewers, AR",
@@ -73,8 +73,10 @@ class Page {
     clearTimeout(this.timer);
     if (!this.next) return;
     const waited = performance.now() - this.since;
-    if (this.busy && !now && waited < OVERTAKE) {
-      this.timer = setTimeout(() => this.pump(), OVERTAKE - waited);
+    // what took long the last time is given as long again, or a moving slider would never see an end
+    const patience = Math.max(OVERTAKE, 1.5 * (this.lasted || 0));
+    if (this.busy && !now && waited < patience) {
+      this.timer = setTimeout(() => this.pump(), patience - waited);
       return;
     }
     const { act, values } = this.next;
@@ -90,6 +92,7 @@ class Page {
     try {
       const answer = await ask(`api/${this.name}/${act}`, values);
       if (!answer.header.superseded && this.busy === ticket) {
+        if (act === "follow") this.lasted = performance.now() - this.since;
         this.take(answer, !["follow", "settle"].includes(act));
       }
     } catch (error) {
