@@ -21,6 +21,7 @@ from pcmc.contact import (
 )
 from pcmc.motion import motion_space
 from pcmc.quality import triangle_quality
+from pcmc.solvers.state import State
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
 
@@ -216,6 +217,27 @@ def test_a_lifted_wall_is_back():
         resting(partly, below), rests & (partly.plane.height(partly.vertices) == 0)
     )
     assert resting(partly, below).sum() == 2
+
+
+@pytest.mark.parametrize(("alpha_aux", "lifts"), [(0.5, 3), (50.0, 0)])
+def test_a_junction_put_down_comes_up_where_the_wall_cannot_hold_it(alpha_aux, lifts):
+    state = State(two_squares(6, alpha_aux=alpha_aux), care=0.45)
+    crest = crest_of(state.full, state.walls)[:3]
+    drop = np.zeros_like(state.X)
+    drop[crest, 2] = -state.X[crest, 2]
+    X, down = state.moved_by(drop)
+    np.testing.assert_array_equal(np.flatnonzero(down), np.sort(crest))
+    state.move(X, down)
+    np.testing.assert_array_equal(state.rests, down)
+    assert state.energy == pytest.approx(energy(state.result_surface()), rel=1e-13)
+    assert state.release() == (lifts > 0)
+    assert state.rests.sum() == 3 - lifts
+    height = state.result_surface().vertices[crest, 2]
+    assert ((height > 0.0) == (lifts > 0)).all()
+    if lifts:  # its wall is back, with all its rows
+        quality = triangle_quality(state.X, state.surface.faces)
+        assert len(quality) == state.full.m
+        assert quality.min() > 1e-3
 
 
 def complementary(surface):
