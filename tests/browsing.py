@@ -51,9 +51,11 @@ def until(condition: Callable[[], Any], what: str, seconds: float = 60.0) -> Any
 class Explored:
     """The page as a user sees and handles it."""
 
-    def __init__(self, driver: Any, url: str) -> None:
+    def __init__(self, driver: Any, url: str = "") -> None:
+        """Open the address; without one, the page is there already."""
         self.driver = driver
-        driver.get(url)
+        if url:
+            driver.get(url)
         self.idle()
 
     def find(self, selector: str) -> Any:
