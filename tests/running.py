@@ -52,8 +52,18 @@ def tidy(notebook: Any) -> Any:
 
 
 def outputs(notebook: Any) -> list[Any]:
-    """All outputs in order."""
-    return [o for cell in notebook.cells for o in cell.get("outputs", [])]
+    """All outputs in order; what a cell prints may reach us in pieces, and counts as one."""
+    found: list[Any] = []
+    for cell in notebook.cells:
+        last = None
+        for output in cell.get("outputs", []):
+            printed = output.output_type == "stream"
+            if printed and last is not None and last.get("name") == output.name:
+                last["text"] += output.text
+                continue
+            last = output.copy() if printed else None
+            found.append(output if last is None else last)
+    return found
 
 
 def text(output: Any) -> str:

@@ -27,6 +27,7 @@ from .steps import Stepper
 
 TARGETS = ("minimum", "stationary")
 DESCENTS = 5  # smooth steps after a Newton step that did not help
+PATIENCE = 8  # steps without halving the residual, once it is that small
 ROUNDED = 1e-10  # relative residual that counts as rest where rounding lets no step improve it
 COLLAPSED = 1e-3  # triangle quality at which the run ends
 POOR = 0.02  # triangle quality that explains why no step helps
@@ -120,6 +121,7 @@ def newton(surface: Surface, options: NewtonOptions, callback: Callback | None) 
 def _run(state: State, stepper: Stepper, options: NewtonOptions, log: _Log, level: int) -> Status:
     bound = options.inflation * state.full.size
     wait = 0
+    lowest, since = state.relative, 0
     try:
         log.row(state, stepper, level)
         for _ in range(options.iterations):
@@ -129,7 +131,10 @@ def _run(state: State, stepper: Stepper, options: NewtonOptions, log: _Log, leve
                 if state.care():
                     stepper.drop_factor()
                 wait = _step(state, stepper, wait)
-                if wait < 0 and state.relative <= ROUNDED:
+                lowest, since = (
+                    (state.relative, 0) if state.relative < 0.5 * lowest else (lowest, since + 1)
+                )
+                if state.relative <= ROUNDED and (wait < 0 or since > PATIENCE):
                     return Status.CONVERGED
                 if wait < 0:
                     return Status.DEGENERATE if state.worst < POOR else Status.STALLED
