@@ -131,23 +131,21 @@ def motion_space(surface: Surface, frame: Structure, X: Floats) -> MotionSpace:
     moving = ~(surface.fixed | frame.idle)
 
     sheet = moving & (frame.kind == SHEET)
-    vector = kernels.area_vectors(X, frame.faces)[0][sheet]
-    length = np.linalg.norm(vector, axis=1)
-    basis[sheet, 0] = vector / np.where(length > 0.0, length, 1.0)[:, None]
-    dimension[sheet] = length > 0.0
+    _along_normals(kernels.area_vectors(X, frame.faces)[0], sheet, basis, dimension)
 
-    curve = moving & (frame.kind == CURVE)
+    curve = np.flatnonzero(moving & (frame.kind == CURVE))
     tangent = curve_tangents(X, frame.curve_edges)
     if frame.level.any():
         along = surface.plane.along(tangent[frame.level])
         length = np.linalg.norm(along, axis=1)
         tangent[frame.level] = along / np.where(length > 0.0, length, 1.0)[:, None]
-    straight = np.einsum("ij,ij->i", tangent, tangent) > 0.5
-    ring = np.flatnonzero(curve & straight)
+    straight = np.einsum("ij,ij->i", tangent[curve], tangent[curve]) > 0.5
+    ring = curve[straight]
     basis[ring, 0], basis[ring, 1] = perpendicular(tangent[ring])
     dimension[ring] = 2
 
-    point = np.flatnonzero(moving & ((frame.kind == POINT) | (curve & ~straight)))
+    ends = np.flatnonzero(moving & (frame.kind == POINT))
+    point = np.concatenate([ends, curve[~straight]])
     basis[point] = np.eye(3)
     dimension[point] = 3
 
@@ -159,9 +157,8 @@ def motion_space(surface: Surface, frame: Structure, X: Floats) -> MotionSpace:
 
 def force_scale(surface: Surface, frame: Structure, X: Floats) -> float:
     """The norm of the single triangles' tension forces ½ α |e|, which cancel at rest, force."""
-    sides = X[frame.faces[:, [1, 2, 0]]] - X[frame.faces]
-    pull = 0.5 * surface.tensions[frame.patch_of_face] * np.linalg.norm(sides, axis=2).T
-    return float(np.linalg.norm(pull)) or 1.0
+    square = _square_of_forces(X, frame.faces, surface.tensions[frame.patch_of_face])
+    return float(np.sqrt(square)) or 1.0
 
 
 def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
@@ -196,6 +193,28 @@ def _within_plane(
         basis[chosen[single], 0] = across[single] / length[single, None]
         basis[chosen[~single], 0], basis[chosen[~single], 1] = first[0], second[0]
         dimension[chosen] = np.where(single, 1, 2)
+
+
+@kernels.compiled
+def _along_normals(vector, chosen, basis, dimension):  # type: ignore[no-untyped-def]
+    for v in range(len(vector)):
+        a, b, c = vector[v, 0], vector[v, 1], vector[v, 2]
+        length = np.sqrt(a * a + b * b + c * c)
+        if chosen[v] and length > 0.0:
+            basis[v, 0, 0], basis[v, 0, 1], basis[v, 0, 2] = a / length, b / length, c / length
+            dimension[v] = 1
+
+
+@kernels.compiled
+def _square_of_forces(X, F, tension):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for f in range(len(F)):
+        square = 0.0
+        for i in range(3):
+            for d in range(3):
+                square += (X[F[f, i], d] - X[F[f, i - 1], d]) ** 2
+        total += 0.25 * tension[f] ** 2 * square
+    return total
 
 
 @kernels.compiled

@@ -200,8 +200,10 @@ def curve_tangents(vertices: Floats, curve_edges: Ints) -> Floats:
     first[1:] = ends[order][1:] != ends[order][:-1]
     weight = np.where(first, -1.0, 1.0)
     np.add.at(tangent, ends[order], weight[:, None] * vertices[other[order]])
-    length = np.linalg.norm(tangent, axis=1)
-    return tangent * (sign / np.where(length > 0, length, 1.0))[:, None]
+    here = ends[order][first]
+    length = np.linalg.norm(tangent[here], axis=1)
+    tangent[here] *= (sign[here] / np.where(length > 0, length, 1.0))[:, None]
+    return tangent
 
 
 def _touched(edges: Ints, vertex_count: int) -> Bools:
