@@ -9,7 +9,7 @@ const OVERTAKE = 400; // milliseconds, at least, after which a newer wish ends t
 const find = (selector) => document.querySelector(selector);
 const KINDS = {
   ".pcmc": "everything", ".3dm": "Rhino", ".obj": "most programs", ".glb": "viewers, AR",
-  ".ply": "with colours' values", ".stl": "printing", ".vtp": "ParaView", ".fe": "Surface Evolver",
+  ".ply": "with the numbers", ".stl": "printing", ".vtp": "ParaView, with the numbers", ".fe": "Surface Evolver",
 };
 
 class Page {
