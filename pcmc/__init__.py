@@ -4,11 +4,9 @@ from . import explore
 from .certificate import Certificate, Verdict, certify
 from .continuation import Direction, follow
 from .curvature import curvature_error, mean_curvature, target_curvature
-from .design import Design, meet
+from .design import Design, Parameter, Target, meet, sensitivities
 from .energy import energy, gradient, hessian
 from .io import read, write
-from .quantities import Parameter, Target
-from .sensitivity import sensitivities
 from .solvers import solve
 from .surface import Patch, Plane, Surface
 

@@ -66,7 +66,7 @@ def check_keys(path: Path, text: str, data: Mapping[str, Any]) -> None:
     if "plane" in plan:
         check(("plan", "plane"), plan["plane"], _keys(Plane))
     if "targets" in data:
-        from .quantities import Parameter, Target
+        from .design import Parameter, Target
 
         for name, aim in (("meet", Target), ("vary", Parameter)):
             for entry in tables(data["targets"].get(name)):

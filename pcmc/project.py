@@ -43,8 +43,7 @@ from .solvers.result import Progress, Result, Status
 from .surface import Surface
 
 if TYPE_CHECKING:
-    from .design import Design
-    from .quantities import Parameter, Target
+    from .design import Design, Parameter, Target
 
 PathLike = str | os.PathLike[str]
 Say = Callable[[str], object]
@@ -345,7 +344,7 @@ def _project(path: Path, data: Mapping[str, Any]) -> Project:
 
 def _aims(table: Mapping[str, Any]) -> dict[str, Any]:
     """The targets of a project, and what may vary."""
-    from .quantities import Parameter, Target
+    from .design import Parameter, Target
 
     if not table.get("meet") or not table.get("vary"):
         raise OptionError("[targets] needs both: meet, what is wanted, and vary, what may change")

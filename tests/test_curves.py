@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pcmc import Plane
-from pcmc.curves import arc, bezier, circle, curve, frame, join, polyline, to_local, to_space
 from pcmc.errors import OptionError
+from pcmc.plan.curves import arc, bezier, circle, curve, frame, join, polyline, to_local, to_space
 
 
 def test_lengths_in_closed_form():

@@ -12,10 +12,10 @@ import pcmc
 from generators import double_bubble, joined_caps, spherical_cap, two_caps
 from pcmc import Design, Parameter, Patch, Target, meet, sensitivities
 from pcmc.design import Reach
+from pcmc.design.quantities import QUANTITIES, measure
+from pcmc.design.sensitivity import as_parameters
 from pcmc.errors import OptionError, SurfaceError
 from pcmc.plan import plan_from
-from pcmc.quantities import QUANTITIES, measure
-from pcmc.sensitivity import as_parameters
 
 TIGHT = {"tolerance": 1e-13, "care": 0.0}
 
@@ -134,7 +134,7 @@ def test_points_are_in_the_coordinates_of_a_tilted_plane():
     normal = frame[:, 2] * np.sign(np.linalg.det(frame))
     plane = pcmc.Plane(point=(1, 2, 3), normal=tuple(normal))
     base = pyramid()
-    from pcmc.curves import to_space
+    from pcmc.plan.curves import to_space
 
     tilted = pcmc.Surface(
         to_space(base.vertices, plane), base.faces, [0] * 4, base.patches, range(4), (), plane
@@ -418,6 +418,6 @@ def test_an_interrupted_solve_interrupts_the_search(monkeypatch):
 
         return pcmc.solve(surface, method, callback, **options)
 
-    monkeypatch.setattr("pcmc.design.solve", interrupted)
+    monkeypatch.setattr("pcmc.design.meeting.solve", interrupted)
     with pytest.raises(KeyboardInterrupt):
         meet(cap(), [Target("apex", None, 0.3)], ["cap"])

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from pcmc import Plane, Surface
-from pcmc.curves import arc, bezier, circle, curve, join, polyline, to_local
 from pcmc.energy import patch_areas
 from pcmc.errors import MissingExtra, OptionError, PlanError, SurfaceError
-from pcmc.lift import dome, spanned
 from pcmc.plan import Area, Divider, Hole, Plan, plan_from
-from pcmc.planar import triangulate
+from pcmc.plan.curves import arc, bezier, circle, curve, join, polyline, to_local
+from pcmc.plan.lift import dome, spanned
+from pcmc.plan.planar import triangulate
 from pcmc.quality import edge_lengths, minimum_angle
 from pcmc.topology import POINT
 
@@ -375,7 +375,7 @@ def test_without_shapely_the_extra_is_named(monkeypatch):
             raise ModuleNotFoundError(name, name=name)
         return real(name, *rest, **more)
 
-    for module in ("pcmc.lines", "pcmc.arrangement", "pcmc.drafting"):
+    for module in ("pcmc.plan.lines", "pcmc.plan.arrangement", "pcmc.plan.drafting"):
         monkeypatch.delitem(sys.modules, module, raising=False)
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(MissingExtra, match=r"pcmc\[plan\]"):

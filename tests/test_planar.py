@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pcmc.errors import OptionError, SurfaceError
-from pcmc.planar import locate, signed_areas, triangulate
+from pcmc.plan.planar import locate, signed_areas, triangulate
 
 
 def ring(corners, h):

@@ -6,10 +6,8 @@ import pytest
 from pcmc import Plane, Surface
 from pcmc.energy import patch_areas
 from pcmc.errors import OptionError, SurfaceError
-from pcmc.labelled import surface_from_labels
-from pcmc.plan import Divider, Plan
+from pcmc.plan import Divider, Plan, add_walls, surface_from_labels
 from pcmc.quality import minimum_angle
-from pcmc.walls import add_walls
 
 BOX = [[0, 0], [8, 0], [8, 6], [0, 6]]
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import pandas as pd
 
+from ..design import Parameter
 from ..errors import MissingExtra, OptionError, SurfaceError, unknown
-from ..quantities import Parameter
 from ..solvers import options as check
 from ..solvers.result import Callback
 from ..surface import Surface

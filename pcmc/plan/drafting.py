@@ -6,16 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..arrays import Bools, Floats, Ints
+from ..errors import PlanError, SurfaceError
+from ..polish import polished
+from ..surface import Patch, Surface
 from .arrangement import Arrangement, arrange, hole_points
-from .arrays import Bools, Floats, Ints
 from .curves import Curve, to_local, to_space
-from .errors import PlanError, SurfaceError
 from .lift import dome, spanned
 from .lines import SNAP, Drawn, Kind, Line
-from .plan import EDGES, Area, Plan
 from .planar import PlanarMesh, locate, signed_areas, triangulate
-from .polish import polished
-from .surface import Patch, Surface
+from .roof import EDGES, Area, Plan
 from .walls import Standing, WallTop, stand
 
 MOST = 5_000_000  # triangles

@@ -12,9 +12,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints
+from ..errors import PlanError
 from .curves import Curve
-from .errors import PlanError
 from .lines import (
     SNAP,
     Drawn,

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints
+from ..errors import OptionError, SurfaceError, unknown
+from ..quality import edge_lengths
+from ..surface import Patch, Plane, Surface
+from ..topology import Curve
 from .curves import to_local, to_space
-from .errors import OptionError, SurfaceError, unknown
 from .planar import triangulate
-from .quality import edge_lengths
-from .surface import Patch, Plane, Surface
-from .topology import Curve
 
 BOTTOMS = ("sliding", "held")
 

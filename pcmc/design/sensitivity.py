@@ -18,17 +18,17 @@ import numpy as np
 import pandas as pd
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from . import kernels
-from .arrays import Floats
-from .assemble import assemble, pattern
-from .certificate import TOLERANCE
-from .contact import Walls, hung, pinched, resting, standing_structure, walls
-from .energy import energy_and_gradient
-from .errors import OptionError, SurfaceError
-from .factor import Factor, SingularMatrix, factoriser
-from .motion import MotionSpace, Structure, force_scale, motion_space
+from .. import kernels
+from ..arrays import Floats
+from ..assemble import assemble, pattern
+from ..certificate import TOLERANCE
+from ..contact import Walls, hung, pinched, resting, standing_structure, walls
+from ..energy import energy_and_gradient
+from ..errors import OptionError, SurfaceError
+from ..factor import Factor, SingularMatrix, factoriser
+from ..motion import MotionSpace, Structure, force_scale, motion_space
+from ..surface import Surface
 from .quantities import Measure, Parameter, Target, measure
-from .surface import Surface
 
 STEP = 1e-6  # of the size: the difference by which the turning of the frames is seen
 ACCURACY = 1e-9  # relative, to which J s = b is solved

@@ -11,12 +11,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from . import check
-from .arrays import Bools, Floats, Ints
-from .errors import OptionError, SurfaceError, unknown
-from .plan import EDGES
-from .surface import Patch, Plane, Surface
-from .topology import topology
+from .. import check
+from ..arrays import Bools, Floats, Ints
+from ..errors import OptionError, SurfaceError, unknown
+from ..surface import Patch, Plane, Surface
+from ..topology import topology
+from .roof import EDGES
 from .walls import add_walls
 
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import MissingExtra, OptionError, unknown
+from ..surface import Plane, Surface
 from .curves import Curve, curve
-from .errors import MissingExtra, OptionError, unknown
-from .surface import Plane, Surface
 
 EDGES = ("fixed", "sliding", "free")
 BOTTOMS = ("sliding", "held", "sloped")

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .arrays import Floats
-from .errors import OptionError, unknown
-from .surface import Plane
+from ..arrays import Floats
+from ..errors import OptionError, unknown
+from ..surface import Plane
 
 CORNER = math.radians(10.0)  # a path that turns by more at a joint has a corner there
 EDGE_TURN = math.radians(45.0)  # no edge spans more of a bend than this

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from . import kernels
-from .arrays import Bools, Floats, Ints
-from .curves import frame
-from .errors import OptionError, unknown
-from .surface import Surface
+from .. import kernels
+from ..arrays import Bools, Floats, Ints
+from ..errors import OptionError, unknown
+from ..plan.curves import frame
+from ..surface import Surface
 
 KINDS = ("tension", "pressure")
 FACTOR = 20.0  # a parameter without bounds may change by this factor, up or down

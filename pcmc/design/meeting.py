@@ -20,15 +20,15 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import lsq_linear
 
-from .arrays import Bools, Floats
-from .certificate import TOLERANCE, Certificate, load_ratio
-from .errors import OptionError, SurfaceError
+from ..arrays import Bools, Floats
+from ..certificate import TOLERANCE, Certificate, load_ratio
+from ..errors import OptionError, SurfaceError
+from ..solvers import options as check
+from ..solvers import solve
+from ..solvers.result import Result, Status
+from ..surface import Surface
 from .quantities import Parameter, Target, measure
 from .sensitivity import as_parameters, as_targets, sensitivities
-from .solvers import options as check
-from .solvers import solve
-from .solvers.result import Result, Status
-from .surface import Surface
 
 LEAST = 1e-3  # part of an unknown that a step must change to be worth a solve near failing ones
 CLOSE = 1e-3  # relative gap of the misfit to a fold at which the search ends there

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .arrays import Floats
+from ..arrays import Floats
+from ..errors import PlanError
 from .curves import Curve
-from .errors import PlanError
 from .planar import cross
 
 SNAP = 0.01  # of the edge length: lines that miss each other by less are taken to meet

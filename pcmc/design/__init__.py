@@ -1,0 +1,7 @@
+"""Meeting a goal: the tensions and pressures that give a surface what is wanted of it."""
+
+from .meeting import Design, Reach, meet
+from .quantities import Parameter, Target
+from .sensitivity import sensitivities
+
+__all__ = ["Design", "Parameter", "Reach", "Target", "meet", "sensitivities"]

@@ -1,0 +1,23 @@
+"""From the lines of a plan, or from a mesh with labels, to a Surface with its walls."""
+
+from .curves import Curve, arc, bezier, circle, curve, join, polyline
+from .labelled import surface_from_labels
+from .roof import Area, Divider, Hole, Plan, plan_from
+from .walls import add_walls
+
+__all__ = [
+    "Area",
+    "Curve",
+    "Divider",
+    "Hole",
+    "Plan",
+    "add_walls",
+    "arc",
+    "bezier",
+    "circle",
+    "curve",
+    "join",
+    "plan_from",
+    "polyline",
+    "surface_from_labels",
+]
