@@ -12,6 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from .arrays import Bools, Floats, Ints
@@ -22,6 +24,8 @@ from .topology import topology
 
 SNAP = 1e-3  # of a crest edge: a vertex this near to hanging straight below a crest vertex does
 RESTING = 1e-12  # height, relative to the size, at which a junction counts as resting on Π
+FLAT = 1e-9  # height of the crest, relative to the size, below which it tells no rows apart
+LEAN = 4.0  # crest heights that a wall vertex may stand off from straight below the crest
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +33,15 @@ class Walls:
     """The walls that can pinch, those whose lower edge slides on Π, and how they hang from their crest.
 
     The crest is the junction above such a wall. A wall vertex hangs below the crest edge (i, j), at
-    the fraction λ along it and the fraction ρ of the height there: 0 on Π, 1 at the crest.
+    the fraction λ along it and the fraction ρ of the height there: 0 on Π, 1 at the crest. In a wall
+    that leans or bulges it stands off from there, in proportion to the height.
 
     Attributes
     ----------
     hanging : (w,) vertices of such walls below the crest.
     ends : (w,2) crest vertices i, j that each hangs from.
     along, share : (w,) λ and ρ.
+    lean : (w,3) what it stands off, over the height of the crest.
     can_rest : (n,) bool, free crest vertices.
     anchored : (n,) bool, fixed crest vertices on Π, where a wall ends in a corner.
     edges : (k,2) crest edges.
@@ -48,6 +54,7 @@ class Walls:
     ends: Ints
     along: Floats
     share: Floats
+    lean: Floats
     can_rest: Bools
     anchored: Bools
     edges: Ints
@@ -65,27 +72,30 @@ def walls(surface: Surface) -> Walls:
     pinchable = np.zeros(len(surface.patches), dtype=bool)
     hanging, edges, tension = [], [np.empty((0, 2), dtype=np.int64)], [np.empty(0)]
     for index, patch in enumerate(surface.patches):
+        if patch.pressure != 0.0:
+            continue
         faces = surface.faces[surface.patch_of_face == index]
         members = np.unique(faces)
         sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         crest = np.unique(sides[outer[sides].all(axis=1)], axis=0)
-        if patch.pressure != 0.0 or not surface.on_plane[members].any() or not len(crest):
+        if not surface.on_plane[members].any() or not len(crest):
             continue
         pinchable[index] = True
         below = members[~outer[members]]
-        hanging.append((below, *_hang(surface, below, crest)))
+        hanging.append((below, *_hang(surface, below, crest, sides)))
         edges.append(crest)
         tension.append(np.full(len(crest), patch.tension))
     crest = np.concatenate(edges)
     above = np.zeros(n, dtype=bool)
     above[crest] = True
     low = np.abs(height) <= RESTING * surface.size
-    below, ends, along, share = _joined(hanging)
+    below, ends, along, share, lean = _joined(hanging)
     return Walls(
         hanging=below,
         ends=ends,
         along=along,
         share=share,
+        lean=lean,
         can_rest=above & ~surface.fixed & ~surface.on_plane,
         anchored=above & surface.fixed & low,
         edges=crest,
@@ -102,11 +112,7 @@ def hung(surface: Surface, below: Walls, X: Floats, space: MotionSpace | None = 
     """
     if not len(below.hanging):
         return X
-    i, j = below.ends.T
-    along = below.along[:, None]
-    place = (1.0 - along) * X[i] + along * X[j]
-    lift = (below.share - 1.0) * surface.plane.height(place)
-    place += lift[:, None] * np.array(surface.plane.normal)
+    place = _place(surface, X, below.ends, below.along, below.share, below.lean)
     change = np.zeros_like(X)
     change[below.hanging] = place - X[below.hanging]
     if space is not None:
@@ -165,13 +171,13 @@ def pull_and_capacity(surface: Surface, below: Walls, rests: Bools) -> tuple[Flo
     """Upward pull (n,) on each resting vertex of a pinched surface and what the wall can take, force.
 
     The pull is the force of the sheets away from Π. Lifting the vertex by dz makes a wall of area
-    ½ ℓ dz under each crest edge there, standing or not, so the capacity is ½ Σ α_w ℓ; the vertex
+    ½ ℓ dz under each crest edge there, ℓ its length along Π, so the capacity is ½ Σ α_w ℓ; the vertex
     rests while pull ≤ capacity.
     """
     force = -energy_and_gradient(surface, supports=False)[1]
     pull = np.where(rests, below.side * (force @ np.array(surface.plane.normal)), 0.0)
-    ends = surface.vertices[below.edges]
-    half = 0.5 * below.tension * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    start, end = surface.vertices[below.edges.T]
+    half = 0.5 * below.tension * np.linalg.norm(surface.plane.along(end - start), axis=1)
     capacity = np.zeros(surface.n)
     np.add.at(capacity, below.edges[:, 0], half)
     np.add.at(capacity, below.edges[:, 1], half)
@@ -214,10 +220,41 @@ def settled(surface: Surface, below: Walls, rests: Bools, X: Floats) -> Floats:
     return X[_merged(surface.n, below, rests)]
 
 
-def _hang(surface: Surface, below: Ints, crest: Ints) -> tuple[Ints, Floats, Floats]:
-    """Crest edge ends (w,2), λ and ρ of wall vertices, by nearness seen along the normal of Π."""
-    height = surface.plane.height(surface.vertices)
-    flat = surface.vertices - height[:, None] * np.array(surface.plane.normal)
+def _place(
+    surface: Surface, X: Floats, ends: Ints, along: Floats, share: Floats, lean: Floats
+) -> Floats:
+    """(w,3) where wall vertices hang with the crest at X (n,3)."""
+    above = (1.0 - along[:, None]) * X[ends[:, 0]] + along[:, None] * X[ends[:, 1]]
+    height = surface.plane.height(above)[:, None]
+    return above + height * ((share[:, None] - 1.0) * np.array(surface.plane.normal) + lean)
+
+
+def _hang(
+    surface: Surface, below: Ints, crest: Ints, sides: Ints
+) -> tuple[Ints, Floats, Floats, Floats]:
+    """Crest edge ends (w,2), λ, ρ and what wall vertices stand off, by nearness seen along Π's normal.
+
+    ``sides`` are the wall's edges. Where the crest lies on Π its height tells nothing, and ρ is that of
+    the vertex's row: steps along edges from the foot, over those from foot to crest.
+    """
+    X, height = surface.vertices, surface.plane.height(surface.vertices)
+    flat = X - height[:, None] * np.array(surface.plane.normal)
+    ends, along = _nearest(flat, below, crest)
+    above = (1.0 - along) * height[ends[:, 0]] + along * height[ends[:, 1]]
+    stands = np.abs(above) > FLAT * surface.size
+    share = np.clip(np.divide(height[below], above, out=np.zeros(len(below)), where=stands), 0, 1)
+    if not stands.all():
+        share = np.where(stands, share, _rows(surface, below, sides))
+    share[surface.on_plane[below]] = 0.0
+    straight = _place(surface, X, ends, along, share, np.zeros((len(below), 3)))
+    lean = np.zeros((len(below), 3))
+    np.divide(X[below] - straight, above[:, None], out=lean, where=stands[:, None])
+    lean[np.linalg.norm(lean, axis=1) > LEAN] = 0.0
+    return ends, along, share, lean
+
+
+def _nearest(flat: Floats, below: Ints, crest: Ints) -> tuple[Ints, Floats]:
+    """The crest edge (w,2) nearest to each wall vertex, seen along Π's normal, and λ there."""
     start, side = flat[crest[:, 0]], flat[crest[:, 1]] - flat[crest[:, 0]]
     length = np.einsum("ij,ij->i", side, side)
     near = cKDTree(start + 0.5 * side).query(flat[below], k=min(4, len(crest)))[1]
@@ -229,19 +266,37 @@ def _hang(surface: Surface, below: Ints, crest: Ints) -> tuple[Ints, Floats, Flo
     row = np.arange(len(below))
     along = along[row, best]
     along = np.where(along < SNAP, 0.0, np.where(along > 1.0 - SNAP, 1.0, along))
-    ends = crest[near[row, best]]
-    above = (1.0 - along) * height[ends[:, 0]] + along * height[ends[:, 1]]
-    share = np.divide(height[below], above, out=np.zeros(len(below)), where=above != 0.0)
-    return ends, along, np.clip(share, 0.0, 1.0)
+    return crest[near[row, best]], along
 
 
-def _joined(parts: list[tuple[Ints, Ints, Floats, Floats]]) -> tuple[Ints, Ints, Floats, Floats]:
+def _rows(surface: Surface, below: Ints, sides: Ints) -> Floats:
+    """ρ (w,) by edges (k,2) of the wall: steps to the foot, over those to the foot and to the crest."""
+    inner = np.zeros(surface.n, dtype=bool)
+    inner[below] = True
+    crest = np.unique(sides[~(inner | surface.fixed)[sides]])
+    foot = below[surface.on_plane[below]]
+    # no way leads through a corner, which is foot and crest at once
+    links = sides[(inner | np.isin(np.arange(surface.n), crest))[sides].all(axis=1)]
+    graph = coo_array((np.ones(len(links)), links.T), shape=(surface.n, surface.n)).tocsr()
+    steps = [
+        dijkstra(graph, directed=False, indices=of, unweighted=True, min_only=True)[below]
+        for of in (foot, crest)
+    ]
+    reached = np.isfinite(steps[0]) & np.isfinite(steps[1])
+    total = np.where(reached, steps[0] + steps[1], 1.0)
+    return np.where(reached, steps[0] / total, 0.5)
+
+
+def _joined(
+    parts: list[tuple[Ints, Ints, Floats, Floats, Floats]],
+) -> tuple[Ints, Ints, Floats, Floats, Floats]:
     """One list of hanging vertices; one that two walls share hangs from the first."""
     if not parts:
-        return np.empty(0, dtype=int), np.empty((0, 2), dtype=int), np.empty(0), np.empty(0)
-    vertex, ends, along, share = (np.concatenate(column) for column in zip(*parts, strict=True))
+        none = np.empty(0, dtype=int)
+        return none, np.empty((0, 2), dtype=int), np.empty(0), np.empty(0), np.empty((0, 3))
+    vertex, ends, along, share, lean = (np.concatenate(column) for column in zip(*parts, strict=True))
     first = np.unique(vertex, return_index=True)[1]
-    return vertex[first], ends[first], along[first], share[first]
+    return vertex[first], ends[first], along[first], share[first], lean[first]
 
 
 def _merged(n: int, below: Walls, rests: Bools) -> Ints:
