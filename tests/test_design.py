@@ -118,6 +118,29 @@ def test_the_reaction_of_a_membrane_is_its_tension_less_half_the_pressure_of_its
     assert corner < 3.0
 
 
+def test_reactions_are_the_certificates():
+    """Where held vertices are no corners, also by patch; the plane's point makes no difference."""
+    dome = cap()
+    for point in ((0.0, 0.0, 0.0), (3.0, -1.0, 0.0)):
+        moved = dataclasses.replace(dome, plane=pcmc.Plane(point))
+        boundaries = pcmc.certify(moved).boundaries
+        for of in (None, "cap"):
+            found = measure(moved, Target("reaction", of)).value
+            assert found == pytest.approx(boundaries["per_length_max"][0], rel=1e-12)
+
+
+def test_the_greatest_reaction_of_a_roof_is_the_certificates(roof):
+    found = pcmc.certify(roof)
+    edges = roof.topology.edges[roof.topology.boundary_edge]
+    edges = edges[(roof.fixed | roof.on_plane)[edges].all(axis=1)]
+    half = 0.5 * np.linalg.norm(roof.vertices[edges[:, 1]] - roof.vertices[edges[:, 0]], axis=1)
+    share = np.bincount(edges.ravel(), np.repeat(half, 2), roof.n)
+    held = share > 0.0
+    force = np.linalg.norm(found.reactions, axis=1)[held]
+    expected = (force / share[held]).max()
+    assert measure(roof, Target("reaction")).value == pytest.approx(expected, rel=1e-12)
+
+
 def test_heights_are_the_meshs_own(roof):
     apex = measure(roof, Target("apex", "north"))
     vertex = int(np.abs(apex.position).sum(axis=1).argmax())

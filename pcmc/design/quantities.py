@@ -237,7 +237,8 @@ def _curvature(surface: Surface, of: str) -> Measure:
 def _reaction(surface: Surface, of: str | None) -> Measure:
     """max |f_v| / ℓ_v over held vertices, f_v the patch's force there, ℓ_v half its edges' length.
 
-    Where vertices slide, only the force along Π's normal is held.
+    f_v = Σ α ∂A - ⅓ Σ p A_T ν_T, as in the certificate. Where vertices slide, only the force along
+    Π's normal is held.
     """
     faces = np.ones(surface.m, dtype=bool) if of is None else _chosen(surface, of)
     topo = surface.topology
@@ -251,7 +252,8 @@ def _reaction(surface: Surface, of: str | None) -> Measure:
     share = np.bincount(ends.ravel(), np.repeat(half, 2), surface.n)
     one = np.zeros(len(surface.patches))
     one[np.unique(surface.patch_of_face[faces])] = 1.0
-    force = _measured(surface, one * surface.tensions, one * surface.pressures)[2]
+    force = _measured(surface, one * surface.tensions, 0.0 * one)[2]
+    force -= _pushes(surface, one * surface.pressures)
     force[surface.on_plane] -= surface.plane.along(force[surface.on_plane])
     size = np.divide(
         np.linalg.norm(force, axis=1), share, out=np.full(surface.n, -1.0), where=share > 0.0
@@ -264,34 +266,53 @@ def _reaction(surface: Surface, of: str | None) -> Measure:
     along = (size[v] / share[v] * 0.25 / half[at])[:, None] * side[at]
     np.add.at(slope, ends[at, 0], along)
     np.add.at(slope, ends[at, 1], -along)
-    areas, volumes = _by_patch(surface, faces, v)
-    return Measure(float(size[v]), slope, areas @ pull, -(volumes @ pull))
+    by_tension, by_pressure = _by_patch(surface, faces, v)
+    return Measure(float(size[v]), slope, by_tension @ pull, by_pressure @ pull)
+
+
+def _pushes(surface: Surface, pressure: Floats) -> Floats:
+    """(n,3) ⅓ Σ p A_T ν_T over the triangles at each vertex, with these pressures (k,).
+
+    Not ∇(p V): at a boundary the side of the cone in which V is counted moves too, and it is no part
+    of the surface.
+    """
+    X, F = surface.vertices, surface.faces
+    vector = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]) / 6.0
+    vector *= pressure[surface.patch_of_face, None]
+    return np.stack(
+        [np.bincount(F.ravel(), np.repeat(part, 3), surface.n) for part in vector.T], axis=1
+    )
 
 
 def _force_slope(surface: Surface, faces: Bools, v: int, pull: Floats) -> Floats:
-    """(n,3) derivative of ⟨pull, f_v⟩, f_v the gradient at v of the energy of these faces."""
+    """(n,3) derivative of ⟨pull, f_v⟩, f_v = Σ α ∂A - ⅓ Σ p A_T ν_T at v over these faces."""
     around = np.flatnonzero(faces & (surface.faces == v).any(axis=1))
     F = np.ascontiguousarray(surface.faces[around])
     blocks = np.empty((len(F), 3, 3, 3, 3))
     kernels.hessian_blocks(
         surface.vertices, F, np.ascontiguousarray(surface.patch_of_face[around]),
-        np.array(surface.plane.point), surface.tensions, surface.pressures, blocks,
+        np.array(surface.plane.point), surface.tensions, 0.0 * surface.pressures, blocks,
     )  # fmt: skip
     slope = np.zeros_like(surface.vertices)
     row, corner = np.nonzero(np.equal(F, v))
     np.add.at(slope, F[row], np.einsum("fjab,a->fjb", blocks[row, corner], pull))
+    # ⅓ A ν = (q - p) × (r - p) / 6, whose part along u changes by (q - r) × u / 6 as p moves
+    X, sixth = surface.vertices, surface.pressures[surface.patch_of_face[around]] / 6.0
+    for corner in range(3):
+        opposite = X[F[:, corner - 2]] - X[F[:, corner - 1]]
+        np.add.at(slope, F[:, corner], -sixth[:, None] * np.cross(opposite, pull))
     return slope
 
 
 def _by_patch(surface: Surface, faces: Bools, v: int) -> tuple[Floats, Floats]:
-    """(k,3) ∇A_i and ∇V_i at vertex v, of the given faces."""
-    areas, volumes = np.zeros((2, len(surface.patches), 3))
+    """(k,3) derivatives of f_v by each patch's tension and pressure: ∇A_i and -⅓ Σ A_T ν_T at v."""
+    by_tension, by_pressure = np.zeros((2, len(surface.patches), 3))
     for i in np.unique(surface.patch_of_face[faces]):
         one = np.zeros(len(surface.patches))
         one[i] = 1.0
-        areas[i] = _measured(surface, one, 0.0 * one)[2][v]
-        volumes[i] = _measured(surface, 0.0 * one, -one)[2][v]
-    return areas, volumes
+        by_tension[i] = _measured(surface, one, 0.0 * one)[2][v]
+        by_pressure[i] = -_pushes(surface, one)[v]
+    return by_tension, by_pressure
 
 
 def _measured(surface: Surface, tension: Floats, pressure: Floats) -> tuple[Floats, Floats, Floats]:
