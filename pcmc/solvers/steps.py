@@ -20,11 +20,6 @@ REFRESH = 6  # descent steps between two factorisations of the Laplacian
 ROUNDING = 1e3 * float(np.finfo(float).eps)
 
 
-import os
-DRIFT=float(os.environ.get('DRIFT','.5'))
-def EDGE(state):
-    from ..quality import edge_lengths
-    return float(np.median(edge_lengths(state.surface.moved(state.X))))
 class Stepper:
     """Takes steps on a State, keeping factorisations while they serve.
 
@@ -39,7 +34,6 @@ class Stepper:
         self.kind = "start"
         self.factorisations = 0
         self._shifted = 0
-        self._owing = False
         self._version = -1
         self._forget()
 
@@ -53,7 +47,6 @@ class Stepper:
         self._factor: Factor | None = None
         self._smoother: Smoother | None = None
         self._carrier: Carrier | None = None
-        self._motions = rigid_motions(self.state.surface)
         self._age = REFRESH
 
     def drop_factor(self) -> None:
@@ -126,8 +119,7 @@ class Stepper:
     def leave_saddle(self) -> bool:
         """Move along the lowest mode as far as E keeps falling; False where no mode lowers it."""
         state = self.state
-        self._forget()
-        rigid = rigid_modes(state.space, self._motions, state.X)
+        rigid = rigid_modes(state.space, rigid_motions(state.surface), state.X)
         try:
             system = stiffness(
                 state.surface.moved(state.X), state.frame, state.space, rigid, self.backend
@@ -191,7 +183,7 @@ class Stepper:
         self.factorisations += 1
         self._shift = shift
         self._space: MotionSpace = state.space
-        rigid = rigid_modes(state.space, self._motions, state.X)
+        rigid = rigid_modes(state.space, rigid_motions(state.surface), state.X)
         self.negative = negatives_without(self._factor, rigid)
         return True
 
@@ -225,19 +217,7 @@ class Stepper:
             rtol=1e-3, restart=12, maxiter=1, callback=norms.append, callback_type="pr_norm",
         )  # fmt: skip
         self._inner = len(norms)
-        if len(self._motions):
-            s = self._held_back(s)
         return self.state.space.push(s)
-
-    def _held_back(self, s: Floats) -> Floats:
-        """s with its rigid part no longer than a part of an edge."""
-        state = self.state
-        rigid = rigid_modes(state.space, self._motions, state.X)
-        drift = rigid @ (rigid.T @ s)
-        far = float(np.abs(state.space.push(drift)).max())
-        room = DRIFT * float(np.sqrt(np.prod(np.ptp(state.X,axis=0)) ) if False else EDGE(state))
-        self._owing = self._owing and far <= room
-        return s if far <= room else s - (1.0 - room / far) * drift
 
     def _shifted_direction(self) -> Floats:
         self._inner = 0
@@ -255,16 +235,8 @@ class Stepper:
         return self._carrier.carry(self.state.space, d)
 
     def _helps(self, t: float, slope: float, energy: float, norm: float) -> bool:
-        """Whether the step just taken lowers the residual enough or, towards a minimum, E.
-
-        Where nothing resists some rigid motion the mesh may have to slide far along the surface: such
-        a step pays only with the next, and every other one may raise the residual.
-        """
+        """Whether the step just taken lowers the residual enough or, towards a minimum, E."""
         if self.state.norm < (1.0 - 0.3 * t) * norm:
-            self._owing = False
-            return True
-        if len(self._motions) and not self._owing and self.state.norm < 2.0 * norm:
-            self._owing = True
             return True
         falls = self.state.energy <= energy + 1e-2 * t * slope and slope < 0.0
         return falls and self.minimum
