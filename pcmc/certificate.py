@@ -58,7 +58,8 @@ class Certificate:
     quality : smallest triangle quality outside pinched walls; ``walls_quality`` in walls that slide.
     patches : a row a patch: target, area, tension, errors by both definitions, quality.
     junctions : a row a junction curve: length, forces left and Σ α n, force/length.
-    boundaries : a row a held boundary curve: length, reaction, largest reaction per length.
+    boundaries : a row a held boundary curve: length, reaction, largest reaction per length. A corner
+        gives each of its curves an equal part of its reaction; per length it counts whole.
     reactions : (n,3) force that each support exerts on the surface.
     pinched : (k,) vertices where a junction rests on Π and its wall has no height.
     load_ratio : pressure along Π's normal over the most that the boundary's tension could carry.
@@ -354,24 +355,31 @@ def _boundary_table(surface: Surface) -> pd.DataFrame:
     count = np.zeros(surface.n)
     for curve in loops:
         count[curve.vertices] += 1.0
-    reactions = reactions / np.maximum(count, 1.0)[:, None]
+    parts = reactions / np.maximum(count, 1.0)[:, None]
+    share = held_lengths(surface)
+    per_length = np.linalg.norm(reactions, axis=1) / np.where(share > 0.0, share, np.inf)
     rows = []
     for curve in loops:
         if not held[curve.vertices].any():
             continue
-        pairs, lengths = _segments(surface, curve)
-        share = np.zeros(surface.n)
-        np.add.at(share, pairs.ravel(), np.repeat(0.5 * lengths, 2))
-        force = np.linalg.norm(reactions[curve.vertices], axis=1)
-        per_length = force / np.where(share > 0, share, np.inf)[curve.vertices]
-        total = reactions[curve.vertices].sum(axis=0)
+        total = parts[curve.vertices].sum(axis=0)
         rows.append({
             "boundary": " | ".join(surface.patches[i].name for i in curve.sheets),
-            "length": float(lengths.sum()),
+            "length": float(_segments(surface, curve)[1].sum()),
             "reaction_x": float(total[0]), "reaction_y": float(total[1]),
-            "reaction_z": float(total[2]), "per_length_max": float(per_length.max()),
+            "reaction_z": float(total[2]),
+            "per_length_max": float(per_length[curve.vertices].max()),
         })  # fmt: skip
     return pd.DataFrame(rows)
+
+
+def held_lengths(surface: Surface) -> Floats:
+    """(n,) half the length of the boundary edges at each vertex that are held at both ends, length."""
+    held = surface.fixed | surface.on_plane
+    ends = surface.topology.edges[surface.topology.boundary_edge]
+    ends = ends[held[ends].all(axis=1)]
+    half = 0.5 * np.linalg.norm(surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]], axis=1)
+    return np.bincount(ends.ravel(), np.repeat(half, 2), surface.n)
 
 
 def _reactions(surface: Surface) -> Floats:

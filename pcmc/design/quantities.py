@@ -15,6 +15,7 @@ import numpy as np
 
 from .. import kernels
 from ..arrays import Bools, Floats, Ints
+from ..certificate import held_lengths
 from ..errors import OptionError, unknown
 from ..plan.curves import frame
 from ..surface import Surface
@@ -32,9 +33,9 @@ class Target:
     quantity : ``"apex"``, greatest height over Π of a patch; ``"height"`` over a point of Π;
         ``"volume"`` (V_i of a patch, seen from the point of Π) and ``"area"``; ``"curvature"``,
         p / (2α), a patch's mean curvature at rest; ``"reaction"``, the greatest force per length
-        with which a patch pulls at its held boundary.
+        that a patch's held boundary takes.
     of : name of the patch, or the point (x, y) in the coordinates of Π for ``"height"``. None: the
-        patches under pressure together (all of them for ``"reaction"``); not for ``"curvature"``.
+        patches under pressure together (the whole held boundary for ``"reaction"``); not for ``"curvature"``.
     value, at_most, at_least : what is wanted: a value, or a limit on one side or both. None of them
         where the quantity is only to be measured.
 
@@ -235,39 +236,37 @@ def _curvature(surface: Surface, of: str) -> Measure:
 
 
 def _reaction(surface: Surface, of: str | None) -> Measure:
-    """max |f_v| / ℓ_v over held vertices, f_v the patch's force there, ℓ_v half its edges' length.
+    """max |f_v| / ℓ_v over the patch's held boundary, ℓ_v half the length of the held edges at v.
 
-    f_v = Σ α ∂A - ⅓ Σ p A_T ν_T, as in the certificate. Where vertices slide, only the force along
-    Π's normal is held.
+    f_v = Σ α ∂A - ⅓ Σ p A_T ν_T over all triangles at v, as in the certificate: at a corner the
+    patches' pulls along their junction cancel. Where vertices slide, only the force along Π's normal
+    is held.
     """
-    faces = np.ones(surface.m, dtype=bool) if of is None else _chosen(surface, of)
     topo = surface.topology
-    edge = topo.boundary_edge & _touched(topo.edge_of_face[faces], len(topo.edges))
-    ends = topo.edges[edge]
-    ends = ends[(surface.fixed | surface.on_plane)[ends].all(axis=1)]
-    if not len(ends):
+    held = (surface.fixed | surface.on_plane)[topo.edges].all(axis=1)
+    edge = np.flatnonzero(topo.boundary_edge & held)
+    mine = edge
+    if of is not None:
+        touched = _touched(topo.edge_of_face[_chosen(surface, of)], len(topo.edges))
+        mine = edge[touched[edge]]
+    if not len(mine):
         raise OptionError(f"reaction of {of}: nothing holds that patch's boundary")
-    side = surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]]
-    half = 0.5 * np.linalg.norm(side, axis=1)
-    share = np.bincount(ends.ravel(), np.repeat(half, 2), surface.n)
-    one = np.zeros(len(surface.patches))
-    one[np.unique(surface.patch_of_face[faces])] = 1.0
-    force = _measured(surface, one * surface.tensions, 0.0 * one)[2]
-    force -= _pushes(surface, one * surface.pressures)
+    ends, share = topo.edges[edge], held_lengths(surface)
+    force = _measured(surface, surface.tensions, 0.0 * surface.pressures)[2]
+    force -= _pushes(surface, surface.pressures)
     force[surface.on_plane] -= surface.plane.along(force[surface.on_plane])
-    size = np.divide(
-        np.linalg.norm(force, axis=1), share, out=np.full(surface.n, -1.0), where=share > 0.0
-    )
-    v = int(size.argmax())
-    length = float(np.linalg.norm(force[v])) or 1.0
-    pull = force[v] / length / share[v]
-    slope = _force_slope(surface, faces, v, pull)
-    at = (ends == v).any(axis=1)
-    along = (size[v] / share[v] * 0.25 / half[at])[:, None] * side[at]
-    np.add.at(slope, ends[at, 0], along)
-    np.add.at(slope, ends[at, 1], -along)
-    by_tension, by_pressure = _by_patch(surface, faces, v)
-    return Measure(float(size[v]), slope, by_tension @ pull, by_pressure @ pull)
+    vertices = np.unique(topo.edges[mine])
+    size = np.linalg.norm(force[vertices], axis=1) / share[vertices]
+    v, value = int(vertices[size.argmax()]), float(size.max())
+    pull = force[v] / (float(np.linalg.norm(force[v])) or 1.0) / share[v]
+    slope = _force_slope(surface, v, pull)
+    ends = ends[(ends == v).any(axis=1)]
+    side = surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]]
+    along = (0.5 * value / share[v] / np.linalg.norm(side, axis=1))[:, None] * side
+    np.add.at(slope, ends[:, 0], along)
+    np.add.at(slope, ends[:, 1], -along)
+    by_tension, by_pressure = _by_patch(surface, v)
+    return Measure(value, slope, by_tension @ pull, by_pressure @ pull)
 
 
 def _pushes(surface: Surface, pressure: Floats) -> Floats:
@@ -284,9 +283,9 @@ def _pushes(surface: Surface, pressure: Floats) -> Floats:
     )
 
 
-def _force_slope(surface: Surface, faces: Bools, v: int, pull: Floats) -> Floats:
-    """(n,3) derivative of ⟨pull, f_v⟩, f_v = Σ α ∂A - ⅓ Σ p A_T ν_T at v over these faces."""
-    around = np.flatnonzero(faces & (surface.faces == v).any(axis=1))
+def _force_slope(surface: Surface, v: int, pull: Floats) -> Floats:
+    """(n,3) derivative of ⟨pull, f_v⟩, f_v = Σ α ∂A - ⅓ Σ p A_T ν_T at v."""
+    around = np.flatnonzero((surface.faces == v).any(axis=1))
     F = np.ascontiguousarray(surface.faces[around])
     blocks = np.empty((len(F), 3, 3, 3, 3))
     kernels.hessian_blocks(
@@ -304,10 +303,10 @@ def _force_slope(surface: Surface, faces: Bools, v: int, pull: Floats) -> Floats
     return slope
 
 
-def _by_patch(surface: Surface, faces: Bools, v: int) -> tuple[Floats, Floats]:
+def _by_patch(surface: Surface, v: int) -> tuple[Floats, Floats]:
     """(k,3) derivatives of f_v by each patch's tension and pressure: ∇A_i and -⅓ Σ A_T ν_T at v."""
     by_tension, by_pressure = np.zeros((2, len(surface.patches), 3))
-    for i in np.unique(surface.patch_of_face[faces]):
+    for i in np.unique(surface.patch_of_face[(surface.faces == v).any(axis=1)]):
         one = np.zeros(len(surface.patches))
         one[i] = 1.0
         by_tension[i] = _measured(surface, one, 0.0 * one)[2][v]
