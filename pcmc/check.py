@@ -13,6 +13,7 @@ from .errors import SurfaceError
 from .topology import Topology
 
 ZERO_AREA = 1e-14  # of the squared longest edge: below this a triangle has no direction in floats
+RESTING = 1e-12  # height, relative to the size, at which a vertex counts as lying on Π
 
 
 def finite_vector(value: Any, what: str) -> tuple[float, float, float]:
@@ -98,8 +99,17 @@ def mask(chosen: Any, n: int, what: str) -> Bools:
     return result
 
 
-def mesh(X: Floats, F: Ints, patch: Ints, topo: Topology, names: Sequence[str]) -> None:
+def mesh(
+    X: Floats,
+    F: Ints,
+    patch: Ints,
+    topo: Topology,
+    patches: Sequence[Any],
+    held: Bools,
+    height: Floats,
+) -> None:
     """Unreferenced vertices, zero areas, double faces, and each patch an oriented manifold."""
+    names = [p.name for p in patches]
     unused = np.flatnonzero(np.bincount(F.ravel(), minlength=len(X)) == 0)
     if len(unused):
         raise SurfaceError(
@@ -109,7 +119,11 @@ def mesh(X: Floats, F: Ints, patch: Ints, topo: Topology, names: Sequence[str]) 
     sides = X[F[:, [1, 2, 0]]] - X[F]
     twice = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     longest = (sides**2).sum(axis=2).max(axis=1)
-    bad = np.flatnonzero(twice <= ZERO_AREA * longest)
+    flat = twice <= ZERO_AREA * longest
+    if flat.any():
+        low = np.abs(height) <= RESTING * np.linalg.norm(np.ptp(X, axis=0))
+        flat &= ~_vanished(F, patch, patches, held, low)
+    bad = np.flatnonzero(flat)
     if len(bad):
         raise SurfaceError(
             f"face {bad[0]} = {F[bad[0]].tolist()} of patch {names[patch[bad[0]]]!r} has zero area"
@@ -123,6 +137,21 @@ def mesh(X: Floats, F: Ints, patch: Ints, topo: Topology, names: Sequence[str]) 
             f"faces {first} and {second} are the same triangle {F[first].tolist()}; remove one"
         )
     _oriented(F, patch, topo, names)
+
+
+def _vanished(F: Ints, patch: Ints, patches: Sequence[Any], held: Bools, low: Bools) -> Bools:
+    """(m,) faces of a wall that has no height there, because its junction rests on Π.
+
+    Such a wall has a vertex on Π that nothing holds there and that a sheet under pressure shares. Of
+    its faces those may have no area that have two vertices on Π, one of them not held.
+    """
+    wall = np.array([p.pressure == 0.0 for p in patches])[patch]
+    rests = low & ~held
+    outer = np.zeros(len(low), dtype=bool)
+    outer[F[~wall]] = True
+    pinched = np.zeros(len(patches), dtype=bool)
+    pinched[patch[wall & (rests & outer)[F].any(axis=1)]] = True
+    return wall & pinched[patch] & (low[F].sum(axis=1) >= 2) & rests[F].any(axis=1)
 
 
 def on_plane(height: Floats, sliding: Bools, size: float) -> None:

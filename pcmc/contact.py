@@ -17,13 +17,13 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from .arrays import Bools, Floats, Ints
+from .check import RESTING
 from .energy import energy_and_gradient
 from .motion import MotionSpace, Structure, structure
 from .surface import Surface
 from .topology import topology
 
 SNAP = 1e-3  # of a crest edge: a vertex this near to hanging straight below a crest vertex does
-RESTING = 1e-12  # height, relative to the size, at which a junction counts as resting on Π
 FLAT = 1e-9  # height of the crest, relative to the size, below which it tells no rows apart
 LEAN = 4.0  # crest heights that a wall vertex may stand off from straight below the crest
 
@@ -119,6 +119,34 @@ def hung(surface: Surface, below: Walls, X: Floats, space: MotionSpace | None = 
         change -= space.project(change)
     change[surface.fixed] = 0.0
     return X + change
+
+
+def midpoints(surface: Surface, edges: Ints) -> Floats:
+    """(k,3) the middles of edges (k,2), for a finer mesh.
+
+    Where a wall's edge leads from a junction at rest to a standing vertex, its middle hangs in its row
+    below the crest's middle: rows that coincide where the crest rests are apart again beside it.
+    """
+    start, end = edges.T
+    X = surface.vertices
+    middle = 0.5 * (X[start] + X[end])
+    below = walls(surface)
+    rests = resting(surface, below)
+    if not rests.any():
+        return middle
+    crest, drop = X.copy(), np.zeros_like(X)
+    crest[below.hanging] = _above(X, below.ends, below.along)
+    drop[below.hanging] = (below.share - 1.0)[:, None] * np.array(surface.plane.normal) + below.lean
+    down = rests.copy()
+    down[below.hanging] = (rests | below.anchored)[below.ends].all(axis=1)
+    of_wall = rests | below.can_rest
+    of_wall[below.hanging] = True
+    leaves = of_wall[start] & of_wall[end] & (down[start] != down[end])
+    start, end = edges[leaves].T
+    place = 0.5 * (crest[start] + crest[end])
+    height = surface.plane.height(place)[:, None]
+    middle[leaves] = place + 0.5 * height * (drop[start] + drop[end])
+    return middle
 
 
 def resting(surface: Surface, below: Walls) -> Bools:
@@ -220,11 +248,16 @@ def settled(surface: Surface, below: Walls, rests: Bools, X: Floats) -> Floats:
     return X[_merged(surface.n, below, rests)]
 
 
+def _above(X: Floats, ends: Ints, along: Floats) -> Floats:
+    """(w,3) the places on the crest that wall vertices hang from."""
+    return (1.0 - along[:, None]) * X[ends[:, 0]] + along[:, None] * X[ends[:, 1]]
+
+
 def _place(
     surface: Surface, X: Floats, ends: Ints, along: Floats, share: Floats, lean: Floats
 ) -> Floats:
     """(w,3) where wall vertices hang with the crest at X (n,3)."""
-    above = (1.0 - along[:, None]) * X[ends[:, 0]] + along[:, None] * X[ends[:, 1]]
+    above = _above(X, ends, along)
     height = surface.plane.height(above)[:, None]
     return above + height * ((share[:, None] - 1.0) * np.array(surface.plane.normal) + lean)
 
@@ -294,7 +327,9 @@ def _joined(
     if not parts:
         none = np.empty(0, dtype=int)
         return none, np.empty((0, 2), dtype=int), np.empty(0), np.empty(0), np.empty((0, 3))
-    vertex, ends, along, share, lean = (np.concatenate(column) for column in zip(*parts, strict=True))
+    vertex, ends, along, share, lean = (
+        np.concatenate(column) for column in zip(*parts, strict=True)
+    )
     first = np.unique(vertex, return_index=True)[1]
     return vertex[first], ends[first], along[first], share[first], lean[first]
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from .arrays import Bools, Floats, Ints
+from .contact import midpoints
 from .errors import OptionError
 from .surface import Surface
 
@@ -29,6 +30,9 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     - junction or seam edge, both ends fixed, not leading from boundary to boundary: fixed;
     - edge inside a sheet, both ends fixed and off the boundary (a held line in a patch): fixed;
     - every other edge, such as one across a sheet between two fixed boundary vertices: free.
+
+    A new vertex is the middle of its edge, but beside a junction that rests on Π the rows of the wall,
+    which coincide there, are taken apart.
 
     Parameters
     ----------
@@ -95,9 +99,7 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
 
 def _refine_once(surface: Surface, project: Projection | None) -> Surface:
     edges = surface.topology.edges
-    start, end = edges.T
-    X = surface.vertices
-    middle = 0.5 * (X[start] + X[end])
+    X, middle = surface.vertices, midpoints(surface, edges)
     held, slides = held_midpoints(surface)
     if project is not None:
         middle[held] = _projected(project, middle[held])

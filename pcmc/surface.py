@@ -157,8 +157,9 @@ class Surface:
             value.setflags(write=False)
             object.__setattr__(self, key, value)
         object.__setattr__(self, "patches", tuple(self.patches))
-        check.mesh(X, F, patch, self.topology, [p.name for p in self.patches])
-        check.on_plane(self.plane.height(X), sliding, self.size)
+        height = self.plane.height(X)
+        check.mesh(X, F, patch, self.topology, self.patches, fixed | sliding, height)
+        check.on_plane(height, sliding, self.size)
         if not (fixed.any() or sliding.any()):
             warnings.warn(
                 "no vertex is fixed or on the plane: translations are free, so only closed"

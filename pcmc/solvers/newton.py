@@ -18,7 +18,7 @@ import pandas as pd
 
 from ..errors import SurfaceError
 from ..quality import worst_quality
-from ..refine import prolongation, refine
+from ..refine import refine
 from ..surface import Surface
 from . import options as check
 from .result import Callback, Progress, Result, Status
@@ -95,7 +95,6 @@ def newton(surface: Surface, options: NewtonOptions, callback: Callback | None) 
     """Solve with the geometric solver; see ``pcmc.solve``."""
     _refuse_loose_parts(surface)
     log = _Log(callback)
-    start = surface
     for level in range(options.levels + 1):
         state = State(surface, options.care)
         stepper = Stepper(state, options.target == "minimum", options.backend)
@@ -104,9 +103,7 @@ def newton(surface: Surface, options: NewtonOptions, callback: Callback | None) 
         log.factorisations += stepper.factorisations
         if status is not Status.CONVERGED or level == options.levels:
             break
-        finer = refine(start)
-        surface = finer.moved(prolongation(start) @ state.result_surface().vertices)
-        start = finer
+        surface = refine(state.result_surface())
     return Result(
         surface=state.result_surface(),
         status=status,
