@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Floats
+from ..contact import pinched, resting, walls
 from ..errors import FileError, FileWarning, PcmcError, unknown
 from ..files import whole
 from ..surface import Plane, Surface
@@ -105,6 +106,10 @@ def write(
 ) -> None:
     """Write a surface as the suffix says; the file appears whole or not at all.
 
+    A wall below a junction that rests on Π has triangles without area. Formats that write every patch
+    apart (.stl, .glb, .gltf, .3dm) join patches again by place and cannot keep them: they get the
+    surface as it stands, its resting junction sliding on Π.
+
     Parameters
     ----------
     path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
@@ -122,9 +127,15 @@ def write(
         raise FileError(f"{path}: the patch name {broken[0]!r} has a line break in it; rename it")
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
     kept = (getattr(module, "SCALARS", False), getattr(module, "FACE_SCALARS", True))
+    faces = surface.m
     lost = [k for k, v in scalars.items() if not (kept[0] and (kept[1] or len(v) == surface.n))]
     if certificate is not None and not getattr(module, "CERTIFICATE", False):
         lost.append("certificate")
+    if getattr(module, "APART", False):
+        below = walls(surface)
+        surface = pinched(surface, below, resting(surface, below))
+        if surface.m < faces:
+            lost.append(f"{faces - surface.m} triangles of walls without height")
     try:
         with whole(path) as temporary:
             module.write(temporary, surface, scalars=scalars, certificate=_values(certificate))

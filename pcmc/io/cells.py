@@ -57,7 +57,7 @@ def from_polygons(
     return Contents(
         X, F, patch[source], about.named(names),
         None if support is None else np.asarray(support).ravel().astype(np.int8),
-        about.plane, scalars, notes=notes,
+        about.plane, scalars, notes=notes, joined=about.counts is not None,
     )  # fmt: skip
 
 

@@ -33,6 +33,8 @@ class Contents:
     scalars : (n,) or (m,) arrays by name.
     certificate : the certificate's values by name, empty when the file has none.
     notes : sentences on what was changed in reading ("3 quads were cut into triangles").
+    joined : whether patches share their vertices for certain, as in what was written here. Then
+        vertices at one place are meant: a wall without height below a junction that rests on Π.
     """
 
     vertices: Floats
@@ -44,6 +46,7 @@ class Contents:
     scalars: Mapping[str, Floats] = field(default_factory=dict)
     certificate: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    joined: bool = False
 
 
 def support_of(surface: Surface) -> Ints:
@@ -71,6 +74,8 @@ def without_unused(contents: Contents) -> Contents:
 
 def merged(contents: Contents) -> Contents:
     """The same with vertices at one place made one, as patches that were written apart need."""
+    if contents.joined:
+        return contents
     from .merge import coincident  # scipy.spatial is slow to import, and rarely needed
 
     keep, place = coincident(check.positions(contents.vertices))

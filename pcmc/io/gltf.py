@@ -21,7 +21,7 @@ from .contents import Contents, described, description, support_of
 from .library import library, reading
 from .scenes import from_meshes
 
-SCALARS = MERGE = True
+SCALARS = MERGE = APART = True
 FACE_SCALARS = False
 SUPPORT = "_SUPPORT"
 
@@ -37,6 +37,8 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any)
     scene = trimesh.Scene()
     for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
         faces = surface.faces[surface.patch_of_face == k]
+        if not len(faces):
+            continue
         used, local = np.unique(faces, return_inverse=True)
         mesh = trimesh.Trimesh(turned[used], local.reshape(-1, 3), process=False)
         mesh.vertex_attributes.update({key: values[used] for key, values in data.items()})

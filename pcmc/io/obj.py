@@ -68,7 +68,7 @@ def read(path: Path) -> Contents:
     known = told is not None or bool(support.any())
     return Contents(
         X, F, np.concatenate(groups)[source], about.named(names), support if known else None,
-        about.plane, notes=notes,
+        about.plane, notes=notes, joined=about.counts is not None,
     )  # fmt: skip
 
 

@@ -30,7 +30,7 @@ from .library import library, reading
 from .merge import TOLERANCE
 from .polygons import triangulate
 
-MERGE = True
+MERGE = APART = True
 KEY = "pcmc"
 HELD = {"fixed": FIXED, "sliding": SLIDING}
 VERSION = 7  # of Rhino's format
@@ -44,9 +44,11 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
     model.Settings.ModelUnitSystem = rhino.UnitSystem.Meters
     text = description(surface)
     for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
+        faces = surface.faces[surface.patch_of_face == k]
+        if not len(faces):
+            continue
         rgba = (*(round(255 * float(c)) for c in color), 255)
         attributes = _layer(rhino, model, patch.name, rgba, text)
-        faces = surface.faces[surface.patch_of_face == k]
         used, local = np.unique(faces, return_inverse=True)
         mesh = rhino.Mesh()
         mesh.Vertices.UseDoublePrecisionVertices = True

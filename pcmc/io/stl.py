@@ -17,7 +17,7 @@ from .library import library, reading
 from .scenes import from_meshes
 from .text import rows
 
-MERGE = True
+MERGE = APART = True
 FACET = (
     "facet normal %.6g %.6g %.6g\nouter loop\nvertex %.9g %.9g %.9g\nvertex %.9g %.9g %.9g\n"
     "vertex %.9g %.9g %.9g\nendloop\nendfacet\n"
@@ -33,7 +33,8 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
     with path.open("w", encoding="utf-8", newline="\n") as file:
         for k, patch in enumerate(surface.patches):
             chosen = lines[surface.patch_of_face == k]
-            file.write(f"solid {patch.name}\n{rows(FACET, *chosen.T)}endsolid {patch.name}\n")
+            if len(chosen):
+                file.write(f"solid {patch.name}\n{rows(FACET, *chosen.T)}endsolid {patch.name}\n")
 
 
 def read(path: Path) -> Contents:

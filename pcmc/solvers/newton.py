@@ -122,9 +122,11 @@ def _run(state: State, stepper: Stepper, options: NewtonOptions, log: _Log, leve
     try:
         log.row(state, stepper, level)
         for _ in range(options.iterations):
-            if state.relative <= options.tolerance and not _go_on(state, stepper, options):
-                return Status.CONVERGED
-            elif state.relative > options.tolerance:
+            if state.relative <= options.tolerance:
+                if not _go_on(state, stepper, options):
+                    return Status.CONVERGED
+                lowest, since = state.relative, 0
+            else:
                 if state.care():
                     stepper.drop_factor()
                 wait = _step(state, stepper, wait)
