@@ -139,7 +139,8 @@ def certify(
     ----------
     modes : how many of the lowest modes to compute; the index is counted in any case.
     tolerance : relative residual up to which it counts as at rest.
-    status : how a solver ended, if one did: ``"DIVERGED"`` or ``"DEGENERATE"`` settle the verdict.
+    status : how a solver ended, if one did: ``"DIVERGED"``, ``"VANISHED"`` and ``"DEGENERATE"`` settle the
+        verdict.
 
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
@@ -164,7 +165,9 @@ def certify(
         system = _system(standing, frame, space)
     values, fields = _modes(system, modes)
     ratio = load_ratio(standing)
-    verdict, detail = _verdict(surface, residual, tolerance, quality, system, values, ratio, status)
+    verdict, detail = _verdict(
+        surface, residual, tolerance, quality, system, values, ratio, status, below.pinchable
+    )
     return Certificate(
         verdict=verdict,
         detail=detail,
@@ -241,7 +244,7 @@ def unbalanced(standing: Surface) -> str:
 
 def _verdict(
     surface: Surface, residual: float, tolerance: float, quality: float,
-    system: Stiffness | None, values: Floats, ratio: float, status: str,
+    system: Stiffness | None, values: Floats, ratio: float, status: str, sliding: Bools,
 ) -> tuple[Verdict, str]:  # fmt: skip
     if residual > tolerance:
         excess = unbalanced(surface)
@@ -252,8 +255,10 @@ def _verdict(
             return Verdict.NO_EQUILIBRIUM, why
         if status == "DIVERGED":
             return Verdict.NO_EQUILIBRIUM, "the surface inflates without bound"
+        if status == "VANISHED":
+            return Verdict.NO_EQUILIBRIUM, "nothing holds the surface, and it shrinks to nothing"
     if status == "DEGENERATE" or quality <= COLLAPSED:
-        return Verdict.DEGENERATE, _where_collapsed(surface)
+        return Verdict.DEGENERATE, _where_collapsed(surface, sliding)
     if residual > tolerance or system is None:
         return Verdict.NOT_CONVERGED, f"relative residual {residual:.1e}, asked {tolerance:.0e}"
     if system.negative:
@@ -265,9 +270,10 @@ def _verdict(
     return Verdict.STABLE, ""
 
 
-def _where_collapsed(surface: Surface) -> str:
+def _where_collapsed(surface: Surface, sliding: Bools) -> str:
+    """Names the worst triangle outside the patches that may pinch."""
     quality = triangle_quality(surface.vertices, surface.faces)
-    outer = np.where(surface.pressures[surface.patch_of_face] != 0.0, quality, np.inf)
+    outer = np.where(sliding[surface.patch_of_face], np.inf, quality)
     face = int(outer.argmin())
     place = surface.vertices[surface.faces[face]].mean(axis=0).round(4).tolist()
     name = surface.patches[surface.patch_of_face[face]].name

@@ -5,17 +5,19 @@ derivative is applied by differences and inverted by GMRES on a factorisation of
 while it still contracts. Where a minimum is sought and the matrix is indefinite, it is shifted; near a
 saddle the lowest mode leads on. Where a step overshoots or spoils triangles, smooth descent steps come
 first. In between vertices are spread along the shape as long as triangles are poor, and junctions that
-come down to Π are set to rest there.
+come down to Π are set to rest there. A way down may run past a shallow minimum, until triangles collapse:
+then the run starts once more for any stationary point, and keeps it if it is a minimum.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from ..certificate import certify
 from ..errors import SurfaceError
 from ..quality import worst_quality
 from ..refine import refine
@@ -30,7 +32,9 @@ DESCENTS = 5  # smooth steps after a Newton step that did not help
 PATIENCE = 8  # steps without halving the residual, once it is that small
 ROUNDED = 1e-10  # relative residual that counts as rest where rounding lets no step improve it
 COLLAPSED = 1e-3  # triangle quality at which the run ends
-POOR = 0.02  # triangle quality that explains why no step helps
+POOR = 0.1  # triangle quality that explains why no step helps
+SHRUNK = 5e-2  # of its first size: a surface that nothing holds has vanished
+LOST = (Status.DEGENERATE, Status.STALLED, Status.ITERATION_LIMIT)
 
 
 @dataclass(frozen=True)
@@ -96,11 +100,7 @@ def newton(surface: Surface, options: NewtonOptions, callback: Callback | None) 
     _refuse_loose_parts(surface)
     log = _Log(callback)
     for level in range(options.levels + 1):
-        state = State(surface, options.care)
-        stepper = Stepper(state, options.target == "minimum", options.backend)
-        status = _run(state, stepper, options, log, level)
-        log.evaluations += state.evaluations
-        log.factorisations += stepper.factorisations
+        state, status = _finish(surface, options, log, level)
         if status is not Status.CONVERGED or level == options.levels:
             break
         surface = refine(state.result_surface())
@@ -115,8 +115,37 @@ def newton(surface: Surface, options: NewtonOptions, callback: Callback | None) 
     )
 
 
+def _finish(
+    surface: Surface, options: NewtonOptions, log: _Log, level: int
+) -> tuple[State, Status]:
+    """Solve on one mesh; where the way down is lost, by way of any stationary point."""
+    state, status = _attempt(surface, options, log, level)
+    if options.target != "minimum" or status not in LOST:
+        return state, status
+    rows = len(log.rows)
+    other, found = _attempt(surface, replace(options, target="stationary"), log, level)
+    if found is Status.STOPPED:
+        return other, found
+    sound = found is Status.CONVERGED and other.worst >= POOR
+    if sound and certify(other.result_surface(), modes=0).index == 0:
+        return other, found
+    del log.rows[rows:]
+    return state, status
+
+
+def _attempt(
+    surface: Surface, options: NewtonOptions, log: _Log, level: int
+) -> tuple[State, Status]:
+    state = State(surface, options.care)
+    stepper = Stepper(state, options.target == "minimum", options.backend)
+    status = _run(state, stepper, options, log, level)
+    log.evaluations += state.evaluations
+    log.factorisations += stepper.factorisations
+    return state, status
+
+
 def _run(state: State, stepper: Stepper, options: NewtonOptions, log: _Log, level: int) -> Status:
-    bound = options.inflation * state.full.size
+    size, worst = state.full.size, state.worst
     wait = 0
     lowest, since = state.relative, 0
     try:
@@ -136,17 +165,25 @@ def _run(state: State, stepper: Stepper, options: NewtonOptions, log: _Log, leve
                 if state.relative <= ROUNDED and (wait < 0 or since > PATIENCE):
                     return Status.CONVERGED
                 if wait < 0:
-                    return Status.DEGENERATE if state.worst < POOR else Status.STALLED
+                    return _lost(state, worst, Status.STALLED)
             if not np.isfinite(state.energy):
                 return Status.NON_FINITE
             if state.worst < COLLAPSED:
                 return Status.DEGENERATE
-            if np.linalg.norm(np.ptp(state.X, axis=0)) > bound:
+            extent = np.linalg.norm(np.ptp(state.X, axis=0)) / size
+            if extent > options.inflation:
                 return Status.DIVERGED
+            if extent < SHRUNK:
+                return Status.VANISHED
             log.row(state, stepper, level)
     except (StopIteration, KeyboardInterrupt):
         return Status.STOPPED
-    return Status.ITERATION_LIMIT
+    return _lost(state, worst, Status.ITERATION_LIMIT)
+
+
+def _lost(state: State, start: float, status: Status) -> Status:
+    """The status, or that triangles have collapsed where that explains it."""
+    return Status.DEGENERATE if state.worst < min(POOR, 0.5 * start) else status
 
 
 def _go_on(state: State, stepper: Stepper, options: NewtonOptions) -> bool:

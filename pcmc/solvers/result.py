@@ -30,6 +30,9 @@ class Status(Enum):
         "diverged: the surface inflates without bound, which happens when no equilibrium exists or"
         " the step is too long; raise the tensions, lower the pressure or take a smaller step"
     )
+    VANISHED = (
+        "stopped because the surface shrinks to nothing: nothing holds it against its tension"
+    )
     NON_FINITE = (
         "stopped at a number that is not finite; the returned surface is the last finite one; use a"
         " smaller step"

@@ -11,12 +11,16 @@ from ..descent import Carrier, Smoother
 from ..factor import Factor, Factoriser, SingularMatrix, factoriser
 from ..modes import lowest, negatives_without, stiffness
 from ..motion import MotionSpace
+from ..quality import edge_lengths
 from ..rigid import rigid_modes, rigid_motions
 from .state import State
 
 SHIFTS = (0.0, 0.25, 1.0, 4.0)  # of the stiffness, tried in turn until the matrix is positive
 LENGTHS = (1.0, 0.5, 0.25, 0.125)  # of a Newton step, tried in turn
 REFRESH = 6  # descent steps between two factorisations of the Laplacian
+DRIFT = (
+    0.1  # of an edge: the farthest that a step drifts along a rigid motion which nothing resists
+)
 ROUNDING = 1e3 * float(np.finfo(float).eps)
 
 
@@ -34,6 +38,7 @@ class Stepper:
         self.kind = "start"
         self.factorisations = 0
         self._shifted = 0
+        self._owing = False
         self._version = -1
         self._forget()
 
@@ -47,6 +52,7 @@ class Stepper:
         self._factor: Factor | None = None
         self._smoother: Smoother | None = None
         self._carrier: Carrier | None = None
+        self._motions = rigid_motions(self.state.surface)
         self._age = REFRESH
 
     def drop_factor(self) -> None:
@@ -119,7 +125,8 @@ class Stepper:
     def leave_saddle(self) -> bool:
         """Move along the lowest mode as far as E keeps falling; False where no mode lowers it."""
         state = self.state
-        rigid = rigid_modes(state.space, rigid_motions(state.surface), state.X)
+        self._forget()
+        rigid = rigid_modes(state.space, self._motions, state.X)
         try:
             system = stiffness(
                 state.surface.moved(state.X), state.frame, state.space, rigid, self.backend
@@ -183,7 +190,7 @@ class Stepper:
         self.factorisations += 1
         self._shift = shift
         self._space: MotionSpace = state.space
-        rigid = rigid_modes(state.space, rigid_motions(state.surface), state.X)
+        rigid = rigid_modes(state.space, self._motions, state.X)
         self.negative = negatives_without(self._factor, rigid)
         return True
 
@@ -217,7 +224,22 @@ class Stepper:
             rtol=1e-3, restart=12, maxiter=1, callback=norms.append, callback_type="pr_norm",
         )  # fmt: skip
         self._inner = len(norms)
-        return self.state.space.push(s)
+        return self.state.space.push(self._held_back(s) if len(self._motions) else s)
+
+    def _held_back(self, s: Floats) -> Floats:
+        """s with its rigid part short: all it does is slide the mesh along the surface.
+
+        While it is held back, a step may raise the residual; the next ones pay for it.
+        """
+        state = self.state
+        rigid = rigid_modes(state.space, self._motions, state.X)
+        drift = rigid @ (rigid.T @ s)
+        far = float(np.abs(state.space.push(drift)).max())
+        room = DRIFT * float(np.median(edge_lengths(state.surface.moved(state.X))))
+        if far <= room:
+            return s
+        self._owing = False
+        return s - (1.0 - room / far) * drift
 
     def _shifted_direction(self) -> Floats:
         self._inner = 0
@@ -235,8 +257,15 @@ class Stepper:
         return self._carrier.carry(self.state.space, d)
 
     def _helps(self, t: float, slope: float, energy: float, norm: float) -> bool:
-        """Whether the step just taken lowers the residual enough or, towards a minimum, E."""
+        """Whether the step just taken lowers the residual enough or, towards a minimum, E.
+
+        Where nothing resists some rigid motion, every other step may raise the residual.
+        """
         if self.state.norm < (1.0 - 0.3 * t) * norm:
+            self._owing = False
+            return True
+        if len(self._motions) and not self._owing and self.state.norm < 2.0 * norm:
+            self._owing = True
             return True
         falls = self.state.energy <= energy + 1e-2 * t * slope and slope < 0.0
         return falls and self.minimum
