@@ -188,7 +188,7 @@ def test_curves_and_neighbours_of_the_resting_part():
     assert np.isinf(spacing[np.setdiff1d(np.arange(full.n), below.edges)]).all()
 
 
-@pytest.mark.parametrize("count", [5])
+@pytest.mark.parametrize("count", [1, 3, 5])
 def test_pull_less_capacity_is_what_lifting_gains(count):
     """(E(lifted by z) - E(resting)) / z tends to capacity - pull."""
     full, below, rests, standing = pressed(count=count)
