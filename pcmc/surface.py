@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +28,10 @@ class Patch:
     ----------
     name : str, unique in its surface.
     tension : α ≥ 0, force per length. At rest the patch has mean curvature pressure / (2 α).
-    pressure : p, force per area along the positive normal; 0 for an auxiliary patch (a wall).
+    pressure : p, force per area along the positive normal; 0 for an auxiliary patch (a wall). It is
+        a difference, that below the patch less that above it. So a wall between two rooms of
+        pressures p_1 and p_2 carries p_1 - p_2, its normal pointing from room 1 to room 2; see
+        ``pcmc.energy`` for what E means where it does not.
 
     >>> Patch("roof", tension=2.0).target_curvature
     0.25
@@ -225,12 +228,12 @@ class Surface:
     ) -> Surface:
         """The same surface with other tensions or pressures, given by patch name."""
         patches = list(self.patches)
-        for name, value in (tensions or {}).items():
-            index = self.patch_index(name)
-            patches[index] = replace(patches[index], tension=value)
-        for name, value in (pressures or {}).items():
-            index = self.patch_index(name)
-            patches[index] = replace(patches[index], pressure=value)
+        changes: dict[int, dict[str, Any]] = {}
+        for key, given in (("tension", tensions), ("pressure", pressures)):
+            for name, value in (given or {}).items():
+                changes.setdefault(self.patch_index(name), {})[key] = value
+        for index, both in changes.items():
+            patches[index] = replace(patches[index], **both)
         return self._with(patches=tuple(patches))
 
     def patch_faces(self, patches: Sequence[int]) -> Bools:
