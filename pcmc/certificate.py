@@ -20,7 +20,7 @@ from .energy import energy_and_gradient, patch_areas, volume
 from .factor import SingularMatrix
 from .modes import Stiffness, lowest, stiffness
 from .motion import MotionSpace, Structure, force_scale, motion_space
-from .quality import triangle_quality
+from .quality import edge_lengths, triangle_quality
 from .rigid import rigid_modes, rigid_motions
 from .surface import Surface
 from .topology import Curve
@@ -62,7 +62,8 @@ class Certificate:
         gives each of its curves an equal part of its reaction; per length it counts whole.
     reactions : (n,3) force that each support exerts on the surface.
     pinched : (k,) vertices where a junction rests on Π and its wall has no height.
-    load_ratio : pressure along Π's normal over the most that the boundary's tension could carry.
+    load_ratio : pressure along Π's normal over the most that the boundary's tension could carry; see
+        the function ``load_ratio``.
     """
 
     verdict: Verdict
@@ -195,7 +196,11 @@ def load_ratio(surface: Surface) -> float:
     """Pressure along Π's normal over the most that tension at the boundary could carry.
 
     Vertical balance of the whole: p |Ω| ≤ Σ α length(∂Ω) + Σ α_wall length(wall feet). Above 1 no
-    equilibrium exists with this boundary, whatever the shape. 0 for a closed surface.
+    smooth surface with this boundary is at rest, whatever its shape. A mesh may be: its triangles
+    balance along the normals alone. A cap over the unit disc with edge length 0.2 comes to rest down
+    to α = 0.493, where the ratio is 1.014; a pyramid over a square with one free vertex down to
+    α = 1/3, at 1.5. The verdict draws on the ratio only above ``1 + coarseness``. 0 for a closed
+    surface.
     """
     topo = surface.topology
     edge_patch = np.full(len(topo.edges), -1)
@@ -208,6 +213,28 @@ def load_ratio(surface: Surface) -> float:
     vector = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     push = surface.pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
     return float(abs(push)) / capacity if capacity > 0.0 else 0.0
+
+
+def coarseness(surface: Surface) -> float:
+    """(h / R)², h the mean length of the boundary's edges and R = 2 · area / length of the plan.
+
+    Of the size of the error with which a mesh balances; 0 for a closed surface.
+
+    >>> from pcmc import Patch
+    >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
+    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+    >>> coarseness(square)
+    4.0
+    """
+    X, topo = surface.vertices, surface.topology
+    ends = X[topo.edges[topo.boundary_edge]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    corners = X[surface.faces[surface.pressures[surface.patch_of_face] != 0.0]]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
+    plan = 0.5 * abs(float(across @ np.array(surface.plane.normal)))
+    if not len(length) or plan == 0.0:
+        return 0.0
+    return float((length.mean() * length.sum() / (2.0 * plan)) ** 2)
 
 
 def _system(surface: Surface, frame: Structure, space: MotionSpace) -> Stiffness | None:
@@ -246,11 +273,13 @@ def _verdict(
     surface: Surface, residual: float, tolerance: float, quality: float,
     system: Stiffness | None, values: Floats, ratio: float, status: str, sliding: Bools,
 ) -> tuple[Verdict, str]:  # fmt: skip
+    if not surface.tensions.any():
+        return Verdict.NEUTRAL, "no patch has a tension: every shape is at rest"
     if residual > tolerance:
         excess = unbalanced(surface)
         if excess:
             return Verdict.NO_EQUILIBRIUM, excess
-        if ratio > 1.0 + 1e-9:
+        if ratio > 1.0 + coarseness(surface):
             why = f"the pressure is {ratio:.2f} times what the boundary's tension could carry"
             return Verdict.NO_EQUILIBRIUM, why
         if status == "DIVERGED":
@@ -260,7 +289,13 @@ def _verdict(
     if status == "DEGENERATE" or quality <= COLLAPSED:
         return Verdict.DEGENERATE, _where_collapsed(surface, sliding)
     if residual > tolerance or system is None:
-        return Verdict.NOT_CONVERGED, f"relative residual {residual:.1e}, asked {tolerance:.0e}"
+        why = f"relative residual {residual:.1e}, asked {tolerance:.0e}"
+        if ratio > 1.0:
+            why += (
+                f"; the pressure is {ratio:.3f} times what the boundary's tension could carry: a"
+                " fine mesh cannot come to rest, one as coarse as this may"
+            )
+        return Verdict.NOT_CONVERGED, why
     if system.negative:
         return Verdict.SADDLE, f"index {system.negative}: {system.negative} ways down"
     if len(values):
@@ -271,13 +306,20 @@ def _verdict(
 
 
 def _where_collapsed(surface: Surface, sliding: Bools) -> str:
-    """Names the worst triangle outside the patches that may pinch."""
-    quality = triangle_quality(surface.vertices, surface.faces)
+    """Names the worst triangle outside the patches that may pinch, and what pressed on it."""
+    X, topo = surface.vertices, surface.topology
+    quality = triangle_quality(X, surface.faces)
     outer = np.where(sliding[surface.patch_of_face], np.inf, quality)
     face = int(outer.argmin())
-    place = surface.vertices[surface.faces[face]].mean(axis=0).round(4).tolist()
+    corners = X[surface.faces[face]]
     name = surface.patches[surface.patch_of_face[face]].name
-    return f"worst is face {face} of patch {name!r} near {place}, quality {outer[face]:.1e}"
+    place = corners.mean(axis=0).round(4).tolist()
+    said = f"worst is face {face} of patch {name!r} near {place}, quality {outer[face]:.1e}"
+    reach = 1.5 * float(np.median(edge_lengths(surface)))
+    near = np.linalg.norm(X - corners.mean(axis=0), axis=1) <= reach
+    if (near & surface.fixed).any() and (near & topo.on_junction & ~surface.fixed).any():
+        said += "; the junction there slips along a support, which does not hold its end"
+    return said
 
 
 def _quality(standing: Surface, below: Walls) -> tuple[float, float]:
@@ -385,7 +427,7 @@ def held_lengths(surface: Surface) -> Floats:
     ends = surface.topology.edges[surface.topology.boundary_edge]
     ends = ends[held[ends].all(axis=1)]
     half = 0.5 * np.linalg.norm(surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]], axis=1)
-    return np.bincount(ends.ravel(), np.repeat(half, 2), surface.n)
+    return np.asarray(np.bincount(ends.ravel(), np.repeat(half, 2), surface.n), dtype=float)
 
 
 def _reactions(surface: Surface) -> Floats:

@@ -33,7 +33,7 @@ CASES = {
             (3, 4, 0, 3), (3, 8, 0, 7), (3, 16, 1, 15), (3, 32, 1, 31),
         )
     },
-    **{f"Example 2, edge {edge}": (partial(two_caps, edge), 0, 0) for edge in (0.8, 0.6, 0.4)},
+    **{f"Example 2, edge {edge}": (partial(two_caps, edge), 0, 0) for edge in (0.8, 0.6, 0.4, 0.2)},
     **{f"Example 3, {rings} rings": (partial(four_fans, rings), 2, 0) for rings in (7, 14, 28)},
     "Example 4": (partial(bezier_hall), 0, 0),
     **{f"Fig. 4, {rings} rings": (partial(three_patches, rings), 2, 0) for rings in (8, 16)},
@@ -46,9 +46,8 @@ CASES = {
 }  # fmt: skip
 LARGE = (
     *(f"{n} squares" for n in (16, 32)), *(f"{n} rings" for n in (14, 16, 28)), "Example 4",
-    *(f"edge {edge}" for edge in (0.05, 0.25, 0.4, 0.6)), "joined caps, edge 0.5", "wall, edge 0.5",
+    *(f"edge {edge}" for edge in (0.05, 0.2, 0.25, 0.4, 0.6)), "joined caps, edge 0.5", "wall, edge 0.5",
 )  # fmt: skip
-SLIVERS = ("Example 1, wall 3, 32 squares",)  # quality 0.24: the sheets meet Π at a sharp angle
 FINER = {
     "Example 1, wall 1": (partial(two_squares, 4, alpha_aux=1), 3, 0),
     "Example 1, wall 3": (partial(two_squares, 4, alpha_aux=3), 3, 1),
@@ -85,7 +84,7 @@ def test_stationary_to_rounding(name):
     make, index, pinched = CASES[name]
     surface = make()
     result = stationary(make)
-    check(result, index, 0.4 if name in SLIVERS else certify(surface).quality)
+    check(result, index, certify(surface).quality)
     assert len(result.certificate.pinched) == pinched
     assert result.history["factorisation"].iloc[-1] <= 60
     assert (result.surface.vertices[surface.fixed] == surface.vertices[surface.fixed]).all()
@@ -112,7 +111,8 @@ def test_coarse_then_refined_then_finished(name):
 
 
 @pytest.mark.parametrize(
-    "name", [name for name, case in CASES.items() if not case[1] and not name.endswith(LARGE)]
+    "name",
+    marked([name for name, case in CASES.items() if not case[1]], lambda name: name.endswith(LARGE)),
 )
 def test_stable_shapes_are_found_by_the_default_too(name):
     make, _, pinched = CASES[name]
@@ -121,6 +121,24 @@ def test_stable_shapes_are_found_by_the_default_too(name):
     check(result, 0, certify(surface).quality)
     assert len(result.certificate.pinched) == pinched
     assert result.history["factorisation"].iloc[-1] <= 60
+
+
+def test_a_way_down_that_runs_past_a_shallow_minimum_is_taken_back():
+    """Example 2 at edge 0.2: the first attempt slips at a corner, the second finds the minimum."""
+    result = solve(two_caps(0.2))
+    starts = result.history.index[result.history["step"] == "start"]
+    assert len(starts) == 2
+    assert result.history["energy"][starts].nunique() == 1
+    assert result.history["energy"][: starts[1]].min() < result.energy
+    assert result.converged
+    assert result.certificate.index == 0
+
+
+def test_a_junction_that_slips_along_its_support_is_named():
+    """The closed form holds at α = (4, 3, 3) alone: with a stronger right cap the crest slips."""
+    result = solve(joined_caps(0.5, alpha_right=3.5))
+    assert result.certificate.verdict is Verdict.DEGENERATE
+    assert "slips along a support" in result.certificate.detail
 
 
 @pytest.mark.parametrize(

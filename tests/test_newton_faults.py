@@ -50,6 +50,26 @@ def test_stopped_on_request(backend, error, iteration):
     assert result.certificate.verdict is Verdict.NOT_CONVERGED
 
 
+@pytest.mark.parametrize("call", [2, 6, 11, 20])
+def test_interrupted_in_the_middle_of_a_step(backend, call, monkeypatch):
+    """Ctrl-C comes while a trial shape is being measured: the result is the last finished step's."""
+    from pcmc.solvers import state
+
+    measured = state.energy_and_gradient
+    calls = iter(range(10**6))
+
+    def pressed(surface, X):
+        if next(calls) == call:
+            raise KeyboardInterrupt
+        return measured(surface, X)
+
+    monkeypatch.setattr(state, "energy_and_gradient", pressed)
+    result = solve(two_caps(0.8), backend=backend)
+    assert result.status is Status.STOPPED
+    assert result.energy == pytest.approx(energy(result.surface), rel=1e-14)
+    assert result.energy == result.history["energy"].iloc[-1]
+
+
 def test_stopped_on_a_refined_level(backend):
     def callback(progress):
         if progress.row["level"] == 1:
@@ -203,6 +223,7 @@ def test_a_mesh_that_cannot_be_mended_is_named(backend, target):
     assert result.status is Status.DEGENERATE
     assert result.certificate.verdict is Verdict.DEGENERATE
     assert "of patch 'roof' near [" in result.certificate.detail
+    assert "slips" not in result.certificate.detail
     assert np.isfinite(result.surface.vertices).all()
 
 

@@ -32,9 +32,9 @@ DESCENTS = 5  # smooth steps after a Newton step that did not help
 PATIENCE = 8  # steps without halving the residual, once it is that small
 ROUNDED = 1e-10  # relative residual that counts as rest where rounding lets no step improve it
 COLLAPSED = 1e-3  # triangle quality at which the run ends
-POOR = 0.1  # triangle quality that explains why no step helps
+POOR = 0.15  # triangle quality that explains why no step helps
 SHRUNK = 5e-2  # of its first size: a surface that nothing holds has vanished
-LOST = (Status.DEGENERATE, Status.STALLED, Status.ITERATION_LIMIT)
+LOST = (Status.DEGENERATE, Status.STALLED)
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class NewtonOptions:
     ----------
     tolerance : converged when ‖Bᵀ∇E‖ ≤ tolerance × the norm of the single triangles' forces, or when
         rounding lets no step improve on 1e-10 of it.
-    iterations : the most steps of any kind.
+    iterations : the most steps of any kind, on each level and in each attempt.
     target : ``"minimum"`` leaves saddles; ``"stationary"`` converges to them.
     levels : solve here, refine 1→4 this many times, and finish on each.
     care : triangles are spread while the worst has less than this quality, or half the initial one.
@@ -145,40 +145,51 @@ def _attempt(
 
 
 def _run(state: State, stepper: Stepper, options: NewtonOptions, log: _Log, level: int) -> Status:
-    size, worst = state.full.size, state.worst
-    wait = 0
-    lowest, since = state.relative, 0
+    start = state.worst
+    wait, since, lowest = 0, 0, state.relative
+    shown = state.X, state.version
     try:
-        log.row(state, stepper, level)
-        for _ in range(options.iterations):
-            if state.relative <= options.tolerance:
+        for step in range(options.iterations + 1):
+            shown = state.X, state.version
+            log.row(state, stepper, level)
+            rounded = state.relative <= ROUNDED and (wait < 0 or since > PATIENCE)
+            if state.relative <= options.tolerance or rounded:
                 if not _go_on(state, stepper, options):
                     return Status.CONVERGED
-                lowest, since = state.relative, 0
+                wait, since, lowest = 0, 0, state.relative
+            elif wait < 0:
+                return _lost(state, start, Status.STALLED)
+            elif step == options.iterations:
+                return _lost(state, start, Status.ITERATION_LIMIT)
             else:
                 if state.care():
                     stepper.drop_factor()
                 wait = _step(state, stepper, wait)
-                lowest, since = (
-                    (state.relative, 0) if state.relative < 0.5 * lowest else (lowest, since + 1)
-                )
-                if state.relative <= ROUNDED and (wait < 0 or since > PATIENCE):
-                    return Status.CONVERGED
-                if wait < 0:
-                    return _lost(state, worst, Status.STALLED)
-            if not np.isfinite(state.energy):
-                return Status.NON_FINITE
-            if state.worst < COLLAPSED:
-                return Status.DEGENERATE
-            extent = np.linalg.norm(np.ptp(state.X, axis=0)) / size
-            if extent > options.inflation:
-                return Status.DIVERGED
-            if extent < SHRUNK:
-                return Status.VANISHED
-            log.row(state, stepper, level)
-    except (StopIteration, KeyboardInterrupt):
+                since += 1
+                if state.relative < 0.5 * lowest:
+                    since, lowest = 0, state.relative
+            ended = _ended(state, options)
+            if ended is not None:
+                log.row(state, stepper, level)
+                return ended
+    except StopIteration:
         return Status.STOPPED
-    return _lost(state, worst, Status.ITERATION_LIMIT)
+    except KeyboardInterrupt:  # perhaps in the middle of a step
+        state.go_back(*shown)
+        return Status.STOPPED
+    return Status.ITERATION_LIMIT
+
+
+def _ended(state: State, options: NewtonOptions) -> Status | None:
+    """Why no further step makes sense, if so."""
+    if not np.isfinite(state.energy):
+        return Status.NON_FINITE
+    if state.worst < COLLAPSED:
+        return Status.DEGENERATE
+    extent = np.linalg.norm(np.ptp(state.X, axis=0)) / state.size
+    if extent > options.inflation:
+        return Status.DIVERGED
+    return Status.VANISHED if extent < SHRUNK else None
 
 
 def _lost(state: State, start: float, status: Status) -> Status:

@@ -23,6 +23,7 @@ from ..quality import compare, redistribution, worst_quality
 from ..surface import Surface
 
 LOW = 2e-3  # height, in spacings along the crest, at which a sinking junction is set to rest
+POOR = 2 / 3  # of the quality that is cared for: once spreading has failed, what is left to mend
 CARES = 60  # times that the vertices are spread at most
 RELEASES = 30  # times that resting junctions are lifted at most
 
@@ -33,6 +34,7 @@ class State:
     Attributes
     ----------
     full, surface : all of the mesh as it last was; the part of it that stands (see ``contact``).
+    size : of the mesh at the start.
     X : (n,3) where the standing surface is now.
     rests : (n,) junction vertices at rest on Π.
     frame, space : what each vertex lies on, and the basis of its motion there.
@@ -43,12 +45,13 @@ class State:
 
     def __init__(self, surface: Surface, care: float) -> None:
         self.full = surface
-        self.care_bound = care
+        self.care_bound, self.size = care, surface.size
         self.walls: Walls = walls(surface)
         self.spacing = crest_spacing(surface, self.walls)
         self.evaluations = 0
         self.version = 0
         self.cares, self.releases = CARES, RELEASES
+        self._care_from, self._care_below = care, np.inf  # quality and residual that ask for it
         self._pinch(resting(surface, self.walls))
 
     def _pinch(self, rests: Bools) -> None:
@@ -109,6 +112,12 @@ class State:
         else:
             self.measure()
 
+    def go_back(self, X: Floats, version: int) -> None:
+        """Stand at X again, where that belongs to the present mesh; all else is measured anew."""
+        if version == self.version:
+            self.X = X
+        self.measure()
+
     def moved_by(self, d: Floats) -> tuple[Floats, Bools]:
         """X + d and the crests it brings down to Π, which it leaves there.
 
@@ -137,13 +146,15 @@ class State:
     def care(self) -> bool:
         """Spread the vertices along the shape while triangles are poor; True if they moved."""
         start = worst = self.worst
-        if self.cares <= 0 or self.relative < 1e-7 or worst >= self.care_bound:
+        if self.cares <= 0 or worst >= self._care_from:
+            return False
+        if not 1e-7 <= self.relative < self._care_below:
             return False
         self.cares -= 1
         best, X = self.X, self.X
         for _ in range(20):
             move = redistribution(self.surface, X, self.frame.curve_edges, self.frame.kind)
-            move[self.rests] = 0.0
+            move[self.rests] = self.surface.plane.along(move[self.rests])
             space = motion_space(self.surface, self.frame, X)
             X = hung(self.surface, self.walls, X + move - space.project(move), space)
             quality = worst_quality(X, self.judged)
@@ -152,7 +163,8 @@ class State:
             if quality >= self.care_bound:
                 break
         if worst <= 1.02 * start:
-            self.cares = 0
+            self._care_from = POOR * self.care_bound
+            self._care_below = 0.1 * self.relative
             return False
         self.X = best
         self.measure()
