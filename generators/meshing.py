@@ -1,4 +1,8 @@
-"""Near-equilateral triangles inside plane outlines whose vertices are given and stay."""
+"""Near-equilateral triangles inside plane outlines whose vertices are given and stay.
+
+The meshes of the paper's examples come from here and not from ``pcmc.plan``: what the flow does depends on
+the mesh, and a better mesher for plans must not move the reproduced numbers.
+"""
 
 from __future__ import annotations
 
