@@ -178,10 +178,9 @@ def _check(
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """A solved surface on the way and where it was sought from; x unknowns, r misfits, J = ∂r/∂x."""
+    """A solved surface on the way: x unknowns, r misfits, J = ∂r/∂x."""
 
     x: Floats
-    start: Surface
     result: Result
     found: Floats
     r: Floats
@@ -250,22 +249,13 @@ class _Search:
         return point
 
     def at(self, x: Floats, near: _Point | None) -> _Point | None:
-        """The solution with these unknowns, from one nearby; None where none is found.
-
-        So near a solution that the solver stalls, it starts once more from where that one started.
-        """
+        """The solution with these unknowns, from one nearby; None where none is found."""
         if near is None:
-            return self.solved(x, self.surface, {})[0]
+            return self.solved(x, self.surface, {})
         still = bool((np.abs(x - near.x) < STILL * self.sizes(near)).all())
-        care = {"care": 0.0} if still else {}
-        point, status = self.solved(x, near.result.surface, care)
-        if status is Status.STALLED and still and len(self.rows) < self.limit:
-            point, _ = self.solved(x, near.start, care)
-        return point
+        return self.solved(x, near.result.surface, {"care": 0.0} if still else {})
 
-    def solved(
-        self, x: Floats, start: Surface, care: dict[str, float]
-    ) -> tuple[_Point | None, Status]:
+    def solved(self, x: Floats, start: Surface, care: dict[str, float]) -> _Point | None:
         """Solve once, from a surface."""
         values = self.turned(x).tolist()
         chosen: dict[str, dict[str, float]] = {"tension": {}, "pressure": {}}
@@ -273,11 +263,11 @@ class _Search:
             chosen[parameter.kind][parameter.patch] = value
         trial = start.retensioned(chosen["tension"], chosen["pressure"])
         if load_ratio(trial) > OVERLOAD:
-            return None, Status.DIVERGED
+            return None
         result = solve(trial, "newton", **{**care, **self.options})
         if result.status is Status.STOPPED:
             raise KeyboardInterrupt
-        point = self.point(x, start, result) if result.converged else None
+        point = self.point(x, result) if result.converged else None
         row = dict(zip((p.label for p in self.parameters), values, strict=True))
         if point is not None:
             row |= zip((t.label for t in self.targets), point.found.tolist(), strict=True)
@@ -285,9 +275,9 @@ class _Search:
         self.rows.append({**row, "status": result.status.name.lower(), "misfit": misfit})
         if self.callback is not None:
             self.callback(pd.Series(self.rows[-1]))
-        return point, result.status
+        return point
 
-    def point(self, x: Floats, start: Surface, result: Result) -> _Point | None:
+    def point(self, x: Floats, result: Result) -> _Point | None:
         """The point at a solution; None at a fold, where nothing can be said of what is ahead."""
         found = np.array([measure(result.surface, t).value for t in self.targets])
         wanted = np.array([t.nearest(q) for t, q in zip(self.targets, found, strict=True)])
@@ -298,7 +288,7 @@ class _Search:
             return None
         jacobian = slopes * np.where(self.inverse, -(self.turned(x) ** 2), 1.0)
         jacobian = jacobian * (r != 0.0)[:, None] / self.scale[:, None]
-        return _Point(x, start, result, found, r, float(np.linalg.norm(r)), jacobian)
+        return _Point(x, result, found, r, float(np.linalg.norm(r)), jacobian)
 
     def met(self, point: _Point) -> bool:
         return bool(np.abs(point.r).max() <= self.tolerance)
