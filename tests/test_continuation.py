@@ -8,6 +8,8 @@ from tables import same
 from generators import four_fans, spherical_cap, two_caps, two_squares
 from pcmc import Direction, Parameter, certify, follow, solve
 from pcmc.continuation import Ending, FollowOptions
+from pcmc.continuation.point import Lost, at_parameter, correct
+from pcmc.continuation.shape import Shape
 from pcmc.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.plot import diagram
 
@@ -407,3 +409,13 @@ def test_every_ending_says_something_else():
     sentences = [ending.value for ending in Ending]
     assert len(set(sentences)) == len(sentences)
     assert FollowOptions().control == "arclength"
+
+
+def test_a_correction_that_leaves_the_tensions_allowed_is_lost_not_a_contact(monkeypatch):
+    """Newton's step may carry λ past 0 and a junction down to Π at once."""
+    surface = solve(two_squares(4, alpha_aux=1.0)).surface
+    line = Direction({"wall": 1.0}).line(surface)
+    shape = Shape(surface)
+    monkeypatch.setattr(Shape, "down", lambda self, X: np.ones(len(X), dtype=bool))
+    with pytest.raises(Lost, match="a tension would reach 0"):
+        correct(shape, line, surface.vertices, 1.0, at_parameter(-5.0, 1.0), 1e-10)

@@ -174,9 +174,8 @@ def correct(
     Touched : a junction comes down to Π on the way.
     """
     last, slow = np.inf, 0
+    _check(line, value)
     for iteration in range(ITERATIONS + 1):
-        if not line.allows(value):
-            raise Lost(f"a tension would reach 0 at the parameter {value:g}")
         surface = line.applied(shape.surface, value)
         space = shape.space(X)
         right = space.pull(shape.forces(surface, X))
@@ -195,11 +194,17 @@ def correct(
         if not np.abs(step).max() < shape.full.size:
             break
         X, value = shape.swept(X + step, space), value + change
+        _check(line, value)
         if shape.quality(X) < COLLAPSED:
             raise Collapsed("triangles collapse")
         if shape.down(X).any():
             raise Touched(X, value)
     raise Lost(f"Newton's method does not converge (residual {residual:.1e})")
+
+
+def _check(line: Line, value: float) -> None:
+    if not line.allows(value):
+        raise Lost(f"a tension would reach 0 at the parameter {value:g}")
 
 
 @dataclass(frozen=True, eq=False)
