@@ -125,10 +125,24 @@ def test_a_file_that_is_no_store_is_refused_and_kept(text, tmp_path):
 
 
 def test_paths_that_cannot_be_opened(tmp_path):
+    (tmp_path / "file").write_bytes(b"")
     with pytest.raises(FileError, match="cannot be opened for writing"):
-        run(SWEEP, tmp_path, workers=1)
+        run(SWEEP, tmp_path / "file" / "s.jsonl", workers=1)
     with pytest.raises(FileError, match="cannot be read"):
         read_store(tmp_path / "missing.jsonl")
+
+
+def test_folders_pipes_and_devices_are_no_stores(tmp_path):
+    """A device may be read without end, a pipe waits for somebody to write."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for path in (tmp_path, pipe, "/dev/zero"):
+        for use in (
+            lambda path=path: run(SWEEP, path, workers=1),
+            lambda path=path: read_store(path),
+        ):
+            with pytest.raises(FileError, match="is no regular file"):
+                use()
 
 
 def test_two_sweeps_cannot_write_to_one_store(tmp_path):

@@ -101,6 +101,7 @@ def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
         be opened.
     """
     path, header = Path(path), _line(_header(sweep))
+    _regular(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
@@ -130,6 +131,7 @@ def read_store(path: str | os.PathLike[str]) -> list[Record]:
     FileError : the file cannot be read, or is no store.
     """
     path = Path(path)
+    _regular(path)
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -137,6 +139,12 @@ def read_store(path: str | os.PathLike[str]) -> list[Record]:
     _check_header(path, data, None)
     records, _ = _records(path, data)
     return [records[number] for number in sorted(records)]
+
+
+def _regular(path: Path) -> None:
+    """Refuse a folder, a pipe or a device, of which some can be read without end."""
+    if path.exists() and not path.is_file():
+        raise FileError(f"{path}: is no regular file; name a file on a disk")
 
 
 def _header(sweep: Sweep) -> dict[str, Any]:
