@@ -17,7 +17,7 @@ from pcmc import (
     mean_curvature,
     solve,
 )
-from pcmc.certificate import Verdict, conormal_sum, load_ratio
+from pcmc.certificate import Verdict, coarseness, conormal_sum, load_ratio
 from pcmc.energy import patch_areas, volume
 from pcmc.quality import triangle_quality
 
@@ -215,6 +215,34 @@ def test_the_load_ratio_of_a_disc_is_its_radius_over_twice_the_tension(alpha):
     surface = spherical_cap(0.1, alpha=alpha, exact=True)
     assert load_ratio(surface) == pytest.approx(0.5 / alpha, rel=2e-3)
     assert load_ratio(double_bubble(0.8)) == 0.0
+
+
+def test_a_load_just_above_what_tension_carries_is_no_proof_on_a_coarse_mesh():
+    """The smooth cap ends at α = 1/2; that of edge length 0.2 is still there a little below."""
+    surface = spherical_cap(0.2, alpha=0.495)
+    assert 1.0 < load_ratio(surface) < 1.0 + coarseness(surface) < 1.1
+    before = certify(surface)
+    assert before.verdict is Verdict.NOT_CONVERGED
+    assert f"{before.load_ratio:.3f} times what the boundary's tension could carry" in before.detail
+    after = solve(surface)
+    assert after.converged
+    assert after.certificate.verdict is Verdict.STABLE
+    assert after.certificate.load_ratio > 1.0
+
+
+def test_coarseness_falls_with_the_square_of_the_edge_length():
+    coarse, fine = coarseness(spherical_cap(0.2)), coarseness(spherical_cap(0.1))
+    assert coarse == pytest.approx(0.04, rel=0.15)
+    assert coarse / fine == pytest.approx(4.0, rel=0.15)
+    assert coarseness(double_bubble(0.8)) == 0.0
+    assert coarseness(pyramid(0.4)) > 0.5  # at rest down to α = 1/3, where the ratio is 1.5
+
+
+def test_without_any_tension_every_shape_is_at_rest():
+    slack = pyramid().retensioned({"roof": 0.0}, {"roof": 0.0})
+    found = certify(slack)
+    assert found.verdict is Verdict.NEUTRAL
+    assert found.detail == "no patch has a tension: every shape is at rest"
 
 
 def test_a_collapsed_triangle_is_named():

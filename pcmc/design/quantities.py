@@ -297,9 +297,9 @@ def _force_slope(surface: Surface, v: int, pull: Floats) -> Floats:
     np.add.at(slope, F[row], np.einsum("fjab,a->fjb", blocks[row, corner], pull))
     # ⅓ A ν = (q - p) × (r - p) / 6, whose part along u changes by (q - r) × u / 6 as p moves
     X, sixth = surface.vertices, surface.pressures[surface.patch_of_face[around]] / 6.0
-    for corner in range(3):
-        opposite = X[F[:, corner - 2]] - X[F[:, corner - 1]]
-        np.add.at(slope, F[:, corner], -sixth[:, None] * np.cross(opposite, pull))
+    for c in range(3):
+        opposite = X[F[:, c - 2]] - X[F[:, c - 1]]
+        np.add.at(slope, F[:, c], -sixth[:, None] * np.cross(opposite, pull))
     return slope
 
 
