@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -50,11 +51,15 @@ def initial(edge_length: float) -> Surface:
 
 def flow_grid(folder: Folder, short: bool) -> pd.DataFrame:
     """A row for each triple of tensions, and their times in ``records_times``."""
-    iterations = SHORT_ITERATIONS if short else ITERATIONS
-    grid = dict.fromkeys(AXES, TENSIONS)
-    sweep = Sweep(flow_case, grid, {"edge_length": EDGE_LENGTH, "iterations": iterations})
+    sweep = flow_sweep(SHORT_ITERATIONS if short else ITERATIONS, TENSIONS)
     columns = ["status", "iterations_taken", "gradient_squared", "energy", "forced_steps"]
     return run_sweep(folder, "records", sweep)[[*AXES, *columns]]
+
+
+def flow_sweep(iterations: int, tensions: Sequence[float]) -> Sweep:
+    """The paper's flow at each triple of some tensions."""
+    grid = dict.fromkeys(AXES, tensions)
+    return Sweep(flow_case, grid, {"edge_length": EDGE_LENGTH, "iterations": iterations})
 
 
 def data(folder: Folder, short: bool) -> None:

@@ -4,46 +4,59 @@ Each case of ``alpha_grid`` is solved for a stationary point on the same mesh. W
 reason is looked for in this order:
 
 - *patch*: a patch over its part of the plan, held all around and along the chord between the corners too,
-  folds at a tension a little below half its radius (``patch_folds``). A patch that is weaker inflates even
-  so, and a wall holds it less than that.
-- *balance*: where the patches' tensions differ by no less than the wall's, no angles at the junction are
-  in balance (7), whether it stands free or rests on Π.
-- *fold*: from the nearest equilibria of the grid (no two of the same patches' tensions, nearest first) the
+  folds at a tension a little below half its radius (``patch_folds``). ``weakening`` follows one patch's
+  tension down from every equilibrium of weak patches: no branch comes below that patch's own fold.
+- *balance*: where the patches' tensions differ by more than the wall's, no angles at the junction are in
+  balance (7), whether it stands free or rests on Π.
+- *fold*: from the equilibria of the grid that are nearest, those that share a patch's tension first, the
   branch is followed along a straight line in the tensions, and folds before it arrives: it turns back, and
-  a way down opens (its index grows) as it does.
+  a way down opens (its index grows) as it does, on triangles that are sound. ``explained`` has the tensions
+  at the fold.
 - *slip*: the branch ends otherwise. The junction runs into a corner of the outline and the triangles there
   collapse, or the branch turns back a long way before any way down opens: that is the mesh, not the
-  surface (``stability`` tells why corners do not hold a crest).
+  surface (``stability`` tells why corners do not hold a crest). No × of the grid is left with it.
+
+An equilibrium of one mesh may be that mesh's own. ``finer`` seeks each on a mesh of half the edge length.
 """
 
 from __future__ import annotations
 
-import math
-from functools import cache
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from generators import two_caps
-from pcmc import Surface, solve
-from pcmc.arrays import Floats
-from pcmc.continuation import Direction, Ending, follow
-from pcmc.solvers.result import Progress
+from pcmc.arrays import Bools, Floats
 from pcmc.sweep import Sweep, solve_case
 
 from .alpha_grid import AXES, CONVERGED, EDGE_LENGTH, FAILED, TENSIONS, flow_grid
+from .alpha_grid_branches import (
+    FOLD,
+    PATCHES,
+    REACHED,
+    SLIP,
+    SOUND,
+    STEPS,
+    balanced,
+    branch_case,
+    branches,
+    finer_case,
+    patch_fold,
+    weakening_case,
+)
+from .alpha_grid_sentences import sentences
 from .cases import run_sweep
 from .folder import Folder
 from .panels import category_panels
 from .study import Study
 
-PATCHES = ("wall", "large", "small")
-SOUND = 0.2  # triangle quality of an equilibrium from which a branch may start
-TRIES, STEPS = 3, 25
-BACK = 0.03  # of the way: how far behind its turn a branch may open a way down and still count as folded
-REACHED, FOLD, SLIP = "reached", "fold", "slip"
+TRIES, TRIES_FOR_CROSS = 2, 6  # equilibria from which a branch is sought
+WEAK = 4.0  # tension of a patch up to which its equilibria are weakened further
+THIN = 0.05  # triangle quality of an equilibrium that leans on its mesh
 FOLD_LENGTHS = (EDGE_LENGTH, 0.6, 0.3)  # of the meshes on which the patches' folds are sought
+_FOUND = ["verdict", "index", "quality", "pinched", "wall_area"]
+_ENDS = [f"{where}_{name}" for where in ("from", "at") for name in PATCHES]
 NUMBERS = {
     "verdict": "verdict", "index": "index", "curvature_error": "curvature_error",
     "curvature_error_cotangent": "curvature_error_cotangent", "quality": "quality",
@@ -64,12 +77,9 @@ CATEGORIES = {
 
 
 def data(folder: Folder, short: bool) -> None:
-    """``records``: the geometric solver's answers; ``branches``: of the cases where none is found."""
-    tensions = TENSIONS[::3] if short else TENSIONS
-    grid = {"alpha_aux": tensions, "alpha_large": tensions, "alpha_small": tensions}
-    fixed = {"generator": "generators:two_caps", "edge_length": EDGE_LENGTH, "method": "newton",
-             "target": "stationary"}  # fmt: skip
-    found = run_sweep(folder, "records", Sweep(solve_case, grid, fixed))
+    """``records``: the geometric solver's answers; then why there is none, or how good it is."""
+    sweep = geometric_sweep(TENSIONS[::3] if short else TENSIONS)
+    found = run_sweep(folder, "records", sweep)
     found = found.rename(columns={"alpha_aux": "alpha_wall"})
     records = found[[*AXES, "status", *NUMBERS]].rename(columns=NUMBERS)
     flow = _flow(folder, short).set_index(list(AXES))
@@ -80,7 +90,15 @@ def data(folder: Folder, short: bool) -> None:
         {"edge_length": h, **{name: patch_fold(h, name) for name in PATCHES[1:]}} for h in lengths
     ]
     folder.write_table("patch_folds", pd.DataFrame(rows))
-    folder.write_table("branches", _branches(folder, folder.read_table("records")))
+    _search(folder, folder.read_table("records"))
+
+
+def geometric_sweep(tensions: Sequence[float]) -> Sweep:
+    """The geometric solver at each triple of some tensions."""
+    grid = dict.fromkeys(("alpha_aux", "alpha_large", "alpha_small"), tensions)
+    fixed = {"generator": "generators:two_caps", "edge_length": EDGE_LENGTH, "method": "newton",
+             "target": "stationary"}  # fmt: skip
+    return Sweep(solve_case, grid, fixed)
 
 
 def _flow(folder: Folder, short: bool) -> pd.DataFrame:
@@ -91,116 +109,46 @@ def _flow(folder: Folder, short: bool) -> pd.DataFrame:
     return flow_grid(folder, short)
 
 
-def _branches(folder: Folder, records: pd.DataFrame) -> pd.DataFrame:
-    """Where branches towards the cases without an equilibrium end; for a × up to TRIES are followed."""
+def _search(folder: Folder, records: pd.DataFrame) -> None:
+    """``branches`` towards the cases without an equilibrium; ``weakening`` and ``finer`` of those with."""
     triples = records[list(AXES)].to_numpy()
     at_rest = (records.status == "converged").to_numpy()
-    sound = triples[at_rest & (records.quality > SOUND).to_numpy()]
     open_cases = ~at_rest & balanced(triples) & ~_weak(folder, triples)
-    targets = triples[open_cases]
-    tries = np.where(records.flow_status.isin(FAILED)[open_cases], TRIES, 1).tolist()
-    columns = [*AXES, "ending", "share", "from_wall", "from_large", "from_small"]
-    if not len(targets) or not len(sound):
-        return pd.DataFrame(columns=columns)
-    towards = [
-        [target.tolist(), *nearest(target, sound)[:count]]
-        for target, count in zip(targets, tries, strict=True)
-    ]
-    grid = {"towards": towards}
-    found = run_sweep(folder, "branches", Sweep(branch_case, grid, {"edge_length": EDGE_LENGTH}))
-    for k, name in enumerate(AXES):
-        found[name] = targets[:, k]
-    return found[columns]
+    columns = ["ending", "share", *_FOUND, *_ENDS]
+    crossed = records.flow_status.isin(FAILED).to_numpy()[open_cases]
+    tries = np.where(crossed, TRIES_FOR_CROSS, TRIES).tolist()
+    towards = branches(records, np.asarray(open_cases), tries)
+    _table(folder, "branches", branch_case, {"towards": towards}, columns)
+    weakest = triples[:, 1:].min(axis=1) <= WEAK
+    sound = triples[at_rest & weakest & (records.quality > SOUND).to_numpy()]
+    grid: dict[str, Any] = {"start": sound.tolist(), "patch": list(PATCHES[1:])}
+    _table(folder, "weakening", weakening_case, grid, ["patch", "ending", "least", "quality"])
+    ends = folder.read_table("branches")
+    arrived = ends[list(AXES)].to_numpy()[(ends.ending == REACHED).to_numpy()]
+    tensions = [*triples[at_rest].tolist(), *arrived.tolist()]
+    columns = ["status", "verdict", "quality", "height", "finer_height"]
+    _table(folder, "finer", finer_case, {"tensions": tensions}, columns)
 
 
-def patch_fold(edge_length: float, name: str) -> float:
-    """The least tension of a patch that is held all around, its junction on the chord, on Π."""
-    whole = _initial(edge_length)
-    faces = whole.faces[whole.patch_faces([whole.patch_index(name)])]
-    used, local = np.unique(faces, return_inverse=True)
-    X, seam = whole.vertices[used].copy(), whole.topology.on_junction[used]
-    X[seam] *= [0.0, 1.0, 0.0]
-    X[seam, 0] = whole.vertices[whole.fixed & whole.topology.on_junction, 0].mean()
-    patch = whole.patches[whole.patch_index(name)]
-    held = whole.fixed[used] | seam
-    part = Surface(X, local.reshape(-1, 3), np.zeros(len(faces), int), (patch,), fixed=held)
-    branch = follow(solve(part).surface, name, 0.1 * patch.tension, folds=1)
-    return float(branch.folds.parameter.iloc[0])
+def _table(
+    folder: Folder, name: str, case: Callable[..., Any], grid: dict[str, Any], columns: list[str]
+) -> None:
+    """A sweep's answers beside the tensions of its cases, the first triple of its first axis."""
+    first = next(iter(grid))
+    if not grid[first]:
+        folder.write_table(name, pd.DataFrame(columns=[*AXES, *columns]))
+        return
+    found = run_sweep(folder, name, Sweep(case, grid, {"edge_length": EDGE_LENGTH}))
+    found = found.reindex(columns=[first, *columns])
+    triples = [v[0] if isinstance(v[0], list) else v for v in found.pop(first)]
+    places = pd.DataFrame(triples, columns=list(AXES), index=found.index)
+    folder.write_table(name, pd.concat([places, found], axis=1))
 
 
-def _weak(folder: Folder, triples: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def _weak(folder: Folder, triples: Floats) -> Bools:
     """(k,) whether a patch has less tension than where it folds on this mesh."""
     folds = folder.read_table("patch_folds").iloc[0]
     return np.asarray((triples[:, 1] < folds.large) | (triples[:, 2] < folds.small))
-
-
-def balanced(triples: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """(k,) whether tensions (wall, large, small) can balance, or the wall rests on Π and holds.
-
-    >>> balanced(np.array([[4.0, 4.0, 3.0], [1.0, 4.0, 2.0], [9.0, 4.0, 3.0]])).tolist()
-    [True, False, True]
-    """
-    wall, large, small = triples.T
-    return np.asarray(np.abs(large - small) < wall)
-
-
-def nearest(target: Floats, sound: Floats) -> list[list[float]]:
-    """The triples from which a branch is followed: nearest in ratio, no two with the same patches.
-
-    A wall stronger than both patches together counts as their sum: it lies on Π either way.
-    """
-
-    def ratios(triples: Floats) -> Floats:
-        wall = np.minimum(triples[..., 0], triples[..., 1] + triples[..., 2])
-        return np.log(np.stack([wall, triples[..., 1], triples[..., 2]], axis=-1))
-
-    apart = np.linalg.norm(ratios(sound) - ratios(target), axis=-1).round(9)
-    chosen: dict[tuple[float, float], list[float]] = {}
-    for triple in sound[np.argsort(apart, kind="stable")].tolist():
-        chosen.setdefault((triple[1], triple[2]), triple)
-    return list(chosen.values())
-
-
-def branch_case(towards: list[Any], edge_length: float) -> dict[str, Any]:
-    """How the branch ends that leads from one of some equilibria to the tensions asked for.
-
-    ``towards``: the tensions asked for, then those to start from, each (wall, large, small). The
-    answer is the first start's whose branch arrives or folds, or the last's; ``share`` is how far
-    along the line it comes.
-    """
-    target, starts = np.array(towards[0]), towards[1:]
-    answer: dict[str, Any] = {}
-    for start in starts:
-        ending, share = _follow(target, np.array(start), edge_length)
-        origin = {f"from_{name}": value for name, value in zip(PATCHES, start, strict=True)}
-        answer = {"ending": ending, "share": share, **origin}
-        if ending in (REACHED, FOLD):
-            break
-    return answer
-
-
-def _follow(target: Floats, start: Floats, edge_length: float) -> tuple[str, float]:
-    named = dict(zip(PATCHES, start.tolist(), strict=True))
-    at_rest = solve(_initial(edge_length).retensioned(named), "newton", target="stationary").surface
-    line = {name: v for name, v in zip(PATCHES, (target - start).tolist(), strict=True) if v}
-    points: list[tuple[float, int]] = []
-
-    def watch(progress: Progress) -> None:
-        points.append((progress.row["parameter"], progress.row["index"]))
-        if points[-1][1] > points[0][1] or points[-1][0] < max(points)[0] - BACK:
-            raise StopIteration
-
-    branch = follow(at_rest, Direction(line, relative=True), 1.0, callback=watch, steps=STEPS)
-    if branch.ending is Ending.REACHED:
-        return REACHED, 1.0
-    opened = branch.events[(branch.events.kind == "index")]
-    behind = branch.folds.parameter.max() - opened.parameter
-    return FOLD if (behind <= BACK).any() else SLIP, max(points)[0]
-
-
-@cache
-def _initial(edge_length: float) -> Surface:
-    return two_caps(edge_length)
 
 
 def table(folder: Folder) -> dict[str, float]:
@@ -214,12 +162,18 @@ def table(folder: Folder) -> dict[str, float]:
     counts = cases.category.value_counts()
     found = {f"cases_{k}": float(counts.get(name, 0)) for k, name in enumerate(CATEGORIES)}
     crossed = cases[cases.crossed]
+    least = folder.read_table("weakening").groupby("patch").least.min()
+    slipped = crossed.category.isin(["none: the junction slips", "none found"])
     return found | {
         "cases": float(len(cases)),
         "crosses": float(len(crossed)),
         "crosses_with_equilibrium": float(crossed.equilibrium.sum()),
-        "crosses_unexplained": float((crossed.category == "none found").sum()),
+        "crosses_unexplained": float(slipped.sum()),
         "equilibria": float(cases.equilibrium.sum()),
+        "equilibria_thin": float((cases.equilibrium & (cases.quality < THIN)).sum()),
+        "equilibria_finer": float(cases.finer.sum()),
+        "thin_finer": float((cases.finer & (cases.quality < THIN)).sum()),
+        **{f"least_{k}": float(v) for k, v in least.items()},
         **{f"fold_{k}": float(v) for k, v in folder.read_table("patch_folds").iloc[-1].items()},
         "sentences_confirmed": float((said.verdict == "confirmed").sum()),
     }
@@ -229,7 +183,14 @@ def explained(folder: Folder) -> pd.DataFrame:
     """Each case with its category: what there is, and what the flow made of it."""
     cases = folder.read_table("records")
     branches = folder.read_table("branches").set_index(list(AXES))
-    cases = cases.join(branches[["ending", "share"]], on=list(AXES))
+    found = branches[_FOUND].add_prefix("found_")
+    cases = cases.join(branches[["ending", "share", *_ENDS]].join(found), on=list(AXES))
+    for name in _FOUND:
+        cases[name] = cases[name].mask(cases.ending == REACHED, cases.pop(f"found_{name}"))
+    finer = folder.read_table("finer").set_index(list(AXES))
+    cases = cases.join(
+        finer[["status", "height", "finer_height"]].add_prefix("half_"), on=list(AXES)
+    )
     cases["crossed"] = cases.flow_status.isin(FAILED)
     cases["near"] = ~cases.crossed & (cases.flow_gradient_squared < CONVERGED)
     cases["equilibrium"] = (cases.status == "converged") | (cases.ending == REACHED)
@@ -247,129 +208,66 @@ def explained(folder: Folder) -> pd.DataFrame:
         cases.ending == SLIP,
     ]
     cases["category"] = np.select(tests, [names[k] for k in (2, 3, 0, 1, 4, 5, 6, 7)], names[8])
+    cases["finer"] = cases.equilibrium & (cases.half_status == "converged")
+    folds = folder.read_table("patch_folds").iloc[0]
+    cases["reason"] = [_reason(case, folds) for _, case in cases.iterrows()]
     return cases[
-        [*AXES, "crossed", "near", "equilibrium", "balanced", "weak", "category", "ending",
-         "share", "verdict", "index", "pinched", "wall_area"]
+        [*AXES, "crossed", "near", "equilibrium", "finer", "balanced", "weak", "category", "reason",
+         "ending", "share", "verdict", "index", "quality", "pinched", "wall_area"]
     ]  # fmt: skip
 
 
-def sentences(cases: pd.DataFrame) -> pd.DataFrame:
-    """What Sec. 4.2 says of small and large α, each beside the table: confirmed or corrected.
-
-    Every verdict is a comparison of two shares of cases.
-    """
-    wall, large, small = (cases[name] for name in AXES)
-    ratio = (small / large).round(6)
-    like = (ratio >= 0.6) & (ratio <= 1.7)
-    low = (large <= 3.0) | (small <= 2.0)  # no more than half the radius of its disc
-    patches = ~low & cases.balanced
-
-    def share(of: pd.Series[bool], among: pd.Series[bool]) -> float:
-        return float(of[among].mean()) if among.any() else math.nan
-
-    rested = cases.equilibrium & (cases.pinched > 0)
-    rows = [
-        _sentence(
-            "α of the auxiliary patch: no adverse effect on convergence if it is small",
-            "share well converged, wall ≤ 2, equal patches above the fold",
-            share(cases.near, (wall <= 2.0) & ~low & (ratio == 1.0)),
-            "the same, unequal patches",
-            share(cases.near, (wall <= 2.0) & ~low & (ratio != 1.0)),
-            lambda a, b: b >= a,
-            "it holds for equal patches; a wall weaker than the difference of their tensions leaves"
-            " no equilibrium to converge to",
-        ),
-        _sentence(
-            "if it is too large, the area of the auxiliary patch will approach 0",
-            "share of the equilibria whose wall rests on the plane somewhere, wall ≥ 8",
-            share(rested, (wall >= 8.0) & cases.equilibrium),
-            "the same, wall ≤ 2",
-            share(rested, (wall <= 2.0) & cases.equilibrium),
-            lambda a, b: a > b,
-            "",
-        ),
-        _sentence(
-            "... causing instability in the analysis due to shape distortion",
-            "share well converged of the equilibria, wall ≥ 8",
-            share(cases.near, (wall >= 8.0) & cases.equilibrium),
-            "the same, wall ≤ 4",
-            share(cases.near, (wall <= 4.0) & cases.equilibrium),
-            lambda a, b: a < b,
-            "",
-        ),
-        _sentence(
-            "well-converged solutions especially when α of the smaller patch is slightly smaller",
-            "share well converged, α_small / α_large from 0.6 to below 1",
-            share(cases.near, (ratio >= 0.6) & (ratio < 1.0)),
-            "the same, equal α",
-            share(cases.near, ratio == 1.0),
-            lambda a, b: a > b,
-            "equal tensions converge more often; slightly smaller ones only with a wall that is"
-            " stronger than the difference",
-        ),
-        _sentence(
-            "the convergence worsened when the α of the two patches were too different",
-            "share well converged, ratio below 0.6 or above 1.7",
-            share(cases.near, ~like),
-            "the same, ratio between",
-            share(cases.near, like),
-            lambda a, b: a < b,
-            "",
-        ),
-        _sentence(
-            "... (and so does existence: share of cases with an equilibrium)",
-            "ratio below 0.6 or above 1.7, above the fold and balanced",
-            share(cases.equilibrium, patches & ~like),
-            "the same, ratio between",
-            share(cases.equilibrium, patches & like),
-            lambda a, b: a < b,
-            "",
-        ),
-        _sentence(
-            "the process diverged due to over-inflation when too small α was assigned",
-            "share of × where a patch has α ≤ half its radius",
-            share(cases.crossed, low),
-            "the same, elsewhere",
-            share(cases.crossed, ~low),
-            lambda a, b: a > b,
-            "",
-        ),
-    ]
-    return pd.DataFrame(rows)
-
-
-def _sentence(
-    says: str, what: str, ours: float, against: str, other: float, holds: Any, correction: str
-) -> dict[str, Any]:
-    """A sentence beside two numbers; where the relation fails, what is true instead."""
-    true = bool(holds(ours, other))
-    return {
-        "paper": says, "measured": what, "value": ours, "against": against, "other": other,
-        "verdict": "confirmed" if true else "corrected", "instead": "" if true else correction,
-    }  # fmt: skip
+def _reason(case: pd.Series[Any], folds: pd.Series[float]) -> str:
+    """What a case's category rests on, in numbers."""
+    wall, large, small = (case[name] for name in AXES)
+    if case["equilibrium"] and case["finer"]:
+        return (
+            f"{case['half_height']:.3f} high here, {case['half_finer_height']:.3f} at half the edge"
+            " length"
+        )
+    if case["equilibrium"]:
+        status = case["half_status"]
+        why = f": {status.replace('_', ' ')}" if isinstance(status, str) else ""
+        return f"not found at half the edge length{why}"
+    if case["weak"]:
+        pairs = [("larger", large, folds.large), ("smaller", small, folds.small)]
+        return ", ".join(f"the {n} patch folds at {f:.3f}" for n, alpha, f in pairs if alpha < f)
+    if not case["balanced"]:
+        return f"|{large:g} - {small:g}| > {wall:g}"
+    if not isinstance(case["ending"], str):
+        return ""
+    start, end = (
+        ", ".join(f"{case[f'{where}_{name}']:.4g}" for name in PATCHES) for where in ("from", "at")
+    )
+    ends = "folds" if case["ending"] == FOLD else "ends"
+    return f"the branch from ({start}) {ends} at ({end})"
 
 
 def figure(folder: Folder) -> None:
-    """What there is at each triple, × where the flow diverged; and how good the triangles are."""
+    """What there is at each triple, × where the flow diverged; and how good the triangles are.
+
+    An equilibrium that is not found at half the edge length has a dot.
+    """
     from pcmc.plot import heatmap
 
-    cases, records = folder.read_table("explained"), folder.read_table("records")
+    cases = folder.read_table("explained")
     tensions = sorted(cases.alpha_large.unique())
-    tables, marks, quality = {}, {}, {}
+    tables, marks, dots, quality = {}, {}, {}, {}
     for wall, mine in cases.groupby("alpha_wall"):
         name = f"α of the wall = {wall:g}"
         square = mine.pivot(index="alpha_small", columns="alpha_large")
         tables[name] = square.category.to_numpy()
         marks[name] = square.crossed.to_numpy().astype(bool)
-        same = records[(records.alpha_wall == wall)].assign(
-            shown=lambda frame: frame.quality.where(frame.status == "converged")
-        )
-        quality[name] = same.pivot(
-            index="alpha_small", columns="alpha_large", values="shown"
-        ).to_numpy()
+        dots[name] = (square.equilibrium & ~square.finer.astype(bool)).to_numpy().astype(bool)
+        quality[name] = np.where(square.equilibrium, square.quality, np.nan).astype(float)
     large, small = "α of the larger patch", "α of the smaller patch"
+    shown = {name: color for name, color in CATEGORIES.items() if (cases.category == name).any()}
     category_panels(
-        tensions, tensions, tables, CATEGORIES, folder.figure("existence"), marks=marks,
+        tensions, tensions, tables, shown, folder.figure("existence"),
+        marks={
+            "the flow diverges": ("x", marks),
+            "not found at half the edge length": (".", dots),
+        },
         xlabel=large, ylabel=small,
     )  # fmt: skip
     heatmap(
@@ -384,7 +282,12 @@ STUDY = Study(
     data,
     table,
     figure,
-    parameters={"tensions": TENSIONS, "edge_length": EDGE_LENGTH, "tries": TRIES, "steps": STEPS},
-    seconds=150,
+    parameters={
+        "tensions": TENSIONS,
+        "edge_length": EDGE_LENGTH,
+        "tries": (TRIES, TRIES_FOR_CROSS),
+        "steps": STEPS,
+    },
+    seconds=200,
     paper=False,
 )

@@ -1,4 +1,4 @@
-"""How fast everything is on this machine: the compiled loops here, the geometric solver beside.
+"""How fast everything is on this machine: the compiled loops here, solver and sweeps beside.
 
 Each function of ``BENCHMARKS`` returns rows, of small cases if asked to be quick; a new benchmark is a
 new function and its name there.
@@ -24,6 +24,7 @@ from pcmc.arrays import Floats
 from pcmc.energy import energy_and_gradient
 
 from .benchmark_solver import SOLVER
+from .benchmark_sweep import SWEEP
 from .folder import Folder, write_json
 from .timing import Row, median_seconds
 
@@ -52,7 +53,7 @@ def energy_rate(quick: bool) -> list[Row]:
     return rows
 
 
-BENCHMARKS: list[Callable[[bool], list[Row]]] = [energy_rate, *SOLVER]
+BENCHMARKS: list[Callable[[bool], list[Row]]] = [energy_rate, *SOLVER, *SWEEP]
 
 
 def numpy_energy_and_gradient(surface: Surface) -> tuple[float, Floats]:

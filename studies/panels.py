@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 Curves = Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]]
+MARK: dict[str, Any] = {"color": "#222222", "markersize": 2.6, "markeredgewidth": 0.7}
 
 
 def curve_panels(
@@ -70,15 +71,16 @@ def category_panels(
     categories: Mapping[str, str],
     path: Path,
     *,
-    marks: Mapping[str, npt.NDArray[np.bool_]],
+    marks: Mapping[str, tuple[str, Mapping[str, npt.NDArray[np.bool_]]]],
     xlabel: str,
     ylabel: str,
     columns: int = 4,
     width: int = 1200,
 ) -> None:
-    """Tables (len(y), len(x)) of category names as coloured squares, × where marked.
+    """Tables (len(y), len(x)) of category names as coloured squares, with marks on some.
 
-    ``categories`` has the colour of each, in the legend's order.
+    ``categories`` has the colour of each, in the legend's order; ``marks`` by meaning the symbol and
+    where it stands.
     """
     from matplotlib.colors import ListedColormap
 
@@ -88,7 +90,7 @@ def category_panels(
     colors = ListedColormap(list(categories.values()))
     rows = math.ceil(len(tables) / columns)
     side = (width - 70.0) / columns - 24.0
-    total = rows * (side + 46.0) + 170.0
+    total = rows * (side + 46.0) + 60.0 + 28.0 * math.ceil((len(names) + len(marks)) / 3)
     figure = new(width, total)
     for k, (title, table) in enumerate(tables.items()):
         row, column = divmod(k, columns)
@@ -98,8 +100,9 @@ def category_panels(
         axes.imshow(
             numbers, origin="lower", cmap=colors, vmin=-0.5, vmax=len(names) - 0.5, aspect="auto"
         )
-        at = np.argwhere(marks[title])
-        axes.plot(at[:, 1], at[:, 0], "x", color=INK, markersize=2.6, markeredgewidth=0.7)
+        for symbol, where in marks.values():
+            at = np.argwhere(where[title])
+            axes.plot(at[:, 1], at[:, 0], symbol, **MARK)
         axes.set_title(title, fontsize=TEXT, color=INK, pad=3.0)
         axes.tick_params(labelsize=SMALL, width=0.5, length=2.0, pad=1.5, colors=INK)
         last, first = k + columns >= len(tables), column == 0
@@ -109,17 +112,30 @@ def category_panels(
         axes.set_ylabel(ylabel if first else "", fontsize=SMALL, labelpad=1.5)
         for spine in axes.spines.values():
             spine.set(linewidth=0.5)
-    _legend(figure, categories, TEXT, columns=3)
+    symbols = {meaning: symbol for meaning, (symbol, _) in marks.items()}
+    _legend(figure, categories, TEXT, columns=3, symbols=symbols)
     finish(figure, path)
 
 
-def _legend(figure: Any, colors: Mapping[str, str], size: float, columns: int = 4) -> None:
+def _legend(
+    figure: Any,
+    colors: Mapping[str, str],
+    size: float,
+    columns: int = 4,
+    symbols: Mapping[str, str] | None = None,
+) -> None:
+    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     from pcmc.plot.figure import INK
 
+    drawn: list[Any] = [Patch(facecolor=color, label=label) for label, color in colors.items()]
+    drawn += [
+        Line2D([], [], linestyle="", marker=symbol, label=label, **MARK)
+        for label, symbol in (symbols or {}).items()
+    ]
     figure.legend(
-        handles=[Patch(facecolor=color, label=label) for label, color in colors.items()],
+        handles=drawn,
         loc="lower center", ncols=columns, fontsize=size, frameon=False, labelcolor=INK,
         handlelength=1.2, handleheight=0.8, borderaxespad=0.4,
     )  # fmt: skip

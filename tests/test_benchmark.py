@@ -9,7 +9,8 @@ import pytest
 from generators import two_squares
 from pcmc import hessian
 from pcmc.motion import motion_space, structure
-from studies import benchmark, benchmark_solver, evolver
+from pcmc.sweep import Sweep
+from studies import benchmark, benchmark_solver, benchmark_sweep, evolver
 from studies.__main__ import main
 from studies.benchmark_solver import Step
 from studies.timing import Row, median, median_seconds
@@ -23,6 +24,8 @@ def small(monkeypatch):
     monkeypatch.setattr(benchmark_solver, "QUICK", 4)
     monkeypatch.setattr(benchmark_solver, "DESIGN", 3)
     monkeypatch.setattr(benchmark_solver, "SCRIPT_STEPS", 1)
+    monkeypatch.setattr(benchmark_sweep, "FEW", (4.0,))
+    monkeypatch.setattr(benchmark_sweep, "SHORT", 2)
 
 
 @pytest.mark.slow
@@ -34,7 +37,8 @@ def test_the_quick_form_prints_and_writes(small, tmp_path, capsys):
     shown = capsys.readouterr().out
     for what in table["what"]:
         assert what.split(",")[0].split(":")[0] in shown
-    assert {"Newton step, superlu", "peak memory", "initial shape to rest"} <= set(table["what"])
+    expected = {"Newton step, superlu", "peak memory", "initial shape to rest", "2 workers over 1"}
+    assert expected <= set(table["what"])
     numbers = pd.to_numeric(table["median"], errors="coerce")
     assert (numbers.dropna() > 0.0).all()
     if evolver.available():
@@ -76,6 +80,30 @@ def test_without_the_fast_backend_the_rows_say_so(small, monkeypatch):
     rows = {row.what: row for row in benchmark_solver.newton_steps(True)}
     assert rows["Newton step, pardiso"].remark == "not installed"
     assert rows["Newton step, superlu"].value > 0.0
+
+
+def test_sweeps_are_timed_whole_and_in_turn(monkeypatch):
+    asked = []
+
+    def seconds(sweep, workers):
+        asked.append((sweep.case.split(":")[1], len(sweep), workers))
+        return {("flow_case", 1): 19.0, ("flow_case", 2): 10.0}.get((asked[-1][0], workers), 30.0)
+
+    monkeypatch.setattr(benchmark_sweep, "sweep_seconds", seconds)
+    rows = {row.what: row for row in benchmark_sweep.sweeps(False)}
+    grid = [("flow_case", 512, 1), ("flow_case", 512, 2)]
+    assert asked == grid * 3 + [("solve_case", 512, 2)]
+    assert rows["2 workers over 1"].value == pytest.approx(1.9)
+    bounds = [row.asked for row in rows.values()]
+    assert bounds == ["", "≤ 60", "≥ 1.7", "≤ 300"]
+    assert [row.asked for row in benchmark_sweep.sweeps(True)] == [""] * 4
+
+
+def test_a_case_that_fails_spoils_a_sweeps_time():
+    halves = Sweep("pcmc.sweep.examples:ratio", {"over": [1, 2]}, {"under": 2})
+    assert benchmark_sweep.sweep_seconds(halves, 1) > 0.0
+    with pytest.raises(AssertionError):
+        benchmark_sweep.sweep_seconds(Sweep(halves.case, halves.grid, {"under": 0}), 1)
 
 
 def test_rows_know_what_is_asked():

@@ -9,13 +9,11 @@ import pandas as pd
 import pytest
 
 from generators import four_fans, two_squares
-from pcmc import solve, sweep
+from pcmc import sweep
 from pcmc.errors import OptionError, SweepError
 from pcmc.quality import triangle_quality
 from pcmc.refine import refine
-from pcmc.solvers.result import Status
-from studies import alpha_grid, alpha_grid_geometric, cases, refinement, solvers, stability
-from studies.alpha_grid_geometric import CATEGORIES, explained, nearest, sentences
+from studies import cases, refinement, solvers, stability
 from studies.cases import run_sweep
 from studies.cone import cone
 from studies.folder import Folder
@@ -232,111 +230,3 @@ def test_solvers_side_by_side_on_one_small_mesh(tmp_path, monkeypatch):
     for column in ("seconds", "wall_time"):
         assert column not in histories.columns
     assert folder.figure("residual-time").is_file()
-
-
-# ------------------------------------------------------------------------------------- Fig. 16
-
-
-def test_flow_at_three_triples():
-    near = alpha_grid.flow_case(4.0, 4.0, 3.0, 1.2, 200)
-    assert near["status"] == "iteration_limit"
-    assert near["gradient_squared"] < alpha_grid.CONVERGED
-    assert alpha_grid.flow_case(1.0, 1.0, 1.0, 1.2, 200)["status"] == "diverged"
-
-
-def test_branches_start_from_the_nearest_and_no_two_from_the_same_patches():
-    sound = np.array([[8.0, 4.0, 3.0], [6.0, 4.0, 3.0], [1.0, 6.0, 6.0], [12.0, 3.0, 2.0]])
-    chosen_starts = nearest(np.array([6.0, 4.0, 2.0]), sound)
-    # the wall of 12 counts as 3 + 2; log ratios 5/6, 3/4, 1 are less than 1, 1, 3/2
-    assert chosen_starts == [[12.0, 3.0, 2.0], [6.0, 4.0, 3.0], [1.0, 6.0, 6.0]]
-
-
-def test_a_patch_held_all_around_folds_below_half_its_radius():
-    fold = alpha_grid_geometric.patch_fold(1.2, "small")
-    assert 1.7 < fold < 2.0
-    weak = alpha_grid_geometric._initial(1.2).retensioned({"small": 0.9 * fold})
-    assert solve(weak, target="stationary").status is not Status.CONVERGED
-
-
-def test_branches_arrive_or_fold_with_a_way_down_opening():
-    found = alpha_grid_geometric.branch_case([[3.0, 3.0, 2.0], [4.0, 3.0, 2.0]], 1.2)
-    assert found["ending"] == "fold"
-    assert 0.1 < found["share"] < 0.3
-    arrived = alpha_grid_geometric.branch_case([[2.0, 4.0, 4.0], [3.0, 4.0, 4.0]], 1.2)
-    assert arrived["ending"] == "reached"
-    assert [arrived[f"from_{name}"] for name in ("wall", "large", "small")] == [3.0, 4.0, 4.0]
-    # here the branch turns although all ways lead up: the mesh's doing
-    turned = alpha_grid_geometric.branch_case([[3.0, 4.0, 4.0], [2.0, 4.0, 4.0]], 1.2)
-    assert turned["ending"] == "slip"
-
-
-def _records(rows):
-    columns = [*alpha_grid.AXES, "status", "verdict", "flow_status", "flow_gradient_squared"]
-    return pd.DataFrame(rows, columns=columns).assign(
-        index=0, pinched=0, wall_area=1.0, quality=0.5
-    )
-
-
-def test_reason_of_each_case(tmp_path):
-    rest, open_case = ("converged", "stable"), ("stalled", "not_converged")
-    rows = [
-        (4, 4, 3, *rest, "iteration_limit", 1e-3),
-        (4, 4, 4, *rest, "diverged", 1e-3),
-        (4, 6, 6, "converged", "saddle", "iteration_limit", 1e-3),
-        (1, 4, 2, *open_case, "diverged", 1e9),
-        (1, 1, 4, *open_case, "diverged", 1e9),
-        (4, 4, 2, *open_case, "diverged", 1e9),
-        (8, 3, 8, *open_case, "diverged", 1e9),
-        (8, 8, 6, *open_case, "diverged", 1e9),
-        (8, 12, 12, *open_case, "iteration_limit", 5.0),
-    ]
-    folder = Folder(tmp_path)
-    folder.write_table("records", _records(rows))
-    folder.write_table("patch_folds", pd.DataFrame([{"large": 2.9, "small": 1.8}]))
-    branches = [(4, 4, 2, "fold", 0.5), (8, 3, 8, "slip", 0.1), (8, 12, 12, "reached", 1.0)]
-    columns = [*alpha_grid.AXES, "ending", "share"]
-    folder.write_table("branches", pd.DataFrame(branches, columns=columns))
-    found, names = explained(folder), list(CATEGORIES)
-    assert found.category.tolist() == [names[k] for k in (0, 1, 2, 5, 4, 6, 7, 8, 3)]
-    assert found.crossed.sum() == 6
-    assert found.equilibrium.sum() == 4
-
-
-def test_sentences_follow_from_the_cases():
-    def case(wall, large, small, near, crossed=False, there=True, pinched=0):
-        return {"alpha_wall": wall, "alpha_large": large, "alpha_small": small, "near": near,
-                "crossed": crossed, "equilibrium": there, "balanced": abs(large - small) < wall,
-                "pinched": pinched}  # fmt: skip
-
-    listed = [
-        case(1.0, 4.0, 4.0, near=False), case(2.0, 4.0, 3.0, near=True),
-        case(8.0, 8.0, 8.0, near=False, pinched=3),
-        case(1.0, 16.0, 4.0, near=False, there=False),
-        case(4.0, 1.0, 1.0, near=False, crossed=True, there=False),
-    ]  # fmt: skip
-    said = sentences(pd.DataFrame(listed))
-    words = said.verdict.tolist()
-    assert words[3] == words[1] == words[6] == "confirmed"
-    listed[1]["near"], listed[0]["near"] = False, True
-    listed[4]["crossed"], listed[2]["pinched"] = False, 0
-    turned = sentences(pd.DataFrame(listed))
-    assert [turned.verdict[k] for k in (1, 3, 6)] == ["corrected"] * 3
-    assert turned.instead[3]
-
-
-@pytest.mark.slow
-def test_grid_by_the_geometric_solver_end_to_end(tmp_path, monkeypatch):
-    for module in (alpha_grid, alpha_grid_geometric):
-        monkeypatch.setattr(module, "TENSIONS", (1.0, 4.0))
-    monkeypatch.setattr(alpha_grid, "SHORT_ITERATIONS", 200)
-    study = alpha_grid_geometric.STUDY
-    monkeypatch.setattr(
-        alpha_grid_geometric, "_flow", lambda folder, short: alpha_grid.flow_grid(folder, True)
-    )
-    perform(study, tmp_path)
-    folder = Folder(tmp_path / study.name)
-    assert len(folder.read_table("explained")) == 8
-    assert folder.read_table("measured").set_index("key").value[f"{study.name}.crosses"] > 0
-    assert folder.read_table("sentences").verdict.isin(["confirmed", "corrected"]).all()
-    assert folder.figure("existence").stat().st_size <= 150_000
-    assert not (folder.path / "build").exists()
