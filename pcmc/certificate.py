@@ -251,15 +251,19 @@ def _modes(system: Stiffness | None, count: int) -> tuple[Floats, Floats]:
     return lowest(system, count)
 
 
-def unbalanced(standing: Surface) -> str:
+def unbalanced(standing: Surface, pinchable: Bools) -> str:
     """Names a junction whose tensions cannot balance whatever the angles; empty if there is none.
 
     Σ α n = 0 (7) needs the largest tension to be at most the sum of the others. Where a junction is
-    held all along, its support takes the difference.
+    held all along, its support takes the difference; a wall that slides on Π and is stronger than its
+    sheets brings its junction down to rest there.
     """
     held = standing.fixed | standing.on_plane
     for curve in standing.topology.junctions:
+        strongest = max(curve.sheets, key=lambda patch: standing.tensions[patch])
         tensions = sorted(standing.tensions[list(curve.sheets)])
+        if pinchable[strongest]:
+            continue
         if tensions[-1] > sum(tensions[:-1]) * (1.0 + 1e-9) and not held[curve.vertices].all():
             names = " | ".join(standing.patches[i].name for i in curve.sheets)
             others = " + ".join(f"{tension:g}" for tension in tensions[:-1])
@@ -276,7 +280,7 @@ def _verdict(
     if not surface.tensions.any():
         return Verdict.NEUTRAL, "no patch has a tension: every shape is at rest"
     if residual > tolerance:
-        excess = unbalanced(surface)
+        excess = unbalanced(surface, sliding)
         if excess:
             return Verdict.NO_EQUILIBRIUM, excess
         if ratio > 1.0 + coarseness(surface):

@@ -16,9 +16,11 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from . import kernels
 from .arrays import Floats
 from .assemble import Pattern, assemble, pattern
-from .factor import Factor, factoriser
+from .factor import Factor, SingularMatrix, factoriser
 from .motion import MotionSpace, Structure
 from .surface import Surface
+
+SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,15 +74,24 @@ def stiffness(
     rigid: Floats,
     backend: str | None = None,
 ) -> Stiffness:
-    """Assemble and factorise Bᵀ(∂²E)B where the surface stands."""
+    """Assemble and factorise Bᵀ(∂²E)B where the surface stands.
+
+    Motions that cost nothing at all, like a vertex's inside a flat part that rests on Π, get a
+    little of the stiffness BᵀLB: they are no way down.
+    """
     X = surface.vertices
     kept = pattern(frame, space)
+    solver = factoriser(kept, backend)
     data = assemble(surface, frame, space, kept, X)
-    factor = factoriser(kept, backend).factor(data)
+    try:
+        factor = solver.factor(data)
+        negative = negatives_without(factor, rigid)
+    except SingularMatrix:
+        data = assemble(surface, frame, space, kept, X, 1.0, SOFT)
+        factor = solver.factor(data)
+        negative = negatives_without(factor, rigid)
     mass = lumped_mass(space, frame, X)
-    return Stiffness(
-        space, full_matrix(kept, data), mass, factor, rigid, negatives_without(factor, rigid)
-    )
+    return Stiffness(space, full_matrix(kept, data), mass, factor, rigid, negative)
 
 
 def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:

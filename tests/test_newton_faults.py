@@ -305,6 +305,15 @@ def test_a_wall_that_outweighs_its_sheets_comes_down(backend, target):
     assert len(found.pinched) == 3
 
 
+def test_motions_that_cost_nothing_are_no_obstacle(backend):
+    """Strong walls pull a whole crossing down to Π, where the middle vertex may lie anywhere."""
+    result = solve(four_fans(5, alpha_aux=16.0), target="stationary", backend=backend)
+    assert result.converged
+    assert result.certificate.residual <= 1e-10
+    assert result.certificate.verdict is Verdict.SADDLE
+    assert len(result.certificate.pinched) == 17
+
+
 def test_walls_without_tension_meet_in_a_line(backend):
     """A junction of sheets none of which pulls has no say: the roof over it is the cap."""
     result = solve(four_fans(5, alpha_aux=0.0), backend=backend)

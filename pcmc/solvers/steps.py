@@ -9,7 +9,7 @@ from ..arrays import Floats
 from ..assemble import Pattern, assemble, pattern
 from ..descent import Carrier, Smoother
 from ..factor import Factor, Factoriser, SingularMatrix, factoriser
-from ..modes import lowest, negatives_without, stiffness
+from ..modes import SOFT, lowest, negatives_without, stiffness
 from ..motion import MotionSpace
 from ..quality import edge_lengths
 from ..rigid import rigid_modes, rigid_motions
@@ -40,6 +40,7 @@ class Stepper:
         self._shifted = 0
         self._owing = False
         self._version = -1
+        self._space: MotionSpace = state.space
         self._forget()
 
     def _forget(self) -> None:
@@ -182,17 +183,20 @@ class Stepper:
         if self._pattern is None or self._factoriser is None:
             self._pattern = pattern(state.frame, state.space)
             self._factoriser = factoriser(self._pattern, self.backend)
-        data = assemble(state.surface, state.frame, state.space, self._pattern, state.X, 1.0, shift)
-        try:
-            self._factor = self._factoriser.factor(data)
-        except SingularMatrix:
-            return False
-        self.factorisations += 1
-        self._shift = shift
-        self._space: MotionSpace = state.space
         rigid = rigid_modes(state.space, self._motions, state.X)
-        self.negative = negatives_without(self._factor, rigid)
-        return True
+        for weight in (shift, shift + SOFT):
+            data = assemble(
+                state.surface, state.frame, state.space, self._pattern, state.X, 1.0, weight
+            )
+            try:
+                factor = self._factoriser.factor(data)
+                self.negative = negatives_without(factor, rigid)
+            except SingularMatrix:
+                continue
+            self.factorisations += 1
+            self._factor, self._shift, self._space = factor, shift, state.space
+            return True
+        return False
 
     def _precondition(self, residual: Floats) -> Floats:
         """The kept factor's answer to a residual in the present basis."""
