@@ -5,7 +5,10 @@
 - Example 2 over the plane of its two tensions: rays from the paper's (4, 3), each followed to the fold
   where the equilibrium ends, or to where the crest has run so far along an outline that triangles
   collapse. Both ends depend on the mesh: the corners hold the crest less and less as it is refined.
-- Example 3 as its walls pull harder: the tension at which the cross lets go of the middle.
+- Example 3 as its walls pull harder: the tension at which the cross lets go of the middle. ``stability``
+  seeks the same on meshes that start anew at each tension; their vertices lie otherwise along the shape,
+  and its tensions are up to a fifth away on the same number of rings, below or above. Both fall with the
+  edge length, as the hold of the cross's ends on the outline does.
 """
 
 from __future__ import annotations
@@ -31,6 +34,7 @@ DEGREES = (10, 30, 40, 45, 50, 60, 80, 100, 130, 160, 190, 210, 220, 230, 240, 2
 FARTHEST = 3.0  # tension, as far as a ray is followed
 DRAWN = (45, 100, 230, 290)
 ENDS = {"folds": "fold", "degenerate": "mesh collapses", "lost": "lost", "reached": "goes on"}
+MARKERS = {"folds": "o", "degenerate": "s", "lost": "X", "reached": "^"}
 RINGS = (5, 7, 10, 14, 20)
 WALLS = (0.5, 4.0)
 
@@ -209,24 +213,41 @@ def figure(folder: Folder) -> None:
 
 
 def _draw_rays(folder: Folder) -> None:
-    """The ends of the rays in the plane of the tensions, joined round; a gap between kinds of end."""
-    from pcmc.plot import lines
+    """The ends of the rays in the plane of the tensions, joined round where the branches end."""
+    from pcmc.plot.figure import CURVES, INK, SMALL, TEXT, finish, new, style
 
     rays = folder.read_table("rays")
-    curves: dict[str, tuple[Any, Any]] = {"the paper's tensions": ([START[0]], [START[1]])}
-    for length, mine in rays.groupby("edge_length", sort=False):
+    figure = new(900, 760)
+    axes = style(figure.add_axes((0.11, 0.1, 0.86, 0.84)))
+    for color, (length, mine) in zip(CURVES, rays.groupby("edge_length", sort=False), strict=False):
         closed = pd.concat([mine, mine.iloc[:1]])
-        for ending, text in ENDS.items():
-            chosen = closed.ending == ending
-            if chosen.any():
-                curves[f"edge length {length:g}: {text}"] = (
-                    closed.alpha_large.where(chosen), closed.alpha_small.where(chosen),
-                )  # fmt: skip
-    lines(
-        curves, folder.figure("boundary"), x="tension of the larger patch",
-        y="tension of the smaller patch", markers=True, height=760,
-        title=f"Example 2 with walls of tension {WALL:g}: inside, an equilibrium exists",
+        bound = closed.ending != "reached"
+        axes.plot(
+            closed.alpha_large.where(bound), closed.alpha_small.where(bound),
+            color=color, linewidth=1.0, label=f"edge length {length:g}",
+        )  # fmt: skip
+        for ending, symbol in MARKERS.items():
+            at = mine[mine.ending == ending]
+            axes.plot(
+                at.alpha_large, at.alpha_small, symbol, color=color, markersize=3.2,
+                markerfacecolor=color if ending == "folds" else "white", markeredgewidth=0.8,
+            )  # fmt: skip
+    axes.plot(*START, "*", color=INK, markersize=5.0, linestyle="", label="the paper's tensions")
+    present = [ending for ending in MARKERS if (rays.ending == ending).any()]
+    for ending in present:
+        filled = INK if ending == "folds" else "white"
+        axes.plot(
+            [], [], MARKERS[ending], color=INK, markersize=3.2, markerfacecolor=filled,
+            markeredgewidth=0.8, label=ENDS[ending],
+        )  # fmt: skip
+    axes.legend(fontsize=SMALL, frameon=False, labelcolor=INK, loc="upper left")
+    axes.set_xlabel("tension of the larger patch", fontsize=TEXT, color=INK)
+    axes.set_ylabel("tension of the smaller patch", fontsize=TEXT, color=INK)
+    axes.set_title(
+        f"Example 2 with walls of tension {WALL:g}: inside, an equilibrium exists",
+        fontsize=TEXT, color=INK,
     )  # fmt: skip
+    finish(figure, folder.figure("boundary"))
 
 
 STUDY = Study(
