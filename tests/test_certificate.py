@@ -17,7 +17,8 @@ from pcmc import (
     mean_curvature,
     solve,
 )
-from pcmc.certificate import Verdict, coarseness, conormal_sum, load_ratio
+from pcmc.balance import coarseness, conormal_sum, load_ratio
+from pcmc.certificate import Verdict
 from pcmc.energy import patch_areas, volume
 from pcmc.quality import triangle_quality
 

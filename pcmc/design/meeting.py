@@ -21,7 +21,8 @@ import pandas as pd
 from scipy.optimize import lsq_linear
 
 from ..arrays import Bools, Floats
-from ..certificate import TOLERANCE, Certificate, load_ratio
+from ..balance import load_ratio
+from ..certificate import TOLERANCE, Certificate
 from ..errors import OptionError, SurfaceError
 from ..solvers import options as check
 from ..solvers import solve

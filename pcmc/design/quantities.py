@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import kernels
 from ..arrays import Bools, Floats, Ints
-from ..certificate import held_lengths
+from ..balance import held_lengths
 from ..errors import OptionError, unknown
 from ..plan.curves import frame
 from ..surface import Surface

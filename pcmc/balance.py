@@ -1,0 +1,194 @@
+"""Who holds whom: the forces along junctions and at supports, and what they could carry."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from . import kernels
+from .arrays import Bools, Floats, Ints
+from .surface import Surface
+from .topology import Curve
+
+
+def load_ratio(surface: Surface) -> float:
+    """Pressure along Π's normal over the most that tension at the boundary could carry.
+
+    Vertical balance of the whole: p |Ω| ≤ Σ α length(∂Ω) + Σ α_wall length(wall feet). Above 1 no
+    smooth surface with this boundary is at rest, whatever its shape. A mesh may be: its triangles
+    balance along the normals alone. A cap over the unit disc with edge length 0.2 comes to rest down
+    to α = 0.493, where the ratio is 1.014; a pyramid over a square with one free vertex down to
+    α = 1/3, at 1.5. The verdict draws on the ratio only above ``1 + coarseness``. 0 for a closed
+    surface.
+    """
+    topo = surface.topology
+    edge_patch = np.full(len(topo.edges), -1)
+    edge_patch[topo.edge_of_face] = surface.patch_of_face[:, None]
+    boundary = np.flatnonzero(topo.boundary_edge)
+    ends = surface.vertices[topo.edges[boundary]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    capacity = float(surface.tensions[edge_patch[boundary]] @ length)
+    corners = surface.vertices[surface.faces]
+    vector = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    push = surface.pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
+    return float(abs(push)) / capacity if capacity > 0.0 else 0.0
+
+
+def coarseness(surface: Surface) -> float:
+    """(h / R)², h the mean length of the boundary's edges and R = 2 · area / length of the plan.
+
+    Of the size of the error with which a mesh balances; 0 for a closed surface.
+
+    >>> from pcmc import Patch
+    >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
+    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+    >>> coarseness(square)
+    4.0
+    """
+    X, topo = surface.vertices, surface.topology
+    ends = X[topo.edges[topo.boundary_edge]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    corners = X[surface.faces[surface.pressures[surface.patch_of_face] != 0.0]]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
+    plan = 0.5 * abs(float(across @ np.array(surface.plane.normal)))
+    if not len(length) or plan == 0.0:
+        return 0.0
+    return float((length.mean() * length.sum() / (2.0 * plan)) ** 2)
+
+
+def unbalanced(standing: Surface, pinchable: Bools) -> str:
+    """Names a junction whose tensions cannot balance whatever the angles; empty if there is none.
+
+    Σ α n = 0 (7) needs the largest tension to be at most the sum of the others. Where a junction is
+    held all along, its support takes the difference; a wall that slides on Π and is stronger than its
+    sheets brings its junction down to rest there.
+    """
+    held = standing.fixed | standing.on_plane
+    for curve in standing.topology.junctions:
+        strongest = max(curve.sheets, key=lambda patch: standing.tensions[patch])
+        tensions = sorted(standing.tensions[list(curve.sheets)])
+        if pinchable[strongest]:
+            continue
+        if tensions[-1] > sum(tensions[:-1]) * (1.0 + 1e-9) and not held[curve.vertices].all():
+            names = " | ".join(standing.patches[i].name for i in curve.sheets)
+            others = " + ".join(f"{tension:g}" for tension in tensions[:-1])
+            return (
+                f"the tensions at the junction {names} cannot balance: {tensions[-1]:g} > {others}"
+            )
+    return ""
+
+
+def conormal_sum(surface: Surface) -> Floats:
+    """(e,3) Σ α n over the triangles at each edge, n the outward co-normal, force/length.
+
+    Zero along a junction of smooth surfaces at rest (7); of triangles it is zero only in the limit.
+    """
+    topo = surface.topology
+    X, F = surface.vertices, surface.faces
+    total = np.zeros((len(topo.edges), 3))
+    for corner in range(3):
+        a, b, apex = X[F[:, corner - 2]], X[F[:, corner - 1]], X[F[:, corner]]
+        along = b - a
+        length = np.linalg.norm(along, axis=1)
+        along /= np.where(length > 0.0, length, 1.0)[:, None]
+        out = a - apex
+        out -= np.einsum("ij,ij->i", out, along)[:, None] * along
+        length = np.linalg.norm(out, axis=1)
+        pull = surface.tensions[surface.patch_of_face] / np.where(length > 0.0, length, 1.0)
+        np.add.at(total, topo.edge_of_face[:, corner], pull[:, None] * out)
+    return total
+
+
+def held_lengths(surface: Surface) -> Floats:
+    """(n,) half the length of the boundary edges at each vertex that are held at both ends, length."""
+    held = surface.fixed | surface.on_plane
+    ends = surface.topology.edges[surface.topology.boundary_edge]
+    ends = ends[held[ends].all(axis=1)]
+    half = 0.5 * np.linalg.norm(surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]], axis=1)
+    return np.asarray(np.bincount(ends.ravel(), np.repeat(half, 2), surface.n), dtype=float)
+
+
+def reactions(surface: Surface) -> Floats:
+    """(n,3) what the supports exert: all of the force where fixed, its part normal to Π where sliding.
+
+    The force at a vertex is Σ α ∂A - ⅓ Σ p A_T ν_T: a third of each triangle's tension and pressure.
+    At a boundary this is not ∇E, whose volume is that of a cone to the point of Π: the cone's side
+    moves with the boundary too, and has no pressure on it.
+    """
+    X, F = surface.vertices, surface.faces
+    zero = np.zeros(len(surface.patches))
+    forces = kernels.measure(X, F, surface.patch_of_face, np.zeros(3), surface.tensions, zero)[2]
+    vector = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]) / 6.0
+    vector *= surface.pressures[surface.patch_of_face, None]
+    for axis in range(3):
+        forces[:, axis] -= np.bincount(F.ravel(), np.repeat(vector[:, axis], 3), surface.n)
+    out = np.zeros_like(forces)
+    out[surface.fixed] = forces[surface.fixed]
+    sliding = surface.on_plane
+    out[sliding] = forces[sliding] - surface.plane.along(forces[sliding])
+    return out
+
+
+def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
+    """Per junction curve: the forces left per length, and Σ α n of the triangles along it."""
+    topo = surface.topology
+    imbalance = np.linalg.norm(conormal_sum(surface), axis=1)
+    number = {tuple(edge): i for i, edge in enumerate(topo.edges[_seams(topo)].tolist())}
+    chosen = np.flatnonzero(_seams(topo))
+    rows = []
+    for curve in topo.junctions:
+        pairs, lengths = _segments(surface, curve)
+        edges = chosen[[number[tuple(pair)] for pair in np.sort(pairs, axis=1).tolist()]]
+        total = float(lengths.sum())
+        rows.append({
+            "junction": " | ".join(surface.patches[i].name for i in curve.sheets),
+            "length": total,
+            "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max()) / _mean(lengths),
+            "sum_alpha_n_mean": float(imbalance[edges] @ lengths) / total if total else 0.0,
+            "sum_alpha_n_max": float(imbalance[edges].max()),
+        })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def boundary_table(surface: Surface) -> pd.DataFrame:
+    """Per held boundary curve: its length, the force on it, and the largest force per length."""
+    forces = reactions(surface)
+    held = surface.fixed | surface.on_plane
+    loops = surface.topology.boundary_loops
+    # a corner that several curves share gives each an equal part, so that the rows add up
+    count = np.zeros(surface.n)
+    for curve in loops:
+        count[curve.vertices] += 1.0
+    parts = forces / np.maximum(count, 1.0)[:, None]
+    share = held_lengths(surface)
+    per_length = np.linalg.norm(forces, axis=1) / np.where(share > 0.0, share, np.inf)
+    rows = []
+    for curve in loops:
+        if not held[curve.vertices].any():
+            continue
+        total = parts[curve.vertices].sum(axis=0)
+        rows.append({
+            "boundary": " | ".join(surface.patches[i].name for i in curve.sheets),
+            "length": float(_segments(surface, curve)[1].sum()),
+            "reaction_x": float(total[0]), "reaction_y": float(total[1]),
+            "reaction_z": float(total[2]),
+            "per_length_max": float(per_length[curve.vertices].max()),
+        })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def _segments(surface: Surface, curve: Curve) -> tuple[Ints, Floats]:
+    order = np.append(curve.vertices, curve.vertices[:1]) if curve.closed else curve.vertices
+    pairs = np.stack([order[:-1], order[1:]], axis=1)
+    ends = surface.vertices[pairs]
+    return pairs, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+
+def _seams(topo: Any) -> Bools:
+    return np.asarray(topo.junction_edge | topo.seam_edge)
+
+
+def _mean(lengths: Floats) -> float:
+    return float(lengths.mean()) or 1.0
