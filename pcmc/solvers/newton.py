@@ -184,12 +184,14 @@ def _ended(state: State, options: NewtonOptions) -> Status | None:
     """Why no further step makes sense, if so."""
     if not np.isfinite(state.energy):
         return Status.NON_FINITE
-    if state.worst < COLLAPSED:
-        return Status.DEGENERATE
+    collapsed = state.worst < COLLAPSED
     extent = np.linalg.norm(np.ptp(state.X, axis=0)) / state.size
-    if extent > options.inflation:
+    # a mesh that inflates may collapse on its way out
+    if extent > options.inflation or (collapsed and extent > np.sqrt(options.inflation)):
         return Status.DIVERGED
-    return Status.VANISHED if extent < SHRUNK else None
+    if extent < SHRUNK:
+        return Status.VANISHED
+    return Status.DEGENERATE if collapsed else None
 
 
 def _lost(state: State, start: float, status: Status) -> Status:
