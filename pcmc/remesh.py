@@ -68,7 +68,8 @@ def remesh(
     >>> fine.m > 2 * dome.m, fine.patches == dome.patches
     (True, True)
     """
-    _check(surface, edge_length, near_curves, growth, chord)
+    check_lengths(edge_length, near_curves, growth, chord)
+    _check_count(surface, edge_length)
     old = _cut_curves(surface, edge_length if near_curves is None else near_curves)
     candidates = []
     mesh = old
@@ -98,14 +99,33 @@ class _Mesh:
     source: Ints
 
 
-def _check(
-    surface: Surface, edge_length: float, near: float | None, growth: float, chord: float | None
+def check_lengths(
+    edge_length: float,
+    near_curves: float | None = None,
+    growth: float = 1.2,
+    chord: float | None = None,
 ) -> None:
-    for name, value in (("edge_length", edge_length), ("near_curves", near), ("chord", chord)):
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise OptionError(f"{name} must be a finite number > 0, found {value}")
-    if not (math.isfinite(growth) and growth > 1.0):
-        raise OptionError(f"growth must be a finite number > 1, found {growth}")
+    """Refuse arguments of ``remesh`` that no surface could be remeshed with.
+
+    >>> check_lengths(0.5, growth=1)
+    Traceback (most recent call last):
+    pcmc.errors.OptionError: growth must be a finite number > 1, found 1
+    """
+    lengths = {"edge_length": edge_length, "near_curves": near_curves, "chord": chord}
+    for name, value in lengths.items():
+        if not (value is None and name != "edge_length") and not _above(0.0, value):
+            raise OptionError(f"{name} must be a finite number > 0, found {value!r}")
+    if not _above(1.0, growth):
+        raise OptionError(f"growth must be a finite number > 1, found {growth!r}")
+
+
+def _above(least: float, value: Any) -> bool:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and math.isfinite(value) and value > least
+
+
+def _check_count(surface: Surface, edge_length: float) -> None:
+    """Refuse a slip in the edge length before it fills the memory."""
     sides = surface.vertices[surface.faces[:, 1:]] - surface.vertices[surface.faces[:, :1]]
     area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum()
     count = area / (math.sqrt(3.0) / 4.0 * edge_length**2)

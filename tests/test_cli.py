@@ -125,14 +125,15 @@ def test_sweep(folder, capsys):
 
 def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
     seen = []
-    monkeypatch.setattr("pcmc.explore.serve", lambda *given: seen.append(given))
+    monkeypatch.setattr("pcmc.explore.start", lambda *given: given)
+    monkeypatch.setattr("pcmc.explore.attend", lambda given, page: seen.append((*given, page)))
     assert cli.main(["explore", "roof.pcmc", "--no-browser"]) == 0
     assert (
         cli.main(["explore", "--example", "two_squares", "--set", "alpha_aux=1", "--port", "8"])
         == 0
     )
-    assert seen[0][1:] == ("127.0.0.1", 0, False, "roof.pcmc")
-    assert seen[1][1:] == ("127.0.0.1", 8, True, "two_squares")
+    assert seen[0][1:] == ("127.0.0.1", 0, "roof.pcmc", False)
+    assert seen[1][1:] == ("127.0.0.1", 8, "two_squares", True)
     assert seen[1][0].patches
 
 
@@ -189,7 +190,7 @@ def test_interrupted_is_130(folder, monkeypatch, capsys):
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("pcmc.project.solve", stop)
+    monkeypatch.setattr("pcmc.project.running.solve", stop)
     assert cli.main(["solve", "roof.toml"]) == 130
     assert capsys.readouterr().err.strip().endswith("pcmc: stopped")
     assert [p.name for p in folder.iterdir()] == ["roof.toml"]
@@ -214,7 +215,7 @@ def test_a_mistake_of_our_own_is_not_hidden(folder, monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError
 
-    monkeypatch.setattr("pcmc.project.solve", broken)
+    monkeypatch.setattr("pcmc.project.running.solve", broken)
     with pytest.raises(ZeroDivisionError):
         cli.main(["solve", "roof.toml"])
 
@@ -238,7 +239,7 @@ def test_ctrl_c_while_solving_is_130_and_writes_nothing(folder, monkeypatch, cap
 
         return report
 
-    monkeypatch.setattr("pcmc.project.reporter", pressed)
+    monkeypatch.setattr("pcmc.project.running.reporter", pressed)
     assert cli.main(command) == 130
     assert capsys.readouterr() == ("", "pcmc: stopped\n")
     assert [p.name for p in folder.iterdir()] == ["roof.toml"]

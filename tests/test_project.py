@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import pcmc
@@ -60,7 +61,6 @@ def test_the_example_gives_certified_files_and_a_picture(tmp_path):
         "solving:",
         "certifying",
         "writing",
-        "drawing",
     }
 
 
@@ -207,6 +207,15 @@ def test_output_names_are_checked_before_any_work(tmp_path):
         check_outputs([tmp_path / "b.obj", tmp_path / "b.obj"])
     with pytest.raises(FileError, match=r"did you mean '.obj'"):
         check_outputs([tmp_path / "b.obk"])
+    with pytest.raises(FileError, match="there is no folder"):
+        check_outputs([tmp_path / "away" / "b.obj"])
+    check_outputs([tmp_path / "away" / "b.obj"], tmp_path / "away")
+
+
+def test_a_folder_that_may_not_be_written_to_is_refused_before_any_work(small, monkeypatch):
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    with pytest.raises(FileError, match="is read-only"):
+        run(small)
 
 
 def test_a_folder_that_is_not_there(small):
@@ -214,6 +223,96 @@ def test_a_folder_that_is_not_there(small):
     with pytest.raises(FileError, match="there is no folder"):
         run(small)
     assert [p.name for p in small.parent.iterdir()] == ["small.toml"]
+
+
+REMESH = "[remesh]\nedge_length = 0.5\n\n[output]"
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_remeshed_before_or_after_and_certified_anew(small, when):
+    coarse = build(small)
+    changed(small, "[output]", REMESH.replace("0.5", f'0.5\nwhen = "{when}"'))
+    steps = []
+    outcome = run(small, progress=steps.append)
+    assert outcome.good
+    assert outcome.surface.m > 2.5 * coarse.m
+    assert [p.name for p in outcome.surface.patches] == ["roof"]
+    back = pcmc.read(small.parent / "roof.pcmc")
+    assert back.m == outcome.surface.m
+    assert pcmc.certify(back).certified
+    solved = [k for k, step in enumerate(steps) if step.startswith("solving")]
+    remeshed = steps.index("remeshing")
+    assert (solved[0] < remeshed) == (when == "after")
+    assert remeshed < solved[-1]
+
+
+def test_remeshed_twice_with_solves_between_and_finer_at_the_curves(small):
+    twice = (
+        "[[remesh]]\nedge_length = 0.7\n[[remesh]]\nedge_length = 0.7\nnear_curves = 0.25\n[output]"
+    )
+    steps = []
+    outcome = run(changed(small, "[output]", twice), progress=steps.append)
+    assert steps.count("remeshing") == 2
+    assert steps.count("certifying") == 3
+    surface = outcome.surface
+    ends = surface.vertices[surface.topology.edges]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    rim = surface.topology.boundary_edge
+    assert length[rim].max() < 0.3
+    assert length[~rim].max() > 0.5
+
+
+def test_targets_are_met_on_the_new_mesh_too(small):
+    aim = '[targets]\nmeet = [{quantity = "apex", of = "roof", value = 0.6}]\nvary = ["roof"]\n'
+    outcome = run(changed(small, "[output]", aim + REMESH))
+    assert outcome.good
+    assert outcome.surface.m > 100
+    assert outcome.surface.vertices[:, 2].max() == pytest.approx(0.6, abs=1e-6)
+
+
+def test_what_is_not_certified_is_not_remeshed(small):
+    changed(small, "tension = 2.0", "tension = 0.3")
+    steps = []
+    assert not run(changed(small, "[output]", REMESH), progress=steps.append).good
+    assert "remeshing" not in steps
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "[remesh]\nedge_lenght = 0.5",
+            "line 11: unknown key of .remesh.*did you mean 'edge_length'",
+        ),
+        ("[[remesh]]\nedge_length = 1\n[[remesh]]\nwen = 1", "line 13: unknown key .*'when'"),
+        ("[remesh]\nnear_curves = 0.5", "needs an edge_length"),
+        ("[remesh]\nedge_length = -1", "remesh: edge_length must be a finite number > 0, found -1"),
+        (
+            "[remesh]\nedge_length = 'a'",
+            "remesh: edge_length must be a finite number > 0, found 'a'",
+        ),
+        ("[remesh]\nedge_length = 1\ngrowth = 1", "remesh: growth must be"),
+        ("[remesh]\nedge_length = 1\nwhen = 'beforre'", "did you mean 'before'"),
+    ],
+)
+def test_bad_remeshing(small, text, message):
+    with pytest.raises(FileError, match=message) as caught:
+        load(changed(small, "[output]", f"{text}\n[output]"))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_project_is_read_with_the_mark_of_windows_editors(small):
+    small.write_bytes(b"\xef\xbb\xbf" + small.read_bytes())
+    assert load(small).method == "newton"
+
+
+def test_a_bad_view_is_refused_before_any_work(small):
+    for view, message in (('"diagnal"', "did you mean 'diagonal'"), ("[30]", "two angles")):
+        text = small.read_text(encoding="utf-8")
+        changed(small, "files =", f"view = {view}\nfiles =")
+        with pytest.raises(FileError, match=message):
+            load(small)
+        small.write_text(text, encoding="utf-8")
 
 
 def test_targets_are_met(small):

@@ -13,7 +13,7 @@ from ..surface import Surface
 if TYPE_CHECKING:
     from .server import Explorer, View
 
-__all__ = ["serve", "show", "start"]
+__all__ = ["attend", "serve", "show", "start"]
 
 
 def serve(
@@ -41,13 +41,17 @@ def serve(
     ------
     OptionError : when the address cannot be listened on.
     """
+    attend(start(surface, host, port, title), open_browser)
+
+
+def attend(explorer: Explorer, open_browser: bool = True) -> None:
+    """Say where a running server is, open its page, and wait; Ctrl-C closes it."""
     import webbrowser
 
-    explorer = start(surface, host, port, title)
     print(f"Exploring at {explorer.url}  (Ctrl-C ends it)", flush=True)
-    if open_browser:
-        webbrowser.open(explorer.url)
     try:
+        if open_browser:
+            webbrowser.open(explorer.url)
         explorer.wait()
     except KeyboardInterrupt:
         pass

@@ -9,10 +9,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from .errors import FileError, OptionError, unknown
-from .plan import Area, Divider, Hole, Plan
-from .solvers import METHODS
-from .surface import Plane
+from ..errors import FileError, OptionError, unknown
+from ..plan import Area, Divider, Hole, Plan
+from ..solvers import METHODS
+from ..surface import Plane
+from .remeshing import Remeshing
 
 
 def options_of(method: str) -> Any:
@@ -43,9 +44,10 @@ def check_keys(path: Path, text: str, data: Mapping[str, Any]) -> None:
                 )
                 raise FileError(f"{path}: line {line}: {unknown(where, key, known)}")
 
-    check((), data, ["plan", "solve", "targets", "output"])
+    check((), data, ["plan", "solve", "remesh", "targets", "output"])
     for section in data:
-        check((section,), data[section], _section_keys(section, data[section]))
+        for table in entries(data[section]) if section == "remesh" else [data[section]]:
+            check((section,), table, _section_keys(section, table))
     plan = data.get("plan", {})
     for name in ("dividers", "holes", "supports"):
         _check_list(path, text, ("plan",), plan, name)
@@ -66,7 +68,7 @@ def check_keys(path: Path, text: str, data: Mapping[str, Any]) -> None:
     if "plane" in plan:
         check(("plan", "plane"), plan["plane"], _keys(Plane))
     if "targets" in data:
-        from .design import Parameter, Target
+        from ..design import Parameter, Target
 
         for name, aim in (("meet", Target), ("vary", Parameter)):
             for entry in tables(data["targets"].get(name)):
@@ -87,14 +89,21 @@ def _section_keys(section: str, table: Any) -> list[str]:
     if section == "solve":
         method = table.get("method", "newton") if isinstance(table, Mapping) else "newton"
         return ["method", *(_keys(options_of(method)) if method in METHODS else table)]
+    if section == "remesh":
+        return _keys(Remeshing)
     if section == "targets":
         return ["meet", "vary"]
     return ["files", "picture", "view", "colour"]
 
 
-def tables(entries: Any) -> list[Any]:
+def entries(value: Any) -> list[Any]:
+    """A list, or what stands where one may: its only entry."""
+    return value if isinstance(value, list) else [value]
+
+
+def tables(value: Any) -> list[Any]:
     """Those of a list's entries that are tables."""
-    return [e for e in entries if isinstance(e, Mapping)] if isinstance(entries, list) else []
+    return [e for e in value if isinstance(e, Mapping)] if isinstance(value, list) else []
 
 
 def _line(text: str, place: tuple[str, ...], key: str) -> int:

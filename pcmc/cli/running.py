@@ -1,4 +1,4 @@
-"""The ``pcmc`` command: runs one of ``commands``, says errors in a line, and gives the exit code."""
+"""Running the command: errors in a line, and the exit code."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ import sys
 import warnings
 from collections.abc import Sequence
 
-from .errors import FileWarning, FreeSurfaceWarning, MissingExtra, PcmcError
-
-OK, NOT_CERTIFIED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+from ..errors import FileWarning, FreeSurfaceWarning, MissingExtra, PcmcError
+from .codes import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -69,7 +68,7 @@ def _command():  # type: ignore[no-untyped-def]
             raise MissingExtra(error.name or library, "cli") from None
     import typer
 
-    from .commands import app
+    from .app import app
 
     return typer.main.get_command(app), typer
 

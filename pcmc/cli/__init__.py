@@ -1,0 +1,5 @@
+"""The ``pcmc`` command."""
+
+from .running import main
+
+__all__ = ["main"]

@@ -1,0 +1,95 @@
+"""What the commands are given: files, NAME=VALUE, views."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .. import project as projects
+from ..errors import OptionError
+from ..io import read
+from ..surface import Surface
+
+TOML = ".toml"
+
+Input = Annotated[Path, typer.Argument(metavar="FILE", help="A surface, or a project (.toml).")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--tension",
+        metavar="NAME=VALUE",
+        help="Tension of a patch; VALUE alone: of all under pressure.",
+    ),
+]
+Pressures = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--pressure",
+        metavar="NAME=VALUE",
+        help="Pressure on a patch; VALUE alone: on all under pressure.",
+    ),
+]
+ViewName = Annotated[
+    str, typer.Option(help="diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")
+]
+Colour = Annotated[str, typer.Option("--colour", "--color", help="patches, curvature or error.")]
+
+
+def surface_in(file: Path) -> Surface:
+    """A surface from its file, or the one that a project starts from."""
+    return projects.build(file) if file.suffix.lower() == TOML else read(file)
+
+
+def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str] | None) -> Surface:
+    loaded = [patch.name for patch in surface.patches if patch.pressure != 0.0]
+    return surface.retensioned(
+        _by_name(loaded, tension, "--tension"), _by_name(loaded, pressure, "--pressure")
+    )
+
+
+def _by_name(names: list[str], given: list[str] | None, option: str) -> dict[str, float]:
+    """Values by patch from NAME=VALUE, and VALUE for those named; the later ones win."""
+    found: dict[str, float] = {}
+    for text in given or ():
+        name, _, value = text.rpartition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            raise OptionError(f"{option}: expected NAME=NUMBER or NUMBER, found {text!r}") from None
+        found |= {name: number} if name else dict.fromkeys(names, number)
+    return found
+
+
+def values_of(text: str) -> tuple[str, list[Any]]:
+    """A name and its values from NAME=V1,V2.
+
+    >>> values_of("alpha=2,4.5"), values_of("wall=upright")
+    (('alpha', [2, 4.5]), ('wall', ['upright']))
+    """
+    name, sign, values = text.partition("=")
+    if not (name and sign and values):
+        raise OptionError(f"expected NAME=VALUE or NAME=V1,V2, found {text!r}")
+    return name, [_value(one) for one in values.split(",")]
+
+
+def _value(text: str) -> Any:
+    words = {"true": True, "false": False, "none": None}
+    if text.lower() in words:
+        return words[text.lower()]
+    try:
+        number = ast.literal_eval(text)
+    except (ValueError, SyntaxError):
+        return text
+    return number if isinstance(number, int | float) else text
+
+
+def view_of(text: str) -> Any:
+    """The name of a view, or (azimuth, elevation)."""
+    try:
+        azimuth, elevation = (float(part) for part in text.split(","))
+    except ValueError:
+        return text
+    return azimuth, elevation

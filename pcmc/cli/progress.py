@@ -1,0 +1,46 @@
+"""Progress on stderr, where that is a terminal that can redraw a line."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+
+@contextmanager
+def working() -> Iterator[Callable[[str], None]]:
+    """A function that shows what is being done."""
+    if not _live():
+        yield lambda words: None
+        return
+    from rich import progress
+    from rich.console import Console
+
+    columns = (
+        progress.BarColumn(20),
+        progress.TimeElapsedColumn(),
+        progress.TextColumn("{task.description}", markup=False),
+    )
+    with progress.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda words: bar.update(task, description=words)
+
+
+@contextmanager
+def sweeping() -> Iterator[Any]:
+    """The bar of a sweep; None where there is no terminal."""
+    from ..sweep.bar import bar
+
+    if not _live():
+        yield None
+        return
+    from rich.console import Console
+
+    with bar(Console(stderr=True)) as draw:
+        yield draw
+
+
+def _live() -> bool:
+    return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"

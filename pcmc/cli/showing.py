@@ -1,0 +1,113 @@
+"""convert, plot, explore: a surface for other programs and for the eye. Each returns the exit code."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .. import project as projects
+from ..errors import FileError, OptionError
+from ..io import write
+from ..surface import Surface
+from .arguments import (
+    Colour,
+    Input,
+    Pressures,
+    Settings,
+    ViewName,
+    retensioned,
+    surface_in,
+    values_of,
+    view_of,
+)
+from .codes import OK
+from .progress import working
+
+
+def convert(
+    file: Input,
+    output: Annotated[Path, typer.Argument(metavar="OUT", help="The suffix says the format.")],
+    tension: Settings = None,
+    pressure: Pressures = None,
+) -> int:
+    """Write a surface in another format: .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf .3dm.
+
+    \b
+    Example:
+      pcmc convert roof.pcmc roof.3dm
+    """
+    write(output, retensioned(surface_in(file), tension, pressure))
+    print(f"written: {output}")
+    return OK
+
+
+def plot(
+    file: Input,
+    picture: Annotated[Path, typer.Argument(metavar="PNG")],
+    view: ViewName = "diagonal",
+    colour: Colour = "patches",
+) -> int:
+    """Draw a surface, coloured by patches, mean curvature or its relative error.
+
+    \b
+    Example:
+      pcmc plot roof.pcmc roof.png --view elevation --colour error
+    """
+    if picture.suffix.lower() != ".png":
+        raise FileError(f"{picture}: a picture is written as .png; name it so")
+    projects.paint(surface_in(file), picture, view_of(view), colour)
+    print(f"written: {picture}")
+    return OK
+
+
+def explore(
+    file: Annotated[Path | None, typer.Argument(metavar="[FILE]")] = None,
+    example: Annotated[
+        str | None, typer.Option(help="Such as two_caps, instead of a file.")
+    ] = None,
+    parameter: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Of the example.")
+    ] = None,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="0 for any that is free.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Open the page.")] = True,
+) -> int:
+    """Explore a surface in the browser until Ctrl-C.
+
+    \b
+    Examples:
+      pcmc explore roof.pcmc
+      pcmc explore --example two_caps --set edge_length=1.2
+    """
+    from ..explore import attend, start
+
+    if (file is None) == (example is None):
+        raise OptionError("explore: give a file or --example, one of them")
+    with working() as say:
+        say("building")
+        if file is not None:
+            surface, title = surface_in(file), file.name
+        else:
+            given = dict(values_of(text) for text in parameter or ())
+            values = {name: found[0] for name, found in given.items()}
+            surface, title = _example(str(example), values), str(example)
+        say("solving")
+        explorer = start(surface, host, port, title)
+    attend(explorer, browser)
+    return OK
+
+
+def _example(name: str, parameters: dict[str, Any]) -> Surface:
+    """The surface of a generator, found by its name when it is asked for."""
+    from ..sweep.child import resolve
+
+    try:
+        build = resolve(name if ":" in name else f"generators:{name}")
+        inspect.signature(build).bind(**parameters)
+    except (ImportError, AttributeError, ValueError, TypeError) as error:
+        raise OptionError(f"--example {name}: {error}") from None
+    surface: Surface = build(**parameters)
+    return surface

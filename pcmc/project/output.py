@@ -1,0 +1,117 @@
+"""What a project writes: files and a picture, all of them or none."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from .. import io
+from ..curvature import curvature_error, mean_curvature
+from ..errors import FileError, FileWarning, OptionError, PcmcError, unknown
+from ..files import together
+from ..solvers.result import Result
+from ..surface import Surface
+
+PathLike = str | os.PathLike[str]
+Say = Callable[[str], object]
+COLOURS = ("patches", "curvature", "error")
+
+
+def silent(words: str) -> None:
+    """Say nothing."""
+
+
+def save(
+    result: Result, files: Iterable[PathLike], picture: PathLike | None = None, *,
+    view: Any = "diagonal", colour: str = "patches", progress: Say | None = None,
+) -> list[Path]:  # fmt: skip
+    """Write a result to files and a picture of it: all of them, or none.
+
+    Curvatures (1/length), their errors and the certificate go where the format can carry them.
+    """
+    surface, found = result.surface, result.certificate
+    scalars = {"mean curvature": mean_curvature(surface), "error": curvature_error(surface)}
+
+    def write(path: Path) -> None:
+        io.write(path, surface, scalars=scalars, certificate=found)
+
+    def draw(path: Path) -> None:
+        paint(surface, path, view, colour)
+
+    works = [(Path(file), write) for file in files]
+    if picture is not None:
+        works.append((Path(picture), draw))
+    return write_all(works, progress)
+
+
+def write_all(
+    works: Iterable[tuple[Path, Callable[[Path], None]]], progress: Say | None = None
+) -> list[Path]:
+    """Files and what writes each, given where to; all appear together, or none does.
+
+    Errors name the file itself and not the temporary one in its place.
+    """
+    say, works = progress or silent, list(works)
+    paths = [path for path, _ in works]
+    check_outputs(paths)
+    with together(paths) as temporaries, warnings.catch_warnings():
+        warnings.simplefilter("ignore", FileWarning)  # what a format cannot carry is not asked for
+        for (path, write), temporary in zip(works, temporaries, strict=True):
+            say(f"writing {path.name}")
+            try:
+                write(temporary)
+            except OSError as error:
+                raise FileError(f"{path}: cannot be written ({error.strerror or error})") from None
+            except PcmcError as error:
+                text = str(error).replace(f"{temporary}: ", "")
+                raise FileError(f"{path}: {text}") from None
+    return paths
+
+
+def paint(surface: Surface, path: PathLike, view: Any, colour: str) -> None:
+    """A picture with the patches, the mean curvature (1/length) or its relative error as colours."""
+    from ..plot import draw  # needs the extra plot, which a project without picture does not
+
+    check_picture(view, colour)
+    if colour == "curvature":
+        draw(surface, path, view=view, scalars=mean_curvature(surface), label="mean curvature")
+    elif colour == "error":
+        draw(surface, path, view=view, scalars=curvature_error(surface), label="curvature error")
+    else:
+        draw(surface, path, view=view, legend=True)
+
+
+def check_picture(view: Any, colour: str) -> None:
+    """Refuse a view or colour that ``paint`` does not know."""
+    from ..plot.scene import VIEWS
+
+    if colour not in COLOURS:
+        raise OptionError(unknown("colour", colour, COLOURS))
+    if isinstance(view, str):
+        if view not in VIEWS:
+            raise OptionError(unknown("view", view, VIEWS))
+    elif len(view) != 2 or not all(isinstance(angle, int | float) for angle in view):
+        raise OptionError(f"view: expected a name or two angles in degrees, found {view!r}")
+
+
+def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
+    """Refuse, before any work, what cannot be written; ``made`` is a folder that is made if missing."""
+    seen: list[str] = []
+    for path in paths:
+        suffix = path.suffix.lower()
+        if suffix not in (*io.FORMATS, ".png"):
+            raise FileError(f"{path}: {unknown('suffix', suffix, [*io.FORMATS, '.png'])}")
+        if path.is_dir():
+            raise FileError(f"{path}: is a folder; give the name of a file")
+        place = os.path.normcase(path.absolute())
+        if place in seen:
+            raise FileError(f"{path}: is named twice among the output")
+        seen.append(place)
+        folder = path.parent
+        if folder != made and not folder.is_dir():
+            raise FileError(f"{path}: there is no folder {folder}; make it first")
+        if folder.is_dir() and not os.access(folder, os.W_OK):
+            raise FileError(f"{path}: cannot be written (the folder {folder} is read-only)")
