@@ -9,6 +9,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from .interrupts import held
+
 
 @contextmanager
 def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
@@ -37,9 +39,10 @@ def together(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path]]:
     kept = [_beside(path) for path in wanted]
     try:
         yield written
-        for path, old in zip(wanted, kept, strict=True):
-            _keep(path, old)
-        _replace(wanted, written, kept)
+        with held():
+            for path, old in zip(wanted, kept, strict=True):
+                _keep(path, old)
+            _replace(wanted, written, kept)
     finally:
         for path in (*written, *kept):
             path.unlink(missing_ok=True)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import builtins
+import signal
 import subprocess
 import sys
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import pcmc
 from pcmc import cli
+from pcmc.io import load
 from tests.test_project import SMALL
 
 COMMANDS = ["solve", "certify", "remesh", "convert", "plot", "sweep", "explore"]
@@ -151,7 +154,7 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["solve", "roof.toml", "--tension", "rof=1"], "did you mean 'roof'"),
         (["solve", "roof.toml", "--tension", "roof=x"], "--tension: expected NAME=NUMBER"),
         (["remesh", "roof.toml", "--edge-length", "-1", "-o", "x.obj"], "edge_length"),
-        (["convert", "roof.toml", "away/x.obj"], "cannot be written"),
+        (["convert", "roof.toml", "away/x.obj"], "there is no folder away"),
         (["plot", "roof.toml", "x.jpg"], ".png"),
         (["plot", "roof.toml", "x.png", "--colour", "eror"], "did you mean 'error'"),
         (["sweep", "generators:two_squares", "alpha_aux"], "expected NAME=VALUE"),
@@ -161,6 +164,10 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
             ["sweep", "generators:two_squares", "alpha_aux=1,2", "--csv", "x.txt"],
             ".csv or .parquet",
         ),
+        (["sweep", "generators:two_squares", "alpha_aux=1,2", "--csv", "no/x.csv"], "no folder"),
+        (["solve", "roof.toml", "--folder", "roof.toml"], "needs a folder"),
+        (["plot", "roof.toml", "away/x.png"], "there is no folder away"),
+        (["plot", "roof.toml", "x.png", "--view", "1,2,3"], "unknown view"),
         (["explore"], "give a file or --example"),
         (["explore", "--example", "two_square"], "two_square"),
         (["explore", "--example", "two_squares", "--set", "a=1"], "'a'"),
@@ -184,6 +191,36 @@ def test_notes_are_one_line(solved, capsys):
     err = capsys.readouterr().err
     assert err.startswith("pcmc: note: q.obj: ")
     assert err.count("\n") == 1
+
+
+def test_what_a_file_says_of_its_surface_is_carried_over(solved, capsys):
+    before = load("roof.pcmc")
+    assert set(before.scalars) == {"mean curvature", "error", "reaction"}
+    assert cli.main(["convert", "roof.pcmc", "b.pcmc"]) == 0
+    after = load("b.pcmc")
+    for name, values in before.scalars.items():
+        np.testing.assert_array_equal(after.scalars[name], values)
+    assert after.certificate["verdict"] == "stable"
+    capsys.readouterr()
+    assert cli.main(["convert", "roof.pcmc", "b.vtp"]) == 0
+    assert "cannot carry certificate" in capsys.readouterr().err
+    assert set(load("b.vtp").scalars) == set(before.scalars)
+    assert cli.main(["convert", "roof.pcmc", "c.pcmc", "--tension", "3"]) == 0
+    assert not load("c.pcmc").scalars  # they are those of other tensions
+
+
+@pytest.mark.parametrize("kind", ["SIGINT", "SIGTERM"])
+def test_ctrl_c_while_writing_clears_away(folder, monkeypatch, capsys, kind):
+    def pressed(path, *_, **__):
+        path.write_text("half of it", encoding="utf-8")
+        signal.raise_signal(getattr(signal, kind))
+
+    monkeypatch.setattr("pcmc.io.write", pressed)
+    before = signal.getsignal(getattr(signal, kind))
+    assert cli.main(["solve", "roof.toml"]) == 130
+    assert signal.getsignal(getattr(signal, kind)) == before
+    assert capsys.readouterr() == ("", "pcmc: stopped\n")
+    assert [p.name for p in folder.iterdir()] == ["roof.toml"]
 
 
 def test_interrupted_is_130(folder, monkeypatch, capsys):

@@ -1,5 +1,7 @@
 """Files that other programs write, and files that are wrong, each in its own way."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -419,3 +421,15 @@ def test_closed_mesh_is_free(tmp_path):
     assert (ball.n, ball.m) == (42, 80)
     assert not ball.fixed.any()
     assert ball.patches == (pcmc.Patch("ball", 0.5),)
+
+
+def test_a_gltf_that_is_cut_off_or_without_its_parts_says_so(tmp_path):
+    path = tmp_path / "roof.gltf"
+    pcmc.write(path, expected())
+    whole = path.read_text(encoding="utf-8")
+    path.write_text(whole[: len(whole) // 2], encoding="utf-8")
+    with pytest.raises(FileError, match=r"roof\.gltf: not a readable glTF file, or cut off"):
+        pcmc.read(path)
+    path.write_text(re.sub(r'"uri": ?"data:[^"]*"', '"uri":"part.bin"', whole), encoding="utf-8")
+    with pytest.raises(FileError, match=r"roof\.gltf: its part part\.bin is not beside it"):
+        pcmc.read(path)

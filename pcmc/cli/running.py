@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Sequence
 
 from ..errors import FileWarning, FreeSurfaceWarning, MissingExtra, PcmcError
+from ..interrupts import endings
 from .codes import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
 
@@ -31,7 +32,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for kind in (FileWarning, FreeSurfaceWarning):
             warnings.simplefilter("always", kind)
         warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")
-        return _run(sys.argv[1:] if arguments is None else list(arguments))
+        with endings():
+            return _run(sys.argv[1:] if arguments is None else list(arguments))
 
 
 def _run(arguments: list[str]) -> int:

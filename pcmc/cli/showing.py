@@ -10,9 +10,11 @@ import typer
 
 from .. import project as projects
 from ..errors import FileError, OptionError
-from ..io import write
+from ..interrupts import held
+from ..io import load, write
 from ..surface import Surface
 from .arguments import (
+    TOML,
     Colour,
     Input,
     Pressures,
@@ -39,9 +41,21 @@ def convert(
     Example:
       pcmc convert roof.pcmc roof.3dm
     """
-    write(output, retensioned(surface_in(file), tension, pressure))
+    projects.check_outputs([output])
+    surface = retensioned(surface_in(file), tension, pressure)
+    kept = _kept(file) if not (tension or pressure) else {}
+    with held():
+        write(output, surface, **kept)
     print(f"written: {output}")
     return OK
+
+
+def _kept(file: Path) -> dict[str, Any]:
+    """What a file says about its surface: scalars and certificate."""
+    if file.suffix.lower() == TOML:
+        return {}
+    told = load(file)
+    return {"scalars": told.scalars, "certificate": told.certificate or None}
 
 
 def plot(
@@ -58,7 +72,11 @@ def plot(
     """
     if picture.suffix.lower() != ".png":
         raise FileError(f"{picture}: a picture is written as .png; name it so")
-    projects.paint(surface_in(file), picture, view_of(view), colour)
+    seen = view_of(view)
+    projects.check_picture(seen, colour)
+    projects.check_outputs([picture])
+    surface = surface_in(file)
+    projects.write_all([(picture, lambda path: projects.paint(surface, path, seen, colour))])
     print(f"written: {picture}")
     return OK
 

@@ -40,6 +40,9 @@ def sweep(
     cases = Sweep(solve_case, grid, {"generator": generator, "method": method, **fixed})
     if csv is not None and csv.suffix not in (".csv", ".parquet"):
         raise FileError(f"{csv}: a table is written as .csv or .parquet; name it so")
+    for path in filter(None, (csv, store)):
+        if not path.parent.is_dir():
+            raise FileError(f"{path}: there is no folder {path.parent}; make it first")
     with sweeping() as draw:
         table = run(cases, store, scheduler=scheduler, workers=workers, on_record=draw)
     if csv is not None:

@@ -18,9 +18,9 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from ..certificate import Certificate
-from ..curvature import curvature_error, mean_curvature
 from ..errors import MissingExtra, OptionError, PcmcError, SurfaceError
 from ..io import FORMATS, write
+from ..project.output import fields as written_fields
 from ..surface import Patch, Surface
 from .draft import Draft, State, begin
 from .drawing import centre, fields, findings, outline
@@ -281,7 +281,7 @@ class _Handler(BaseHTTPRequestHandler):
                 "ignore"
             )  # what a format cannot carry, every format of its kind says
             path = Path(folder) / f"surface{suffix}"
-            write(path, state.surface, scalars=_scalars(state.surface),
+            write(path, state.surface, scalars=written_fields(state.surface, state.found),
                   certificate=plain(state.found.numbers()))  # fmt: skip
             body = path.read_bytes()
         self._send(body, "application/octet-stream", f'attachment; filename="surface{suffix}"')
@@ -343,11 +343,4 @@ def _verdict(found: Certificate) -> dict[str, str]:
         "word": word,
         "sentence": rest,
         "detail": found.detail,
-    }
-
-
-def _scalars(surface: Surface) -> dict[str, Any]:
-    return {
-        "mean_curvature": mean_curvature(surface, "variational"),
-        "curvature_error": curvature_error(surface, "cotangent"),
     }

@@ -6,6 +6,7 @@ scalars at vertices are attributes of the vertices, tensions, pressures and plan
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
+from ..errors import FileError
 from ..palette import patch_colors
 from ..surface import Surface
 from .contents import Contents, described, description, support_of
@@ -60,7 +62,14 @@ def read(path: Path) -> Contents:
     """Meshes as patches, by the names of their nodes."""
     trimesh = library("trimesh")
     with reading("glTF"):
-        scene = trimesh.load_scene(path, process=False)
+        if path.suffix.lower() == ".gltf":
+            json.loads(path.read_bytes())  # trimesh asks for another file where this one is cut off
+        try:
+            scene = trimesh.load_scene(path, process=False)
+        except FileNotFoundError as error:
+            raise FileError(
+                f"its part {error} is not beside it; keep a .gltf's files together"
+            ) from None
     told = scene.metadata.get("pcmc")
     found = from_meshes(scene, path.stem, described(told))
     X = found.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]

@@ -24,7 +24,7 @@
 """
 
 from .file import Project, build, load, surface_of
-from .output import COLOURS, check_outputs, paint, save, write_all
+from .output import COLOURS, check_outputs, check_picture, paint, save, write_all
 from .remeshing import Remeshing
 from .running import Outcome, carry_out, reporter, run, settle, uninterrupted
 
@@ -36,6 +36,7 @@ __all__ = [
     "build",
     "carry_out",
     "check_outputs",
+    "check_picture",
     "load",
     "paint",
     "reporter",

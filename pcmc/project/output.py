@@ -8,10 +8,15 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .. import io
+from ..arrays import Floats
+from ..certificate import Certificate
 from ..curvature import curvature_error, mean_curvature
 from ..errors import FileError, FileWarning, OptionError, PcmcError, unknown
 from ..files import together
+from ..interrupts import held
 from ..solvers.result import Result
 from ..surface import Surface
 
@@ -30,10 +35,10 @@ def save(
 ) -> list[Path]:  # fmt: skip
     """Write a result to files and a picture of it: all of them, or none.
 
-    Curvatures (1/length), their errors and the certificate go where the format can carry them.
+    ``fields`` and the certificate go where the format can carry them.
     """
     surface, found = result.surface, result.certificate
-    scalars = {"mean curvature": mean_curvature(surface), "error": curvature_error(surface)}
+    scalars = fields(surface, found)
 
     def write(path: Path) -> None:
         io.write(path, surface, scalars=scalars, certificate=found)
@@ -45,6 +50,16 @@ def save(
     if picture is not None:
         works.append((Path(picture), draw))
     return write_all(works, progress)
+
+
+def fields(surface: Surface, found: Certificate) -> dict[str, Floats]:
+    """What travels with a surface, by vertex: mean curvature (1/length), its relative error, and the size
+    of the reaction where it is supported (force)."""
+    return {
+        "mean curvature": mean_curvature(surface),
+        "error": curvature_error(surface),
+        "reaction": np.linalg.norm(found.reactions, axis=1),
+    }
 
 
 def write_all(
@@ -62,7 +77,8 @@ def write_all(
         for (path, write), temporary in zip(works, temporaries, strict=True):
             say(f"writing {path.name}")
             try:
-                write(temporary)
+                with held():
+                    write(temporary)
             except OSError as error:
                 raise FileError(f"{path}: cannot be written ({error.strerror or error})") from None
             except PcmcError as error:
@@ -100,6 +116,8 @@ def check_picture(view: Any, colour: str) -> None:
 def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
     """Refuse, before any work, what cannot be written; ``made`` is a folder that is made if missing."""
     seen: list[str] = []
+    if made is not None and made.exists() and not made.is_dir():
+        raise FileError(f"{made}: is a file; the output needs a folder")
     for path in paths:
         suffix = path.suffix.lower()
         if suffix not in (*io.FORMATS, ".png"):
