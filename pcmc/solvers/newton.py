@@ -5,8 +5,9 @@ derivative is applied by differences and inverted by GMRES on a factorisation of
 while it still contracts. Where a minimum is sought and the matrix is indefinite, it is shifted; near a
 saddle the lowest mode leads on. Where a step overshoots or spoils triangles, smooth descent steps come
 first. In between vertices are spread along the shape as long as triangles are poor, and junctions that
-come down to Π are set to rest there. A way down may run past a shallow minimum, until triangles collapse:
-then the run starts once more for any stationary point, and keeps it if it is a minimum.
+come down to Π are set to rest there. A way may run past a shallow minimum, or a step too far, until
+triangles collapse. Then the run starts once more: towards any stationary point, which is kept if it is a
+minimum where one was asked for; or, if that is what has failed, with smooth steps first.
 """
 
 from __future__ import annotations
@@ -118,35 +119,41 @@ def newton(surface: Surface, options: NewtonOptions, callback: Callback | None) 
 def _finish(
     surface: Surface, options: NewtonOptions, log: _Log, level: int
 ) -> tuple[State, Status]:
-    """Solve on one mesh; where the way down is lost, by way of any stationary point."""
+    """Solve on one mesh; where the way is lost, once more on another."""
     state, status = _attempt(surface, options, log, level)
-    if options.target != "minimum" or status not in LOST:
+    if status not in LOST:
         return state, status
     rows = len(log.rows)
-    other, found = _attempt(surface, replace(options, target="stationary"), log, level)
+    downwards = options.target == "minimum"
+    other, found = _attempt(
+        surface, replace(options, target="stationary"), log, level, 0 if downwards else DESCENTS
+    )
     if found is Status.STOPPED:
         return other, found
     sound = found is Status.CONVERGED and other.worst >= POOR
-    if sound and certify(other.result_surface(), modes=0).index == 0:
+    if sound and (not downwards or certify(other.result_surface(), modes=0).index == 0):
         return other, found
     del log.rows[rows:]
     return state, status
 
 
 def _attempt(
-    surface: Surface, options: NewtonOptions, log: _Log, level: int
+    surface: Surface, options: NewtonOptions, log: _Log, level: int, smooth: int = 0
 ) -> tuple[State, Status]:
     state = State(surface, options.care)
     stepper = Stepper(state, options.target == "minimum", options.backend)
-    status = _run(state, stepper, options, log, level)
+    status = _run(state, stepper, options, log, level, smooth)
     log.evaluations += state.evaluations
     log.factorisations += stepper.factorisations
     return state, status
 
 
-def _run(state: State, stepper: Stepper, options: NewtonOptions, log: _Log, level: int) -> Status:
+def _run(
+    state: State, stepper: Stepper, options: NewtonOptions, log: _Log, level: int, smooth: int
+) -> Status:
+    """Step until one of the ends; ``smooth`` steps of descent come first."""
     start = state.worst
-    wait, since, lowest = 0, 0, state.relative
+    wait, since, lowest = smooth, 0, state.relative
     shown = state.X, state.version
     try:
         for step in range(options.iterations + 1):
