@@ -33,9 +33,14 @@ Pressures = Annotated[
     ),
 ]
 ViewName = Annotated[
-    str, typer.Option(help="diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")
+    str,
+    typer.Option(
+        metavar="NAME", help="diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees."
+    ),
 ]
-Colour = Annotated[str, typer.Option("--colour", "--color", help="patches, curvature or error.")]
+Colour = Annotated[
+    str, typer.Option("--colour", "--color", metavar="NAME", help="patches, curvature or error.")
+]
 
 
 def surface_in(file: Path) -> Surface:

@@ -40,7 +40,8 @@ def _run(arguments: list[str]) -> int:
     try:
         command, exits = _command()
         code = command(args=arguments, prog_name="pcmc", standalone_mode=False)
-        sys.stdout.flush()
+        if sys.stdout is not None:  # it is where the shell closed it
+            sys.stdout.flush()
         return _interrupted() if code == INTERRUPTED else int(code or OK)
     except KeyboardInterrupt:
         return _interrupted()

@@ -68,7 +68,7 @@ def plot(
 
     \b
     Example:
-      pcmc plot roof.pcmc roof.png --view elevation --colour error
+      pcmc plot roof.pcmc roof.png --colour error
     """
     if picture.suffix.lower() != ".png":
         raise FileError(f"{picture}: a picture is written as .png; name it so")
@@ -84,13 +84,13 @@ def plot(
 def explore(
     file: Annotated[Path | None, typer.Argument(metavar="[FILE]")] = None,
     example: Annotated[
-        str | None, typer.Option(help="Such as two_caps, instead of a file.")
+        str | None, typer.Option(metavar="NAME", help="Such as two_caps, instead of a file.")
     ] = None,
     parameter: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Of the example.")
     ] = None,
-    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="0 for any that is free.")] = 0,
+    host: Annotated[str, typer.Option(metavar="ADDRESS", help="To listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(metavar="NUMBER", help="0 for any that is free.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page.")] = True,
 ) -> int:
     """Explore a surface in the browser until Ctrl-C.

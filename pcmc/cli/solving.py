@@ -21,16 +21,22 @@ from .progress import working
 def solve_(
     file: Input,
     output: Annotated[
-        list[Path] | None, typer.Option("-o", "--output", help="File to write; may be repeated.")
+        list[Path] | None,
+        typer.Option("-o", "--output", metavar="FILE", help="To write; may be repeated."),
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="PNG to draw.")] = None,
-    method: Annotated[str | None, typer.Option(help="newton, nesterov or lbfgs.")] = None,
+    picture: Annotated[Path | None, typer.Option(metavar="PNG", help="To draw.")] = None,
+    method: Annotated[
+        str | None, typer.Option(metavar="NAME", help="newton, nesterov or lbfgs.")
+    ] = None,
     target: Annotated[
-        str | None, typer.Option(help="minimum, or stationary for saddles too (newton).")
+        str | None,
+        typer.Option(metavar="NAME", help="minimum, or stationary for saddles too (newton)."),
     ] = None,
     tension: Settings = None,
     pressure: Pressures = None,
-    folder: Annotated[Path | None, typer.Option(help="Where a project's output goes.")] = None,
+    folder: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Where a project's output goes.")
+    ] = None,
     anyway: Annotated[
         bool, typer.Option("--anyway", help="Write the output even if it is not certified.")
     ] = False,
@@ -40,7 +46,7 @@ def solve_(
     \b
     Examples:
       pcmc solve roof.toml
-      pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm --picture roof.png
+      pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
     project = _project(file, folder, output, picture)
     options = dict(project.options) if method in (None, project.method) else {}
@@ -89,14 +95,20 @@ def certify_(file: Input, tension: Settings = None, pressure: Pressures = None) 
 
 def remesh_(
     file: Input,
-    edge_length: Annotated[float, typer.Option(help="Of the triangles, length.")],
-    output: Annotated[list[Path], typer.Option("-o", "--output", help="File; may be repeated.")],
+    edge_length: Annotated[float, typer.Option(metavar="LENGTH", help="Of the triangles.")],
+    output: Annotated[
+        list[Path],
+        typer.Option("-o", "--output", metavar="FILE", help="To write; may be repeated."),
+    ],
     near_curves: Annotated[
-        float | None, typer.Option(help="Edge length at junctions and boundaries.")
+        float | None,
+        typer.Option(metavar="LENGTH", help="Edge length at junctions and boundaries."),
     ] = None,
     chord: Annotated[
         float | None,
-        typer.Option(help="Largest distance to the smooth surface: finer where it curves."),
+        typer.Option(
+            metavar="LENGTH", help="Largest distance to the smooth surface: finer where it curves."
+        ),
     ] = None,
     solved: Annotated[
         bool, typer.Option("--solve/--no-solve", help="Solve and certify the new mesh.")

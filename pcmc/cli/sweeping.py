@@ -15,22 +15,32 @@ from .progress import sweeping
 
 def sweep(
     generator: Annotated[
-        str, typer.Argument(help="package.module:function that returns a Surface.")
+        str,
+        typer.Argument(metavar="GENERATOR", help="package.module:function that returns a Surface."),
     ],
     values: Annotated[list[str], typer.Argument(metavar="NAME=V1,V2,...")],
-    method: Annotated[str, typer.Option(help="newton, nesterov or lbfgs.")] = "newton",
+    method: Annotated[
+        str, typer.Option(metavar="NAME", help="newton, nesterov or lbfgs.")
+    ] = "newton",
     store: Annotated[
-        Path | None, typer.Option(help="Keeps finished cases; run again to go on from there.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Keeps finished cases; run again to go on from there."),
     ] = None,
-    csv: Annotated[Path | None, typer.Option(help="Table to write (.csv or .parquet).")] = None,
-    workers: Annotated[int | None, typer.Option(help="Local processes; default: all.")] = None,
-    scheduler: Annotated[str | None, typer.Option(help="Dask scheduler, tcp://HOST:8786.")] = None,
+    csv: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Table to write (.csv or .parquet).")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(metavar="NUMBER", help="Local processes; default: all.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, tcp://HOST:8786.")
+    ] = None,
 ) -> int:
     """Solve a generator's surface for every combination of the values; exit code 0 if all are certified.
 
     \b
     Example:
-      pcmc sweep generators:two_caps edge_length=1.2 alpha_large=2,4,8 --store caps.jsonl --csv caps.csv
+      pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
     """
     from ..sweep import Sweep, run, solve_case, write_table
 
