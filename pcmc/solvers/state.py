@@ -22,7 +22,7 @@ from ..motion import MotionSpace, Structure, force_scale, motion_space
 from ..quality import compare, redistribution, worst_quality
 from ..surface import Surface
 
-LOW = 2e-3  # height, in spacings along the crest, at which a sinking junction is set to rest
+LOW = 5e-3  # height, in spacings along the crest, at which a sinking junction is set to rest
 POOR = 2 / 3  # of the quality that is cared for: once spreading has failed, what is left to mend
 CARES = 60  # times that the vertices are spread at most
 RELEASES = 30  # times that resting junctions are lifted at most
