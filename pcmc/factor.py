@@ -11,6 +11,8 @@ import importlib.util
 import os
 import threading
 import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal, Protocol
@@ -25,6 +27,7 @@ from .assemble import Pattern
 from .errors import MissingExtra, OptionError, unknown
 
 BACKENDS = ("pardiso", "superlu")
+ALONE = 10_000  # rows; up to here MKL's threads wait for each other longer than they work
 
 
 class SingularMatrix(ArithmeticError):
@@ -181,9 +184,22 @@ class _Pardiso:
         return _PardisoFactor(self, matrix, int(iparm[22]))
 
     def run(self, phase: int, matrix: csr_array, right: Floats) -> Floats:
-        with self._lock:
+        with self._lock, self._threads():
             self._solver.set_phase(phase)
             return self._solver._call_pardiso(matrix, right)
+
+    @contextmanager
+    def _threads(self) -> Iterator[None]:
+        """A single one within the block where the matrix is small."""
+        if self._kept.size > ALONE:
+            yield
+            return
+        choose = self._solver.libmkl.MKL_Set_Num_Threads_Local
+        before = choose(1)
+        try:
+            yield
+        finally:
+            choose(before)
 
 
 def _release(solver: Any, kept: Pattern) -> None:

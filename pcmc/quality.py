@@ -103,17 +103,18 @@ def redistribution(
     area = 0.5 * np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )
-    weighted = np.zeros_like(X)
-    total = np.zeros(len(X))
-    for corner in range(3):
-        np.add.at(total, F[:, corner], area)
-        np.add.at(weighted, F[:, corner], area[:, None] * corners.mean(axis=1))
-    move = np.where(
-        total[:, None] > 0.0, weighted / np.where(total > 0, total, 1.0)[:, None] - X, 0
-    )
-    middle = np.zeros_like(X)
-    np.add.at(middle, curve_edges[:, 0], 0.5 * X[curve_edges[:, 1]])
-    np.add.at(middle, curve_edges[:, 1], 0.5 * X[curve_edges[:, 0]])
+    centroid = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0
+    corner = F.T.ravel()
+    total = np.bincount(corner, np.tile(area, 3), len(X))[:, None]
+    weighted = _summed(corner, np.tile(area[:, None] * centroid, (3, 1)), len(X))
+    move = np.where(total > 0.0, weighted / np.where(total > 0.0, total, 1.0) - X, 0.0)
+    ends = X[curve_edges[:, ::-1].T.ravel()]
+    middle = _summed(curve_edges.T.ravel(), 0.5 * ends, len(X))
     move[kind == CURVE] = (middle - X)[kind == CURVE]
     move[kind == POINT] = 0.0
     return apply_supports(surface, step * move)
+
+
+def _summed(place: Ints, values: Floats, n: int) -> Floats:
+    """(n,3) the sum of the values (k,3) at each place."""
+    return np.stack([np.bincount(place, column, n) for column in values.T], axis=1)
