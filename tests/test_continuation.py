@@ -281,7 +281,7 @@ def test_fold_of_two_caps_on_a_coarse_mesh():
     lower = start.retensioned(
         {"large": at["tension large"] - 0.02, "small": at["tension small"] - 0.02}
     )
-    assert not solve(lower, target="stationary").converged
+    assert not solve(lower).converged  # no minimum is left; a far saddle is
 
 
 @pytest.mark.slow

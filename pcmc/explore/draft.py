@@ -270,7 +270,8 @@ def reach(
             if done == 1.0:
                 return Reached(here, found, None)
         else:
-            failed, step = ended, 0.5 * (ahead - done)
+            failed = ended if ahead == 1.0 or failed is None else failed
+            step = 0.5 * (ahead - done)
         if step < SMALLEST or stop():
             break
     return Reached(here, found, failed)
