@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import threading
 import weakref
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
+from importlib import metadata
+from pathlib import Path
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -153,11 +156,13 @@ class _Pardiso:
     """MKL PARDISO on the upper triangle: mtype -2, real symmetric indefinite."""
 
     def __init__(self, kept: Pattern) -> None:
+        # pypardiso looks for MKL in the whole prefix, 0.2 s each time, unless it is told where
+        if known := _mkl():
+            os.environ.setdefault("PYPARDISO_MKL_RT", known)
         import pypardiso
 
         self._kept = kept
         self._solver = pypardiso.PyPardisoSolver(mtype=-2)
-        # pypardiso looks for MKL in the whole prefix, 0.2 s each time, unless it is told where
         os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
         self._error = pypardiso.pardiso_wrapper.PyPardisoError
         self._lock = threading.Lock()
@@ -200,6 +205,17 @@ class _Pardiso:
             yield
         finally:
             choose(before)
+
+
+@cache
+def _mkl() -> str:
+    """Where MKL's own list of files says that it is; empty without one."""
+    with suppress(metadata.PackageNotFoundError):
+        for file in metadata.files("mkl") or ():
+            if re.fullmatch(r"(lib)?mkl_rt[.\d]*\.(so[.\d]*|dll)", file.name):
+                path = Path(str(file.locate()))
+                return str(path.resolve()) if path.is_file() else ""
+    return ""
 
 
 def _release(solver: Any, kept: Pattern) -> None:
