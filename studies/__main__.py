@@ -94,7 +94,7 @@ def _benchmark(asked: argparse.Namespace) -> int:
 
 
 def _readme(asked: argparse.Namespace) -> int:
-    from .report import write_readme
+    from .readme import write_readme
 
     write_readme(HOME / "README.md", HOME / "results")
     return 0

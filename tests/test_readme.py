@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.report import readme_block, with_block
+from studies.readme import up_to_date
 
 HOME = Path(__file__).resolve().parent.parent
 README = (HOME / "README.md").read_text(encoding="utf-8")
@@ -36,8 +36,7 @@ def test_commands_are_the_readmes_and_the_continuous_integrations(command):
 
 
 def test_tables_are_up_to_date_with_the_results():
-    expected = with_block(README, readme_block(HOME / "results"))
-    assert expected == README, "run: python -m studies readme"
+    assert up_to_date(README, HOME / "results") == README, "run: python -m studies readme"
 
 
 def test_every_picture_and_folder_named_is_there():

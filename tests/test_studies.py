@@ -36,8 +36,8 @@ from studies.paper import (
     paper,
     read_measured,
 )
+from studies.readme import with_block
 from studies.registry import STUDIES, chosen
-from studies.report import with_block
 from studies.runner import run_all
 from studies.study import Study, perform
 from studies.worker import main as work
@@ -341,6 +341,8 @@ def test_every_vertex_that_can_move_is_in_one_group_and_the_shares_add_to_one():
 
 def test_template_keeps_what_is_around_the_markers():
     text = "before\n<!-- comparison: begin -->old<!-- comparison: end -->\nafter"
-    assert with_block(text, "NEW") == "before\nNEW\nafter"
+    wanted = "before\n<!-- comparison: begin -->\n\nNEW\n\n<!-- comparison: end -->\nafter"
+    assert with_block(text, "comparison", ["NEW"]) == wanted
+    assert with_block(wanted, "comparison", ["NEW"]) == wanted
     with pytest.raises(FileError, match="markers"):
-        with_block("no markers", "NEW")
+        with_block("no markers", "comparison", ["NEW"])
