@@ -5,6 +5,8 @@ import sys
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.patches import Rectangle
+from PIL import Image
 from tents import tent
 
 import pcmc
@@ -13,6 +15,7 @@ from pcmc import plot
 from pcmc.errors import FileError, MissingExtra, OptionError
 from pcmc.palette import WALLS, patch_colors, rgb
 from pcmc.plot import raster
+from pcmc.plot.figure import finish, new
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
 
 RENDERERS = [
@@ -295,3 +298,18 @@ def test_a_million_triangles_are_drawn(tmp_path):
     assert surface.m > 900_000
     plot.draw(surface, tmp_path / "a.png", scalars=pcmc.mean_curvature(surface), label="H")
     assert 10_000 < (tmp_path / "a.png").stat().st_size < 150_000
+
+
+def test_a_large_picture_is_written_in_fewer_colours_and_keeps_the_rare_ones(tmp_path):
+    shades = np.linspace(0.2, 0.9, 150 * 300).reshape(150, 300)
+    figure = new(900.0, 600.0)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    noise = np.random.default_rng(1).uniform(-0.1, 0.1, (150, 300))
+    axes.imshow(np.stack([0.2 + 0.0 * shades, shades, 1.0 - shades + noise], 2).clip(0, 1))
+    axes.add_patch(Rectangle((10, 10), 3, 3, color="#EE8866"))
+    image = finish(figure, tmp_path / "p.png")
+    with Image.open(tmp_path / "p.png") as picture:
+        assert picture.mode == "P"
+        found = np.asarray(picture.convert("RGB")).astype(int)
+    assert near(found, rgb("#EE8866"), 0.03).sum() > 20
+    assert np.abs(found - image.astype(int)).max() < 40

@@ -66,7 +66,9 @@ def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
     picture.save(stream, format="PNG", optimize=True)
     if stream.tell() > LARGE:
         stream = io.BytesIO()
-        picture.quantize(256).save(stream, format="PNG", optimize=True)
+        # the palette covers all colours, also those of a few pixels, such as a legend's
+        small = picture.quantize(256, method=Pillow.Quantize.MAXCOVERAGE, kmeans=1)
+        small.save(stream, format="PNG", optimize=True)
     try:
         with whole(path) as temporary:
             temporary.write_bytes(stream.getvalue())
