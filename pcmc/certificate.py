@@ -254,7 +254,10 @@ def _where_collapsed(surface: Surface, sliding: Bools) -> str:
     reach = 1.5 * float(np.median(edge_lengths(surface)))
     near = np.linalg.norm(X - corners.mean(axis=0), axis=1) <= reach
     if (near & surface.fixed).any() and (near & topo.on_junction & ~surface.fixed).any():
-        said += "; the junction there slips along a support, which does not hold its end"
+        said += (
+            "; the junction there slips along a support, which does not hold its end: hold the bottom"
+            " of its wall"
+        )
     return said
 
 

@@ -15,7 +15,7 @@ from starts import (
     two_squares,
 )
 
-from pcmc import certify, curvature_error, solve
+from pcmc import Surface, certify, curvature_error, solve
 from pcmc.certificate import Verdict
 from pcmc.solvers.result import Status
 
@@ -112,7 +112,9 @@ def test_coarse_then_refined_then_finished(name):
 
 @pytest.mark.parametrize(
     "name",
-    marked([name for name, case in CASES.items() if not case[1]], lambda name: name.endswith(LARGE)),
+    marked(
+        [name for name, case in CASES.items() if not case[1]], lambda name: name.endswith(LARGE)
+    ),
 )
 def test_stable_shapes_are_found_by_the_default_too(name):
     make, _, pinched = CASES[name]
@@ -139,6 +141,22 @@ def test_a_junction_that_slips_along_its_support_is_named():
     result = solve(joined_caps(0.5, alpha_right=3.5))
     assert result.certificate.verdict is Verdict.DEGENERATE
     assert "slips along a support" in result.certificate.detail
+
+
+@pytest.mark.parametrize("tensions", [{"wall": 2.0}, {"small": 4.0}, {"large": 5.0}])
+def test_a_wall_whose_bottom_is_held_does_not_slip(tensions):
+    """Example 2 with tensions at which it slips while the wall's bottom slides."""
+    surface = two_caps(0.4).retensioned(tensions)
+    assert not solve(surface).converged
+    assert solve(bottom_held(surface)).certificate.verdict is Verdict.STABLE
+
+
+def bottom_held(surface):
+    """The surface with all that slides on Π held instead."""
+    return Surface(
+        surface.vertices, surface.faces, surface.patch_of_face, surface.patches,
+        fixed=surface.fixed | surface.on_plane,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
