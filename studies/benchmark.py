@@ -23,6 +23,7 @@ from pcmc import Surface
 from pcmc.arrays import Floats
 from pcmc.energy import energy_and_gradient
 
+from .benchmark_explore import EXPLORE
 from .benchmark_solver import SOLVER
 from .benchmark_sweep import SWEEP
 from .folder import Folder, write_json
@@ -53,7 +54,7 @@ def energy_rate(quick: bool) -> list[Row]:
     return rows
 
 
-BENCHMARKS: list[Callable[[bool], list[Row]]] = [energy_rate, *SOLVER, *SWEEP]
+BENCHMARKS: list[Callable[[bool], list[Row]]] = [energy_rate, *SOLVER, *SWEEP, *EXPLORE]
 
 
 def numpy_energy_and_gradient(surface: Surface) -> tuple[float, Floats]:

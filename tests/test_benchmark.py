@@ -10,7 +10,7 @@ from generators import two_squares
 from pcmc import hessian
 from pcmc.motion import motion_space, structure
 from pcmc.sweep import Sweep
-from studies import benchmark, benchmark_solver, benchmark_sweep, evolver
+from studies import benchmark, benchmark_explore, benchmark_solver, benchmark_sweep, evolver
 from studies.__main__ import main
 from studies.benchmark_solver import Step
 from studies.timing import Row, median, median_seconds
@@ -26,6 +26,7 @@ def small(monkeypatch):
     monkeypatch.setattr(benchmark_solver, "SCRIPT_STEPS", 1)
     monkeypatch.setattr(benchmark_sweep, "FEW", (4.0,))
     monkeypatch.setattr(benchmark_sweep, "SHORT", 2)
+    monkeypatch.setattr(benchmark_explore, "STEPS", 3)
 
 
 @pytest.mark.slow
@@ -38,7 +39,7 @@ def test_the_quick_form_prints_and_writes(small, tmp_path, capsys):
     for what in table["what"]:
         assert what.split(",")[0].split(":")[0] in shown
     expected = {"Newton step, superlu", "peak memory", "initial shape to rest"}
-    expected.add("grid of Fig. 16, 2 workers over 1")
+    expected |= {"grid of Fig. 16, 2 workers over 1", "slider followed"}
     assert expected <= set(table["what"])
     numbers = pd.to_numeric(table["median"], errors="coerce")
     assert (numbers.dropna() > 0.0).all()

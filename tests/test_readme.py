@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import re
+import shlex
+import shutil
 from pathlib import Path
 
 import pytest
 
+from pcmc import cli
+from pcmc.project import build, run
 from studies.readme import up_to_date
 
 HOME = Path(__file__).resolve().parent.parent
@@ -35,12 +39,42 @@ def test_commands_are_the_readmes_and_the_continuous_integrations(command):
     assert command in (HOME / ".ci" / "run").read_text(encoding="utf-8")
 
 
+def test_commands_of_the_table_run_in_order(tmp_path, monkeypatch, capsys):
+    shutil.copy(HOME / "notebooks" / "roof.toml", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    lines = re.findall(r"^\| `pcmc ([^`]+)` \|", README, re.MULTILINE)
+    assert [line.split()[0] for line in lines] == [
+        "solve", "certify", "remesh", "convert", "plot", "sweep", "explore",
+    ]  # fmt: skip
+    for line in lines[:-1]:
+        assert cli.main(shlex.split(line)) == 0, capsys.readouterr().err
+    for name in ("roof.pcmc", "fine.pcmc", "roof.3dm", "error.png", "walls.csv"):
+        assert (tmp_path / name).stat().st_size > 0
+
+
+def test_the_sections_added_to_the_project_give_what_they_say(tmp_path):
+    added = re.search(r"```toml\n(.*?)```", README, re.DOTALL)[1]
+    roof = (HOME / "notebooks" / "roof.toml").read_text(encoding="utf-8")
+    (tmp_path / "roof.toml").write_text(roof + added, encoding="utf-8")
+    plain, outcome = build(tmp_path / "roof.toml"), run(tmp_path / "roof.toml")
+    surface = outcome.surface
+    assert outcome.good
+    assert surface.m > 2 * plain.m
+    corner = surface.faces[surface.patch_of_face == surface.patch_index("corner")]
+    assert surface.vertices[corner, 2].max() == pytest.approx(2.5, abs=1e-6)
+
+
 def test_tables_are_up_to_date_with_the_results():
     assert up_to_date(README, HOME / "results") == README, "run: python -m studies readme"
 
 
 def test_every_picture_and_folder_named_is_there():
     pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", README)
+    links = re.findall(r"[^!]\[[^]]*\]\(([^)#]+)\)", README)
+    assert {link for link in links if link.endswith(".ipynb")} == {
+        f"notebooks/{path.name}" for path in (HOME / "notebooks").glob("*.ipynb")
+    }
+    pictures += [link for link in links if not link.startswith("http") and link]
     folders = re.findall(r"^\| `(\w+/)`", README, re.MULTILINE)
     assert pictures
     assert len(folders) >= 5

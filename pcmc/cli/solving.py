@@ -58,7 +58,7 @@ def solve_(
             project, say, anyway=anyway,
             changed=partial(retensioned, tension=tension, pressure=pressure),
         )  # fmt: skip
-    print(outcome.result.message)
+    print(f"{outcome.surface.m} triangles; {outcome.result.message}")
     if outcome.design is not None:
         print(f"targets {outcome.design.message}")
     report(outcome.certificate, list(outcome.files))

@@ -114,7 +114,10 @@ def settle(project: Project, surface: Surface, progress: Say | None = None) -> O
             if not outcome.good:
                 break
             say("remeshing")
-            outcome = _at_rest(project, remesh(outcome.surface, **stage.options), say)
+            surface = remesh(outcome.surface, **stage.options)
+            outcome = _at_rest(replace(project, targets=()), surface, say)
+            if project.targets and outcome.good:  # else its verdict tells more than a search would
+                outcome = _at_rest(project, outcome.surface, say)
     except PcmcError as error:
         raise type(error)(f"{project.path}: {error}") from None
     return outcome
