@@ -288,6 +288,6 @@ STUDY = Study(
         "tries": (TRIES, TRIES_FOR_CROSS),
         "steps": STEPS,
     },
-    seconds=200,
+    seconds=240,
     paper=False,
 )

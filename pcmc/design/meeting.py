@@ -41,6 +41,7 @@ ALIKE = (
     0.9  # how much cheaper a change of all tensions in proportion is than one of a single tension
 )
 STIFFEN = 1.5  # factor on tensions while the surface given has no equilibrium
+STARTS = 7  # solves on that way: 1.5⁶ is 11, and what that does not help has another reason
 OVERLOAD = (
     1.05  # load over capacity for which no solve is tried (discrete surfaces bear a little over 1)
 )
@@ -236,7 +237,7 @@ class _Search:
         """The first solution; tensions are raised until there is one."""
         values = np.array([p.of(self.surface) for p in self.parameters])
         x = np.clip(self.turned(values), *self.bounds)
-        while len(self.rows) < self.limit:
+        while len(self.rows) < min(STARTS, self.limit):
             point = self.at(x, None)
             stiffer = np.clip(np.where(self.inverse, x / STIFFEN, x), *self.bounds)
             if point is not None or np.array_equal(stiffer, x):
