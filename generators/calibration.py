@@ -101,6 +101,6 @@ def _families(example: str) -> Iterator[_Family]:
         for start, bulge in (("soap film", None), ("cone", 0.0)):
             for mesh in ("rings", "even", "double", "lattice"):
                 build = partial(four_fans, bulge=bulge, mesh=mesh)
-                yield f"{start}, {mesh}", "rings", RINGS_3, build  # type: ignore[misc]
+                yield f"{start}, {mesh}", "rings", RINGS_3, build
     elif example == "example4":
         yield "lattice", "edge_length", EDGES_4, bezier_hall

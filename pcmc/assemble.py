@@ -83,7 +83,9 @@ def assemble(
 
 
 @compiled
-def _fill_pattern(dimension, start, first, high, beyond):  # type: ignore[no-untyped-def]
+def _fill_pattern(
+    dimension: Ints, start: Ints, first: Ints, high: Ints, beyond: Ints
+) -> tuple[Ints, Ints]:
     indptr = np.zeros(start[-1] + 1, dtype=np.int32)
     for v in range(len(dimension)):
         for r in range(dimension[v]):
@@ -105,10 +107,11 @@ def _fill_pattern(dimension, start, first, high, beyond):  # type: ignore[no-unt
 
 
 @compiled
-def _assemble(  # type: ignore[no-untyped-def]
-    X, F, patch, origin, tension, pressure, basis, dimension, start, indptr, offset, hessian,
-    stiffness, data,
-):  # fmt: skip
+def _assemble(
+    X: Floats, F: Ints, patch: Ints, origin: Floats, tension: Floats, pressure: Floats,
+    basis: Floats, dimension: Ints, start: Ints, indptr: Ints, offset: Ints, hessian: float,
+    stiffness: float, data: Floats,
+) -> None:  # fmt: skip
     x = np.empty((3, 3))
     e = np.empty((3, 3))
     nu = np.empty(3)

@@ -24,7 +24,7 @@ def finite_vector(value: Any, what: str) -> tuple[float, float, float]:
         vector = ()
     if len(vector) != 3 or not all(np.isfinite(vector)):
         raise SurfaceError(f"{what}: expected three finite numbers, found {value!r}")
-    return vector  # type: ignore[return-value]
+    return vector[0], vector[1], vector[2]
 
 
 def positions(vertices: npt.ArrayLike) -> Floats:

@@ -196,7 +196,7 @@ def _within_plane(
 
 
 @kernels.compiled
-def _along_normals(vector, chosen, basis, dimension):  # type: ignore[no-untyped-def]
+def _along_normals(vector: Floats, chosen: Bools, basis: Floats, dimension: Ints) -> None:
     for v in range(len(vector)):
         a, b, c = vector[v, 0], vector[v, 1], vector[v, 2]
         length = np.sqrt(a * a + b * b + c * c)
@@ -206,7 +206,7 @@ def _along_normals(vector, chosen, basis, dimension):  # type: ignore[no-untyped
 
 
 @kernels.compiled
-def _square_of_forces(X, F, tension):  # type: ignore[no-untyped-def]
+def _square_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
     total = 0.0
     for f in range(len(F)):
         square = 0.0
@@ -218,7 +218,7 @@ def _square_of_forces(X, F, tension):  # type: ignore[no-untyped-def]
 
 
 @kernels.compiled
-def _pull(basis, dimension, start, vectors):  # type: ignore[no-untyped-def]
+def _pull(basis: Floats, dimension: Ints, start: Ints, vectors: Floats) -> Floats:
     out = np.empty(start[-1])
     for v in range(len(dimension)):
         for c in range(dimension[v]):
@@ -228,7 +228,7 @@ def _pull(basis, dimension, start, vectors):  # type: ignore[no-untyped-def]
 
 
 @kernels.compiled
-def _push(basis, dimension, start, components):  # type: ignore[no-untyped-def]
+def _push(basis: Floats, dimension: Ints, start: Ints, components: Floats) -> Floats:
     out = np.zeros((len(dimension), 3))
     for v in range(len(dimension)):
         for c in range(dimension[v]):

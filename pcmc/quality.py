@@ -37,7 +37,7 @@ def compare(X: Floats, Y: Floats, F: Ints) -> tuple[bool, float, float]:
 
 
 @compiled
-def _worst(X, F):  # type: ignore[no-untyped-def]
+def _worst(X: Floats, F: Ints) -> float:
     worst = 1.0
     for f in range(len(F)):
         i, j, k = F[f, 0], F[f, 1], F[f, 2]
@@ -57,7 +57,7 @@ def _worst(X, F):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _turns(X, Y, F):  # type: ignore[no-untyped-def]
+def _turns(X: Floats, Y: Floats, F: Ints) -> bool:
     for f in range(len(F)):
         i, j, k = F[f, 0], F[f, 1], F[f, 2]
         ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from types import ModuleType
+from typing import Any
 
 from ..errors import FileWarning, FreeSurfaceWarning, MissingExtra, PcmcError
 from ..interrupts import endings
@@ -62,7 +64,7 @@ def _run(arguments: list[str]) -> int:
         return BAD_INPUT
 
 
-def _command():  # type: ignore[no-untyped-def]
+def _command() -> tuple[Callable[..., Any], ModuleType]:
     """The command line, and the module with the exceptions that end it."""
     for library in ("typer", "rich"):
         try:

@@ -66,8 +66,9 @@ class Target:
             _finite(getattr(self, key), f"{self.label}: {key}")
         if self.value is not None and (self.at_most, self.at_least) != (None, None):
             raise OptionError(f"{self.label}: give a value or limits, not both")
-        if None not in (self.at_most, self.at_least) and self.at_most < self.at_least:  # type: ignore[operator]
-            raise OptionError(f"{self.label}: at_most {self.at_most} < at_least {self.at_least}")
+        least, most = self.at_least, self.at_most
+        if least is not None and most is not None and most < least:
+            raise OptionError(f"{self.label}: at_most {most} < at_least {least}")
 
     @property
     def label(self) -> str:

@@ -20,7 +20,7 @@ from ..errors import FileError
 from ..palette import patch_colors
 from ..surface import Surface
 from .contents import Contents, described, description, support_of
-from .library import library, reading
+from .optional import library, reading
 from .scenes import from_meshes
 
 SCALARS = MERGE = APART = True

@@ -21,7 +21,7 @@ from ..arrays import Floats
 from ..errors import FileError
 from ..surface import Surface
 from .contents import Contents, described, description, support_of
-from .library import reading
+from .optional import reading
 
 VERSION = 1
 SCALARS = CERTIFICATE = True

@@ -195,8 +195,10 @@ def _rows(element: _Element, data: bytes, start: int) -> tuple[dict[str, Any], i
 def _list_counts(element: _Element, data: bytes, start: int) -> tuple[Ints, Ints | None]:
     """Items in each row's list; where lists differ, also where each row starts and the last ends."""
     base = np.dtype(element.row(0))
-    name, of_count, of_items = element.items  # type: ignore[misc]
-    at = base.fields[f"{name} count"][1]  # type: ignore[index]
+    assert element.items is not None
+    assert base.fields is not None
+    name, of_count, of_items = element.items
+    at = base.fields[f"{name} count"][1]
     item = np.dtype(of_items).itemsize
 
     def count_at(offset: int) -> int:
@@ -221,7 +223,8 @@ def _list_counts(element: _Element, data: bytes, start: int) -> tuple[Ints, Ints
 
 def _mixed(element: _Element, data: Any, counts: Ints, offsets: Ints) -> dict[str, Any]:
     """Columns of rows of different lengths, read together by length."""
-    name = element.items[0]  # type: ignore[index]
+    assert element.items is not None
+    name = element.items[0]
     columns: dict[str, Any] = {}
     ends = np.cumsum(counts)
     for count in np.unique(counts):

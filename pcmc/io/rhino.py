@@ -26,8 +26,8 @@ from .contents import (
     description,
     support_of,
 )
-from .library import library, reading
 from .merge import TOLERANCE
+from .optional import library, reading
 from .polygons import triangulate
 
 MERGE = APART = True

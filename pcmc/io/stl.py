@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import FileError
 from ..surface import Surface
 from .contents import Contents
-from .library import library, reading
+from .optional import library, reading
 from .scenes import from_meshes
 from .text import rows
 

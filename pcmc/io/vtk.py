@@ -18,7 +18,7 @@ from ..errors import FileError
 from ..surface import Surface
 from .cells import from_polygons
 from .contents import Contents, described, description, support_of
-from .library import library, reading
+from .optional import library, reading
 
 SCALARS = MERGE = True
 RESERVED = ("support", "patch")
