@@ -75,12 +75,12 @@ def speed(results: Path) -> list[str]:
     """The benchmark's medians, with what was asked of them."""
     rows = Folder(results / "benchmark").read_table("full")
     rows = rows[rows.asked.notna() | (rows.unit == "s")]
-    text = rows[["what", "unit", "asked", "remark"]].fillna("").astype(str)
+    text = rows[["what", "unit", "asked", "met", "remark"]].fillna("").astype(str)
     cells = [
-        [line.what, f"{median:.3g} {line.unit}", line.asked, line.remark]
+        [line.what, f"{median:.3g} {line.unit}", line.asked, line.met, line.remark]
         for line, median in zip(text.itertuples(), rows["median"], strict=True)
     ]
-    return table(["What", "Median", "Asked", ""], cells)
+    return table(["What", "Median", "Asked", "Met", ""], cells)
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> list[str]:
