@@ -20,7 +20,7 @@ import numpy as np
 from . import kernels
 from .arrays import Bools, Floats, Ints
 from .surface import Surface
-from .topology import CURVE, POINT, SHEET, Topology, curve_tangents, topology, vertex_kind
+from .topology import CURVE, POINT, SHEET, Topology, curve_neighbours, topology, vertex_kind
 
 PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
 
@@ -34,6 +34,7 @@ class Structure:
     active : (m,) bool, faces with a tension or a pressure.
     faces, patch_of_face : the active faces alone.
     curve_edges : (k,2) edges where active sheets meet, end, or change tension or pressure.
+    curve, beside : (c,) vertices on exactly two of them, and their neighbours along the curve (c,2).
     kind : (n,) SHEET, CURVE or POINT in that sense.
     idle : (n,) vertices of no active face.
     level : (n,) curve vertices beside one that rests on Π: their tangent is taken along Π.
@@ -44,6 +45,8 @@ class Structure:
     patch_of_face: Ints
     topology: Topology
     curve_edges: Ints
+    curve: Ints
+    beside: Ints
     kind: Ints
     idle: Bools
     level: Bools
@@ -110,6 +113,7 @@ def structure(
             key, np.sort(creases, axis=1).astype(np.int64) @ [surface.n, 1]
         )
     curve_edges = topo.edges[is_curve]
+    curve, beside = curve_neighbours(curve_edges, surface.n)
     idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
     return Structure(
         active=active,
@@ -117,6 +121,8 @@ def structure(
         patch_of_face=patch,
         topology=topo,
         curve_edges=curve_edges,
+        curve=curve,
+        beside=beside,
         kind=vertex_kind(curve_edges, surface.n),
         idle=idle,
         level=np.zeros(surface.n, dtype=bool) if level is None else level,
@@ -134,11 +140,10 @@ def motion_space(surface: Surface, frame: Structure, X: Floats) -> MotionSpace:
     _along_normals(kernels.area_vectors(X, frame.faces)[0], sheet, basis, dimension)
 
     curve = np.flatnonzero(moving & (frame.kind == CURVE))
-    tangent = curve_tangents(X, frame.curve_edges)
-    if frame.level.any():
-        along = surface.plane.along(tangent[frame.level])
-        length = np.linalg.norm(along, axis=1)
-        tangent[frame.level] = along / np.where(length > 0.0, length, 1.0)[:, None]
+    tangent = np.zeros((n, 3))
+    chord = curve_chords(surface, frame, X)
+    length = np.linalg.norm(chord, axis=1)
+    tangent[frame.curve] = chord / np.where(length > 0.0, length, 1.0)[:, None]
     straight = np.einsum("ij,ij->i", tangent[curve], tangent[curve]) > 0.5
     ring = curve[straight]
     basis[ring, 0], basis[ring, 1] = perpendicular(tangent[ring])
@@ -153,6 +158,14 @@ def motion_space(surface: Surface, frame: Structure, X: Floats) -> MotionSpace:
     if len(sliding):
         _within_plane(np.array(surface.plane.normal), tangent, sliding, basis, dimension)
     return MotionSpace(basis, dimension)
+
+
+def curve_chords(surface: Surface, frame: Structure, X: Floats) -> Floats:
+    """(c,3) from the vertex before to the one after each curve vertex: along its tangent."""
+    chord = X[frame.beside[:, 1]] - X[frame.beside[:, 0]]
+    level = frame.level[frame.curve]
+    chord[level] = surface.plane.along(chord[level])
+    return np.asarray(chord)
 
 
 def force_scale(surface: Surface, frame: Structure, X: Floats) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from .arrays import Bools, Floats, Ints
+from .arrays import Bools, Ints
 
 SHEET, CURVE, POINT = 0, 1, 2
 
@@ -185,25 +185,20 @@ def components(edges: Ints, vertex_count: int) -> Ints:
     return connected_components(_adjacency(edges, vertex_count), directed=False)[1]
 
 
-def curve_tangents(vertices: Floats, curve_edges: Ints) -> Floats:
-    """(n,3) unit tangents at vertices on exactly two of the curve edges (k,2), zero elsewhere.
+def curve_neighbours(curve_edges: Ints, vertex_count: int) -> tuple[Ints, Ints]:
+    """The vertices (k,) on exactly two of the curve edges, and their neighbours along them (k,2).
 
-    The tangent at a vertex is the direction between its two neighbours along the curve.
+    >>> import numpy as np
+    >>> inner, beside = curve_neighbours(np.array([[0, 1], [1, 4], [4, 2]]), 5)
+    >>> inner.tolist(), beside.tolist()
+    ([1, 4], [[0, 4], [1, 2]])
     """
-    n = len(vertices)
-    tangent = np.zeros((n, 3))
-    sign = np.where(vertex_kind(curve_edges, n) == CURVE, 1.0, 0.0)
     ends = curve_edges.ravel()
     other = curve_edges[:, ::-1].ravel()
     order = np.argsort(ends, kind="stable")
-    first = np.ones(len(ends), dtype=bool)
-    first[1:] = ends[order][1:] != ends[order][:-1]
-    weight = np.where(first, -1.0, 1.0)
-    np.add.at(tangent, ends[order], weight[:, None] * vertices[other[order]])
-    here = ends[order][first]
-    length = np.linalg.norm(tangent[here], axis=1)
-    tangent[here] *= (sign[here] / np.where(length > 0, length, 1.0))[:, None]
-    return tangent
+    inner = np.flatnonzero(vertex_kind(curve_edges, vertex_count) == CURVE)
+    first = np.searchsorted(ends[order], inner)
+    return inner, np.stack([other[order[first]], other[order[first + 1]]], axis=1)
 
 
 def _touched(edges: Ints, vertex_count: int) -> Bools:

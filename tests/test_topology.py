@@ -8,7 +8,7 @@ import pytest
 from shapes import cap, hexagon, octahedron, pyramid, three_patches
 
 from pcmc import Patch, Surface
-from pcmc.topology import CURVE, POINT, SHEET, curve_tangents
+from pcmc.topology import CURVE, POINT, SHEET, curve_neighbours
 
 
 def edges_by_hand(surface):
@@ -138,17 +138,16 @@ def test_adjacency_numbers_the_edges():
     assert t.adjacency.nnz == 2 * len(t.edges)
 
 
-def test_tangents_are_central_differences():
-    surface = three_patches(3)
-    t = surface.topology
-    tangent = curve_tangents(surface.vertices, t.edges[t.curve_edge])
+def test_neighbours_along_a_curve_are_those_before_and_after():
+    t = three_patches(3).topology
+    inner, beside = curve_neighbours(t.edges[t.curve_edge], t.vertex_count)
+    assert inner.tolist() == np.flatnonzero(t.vertex_kind == CURVE).tolist()
+    found = {int(v): set(pair) for v, pair in zip(inner, beside.tolist(), strict=True)}
     for curve in t.junctions:
-        X = surface.vertices[curve.vertices]
-        central = (X[2:] - X[:-2]) / np.linalg.norm(X[2:] - X[:-2], axis=1)[:, None]
-        along = np.abs((tangent[curve.vertices[1:-1]] * central).sum(axis=1))
-        assert along == pytest.approx(1.0)
-    assert not tangent[t.vertex_kind != CURVE].any()
-    assert np.linalg.norm(tangent[t.vertex_kind == CURVE], axis=1) == pytest.approx(1.0)
+        for before, v, after in zip(
+            curve.vertices, curve.vertices[1:], curve.vertices[2:], strict=False
+        ):
+            assert found[int(v)] == {before, after}
 
 
 def test_relabelled_vertices_have_the_same_topology():

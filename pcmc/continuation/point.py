@@ -9,10 +9,10 @@ with g a condition on arclength, volume, height or λ itself. A Newton step solv
     [ J   f ] [ s ]     [ -r ]        J s = dr along s,  f = Bᵀ ∂∇E/∂λ
     [ cᵀ  d ] [ δλ]  =  [ -g ]        c = Bᵀ ∂g/∂X,  d = ∂g/∂λ
 
-by GMRES. J is known by differences only: s moves the vertices by Bs, the sheets slide along after
-their junctions, and the frames B turn. The preconditioner has H = Bᵀ(∂²E)B in the place of J, by block
-elimination on a factorisation of H. At a fold J is singular and the bordered matrix is not. (Keller 1977
-for the arclength; Govaerts 2000, ch. 3, for the elimination.)
+by GMRES. J is applied, not assembled: s moves the vertices by Bs, the sheets slide along after their
+junctions, and the frames B turn (``linearise``). The preconditioner has H = Bᵀ(∂²E)B in the place of
+J, by block elimination on a factorisation of H. At a fold J is singular and the bordered matrix is not.
+(Keller 1977 for the arclength; Govaerts 2000, ch. 3, for the elimination.)
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from scipy.spatial import cKDTree
 
 from ..arrays import Floats
-from ..energy import energy_at
+from ..energy import energy_and_gradient, energy_at
 from ..factor import Factor, SingularMatrix
+from ..linearise import Linearisation, linearise
 from ..modes import Stiffness, lowest
 from ..motion import MotionSpace, force_scale
 from ..surface import Surface
@@ -38,7 +39,6 @@ from .shape import Shape
 ITERATIONS = 12  # Newton steps before a correction is given up
 SLOW = 0.8  # a residual that falls by less, three times in a row, will not converge
 COLLAPSED = 0.02  # triangle quality below which no point is accepted
-DIFFERENCE = 1e-7  # of the size: the displacement by which J is seen
 SMALL = 12  # unknowns below which all eigenvalues are computed at once
 
 
@@ -147,20 +147,24 @@ class Bordered:
         return z[:-1], float(z[-1])
 
     def times(self, z: Floats) -> Floats:
-        """The matrix times a vector (N+1,), by a difference."""
+        """The matrix times a vector (N+1,)."""
         d = self.shape.motion(self.space, self.X, z[:-1])
-        t = DIFFERENCE * self.shape.full.size / (float(np.abs(d).max()) or 1.0)
-        here, forces = self.base
-        there = self.shape.swept(self.X + t * d, self.space)
-        change = self.space.pull(self.shape.forces(self.surface, there) - forces) / t
-        along = float((self.row * (there - here)).sum()) / t
-        return np.append(change + self.f * z[-1], self.unit * (along + self.rate * z[-1]))
+        d = self.shape.swept(self.X + d, self.space) - self.swept
+        along = float((self.row * d).sum())
+        return np.append(
+            self.linear.times(d) + self.f * z[-1], self.unit * (along + self.rate * z[-1])
+        )
 
     @cached_property
-    def base(self) -> tuple[Floats, Floats]:
-        """Where differences start (n,3), and the forces there (n,3)."""
-        here = self.shape.swept(self.X, self.space)
-        return here, self.shape.forces(self.surface, here)
+    def swept(self) -> Floats:
+        """X (n,3) with the rows of walls below their crest, from where motions count."""
+        return self.shape.swept(self.X, self.space)
+
+    @cached_property
+    def linear(self) -> Linearisation:
+        """J, as it acts on motions of the vertices."""
+        gradient = energy_and_gradient(self.surface, self.X)[1]
+        return linearise(self.surface, self.shape.frame, self.space, self.X, gradient)
 
 
 def correct(

@@ -5,8 +5,8 @@ At rest the residual r(X, λ) = Bᵀ∇E vanishes and stays zero along the solut
     J s = -Bᵀ ∂(∇E)/∂λ,   dX/dλ = B s,   ∂(∇E)/∂α_i = ∇A_i,   ∂(∇E)/∂p_i = -∇V_i
 
 (E is linear in tensions and pressures). J differs from Bᵀ(∂²E)B by how the frames B turn while the surface
-moves; that part is small, so J s = b is solved by a few GMRES steps on the factor of Bᵀ(∂²E)B. A quantity
-q(X, λ) then changes by ⟨∂q/∂X, dX/dλ⟩ + ∂q/∂λ.
+moves (``linearise``); that part is small, so J s = b is solved by a few GMRES steps on the
+factor of Bᵀ(∂²E)B. A quantity q(X, λ) then changes by ⟨∂q/∂X, dX/dλ⟩ + ∂q/∂λ.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from ..contact import Walls, hung, pinched, resting, standing_structure, walls
 from ..energy import energy_and_gradient
 from ..errors import OptionError, SurfaceError
 from ..factor import Factor, SingularMatrix, factoriser
-from ..motion import MotionSpace, Structure, force_scale, motion_space
+from ..linearise import Linearisation, linearise
+from ..motion import MotionSpace, force_scale, motion_space
 from ..surface import Surface
 from .quantities import Measure, Parameter, Target, measure
 
-STEP = 1e-6  # of the size: the difference by which the turning of the frames is seen
 ACCURACY = 1e-9  # relative, to which J s = b is solved
 LEFT = 1e-6  # the same, above which there is no solution
 AT_FOLD = "sensitivities: the surface stands at a fold, where they are infinite"
@@ -136,8 +136,8 @@ class _AtRest:
     standing: Surface
     below: Walls
     follows: bool
-    frame: Structure
     space: MotionSpace
+    linear: Linearisation
     factor: Factor
 
     @classmethod
@@ -148,7 +148,8 @@ class _AtRest:
         frame = standing_structure(standing, below, rests)
         X = standing.vertices
         space = motion_space(standing, frame, X)
-        left = np.linalg.norm(space.pull(energy_and_gradient(standing, X)[1]))
+        gradient = energy_and_gradient(standing, X)[1]
+        left = np.linalg.norm(space.pull(gradient))
         if left > TOLERANCE * force_scale(standing, frame, X):
             raise SurfaceError(
                 f"sensitivities: the surface is not at rest (relative residual"
@@ -160,7 +161,8 @@ class _AtRest:
         except SingularMatrix:
             raise SurfaceError(AT_FOLD) from None
         follows = bool((below.can_rest & ~rests).any())
-        return cls(standing, below, follows, frame, space, factor)
+        linear = linearise(standing, frame, space, X, gradient)
+        return cls(standing, below, follows, space, linear, factor)
 
     def answer(self, parameter: Parameter) -> Floats:
         """dX/dλ (n,3)."""
@@ -170,7 +172,7 @@ class _AtRest:
         size = self.space.size
         steps: list[float] = []
         s, _ = gmres(
-            LinearOperator((size, size), self._derivative, dtype=float), right,
+            LinearOperator((size, size), lambda s: self.linear.times(self._moved(s)), dtype=float), right,
             M=LinearOperator((size, size), self.factor.solve, dtype=float),
             rtol=ACCURACY, restart=40, maxiter=1, callback=steps.append, callback_type="pr_norm",
         )  # fmt: skip
@@ -196,18 +198,3 @@ class _AtRest:
         X = self.standing.vertices
         ahead = hung(self.standing, self.below, X + d, self.space)
         return ahead - hung(self.standing, self.below, X, self.space)
-
-    def _derivative(self, s: Floats) -> Floats:
-        """J s, by a central difference of the forces in their own frames."""
-        d = self._moved(s)
-        length = float(np.abs(d).max())
-        if length == 0.0:
-            return np.zeros_like(s)
-        X, t = self.standing.vertices, STEP * self.standing.size / length
-        ahead, behind = (self._forces(X + t * d), self._forces(X - t * d))
-        return self.space.pull(ahead - behind) / (2.0 * t)
-
-    def _forces(self, X: Floats) -> Floats:
-        """B Bᵀ∇E (n,3) with the frames at X."""
-        space = motion_space(self.standing, self.frame, X)
-        return space.project(energy_and_gradient(self.standing, X)[1])

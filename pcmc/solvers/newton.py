@@ -1,7 +1,7 @@
 """The geometric solver: Bᵀ∇E = 0 in the motion space, to rounding, on any refinement.
 
 Each iteration tries a Newton step on the residual r = Bᵀ∇E, whose frames B turn with the surface: its
-derivative is applied by differences and inverted by GMRES on a factorisation of Bᵀ(∂²E)B, which is kept
+derivative is applied (``linearise``) and inverted by GMRES on a factorisation of Bᵀ(∂²E)B, which is kept
 while it still contracts. Where a minimum is sought and the matrix is indefinite, it is shifted; near a
 saddle the lowest mode leads on. Where a step overshoots or spoils triangles, smooth descent steps come
 first. In between vertices are spread along the shape as long as triangles are poor, and junctions that

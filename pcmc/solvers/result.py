@@ -53,7 +53,8 @@ class Result:
     status : why the solver stopped; ``message`` is its sentence.
     method : the solver's name.
     energy : E of ``surface``, force·length.
-    iterations, evaluations : steps taken; energy or gradient evaluations made.
+    iterations, evaluations : steps taken; passes over the triangles made, for E, ∇E or its
+        derivative along a motion.
     history : a row per iteration (per evaluation for ``"lbfgs"``) with at least ``evaluation``,
         ``energy`` and ``gradient_squared`` (‖∇E‖², the paper's squared sum).
     """

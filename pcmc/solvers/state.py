@@ -40,7 +40,7 @@ class State:
     frame, space : what each vertex lies on, and the basis of its motion there.
     energy, gradient, residual, norm, scale : E, ∇E, Bᵀ∇E, its norm and the forces it compares with.
     version : changes whenever the faces or the number of unknowns do.
-    evaluations : energy or gradient evaluations so far.
+    evaluations : passes over the triangles so far: E, ∇E or its derivative along a motion.
     """
 
     def __init__(self, surface: Surface, care: float) -> None:
@@ -80,12 +80,6 @@ class State:
         """E of the standing surface at X."""
         self.evaluations += 1
         return energy_at(self.surface, X)
-
-    def residual_vectors(self, X: Floats) -> Floats:
-        """B Bᵀ ∇E (n,3) with the frames and the gradient at X."""
-        self.evaluations += 1
-        gradient = energy_and_gradient(self.surface, X)[1]
-        return motion_space(self.surface, self.frame, X).project(gradient)
 
     @property
     def relative(self) -> float:

@@ -9,6 +9,8 @@ from ..arrays import Floats
 from ..assemble import Pattern, assemble, pattern
 from ..descent import Carrier, Smoother
 from ..factor import Factor, Factoriser, SingularMatrix, factoriser
+from ..kernels import area_vectors
+from ..linearise import linearise
 from ..modes import SOFT, lowest, negatives_without, stiffness
 from ..motion import MotionSpace
 from ..quality import edge_lengths
@@ -140,8 +142,10 @@ class Stepper:
         modes = lowest(system, 1)[1]
         if not len(modes):
             return False
-        unit = modes[0] / np.abs(modes[0]).max()
-        unit *= np.sign(unit.sum()) or 1.0
+        normals, area = area_vectors(state.X, state.frame.faces)
+        unit = modes[0] * (np.sqrt(area.sum() / 3.0) / np.linalg.norm(modes[0], axis=1).max())
+        if (unit * normals).sum() < 0.0:
+            unit = -unit  # first where it swells: no matter how the surface is turned
         X = self._downhill(unit)
         if X is None:
             X = self._downhill(-unit)
@@ -154,11 +158,11 @@ class Stepper:
         return True
 
     def _downhill(self, unit: Floats) -> Floats | None:
-        """The farthest doubling along a direction on which E keeps falling, or None."""
+        """The farthest doubling along a motion, as long as the surface, on which E keeps falling."""
         state = self.state
         best, lowest_energy = None, state.energy
-        t = 1e-3 * state.full.size
-        while t < 0.1 * state.full.size:
+        t = 1e-3
+        while t < 0.1:
             X, down = state.moved_by(t * unit)
             value = state.energy_at(X)
             if not value < lowest_energy or down.any() or state.spoils(X):
@@ -206,29 +210,21 @@ class Stepper:
             return self._factor.solve(residual)
         return now.pull(then.push(self._factor.solve(then.pull(now.push(residual)))))
 
-    def _derivative(self, s: Floats) -> Floats:
-        """Change of the residual along s, by a difference: the frames turn with the surface."""
-        state = self.state
-        d = state.space.push(s)
-        length = float(np.abs(d).max())
-        if length == 0.0:
-            return np.zeros_like(s)
-        t = 1e-7 * state.full.size / length
-        change = state.residual_vectors(state.X + t * d) - state.space.push(state.residual)
-        return state.space.pull(change) / t
-
     def _direction(self) -> Floats:
         """-B J⁻¹ r with J the derivative of r itself, by GMRES on the kept factor."""
-        residual = self.state.residual
+        state = self.state
+        residual = state.residual
         size = (len(residual), len(residual))
+        here = linearise(state.surface, state.frame, state.space, state.X, state.gradient)
         norms: list[float] = []
         s, _ = gmres(
-            LinearOperator(size, self._derivative, dtype=float), -residual,
+            LinearOperator(size, lambda s: here.times(state.space.push(s)), dtype=float), -residual,
             M=LinearOperator(size, self._precondition, dtype=float),
             rtol=1e-3, restart=12, maxiter=1, callback=norms.append, callback_type="pr_norm",
         )  # fmt: skip
         self._inner = len(norms)
-        return self.state.space.push(self._held_back(s) if len(self._motions) else s)
+        state.evaluations += len(norms)
+        return state.space.push(self._held_back(s) if len(self._motions) else s)
 
     def _held_back(self, s: Floats) -> Floats:
         """s with its rigid part short: all it does is slide the mesh along the surface.
