@@ -1,0 +1,78 @@
+"""The derivative of the forces in the motion space, frames turning, against differences of them."""
+
+import numpy as np
+import pytest
+from motion_cases import SURFACES
+from shapes import octahedron, rotation, shaken
+from starts import two_squares
+
+from pcmc import Plane, Surface, solve
+from pcmc.contact import pinched, resting, standing_structure, walls
+from pcmc.energy import energy_and_gradient
+from pcmc.linearise import linearise
+from pcmc.motion import motion_space, structure
+from pcmc.topology import SHEET
+
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+
+
+def equator() -> Surface:
+    """A closed surface whose middle slides on a tilted Π: sheet vertices that slide."""
+    R = rotation(2)
+    plane = Plane((0.0, 0.0, 0.0), R[:, 2])
+    X = octahedron(0.7).vertices
+    middle = np.abs(X[:, 2]) < 1e-9
+    X = X + 0.05 * np.cos(np.arange(X.size).reshape(X.shape)) * np.where(
+        middle[:, None], [1, 1, 0], 1
+    )
+    given = octahedron(0.7)
+    return Surface(
+        X @ R.T, given.faces, given.patch_of_face, given.patches, on_plane=middle, plane=plane
+    )
+
+
+def forces(surface, frame, X):
+    return motion_space(surface, frame, X).project(energy_and_gradient(surface, X)[1])
+
+
+def slope(surface, frame):
+    """How fast the error of central differences falls when their step is halved: log2 of it."""
+    X = surface.vertices
+    space = motion_space(surface, frame, X)
+    d = np.random.default_rng(0).standard_normal(X.shape)  # off the motion space too
+    d[surface.fixed] = 0.0
+    d[surface.on_plane] = surface.plane.along(d[surface.on_plane])
+    exact = linearise(surface, frame, space, X, energy_and_gradient(surface, X)[1]).times(d)
+    errors = [
+        np.abs(
+            space.pull(forces(surface, frame, X + t * d) - forces(surface, frame, X - t * d))
+            / (2.0 * t) - exact
+        ).max()
+        for t in surface.size * np.array([1e-4, 5e-5])
+    ]  # fmt: skip
+    assert errors[1] < 1e-4 * np.abs(exact).max()
+    return np.log2(errors[0] / errors[1])
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_it_is_the_limit_of_differences(name):
+    surface = SURFACES[name]()
+    assert slope(surface, structure(surface)) == pytest.approx(2.0, abs=0.05)
+
+
+def test_sheets_that_slide_on_the_plane():
+    surface = equator()
+    frame = structure(surface)
+    assert (frame.kind[surface.on_plane] == SHEET).all()
+    assert slope(surface, frame) == pytest.approx(2.0, abs=0.05)
+
+
+def test_a_junction_beside_one_that_rests():
+    surface = solve(two_squares(6, alpha_aux=2.5), target="stationary").surface
+    below = walls(surface)
+    rests = resting(surface, below)
+    standing = pinched(surface, below, rests)
+    frame = standing_structure(standing, below, rests)
+    assert frame.level.any()
+    moves = shaken(standing, 0.02)
+    assert slope(moves, frame) == pytest.approx(2.0, abs=0.05)
