@@ -1,13 +1,28 @@
-"""The same problem said otherwise has the same answer: turned, scaled, renumbered, on another Π."""
+"""The same problem said otherwise has the same answer to rounding: turned, scaled, renumbered, on another Π.
+
+Not only the numbers that do not depend on the mesh: every vertex ends in the same place along its sheet,
+as each step is the same but for rounding. What rounding may do is multiplied by how nearly singular the
+steps' matrices are; the bounds leave room for ten to a hundred times what is seen.
+"""
 
 from functools import partial
 
 import numpy as np
 import pytest
 from shapes import rotation
-from starts import joined_caps, spherical_cap, two_squares
+from starts import (
+    bezier_hall,
+    double_bubble,
+    four_fans,
+    joined_caps,
+    spherical_cap,
+    two_caps,
+    two_squares,
+)
 
 from pcmc import Patch, Plane, Surface, mean_curvature, solve
+
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
 
 SURFACES = {
     "two squares": partial(two_squares, 6, alpha_aux=1.0),
@@ -17,6 +32,10 @@ SURFACES = {
         joined_caps, 1.4, alpha_left=4.0, alpha_right=4.0, alpha_aux=1.0, depth=5.0
     ),
     "cap": partial(spherical_cap, 0.25),
+    "two caps": partial(two_caps, 1.2),
+    "fans": partial(four_fans, 5),
+    "hall": partial(bezier_hall),
+    "bubbles": partial(double_bubble, 0.8),
 }
 
 
@@ -40,6 +59,8 @@ def answer(surface):
     found = result.certificate
     scale = surface.tensions.max()  # of force/length; lengths go with it, as the pressure stays
     H = mean_curvature(result.surface, "variational")
+    X = result.surface.vertices
+    centre = X[surface.fixed if surface.fixed.any() else slice(None)].mean(axis=0)
     return {
         "energy": result.energy / scale**3,
         "volume": found.volume / scale**3,
@@ -48,9 +69,7 @@ def answer(surface):
         "verdict": found.verdict,
         "pinched": len(found.pinched),
         "eigenvalue": found.eigenvalues[0] * scale,
-        "lengths": np.sort(np.linalg.norm(
-            result.surface.vertices - result.surface.vertices[surface.fixed].mean(axis=0), axis=1
-        )) / scale,
+        "lengths": np.sort(np.linalg.norm(X - centre, axis=1)) / scale,
     }  # fmt: skip
 
 
@@ -62,13 +81,12 @@ def answers():
 def agrees(found, expected):
     for key in ("index", "verdict", "pinched"):
         assert found[key] == expected[key]
-    # where a vertex lies along its sheet is decided by the steps taken, whose rounding is about 1e-9
-    assert found["energy"] == pytest.approx(expected["energy"], rel=1e-9)
-    assert found["volume"] == pytest.approx(expected["volume"], rel=2e-8)
-    assert found["eigenvalue"] == pytest.approx(expected["eigenvalue"], rel=1e-5)
+    assert found["energy"] == pytest.approx(expected["energy"], rel=1e-13)
+    assert found["volume"] == pytest.approx(expected["volume"], rel=1e-12)
+    assert found["eigenvalue"] == pytest.approx(expected["eigenvalue"], rel=1e-10)
     size = np.abs(expected["lengths"]).max()
-    np.testing.assert_allclose(found["lengths"], expected["lengths"], atol=1e-7 * size)
-    np.testing.assert_allclose(found["curvature"], expected["curvature"], atol=1e-8)
+    np.testing.assert_allclose(found["lengths"], expected["lengths"], atol=1e-11 * size)
+    np.testing.assert_allclose(found["curvature"], expected["curvature"], atol=1e-11)
 
 
 @pytest.mark.parametrize("name", SURFACES)
@@ -95,7 +113,7 @@ def test_more_tension_and_pressure_alike_change_no_shape(name, answers):
     result = solve(rebuilt(surface, patches=patches), target="stationary")
     assert result.converged
     scale = surface.tensions.max()
-    assert result.energy / 7.0 / scale**3 == pytest.approx(answers[name]["energy"], rel=1e-9)
+    assert result.energy / 7.0 / scale**3 == pytest.approx(answers[name]["energy"], rel=1e-13)
     assert result.certificate.index == answers[name]["index"]
 
 
@@ -125,5 +143,20 @@ def test_a_tilted_plane_gives_the_surface_tilted():
     plane = Plane(R @ surface.plane.point, R @ surface.plane.normal)
     tilted = solve(rebuilt(surface, surface.vertices @ R.T, plane)).surface
     np.testing.assert_allclose(
-        tilted.vertices, solve(surface).surface.vertices @ R.T, atol=1e-8 * surface.size
+        tilted.vertices, solve(surface).surface.vertices @ R.T, atol=1e-12 * surface.size
     )
+
+
+def test_a_saddle_is_left_the_same_way():
+    saddle = solve(
+        joined_caps(1.0, alpha_left=4.0, alpha_right=4.0, alpha_aux=1.0, depth=5.0),
+        target="stationary",
+    ).surface
+    R = rotation(5)
+    turned = rebuilt(
+        saddle, saddle.vertices @ R.T, Plane(R @ saddle.plane.point, R @ saddle.plane.normal)
+    )
+    ways = [solve(surface, iterations=6).history for surface in (saddle, turned)]
+    assert "saddle" in ways[0]["step"].to_list()
+    assert ways[1]["step"].to_list() == ways[0]["step"].to_list()
+    np.testing.assert_allclose(ways[1]["energy"], ways[0]["energy"], rtol=1e-12)
