@@ -6,6 +6,8 @@ import builtins
 import signal
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -16,6 +18,7 @@ from pcmc import cli
 from pcmc.io import load
 from tests.test_project import SMALL
 
+HOME = Path(__file__).resolve().parent.parent
 COMMANDS = ["solve", "certify", "remesh", "convert", "plot", "sweep", "explore"]
 
 
@@ -263,6 +266,57 @@ def test_as_a_process(folder):
     done = subprocess.run(run, capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "pcmc: error: none.obj: cannot be read (No such file or directory)\n"
+
+
+def begun(code, *arguments):
+    """The command run as its installed script does, after some code; exit code, output, errors."""
+    settings = tomllib.loads((HOME / "pyproject.toml").read_text(encoding="utf-8"))
+    module, name = settings["project"]["scripts"]["pcmc"].split(":")
+    places = settings["tool"]["setuptools"]["package-dir"]
+    assert module in settings["tool"]["setuptools"]["packages"]
+    start = f"""
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+{code}
+assert not [name for name in sys.modules if name.startswith(("pcmc", "numpy"))]
+spec = spec_from_file_location({module!r}, {str(HOME / places[module] / "__init__.py")!r})
+started = module_from_spec(spec)
+spec.loader.exec_module(started)
+sys.exit(started.{name}())
+"""
+    run = [sys.executable, "-c", start, *arguments]
+    done = subprocess.run(run, capture_output=True, text=True, timeout=120, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.parametrize("module", ["pcmc", "numpy", "numba", "pcmc.cli.running", "typer"])
+def test_ctrl_c_while_a_module_is_imported_is_one_line(folder, module):
+    press = f"""
+import signal
+
+class Press:
+    def find_spec(name, *_):
+        if name == {module!r}:
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Press)
+"""
+    assert begun(press, "certify", "none.obj") == (130, "", "pcmc: stopped\n")
+
+
+def test_ctrl_c_while_python_ends_is_one_line(folder):
+    press = "import atexit, signal; atexit.register(signal.raise_signal, signal.SIGINT)"
+    code, out, err = begun(press, "--help")
+    assert (code, err) == (130, "pcmc: stopped\n")
+    assert "solve" in out
+
+
+def test_ctrl_c_stays_ignored_where_it_was(folder):
+    ignore = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
+    press = ignore + "; import atexit; atexit.register(signal.raise_signal, signal.SIGINT)"
+    code, _, err = begun(press, "certify", "none.obj")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "none.obj" in err
 
 
 @pytest.mark.parametrize(
