@@ -48,7 +48,7 @@ def slope(surface, frame):
             space.pull(forces(surface, frame, X + t * d) - forces(surface, frame, X - t * d))
             / (2.0 * t) - exact
         ).max()
-        for t in surface.size * np.array([1e-4, 5e-5])
+        for t in surface.size * np.array([2e-5, 1e-5])
     ]  # fmt: skip
     assert errors[1] < 1e-4 * np.abs(exact).max()
     return np.log2(errors[0] / errors[1])
