@@ -27,7 +27,7 @@ for name, act, what in (
     ("remesh", remesh_, "Other triangles, then solve and certify again."),
     ("convert", convert, "Write a surface in another format."),
     ("plot", plot, "Draw a surface."),
-    ("sweep", sweep, "Solve every combination of a generator's parameters."),
+    ("sweep", sweep, "Solve every combination of some values, as a table."),
     ("explore", explore, "Move tensions and pressures by sliders, in the browser."),
 ):
     app.command(name, short_help=what)(act)

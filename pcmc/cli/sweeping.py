@@ -1,27 +1,33 @@
-"""sweep: every combination of a generator's parameters."""
+"""sweep: every combination of some numbers of a project, a surface or a generator."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from ..errors import FileError
-from .arguments import values_of
+from ..errors import FileError, OptionError
+from ..io import FORMATS
+from .arguments import TOML, values_of
 from .codes import INTERRUPTED, NOT_CERTIFIED, OK
 from .progress import sweeping
 
 
 def sweep(
-    generator: Annotated[
+    what: Annotated[
         str,
-        typer.Argument(metavar="GENERATOR", help="package.module:function that returns a Surface."),
+        typer.Argument(
+            metavar="WHAT",
+            help="A project (.toml), a surface, or package.module:function that returns a Surface.",
+        ),
     ],
     values: Annotated[list[str], typer.Argument(metavar="NAME=V1,V2,...")],
     method: Annotated[
-        str, typer.Option(metavar="NAME", help="newton, nesterov or lbfgs.")
-    ] = "newton",
+        str | None,
+        typer.Option(metavar="NAME", help="newton, nesterov or lbfgs, instead of the project's."),
+    ] = None,
     store: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Keeps finished cases; run again to go on from there."),
@@ -36,29 +42,65 @@ def sweep(
         str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, tcp://HOST:8786.")
     ] = None,
 ) -> int:
-    """Solve a generator's surface for every combination of the values; exit code 0 if all are certified.
+    """Solve for every combination of the values; exit code 0 if all are certified.
+
+    Of a project or a surface, NAME is PATCH.tension or PATCH.pressure of a patch or wall; of a project
+    also any number that stands in the file, by its keys: plan.edge_length, plan.outline.3.1 (the first
+    coordinate of the third corner). Of a generator it is a parameter, or an option of the method. A store
+    belongs to the values and to the file as it is: when the file has changed, name a new store.
 
     \b
-    Example:
+    Examples:
+      pcmc sweep roof.toml corner.tension=6,6.2 "wall 1.tension=1,2" --csv roof.csv
       pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
     """
-    from ..sweep import Sweep, run, solve_case, write_table
+    from ..sweep import run, write_table
 
-    given = dict(values_of(text) for text in values)
+    for path, suffixes in ((csv, (".csv", ".parquet")), (store, ())):
+        _check_place(path, suffixes)
+    given: dict[str, list[Any]] = {}
+    for name, found in map(values_of, values):
+        if name in given:
+            raise OptionError(f"{name} is given twice; list its values with commas: {name}=1,2")
+        given[name] = found
     grid = {name: found for name, found in given.items() if len(found) > 1}
     fixed = {name: found[0] for name, found in given.items() if len(found) == 1}
-    cases = Sweep(solve_case, grid, {"generator": generator, "method": method, **fixed})
-    if csv is not None and csv.suffix not in (".csv", ".parquet"):
-        raise FileError(f"{csv}: a table is written as .csv or .parquet; name it so")
-    for path in filter(None, (csv, store)):
-        if not path.parent.is_dir():
-            raise FileError(f"{path}: there is no folder {path.parent}; make it first")
     with sweeping() as draw:
+        cases = _cases(what, grid, fixed, method)
         table = run(cases, store, scheduler=scheduler, workers=workers, on_record=draw)
     if csv is not None:
         write_table(csv, table)
-    columns = [c for c in (*grid, "status", "verdict") if c in table]
+    columns = [c for c in (*grid, "status", "verdict", "targets_met") if c in table]
     print(table[columns].to_string())
     if len(table) < len(cases):
         return INTERRUPTED
-    return OK if table["verdict"].isin(["stable", "neutral"]).all() else NOT_CERTIFIED
+    good = table["verdict"].isin(["stable", "neutral"]) & table.get("targets_met", True)
+    return OK if good.all() else NOT_CERTIFIED
+
+
+def _cases(what: str, grid: dict[str, Any], fixed: dict[str, Any], method: str | None) -> Any:
+    from ..sweep import Sweep, solve_case
+    from ..sweep.projects import project_sweep
+
+    if Path(what).suffix.lower() in (TOML, *FORMATS):
+        return project_sweep(what, grid, fixed, method=method)
+    if ":" not in what:
+        raise OptionError(
+            f"{what}: expected a project (.toml), a surface ({' '.join(FORMATS)}), or a generator such"
+            " as generators:two_caps"
+        )
+    return Sweep(solve_case, grid, {"generator": what, "method": method or "newton", **fixed})
+
+
+def _check_place(path: Path | None, suffixes: tuple[str, ...]) -> None:
+    """Refuse a file that cannot be written, before any case is run."""
+    if path is None:
+        return
+    if suffixes and path.suffix not in suffixes:
+        raise FileError(f"{path}: a table is written as {' or '.join(suffixes)}; name it so")
+    if path.is_dir():
+        raise FileError(f"{path}: is a folder; give the name of a file")
+    if not path.parent.is_dir():
+        raise FileError(f"{path}: there is no folder {path.parent}; make it first")
+    if not os.access(path.parent, os.W_OK):
+        raise FileError(f"{path}: cannot be written (the folder {path.parent} is read-only)")

@@ -27,6 +27,7 @@ from .file import Project, build, load, surface_of
 from .output import COLOURS, check_outputs, check_picture, paint, save, write_all
 from .remeshing import Remeshing
 from .running import Outcome, carry_out, reporter, run, settle, uninterrupted
+from .varied import check_varied, digest, is_project, varied
 
 __all__ = [
     "COLOURS",
@@ -37,6 +38,9 @@ __all__ = [
     "carry_out",
     "check_outputs",
     "check_picture",
+    "check_varied",
+    "digest",
+    "is_project",
     "load",
     "paint",
     "reporter",
@@ -45,5 +49,6 @@ __all__ = [
     "settle",
     "surface_of",
     "uninterrupted",
+    "varied",
     "write_all",
 ]

@@ -79,6 +79,11 @@ def load(path: PathLike) -> Project:
         unknown key (with the nearest known one); naming file and element for a bad value.
     """
     path = Path(path)
+    return project_of(path, read_data(path)[1])
+
+
+def read_data(path: Path) -> tuple[str, dict[str, Any]]:
+    """The text of a project file and what it says, every key known. Errors as in ``load``."""
     try:
         text = path.read_text(encoding="utf-8-sig")  # editors on Windows begin a file with a mark
         data = tomllib.loads(text)
@@ -89,6 +94,11 @@ def load(path: PathLike) -> Project:
     except tomllib.TOMLDecodeError as error:
         raise FileError(f"{path}: not TOML: {error}") from None
     check_keys(path, text, data)
+    return text, data
+
+
+def project_of(path: Path, data: Mapping[str, Any]) -> Project:
+    """The project in a file that says ``data``. Errors as in ``load``."""
     try:
         return _project(path, data)
     except PcmcError as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import fields
 from importlib import import_module
 from typing import Any
@@ -13,6 +13,7 @@ import pandas as pd
 from ..energy import gradient
 from ..errors import OptionError, unknown
 from ..solvers import METHODS, solve
+from ..solvers.result import Result
 from .child import resolve
 from .grid import checked
 
@@ -75,6 +76,11 @@ def solve_case(generator: str, method: str = "newton", **arguments: Any) -> dict
     """
     build, shape, solver = _split(generator, method, arguments)
     result = solve(build(**shape), method, **solver)
+    return row(result, arguments)
+
+
+def row(result: Result, names: Container[str]) -> dict[str, Any]:
+    """What a case says about a result: see ``solve_case``. ``names`` are those of its parameters."""
     certificate = result.certificate
     found = {
         "iterations_taken": result.iterations,
@@ -91,7 +97,7 @@ def solve_case(generator: str, method: str = "newton", **arguments: Any) -> dict
         "verdict": found.pop("verdict").replace("_", " "),
         "message": result.message,
     }
-    return words | {f"{n}_reached" if n in arguments else n: v for n, v in found.items()}
+    return words | {f"{n}_reached" if n in names else n: v for n, v in found.items()}
 
 
 def _cells(frame: pd.DataFrame, names: Iterable[str]) -> dict[str, Any]:

@@ -1,0 +1,235 @@
+"""Sweeps over a project file, or a surface, with some of its numbers replaced."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from tables import same
+
+import pcmc
+from generators import two_squares
+from pcmc import cli
+from pcmc.errors import FileError, OptionError, PcmcError
+from pcmc.project import digest, run, varied
+from pcmc.sweep import read_store
+from pcmc.sweep import run as run_sweep
+from pcmc.sweep.projects import project_sweep, solve_project
+
+TEXT = """
+[plan]
+edge_length = 1.5                 # coarse: these are tests
+outline = [[0, 0], [6, 0], [6, 4], [0, 4]]
+dividers = [{curve = [[3, 0], [3, 4]], wall = 0.8, bottom = "held"}]
+holes = [{name = "yard", curve = {circle = {centre = [1.5, 2], radius = 0.4}}}]
+
+[plan.patches]
+west = {tension = 3.0, at = [0.5, 0.5]}
+east = {tension = 3.0, at = [5, 2]}
+
+[solve]
+tolerance = 1e-11
+"""
+
+
+@pytest.fixture
+def roof(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "roof.toml").write_text(TEXT, encoding="utf-8")
+    return tmp_path / "roof.toml"
+
+
+# ---- a project with other numbers
+
+
+def test_numbers_of_the_file_and_of_patches_are_replaced(roof):
+    plain, start = varied(roof, {})
+    values = {
+        "plan.edge_length": 2.0,
+        "plan.outline.2.1": 7,
+        "plan.holes.yard.curve.circle.radius": 0.5,
+        "solve.tolerance": 1e-8,
+        "west.tension": 4.0,
+        "wall 1.tension": 0.1,
+        "east.pressure": 1.25,
+    }
+    project, surface = varied(roof, values)
+    assert (project.plan.edge_length, project.options) == (2.0, {"tolerance": 1e-8})
+    assert surface.vertices[:, 0].max() == 7.0
+    hole = np.linalg.norm(surface.vertices[:, :2] - [1.5, 2.0], axis=1).min()
+    assert hole == pytest.approx(0.5)
+    assert surface.m < start.m
+    told = {p.name: (p.tension, p.pressure) for p in surface.patches}
+    assert told == {"west": (4.0, 1.0), "east": (3.0, 1.25), "wall 1": (0.1, 0.0)}
+    again, same_start = varied(roof, {})
+    assert again.plan.edge_length == plain.plan.edge_length == 1.5
+    assert pcmc.energy(same_start) == pcmc.energy(start)
+
+
+def test_a_case_is_what_the_project_with_these_numbers_gives(roof):
+    case = solve_project("roof.toml", digest(roof), **{"west.tension": 3.2, "wall 1.tension": 0.5})
+    text = TEXT.replace("west = {tension = 3.0", "west = {tension = 3.2").replace("0.8", "0.5")
+    roof.write_text(text, encoding="utf-8")
+    alone = run(roof)
+    assert case["verdict"] == "stable"
+    assert case["energy"] == pytest.approx(pcmc.energy(alone.surface), rel=1e-12)
+    assert case["west.tension_reached"] == 3.2
+
+
+def test_targets_and_remeshing_are_the_projects(roof):
+    aim = '[targets]\nmeet = [{quantity = "apex", of = "west", value = 0.3}]\nvary = ["west"]\n'
+    roof.write_text(TEXT + aim + "[remesh]\nedge_length = 1.0\n", encoding="utf-8")
+    case = solve_project("roof.toml", digest(roof), **{"east.tension": 3.1})
+    assert case["targets_met"] is True
+    assert case["triangles"] > 1.5 * varied(roof, {})[1].m
+
+
+def test_the_digest_is_of_what_the_file_says(roof, tmp_path):
+    first = digest(roof)
+    roof.write_bytes(TEXT.replace("\n", "\r\n").encode())  # as an editor on Windows leaves it
+    assert digest(roof) == first
+    roof.write_text(TEXT.replace("0.8", "0.81"), encoding="utf-8")
+    assert digest(roof) != first
+    surface = two_squares(2)
+    pcmc.write(tmp_path / "a.pcmc", surface)
+    pcmc.write(tmp_path / "b.pcmc", surface.retensioned({"left": 9.0}))
+    pcmc.write(tmp_path / "c.pcmc", surface.moved(surface.vertices * (1.0 + 1e-15)))
+    assert len({digest(tmp_path / f"{name}.pcmc") for name in "abc"}) == 3
+
+
+BAD = [
+    ("wst.tension", 2.0, "unknown number 'wst.tension'; did you mean 'west.tension'"),
+    ("west.tensoin", 2.0, "did you mean 'west.tension'"),
+    ("plan.edge_lenght", 2.0, "did you mean 'plan.edge_length'"),
+    ("plan.outlin.2.1", 2.0, "did you mean 'plan.outline.2.1'"),
+    ("plan.holes.1.curve.circle.radius", 2.0, "did you mean 'plan.holes.yard.curve"),
+    ("plan.outline.5.1", 2.0, "unknown number"),
+    ("plan.edge", 2.0, "unknown number"),
+    ("plan.edge_length", -1, "edge_length must be a finite number > 0, found -1"),
+    ("plan.edge_length", "x", "must be a finite number, found 'x'"),
+    ("plan.edge_length", True, "must be a finite number, found True"),
+    ("west.tension", float("nan"), "west.tension must be a finite number, found nan"),
+    ("west.tension", -2.0, "patch 'west': tension must be a finite number ≥ 0"),
+    ("solve.tolerance", -1.0, "tolerance"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "message"), BAD, ids=[f"{n}={v}" for n, v, _ in BAD])
+def test_bad_names_and_values_are_refused_before_any_case(roof, name, value, message):
+    good = {"east.tension": [3.0, 4.0]}
+    with pytest.raises(PcmcError, match=message) as caught:
+        project_sweep(roof, good, {name: value})
+    assert str(caught.value).startswith(f"{roof}: ")
+    with pytest.raises(PcmcError, match=message):
+        project_sweep(roof, good | {name: [value, 1.0]})
+
+
+def test_a_name_that_is_none_is_refused_by_a_case_too(roof):
+    with pytest.raises(OptionError, match=r"unknown number 'edge'"):
+        varied(roof, {"edge": 1.0})
+    with pytest.raises(OptionError, match="unknown patch 'wst'"):
+        varied(roof, {"wst.tension": 1.0})
+
+
+def test_bad_methods_and_projects_are_refused(roof):
+    with pytest.raises(OptionError, match="did you mean 'newton'"):
+        project_sweep(roof, {"west.tension": [3.0, 4.0]}, method="newtn")
+    with pytest.raises(FileError, match=r"none\.toml: cannot be read"):
+        project_sweep("none.toml", {"west.tension": [3.0, 4.0]})
+
+
+# ---- the command
+
+
+GRID = ["west.tension=3,3.2", "wall 1.tension=0.5,0.8"]
+
+
+def test_the_command_makes_a_table(roof, capsys):
+    assert cli.main(["sweep", "roof.toml", *GRID, "east.tension=3.1", "--csv", "t.csv"]) == 0
+    shown = capsys.readouterr().out
+    table = pd.read_csv("t.csv")
+    assert table["west.tension"].tolist() == [3.0, 3.0, 3.2, 3.2]
+    assert table["wall 1.tension"].tolist() == [0.5, 0.8] * 2
+    assert set(table["project"]) == {"roof.toml"}
+    assert set(table["project_digest"]) == {digest(roof)}
+    assert (table["verdict"] == "stable").all()
+    assert shown.count("stable") == 4
+    assert shown.split()[:3] == ["west.tension", "wall", "1.tension"]
+    assert sorted(p.name for p in roof.parent.iterdir()) == ["roof.toml", "t.csv"]
+
+
+def test_a_surface_is_swept_too_by_any_method(roof, capsys):
+    run(roof)
+    pcmc.write("roof.ply", varied(roof, {})[1])
+    given = ["sweep", "roof.ply", "west.tension=3,4", "--workers", "1", "--csv", "t.csv"]
+    assert cli.main([*given, "--method", "lbfgs"]) in (0, 1)
+    table = pd.read_csv("t.csv")
+    assert set(table["method"]) == {"lbfgs"}
+    assert table["message"].str.startswith("lbfgs: ").all()
+    assert cli.main(["sweep", "roof.ply", "plan.edge_length=1,2"]) == 2
+    assert "unknown number 'plan.edge_length'" in capsys.readouterr().err
+
+
+def test_a_target_that_is_missed_is_1(roof):
+    aim = '[targets]\nmeet = [{quantity = "apex", of = "west", value = 9}]\nvary = ["west"]\n'
+    roof.write_text(TEXT + aim, encoding="utf-8")
+    assert cli.main(["sweep", "roof.toml", "east.tension=3,3.1", "--csv", "t.csv"]) == 1
+    assert not pd.read_csv("t.csv")["targets_met"].any()
+
+
+def test_a_stopped_sweep_goes_on_where_it_was(roof, capsys):
+    grid = {"west.tension": [3, 3.2], "wall 1.tension": [0.5, 0.8]}
+
+    def stop(state):
+        raise StopIteration
+
+    short = run_sweep(project_sweep("roof.toml", grid), "s.jsonl", workers=1, on_record=stop)
+    assert len(short) == 1
+    done = read_store("s.jsonl")[0]
+    assert cli.main(["sweep", "./roof.toml", *GRID, "--store", "s.jsonl", "--csv", "t.csv"]) == 0
+    records = read_store("s.jsonl")
+    assert records[0] == done  # not run again
+    assert len(records) == 4
+    assert cli.main(["sweep", "roof.toml", *GRID, "--csv", "u.csv"]) == 0
+    same(pd.read_csv("t.csv"), pd.read_csv("u.csv"))
+
+
+def test_the_store_of_another_project_is_refused_and_kept(roof, capsys):
+    given = ["sweep", "roof.toml", *GRID[:1], "--store", "s.jsonl", "--workers", "1"]
+    assert cli.main(given) == 0
+    kept = (roof.parent / "s.jsonl").read_bytes()
+    roof.write_text(TEXT.replace("0.8", "0.81"), encoding="utf-8")
+    capsys.readouterr()
+    assert cli.main(given) == 2
+    err = capsys.readouterr().err
+    assert "s.jsonl: written for another sweep (its fixed has project_digest=" in err
+    assert (roof.parent / "s.jsonl").read_bytes() == kept
+
+
+def test_a_project_changed_while_it_is_swept_is_noticed(roof):
+    sweep = project_sweep("roof.toml", {"west.tension": [3.0, 3.2]})
+    roof.write_text(TEXT.replace("0.8", "0.81"), encoding="utf-8")
+    table = run_sweep(sweep, workers=1)
+    assert set(table["status"]) == {"raised"}
+    assert table["message"].str.contains("has changed since the sweep was begun").all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["roof.toml", "wst.tension=1,2"], "did you mean 'west.tension'"),
+        (["roof.toml", "west.tension=3"], "the grid is empty"),
+        (["roof.toml", "west.tension=3,4", "west.tension=5"], "west.tension is given twice"),
+        (["roof.tml", "west.tension=3,4"], "roof.tml: expected a project"),
+        (["none.toml", "west.tension=3,4"], "none.toml: cannot be read"),
+        (["none.obj", "west.tension=3,4"], "none.obj: cannot be read"),
+        (["roof.toml", "west.tension=3,4", "--store", "."], "is a folder"),
+        (["roof.toml", "west.tension=3,4", "--store", "no/s"], "there is no folder"),
+    ],
+)
+def test_bad_input_is_2_in_one_line(roof, capsys, arguments, message):
+    assert cli.main(["sweep", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert message in err
+    assert [p.name for p in roof.parent.iterdir()] == ["roof.toml"]
