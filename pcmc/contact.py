@@ -176,10 +176,10 @@ def pinched(surface: Surface, below: Walls, rests: Bools) -> Surface:
     )  # fmt: skip
 
 
-def creases(below: Walls, rests: Bools) -> Ints:
-    """(k,2) junction edges that lie on Π, both ends at rest or in a corner."""
-    down = rests | below.anchored
-    return below.edges[down[below.edges].all(axis=1)]
+def resting_crest(below: Walls, rests: Bools) -> Ints:
+    """(k,2) from each resting junction vertex to its neighbours along the junction."""
+    links = np.concatenate([below.edges, below.edges[:, ::-1]])
+    return links[rests[links[:, 0]]]
 
 
 def beside(below: Walls, rests: Bools) -> Bools:
@@ -191,8 +191,8 @@ def beside(below: Walls, rests: Bools) -> Bools:
 
 
 def standing_structure(standing: Surface, below: Walls, rests: Bools) -> Structure:
-    """The ``motion.structure`` of a pinched surface, with its creases on Π and what stands beside."""
-    return structure(standing, creases(below, rests), beside(below, rests))
+    """The ``motion.structure`` of a pinched surface: what rests follows the junction."""
+    return structure(standing, resting_crest(below, rests), beside(below, rests))
 
 
 def pull_and_capacity(surface: Surface, below: Walls, rests: Bools) -> tuple[Floats, Floats]:

@@ -8,6 +8,7 @@ done once per pattern; ``factor`` then takes new values. Backends, fastest first
 from __future__ import annotations
 
 import importlib.util
+import math
 import os
 import re
 import threading
@@ -30,6 +31,7 @@ from .assemble import Pattern
 from .errors import MissingExtra, OptionError, unknown
 
 BACKENDS = ("pardiso", "superlu")
+ZERO = 1e-13  # of the largest entry: a pivot below is zero to rounding, as MKL sees it
 ALONE = 10_000  # rows; up to here MKL's threads wait for each other longer than they work
 
 
@@ -142,7 +144,13 @@ class _SuperLUFactor:
     def negative(self) -> int:
         if not np.array_equal(self.lu.perm_r, self.lu.perm_c):
             raise SingularMatrix("a zero pivot forced a row exchange, so the inertia is unknown")
-        return int(np.count_nonzero(self.lu.U.diagonal() < 0.0))
+        pivots = self.lu.U.diagonal()
+        lost = int(
+            np.count_nonzero(np.abs(pivots) < ZERO * np.abs(self.matrix.data).max(initial=0.0))
+        )
+        if lost:
+            raise SingularMatrix(f"{lost} pivots are zero to rounding")
+        return int(np.count_nonzero(pivots < 0.0))
 
     def solve(self, right: Floats) -> Floats:
         right = right[self.order]
@@ -166,7 +174,16 @@ class _Pardiso:
         os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
         self._error = pypardiso.pardiso_wrapper.PyPardisoError
         self._lock = threading.Lock()
-        for place, value in ((1, 1), (2, 2), (8, 0), (10, 13), (11, 0), (13, 0), (21, 1), (24, 1)):
+        for place, value in (
+            (1, 1),
+            (2, 2),
+            (8, 0),
+            (10, round(-math.log10(ZERO))),
+            (11, 0),
+            (13, 0),
+            (21, 1),
+            (24, 1),
+        ):
             self._solver.set_iparm(place, value)
         self._analysed = False
 
@@ -184,7 +201,7 @@ class _Pardiso:
         except self._error as error:
             raise SingularMatrix(str(error)) from None
         iparm = self._solver.iparm
-        if iparm[13]:  # MKL replaces a pivot below 1e-13 of the matrix and goes on
+        if iparm[13]:  # MKL replaces such a pivot and goes on
             raise SingularMatrix(f"{iparm[13]} pivots are zero to rounding")
         return _PardisoFactor(self, matrix, int(iparm[22]))
 

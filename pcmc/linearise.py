@@ -22,7 +22,7 @@ from .arrays import Floats, Ints
 from .kernels import area_vectors, compiled
 from .motion import MotionSpace, Structure, curve_chords
 from .surface import Surface
-from .topology import CURVE, SHEET
+from .topology import SHEET
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +73,7 @@ def _at_curves(
     surface: Surface, frame: Structure, space: MotionSpace, X: Floats, gradient: Floats
 ) -> tuple[Ints, Floats]:
     slides = surface.on_plane[frame.curve]
-    turns = space.dimension[frame.curve] == np.where(slides, 1, 2)
-    bends = np.flatnonzero(turns & (frame.kind[frame.curve] == CURVE))
+    bends = np.flatnonzero(space.dimension[frame.curve] == np.where(slides, 1, 2))
     chord = curve_chords(surface, frame, X)[bends]
     chord[slides[bends]] = surface.plane.along(chord[slides[bends]])
     square = np.einsum("ij,ij->i", chord, chord)

@@ -33,9 +33,9 @@ class Structure:
     ----------
     active : (m,) bool, faces with a tension or a pressure.
     faces, patch_of_face : the active faces alone.
-    curve_edges : (k,2) edges where active sheets meet, end, or change tension or pressure.
-    curve, beside : (c,) vertices on exactly two of them, and their neighbours along the curve (c,2).
-    kind : (n,) SHEET, CURVE or POINT in that sense.
+    kind : (n,) SHEET, CURVE or POINT: how many edges end there at which active sheets meet, end, or
+        change tension or pressure.
+    curve, beside : (c,) vertices on a curve, and their neighbours along it (c,2).
     idle : (n,) vertices of no active face.
     level : (n,) curve vertices beside one that rests on Π: their tangent is taken along Π.
     """
@@ -44,10 +44,9 @@ class Structure:
     faces: Ints
     patch_of_face: Ints
     topology: Topology
-    curve_edges: Ints
+    kind: Ints
     curve: Ints
     beside: Ints
-    kind: Ints
     idle: Bools
     level: Bools
 
@@ -88,14 +87,13 @@ class MotionSpace:
         return self.push(self.pull(vectors))
 
 
-def structure(
-    surface: Surface, creases: Ints | None = None, level: Bools | None = None
-) -> Structure:
+def structure(surface: Surface, crest: Ints | None = None, level: Bools | None = None) -> Structure:
     """The pulling faces of a surface and what its vertices lie on.
 
-    ``creases`` (k,2) are edges that count as curves whatever meets there: a junction that rests on Π
-    is held by it and may be sharp. ``level`` (n,) marks curve vertices whose tangent is taken along
-    Π: beside a resting vertex the curve has a corner and no tangent of its own.
+    ``crest`` (k,2) leads from each junction vertex that rests on Π to its neighbours on the junction:
+    that is its curve, sharp or not, and whatever else ends there, as a standing wall does beside.
+    ``level`` (n,) marks curve vertices whose tangent is taken along Π: beside a resting vertex the
+    curve has a corner and no tangent of its own.
 
     Two sheets of equal tension and pressure that meet with no pulling wall between them are one
     smooth sheet: their common curve can slide along it freely and carries no motion of its own.
@@ -106,24 +104,20 @@ def structure(
     patch = np.ascontiguousarray(surface.patch_of_face[active])
     kinds = np.unique(np.stack([surface.tensions, surface.pressures]), axis=1, return_inverse=True)
     topo = topology(faces, np.asarray(kinds[1]).ravel()[patch].astype(np.int32), surface.n)
-    is_curve = topo.curve_edge
-    if creases is not None and len(creases):
-        key = topo.edges.astype(np.int64) @ [surface.n, 1]
-        is_curve = is_curve | np.isin(
-            key, np.sort(creases, axis=1).astype(np.int64) @ [surface.n, 1]
-        )
-    curve_edges = topo.edges[is_curve]
-    curve, beside = curve_neighbours(curve_edges, surface.n)
+    edges = topo.edges[topo.curve_edge]
+    links = np.concatenate([edges, edges[:, ::-1]])
+    if crest is not None and len(crest):
+        links = np.concatenate([links[~np.isin(links[:, 0], crest[:, 0])], crest])
+    curve, beside = curve_neighbours(links, surface.n)
     idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
     return Structure(
         active=active,
         faces=faces,
         patch_of_face=patch,
         topology=topo,
-        curve_edges=curve_edges,
+        kind=vertex_kind(links[:, 0], surface.n),
         curve=curve,
         beside=beside,
-        kind=vertex_kind(curve_edges, surface.n),
         idle=idle,
         level=np.zeros(surface.n, dtype=bool) if level is None else level,
     )

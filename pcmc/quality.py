@@ -10,7 +10,7 @@ from .arrays import Floats, Ints
 from .energy import apply_supports
 from .kernels import compiled
 from .surface import Surface
-from .topology import CURVE, POINT
+from .topology import SHEET
 
 SQRT3 = sqrt(3.0)
 
@@ -90,13 +90,13 @@ def edge_lengths(surface: Surface) -> Floats:
 
 
 def redistribution(
-    surface: Surface, X: Floats, curve_edges: Ints, kind: Ints, step: float = 0.5
+    surface: Surface, X: Floats, kind: Ints, curve: Ints, beside: Ints, step: float = 0.5
 ) -> Floats:
     """Move (n,3) of each vertex towards a better-shaped star, before any projection.
 
-    Inside a sheet towards the area-weighted mean of its triangles' centroids, on a curve towards the
-    middle of its two neighbours along the curve, at a point not at all; fixed vertices stay and
-    sliding ones keep to Π.
+    Inside a sheet (``kind`` (n,)) towards the area-weighted mean of its triangles' centroids, at the
+    vertices ``curve`` (c,) towards the middle of their neighbours ``beside`` (c,2), elsewhere not at
+    all; fixed vertices stay and sliding ones keep to Π.
     """
     F = surface.faces
     corners = X[F]
@@ -108,10 +108,8 @@ def redistribution(
     total = np.bincount(corner, np.tile(area, 3), len(X))[:, None]
     weighted = _summed(corner, np.tile(area[:, None] * centroid, (3, 1)), len(X))
     move = np.where(total > 0.0, weighted / np.where(total > 0.0, total, 1.0) - X, 0.0)
-    ends = X[curve_edges[:, ::-1].T.ravel()]
-    middle = _summed(curve_edges.T.ravel(), 0.5 * ends, len(X))
-    move[kind == CURVE] = (middle - X)[kind == CURVE]
-    move[kind == POINT] = 0.0
+    move[kind != SHEET] = 0.0
+    move[curve] = 0.5 * (X[beside[:, 0]] + X[beside[:, 1]]) - X[curve]
     return apply_supports(surface, step * move)
 
 

@@ -174,9 +174,9 @@ def topology(faces: Ints, patch_of_face: Ints, vertex_count: int) -> Topology:
     )
 
 
-def vertex_kind(curve_edges: Ints, vertex_count: int) -> Ints:
-    """(n,) int: SHEET, CURVE or POINT, from the curve edges (k,2) alone."""
-    degree = np.bincount(curve_edges.ravel(), minlength=vertex_count)
+def vertex_kind(ends: Ints, vertex_count: int) -> Ints:
+    """(n,) int: SHEET, CURVE or POINT, from the ends of the curve edges alone."""
+    degree = np.bincount(ends.ravel(), minlength=vertex_count)
     return np.where(degree == 0, SHEET, np.where(degree == 2, CURVE, POINT)).astype(np.int8)
 
 
@@ -185,20 +185,21 @@ def components(edges: Ints, vertex_count: int) -> Ints:
     return connected_components(_adjacency(edges, vertex_count), directed=False)[1]
 
 
-def curve_neighbours(curve_edges: Ints, vertex_count: int) -> tuple[Ints, Ints]:
-    """The vertices (k,) on exactly two of the curve edges, and their neighbours along them (k,2).
+def curve_neighbours(links: Ints, vertex_count: int) -> tuple[Ints, Ints]:
+    """The vertices (c,) that two of the links lead from, and where these lead to (c,2).
+
+    ``links`` (k,2) are curve edges, each twice: as seen from the one end and from the other.
 
     >>> import numpy as np
-    >>> inner, beside = curve_neighbours(np.array([[0, 1], [1, 4], [4, 2]]), 5)
-    >>> inner.tolist(), beside.tolist()
-    ([1, 4], [[0, 4], [1, 2]])
+    >>> edges = np.array([[0, 1], [1, 4], [4, 2]])
+    >>> curve, beside = curve_neighbours(np.concatenate([edges, edges[:, ::-1]]), 5)
+    >>> curve.tolist(), beside.tolist()
+    ([1, 4], [[4, 0], [2, 1]])
     """
-    ends = curve_edges.ravel()
-    other = curve_edges[:, ::-1].ravel()
-    order = np.argsort(ends, kind="stable")
-    inner = np.flatnonzero(vertex_kind(curve_edges, vertex_count) == CURVE)
-    first = np.searchsorted(ends[order], inner)
-    return inner, np.stack([other[order[first]], other[order[first + 1]]], axis=1)
+    here, there = links[np.argsort(links[:, 0], kind="stable")].T
+    curve = np.flatnonzero(vertex_kind(here, vertex_count) == CURVE)
+    first = np.searchsorted(here, curve)
+    return curve, np.stack([there[first], there[first + 1]], axis=1)
 
 
 def _touched(edges: Ints, vertex_count: int) -> Bools:

@@ -11,8 +11,8 @@ from pcmc.motion import motion_space, structure
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
 
 
-def ready(surface, creases=None):
-    frame = structure(surface, creases)
+def ready(surface, crest=None):
+    frame = structure(surface, crest)
     space = motion_space(surface, frame, surface.vertices)
     return frame, space, pattern(frame, space)
 
@@ -90,7 +90,7 @@ def test_other_places_than_the_surfaces_own():
 
 def test_with_a_crease():
     surface = seam()
-    frame, space, kept = ready(surface, np.array([[6, 7], [7, 8]]))
+    frame, space, kept = ready(surface, np.array([[6, 7], [7, 6], [7, 8], [8, 7]]))
     assert space.dimension.max() == 3
     B = dense_basis(space)
     found = symmetric(kept, assemble(surface, frame, space, kept, surface.vertices))

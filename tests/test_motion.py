@@ -6,7 +6,8 @@ from motion_cases import SURFACES, TILTED, seam
 from shapes import disc, pyramid, rotation, shaken, three_patches
 
 from generators import two_squares
-from pcmc import Patch, Plane, Surface, energy, gradient
+from pcmc import Patch, Plane, Surface, energy, gradient, solve
+from pcmc.contact import pinched, resting, resting_crest, standing_structure, walls
 from pcmc.energy import energy_and_gradient
 from pcmc.motion import force_scale, motion_space, structure
 from pcmc.topology import CURVE, POINT, SHEET
@@ -70,8 +71,10 @@ def test_directions_are_the_normal_and_the_plane_across_the_curve():
     sheet = surface.free & (frame.kind == SHEET)
     normal = vector[sheet] / np.linalg.norm(vector[sheet], axis=1)[:, None]
     np.testing.assert_allclose(space.basis[sheet, 0], normal, atol=1e-14)
-    for v in np.flatnonzero(surface.free & (frame.kind == CURVE)):
-        one, two = (frame.curve_edges[(frame.curve_edges == v).any(axis=1)]).sum(axis=1) - v
+    assert frame.curve.tolist() == np.flatnonzero(frame.kind == CURVE).tolist()
+    for v, (one, two) in zip(frame.curve, frame.beside, strict=True):
+        if not surface.free[v]:
+            continue
         # the chord weighted by lengths or not: both lie in the plane of the two edges
         tangent = np.cross(*space.basis[v, :2])
         plane = np.cross(X[one] - X[v], X[two] - X[v])
@@ -163,16 +166,33 @@ def test_a_seam_is_smooth_until_tension_or_pressure_differ():
     assert (structure(pushed).kind[middle] == CURVE).all()
 
 
-def test_creases_are_curves():
+def test_a_crest_at_rest_is_a_curve_whatever_meets_there():
     surface = seam()
-    frame = structure(surface, np.array([[6, 7], [8, 7]]))
+    frame = structure(surface, np.array([[6, 7], [7, 6], [7, 8], [8, 7]]))
     assert frame.kind[[6, 7, 8]].tolist() == [POINT, CURVE, POINT]
     assert motion_space(surface, frame, surface.vertices).dimension[[6, 7, 8]].tolist() == [3, 2, 3]
 
 
+def test_where_a_standing_wall_begins_a_resting_vertex_keeps_to_the_crest():
+    """Three curves meet there, two sheets' junction and the wall's foot; only the junction counts."""
+    surface = solve(two_squares(6, alpha_aux=2.5), target="stationary").surface
+    below = walls(surface)
+    rests = resting(surface, below)
+    standing = pinched(surface, below, rests)
+    links = resting_crest(below, rests)
+    tip = np.unique(links[(below.can_rest & ~rests)[links[:, 1]], 0])
+    frame = standing_structure(standing, below, rests)
+    assert len(tip) == 2
+    assert (frame.kind[tip] == CURVE).all()
+    space = motion_space(standing, frame, standing.vertices)
+    assert (space.dimension[tip] == 1).all()
+    one, two = standing.vertices[frame.beside[np.isin(frame.curve, tip)]].transpose(1, 0, 2)
+    assert np.einsum("ij,ij->i", two - one, space.basis[tip, 0]) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_a_curve_that_turns_back_on_itself_moves_in_all_directions():
     surface = seam()
-    frame = structure(surface, np.array([[6, 7], [7, 8]]))
+    frame = structure(surface, np.array([[7, 6], [7, 8]]))
     X = surface.vertices.copy()
     X[8] = 2 * X[7] - X[8]
     X[8] += X[6] - X[8]  # both neighbours in one place: no tangent

@@ -140,7 +140,9 @@ def test_adjacency_numbers_the_edges():
 
 def test_neighbours_along_a_curve_are_those_before_and_after():
     t = three_patches(3).topology
-    inner, beside = curve_neighbours(t.edges[t.curve_edge], t.vertex_count)
+    edges = t.edges[t.curve_edge]
+    links = np.concatenate([edges, edges[:, ::-1]])
+    inner, beside = curve_neighbours(links, t.vertex_count)
     assert inner.tolist() == np.flatnonzero(t.vertex_kind == CURVE).tolist()
     found = {int(v): set(pair) for v, pair in zip(inner, beside.tolist(), strict=True)}
     for curve in t.junctions:

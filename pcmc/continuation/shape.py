@@ -169,9 +169,9 @@ class Shape:
         The best of the sweeps; None where none is clearly better.
         """
         least = worst = self.quality(X)
-        best = None
+        best, frame = None, self.frame
         for _ in range(SWEEPS):
-            move = redistribution(self.surface, X, self.frame.curve_edges, self.frame.kind)
+            move = redistribution(self.surface, X, frame.kind, frame.curve, frame.beside)
             move[self.rests] = 0.0
             space = self.space(X)
             X = self.swept(X + move - space.project(move), space)

@@ -9,7 +9,6 @@ from typing import Any
 
 import nlopt
 import numpy as np
-import pandas as pd
 
 from ..arrays import Floats
 from ..surface import Surface
@@ -178,7 +177,7 @@ def lbfgs(
         energy=best.energy,
         iterations=len(rows),
         evaluations=objective.evaluate.count,
-        history=pd.DataFrame(rows, columns=list(COLUMNS)),
+        rows=[dict(zip(COLUMNS, row, strict=True)) for row in rows],
     )
 
 

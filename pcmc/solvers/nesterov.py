@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from ..arrays import Floats
 from ..surface import Surface
@@ -131,7 +130,7 @@ def nesterov(
         iterations=move.iteration,
         evaluations=evaluate.count,
         # An interrupt may have come between a row and its move: what is returned ends the history.
-        history=pd.DataFrame(rows[: move.iteration + 1], columns=list(COLUMNS)),
+        rows=[dict(zip(COLUMNS, row, strict=True)) for row in rows[: move.iteration + 1]],
     )
 
 

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ..certificate import certify
 from ..errors import SurfaceError
@@ -112,7 +111,7 @@ def newton(surface: Surface, options: NewtonOptions, callback: Callback | None) 
         energy=state.energy,
         iterations=len(log.rows) - 1,
         evaluations=log.evaluations,
-        history=pd.DataFrame(log.rows),
+        rows=log.rows,
     )
 
 

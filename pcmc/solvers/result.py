@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-
-from ..certificate import Certificate, certify
 from ..surface import Surface
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from ..certificate import Certificate
 
 
 class Status(Enum):
@@ -55,6 +57,7 @@ class Result:
     energy : E of ``surface``, force·length.
     iterations, evaluations : steps taken; passes over the triangles made, for E, ∇E or its
         derivative along a motion.
+    rows : the rows of ``history``, each a mapping of its columns.
     history : a row per iteration (per evaluation for ``"lbfgs"``) with at least ``evaluation``,
         ``energy`` and ``gradient_squared`` (‖∇E‖², the paper's squared sum).
     """
@@ -65,7 +68,7 @@ class Result:
     energy: float
     iterations: int
     evaluations: int
-    history: pd.DataFrame
+    rows: Sequence[Mapping[str, Any]] = field(repr=False)
 
     @property
     def converged(self) -> bool:
@@ -75,7 +78,16 @@ class Result:
     @cached_property
     def certificate(self) -> Certificate:
         """What the surface reached is: residual, curvature error, stability, verdict."""
+        from ..certificate import certify  # here, as pandas below: both take long to import
+
         return certify(self.surface, status=self.status.name)
+
+    @cached_property
+    def history(self) -> pd.DataFrame:
+        """A row per iteration (per evaluation for ``"lbfgs"``), made when first asked for."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows)
 
     @property
     def message(self) -> str:

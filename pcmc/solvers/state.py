@@ -145,11 +145,12 @@ class State:
         if not 1e-7 <= self.relative < self._care_below:
             return False
         self.cares -= 1
+        frame = self.frame
         best, X = self.X, self.X
         for _ in range(20):
-            move = redistribution(self.surface, X, self.frame.curve_edges, self.frame.kind)
+            move = redistribution(self.surface, X, frame.kind, frame.curve, frame.beside)
             move[self.rests] = self.surface.plane.along(move[self.rests])
-            space = motion_space(self.surface, self.frame, X)
+            space = motion_space(self.surface, frame, X)
             X = hung(self.surface, self.walls, X + move - space.project(move), space)
             quality = worst_quality(X, self.judged)
             if quality > worst:

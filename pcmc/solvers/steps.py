@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..arrays import Floats
@@ -11,7 +14,7 @@ from ..descent import Carrier, Smoother
 from ..factor import Factor, Factoriser, SingularMatrix, factoriser
 from ..kernels import area_vectors
 from ..linearise import linearise
-from ..modes import SOFT, lowest, negatives_without, stiffness
+from ..modes import SOFT, full_matrix, lowest, negatives_without, stiffness
 from ..motion import MotionSpace
 from ..quality import edge_lengths
 from ..rigid import rigid_modes, rigid_motions
@@ -53,6 +56,7 @@ class Stepper:
         self._pattern: Pattern | None = None
         self._factoriser: Factoriser | None = None
         self._factor: Factor | None = None
+        self._soft: csr_array | None = None
         self._smoother: Smoother | None = None
         self._carrier: Carrier | None = None
         self._motions = rigid_motions(self.state.surface)
@@ -199,27 +203,44 @@ class Stepper:
                 continue
             self.factorisations += 1
             self._factor, self._shift, self._space = factor, shift, state.space
+            self._soft = None if weight == shift else self._softness()
             return True
         return False
 
-    def _precondition(self, residual: Floats) -> Floats:
-        """The kept factor's answer to a residual in the present basis."""
-        assert self._factor is not None
+    def _softness(self) -> csr_array:
+        """The little stiffness that a singular matrix was given."""
+        state = self.state
+        assert self._pattern is not None
+        data = assemble(state.surface, state.frame, state.space, self._pattern, state.X, 0.0, SOFT)
+        return full_matrix(self._pattern, data)
+
+    def _as_kept(self, action: Callable[[Floats], Floats], s: Floats) -> Floats:
+        """What belongs to the kept factor acts in the basis of its time: s in the present one."""
         now, then = self.state.space, self._space
         if now is then:
-            return self._factor.solve(residual)
-        return now.pull(then.push(self._factor.solve(then.pull(now.push(residual)))))
+            return action(s)
+        return now.pull(then.push(action(then.pull(now.push(s)))))
 
     def _direction(self) -> Floats:
-        """-B J⁻¹ r with J the derivative of r itself, by GMRES on the kept factor."""
-        state = self.state
+        """-B J⁻¹ r with J the derivative of r itself, by GMRES on the kept factor.
+
+        Where the factor has been given stiffness J has it too: a motion that costs nothing would
+        otherwise take all of the accuracy.
+        """
+        state, factor, soft = self.state, self._factor, self._soft
+        assert factor is not None
         residual = state.residual
         size = (len(residual), len(residual))
         here = linearise(state.surface, state.frame, state.space, state.X, state.gradient)
+
+        def times(s: Floats) -> Floats:
+            change = here.times(state.space.push(s))
+            return change if soft is None else change + self._as_kept(soft.__matmul__, s)
+
         norms: list[float] = []
         s, _ = gmres(
-            LinearOperator(size, lambda s: here.times(state.space.push(s)), dtype=float), -residual,
-            M=LinearOperator(size, self._precondition, dtype=float),
+            LinearOperator(size, times, dtype=float), -residual,
+            M=LinearOperator(size, lambda r: self._as_kept(factor.solve, r), dtype=float),
             rtol=1e-3, restart=12, maxiter=1, callback=norms.append, callback_type="pr_norm",
         )  # fmt: skip
         self._inner = len(norms)
@@ -243,7 +264,8 @@ class Stepper:
 
     def _shifted_direction(self) -> Floats:
         self._inner = 0
-        return -self.state.space.push(self._precondition(self.state.residual))
+        assert self._factor is not None
+        return -self.state.space.push(self._as_kept(self._factor.solve, self.state.residual))
 
     def _carried(self, d: Floats) -> Floats:
         """The motion d with the insides of the sheets carried along."""
