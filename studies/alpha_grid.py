@@ -3,50 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from generators import two_caps
-from pcmc import Surface, solve
 from pcmc.sweep import Sweep
 
 from .cases import run_sweep
-from .flow import PAPER, SHORT_ITERATIONS, forced_steps
+from .flow import SHORT_ITERATIONS
+from .flow_case import flow_case
 from .folder import Folder
 from .study import Study
 
 TENSIONS = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
-ITERATIONS, T0, EDGE_LENGTH = 200, 0.01, 1.2
+ITERATIONS, EDGE_LENGTH = 200, 1.2
 CONVERGED = 1.0  # ‖∇E‖² after 200 iterations below which a case counts as well converged
 FAILED = ("diverged", "non_finite")
 AXES = ("alpha_wall", "alpha_large", "alpha_small")
-
-
-def flow_case(
-    alpha_wall: float, alpha_large: float, alpha_small: float, edge_length: float, iterations: int
-) -> dict[str, Any]:
-    """How the paper's flow ends at three tensions; one case of the sweep."""
-    surface = initial(edge_length).retensioned(
-        {"wall": alpha_wall, "large": alpha_large, "small": alpha_small}
-    )
-    options: dict[str, Any] = {**PAPER, "t0": T0, "tolerance": None, "iterations": iterations}
-    result = solve(surface, "nesterov", **options)
-    return {
-        "status": result.status.name.lower(),
-        "iterations_taken": result.iterations,
-        "gradient_squared": float(result.history.gradient_squared.iloc[-1]),
-        "energy": result.energy,
-        "forced_steps": forced_steps(result.history),
-    }
-
-
-@cache
-def initial(edge_length: float) -> Surface:
-    """Example 2's initial shape: a worker builds it once for all its cases."""
-    return two_caps(edge_length)
 
 
 def flow_grid(folder: Folder, short: bool) -> pd.DataFrame:

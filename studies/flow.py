@@ -23,10 +23,10 @@ from pcmc.energy import patch_areas
 from pcmc.quality import minimum_angle, triangle_quality
 from pcmc.solvers.result import Progress
 
+from .flow_case import PAPER
 from .folder import Folder
 
 SHORT_ITERATIONS = 12
-PAPER = {"gamma": 0.9, "xi": 0.2, "tau": 0.5, "floor_power": 5}  # Secs. 3.3, 3.4
 METHODS = ("cotangent", "variational")
 
 

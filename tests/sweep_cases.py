@@ -57,6 +57,16 @@ def misbehave(how, marker=""):
     return {"how_it_went": 1.0}
 
 
+def mortal(n, fatal, folder):
+    """Print and note each case that is begun; one of them ends its process."""
+    print("this is case", n)
+    with (Path(folder) / "begun").open("a") as file:
+        file.write(f"{n}\n")
+    if n == fatal:
+        os._exit(7)
+    return {"pid": os.getpid()}
+
+
 def surroundings(n):
     """How many threads a case gets, and who runs it."""
     names = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "PCMC_THREADS")

@@ -1,6 +1,8 @@
 """The benchmarks run and describe themselves; their times are not judged here."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pandas as pd
@@ -98,6 +100,11 @@ def test_sweeps_are_timed_whole_and_in_turn(monkeypatch):
     assert [row.asked for row in rows] == ["", "≤ 60", "≥ 1.7", "", "≤ 300", "≥ 1.7", ""]
     assert [row.value for row in rows if "over" in row.what] == [pytest.approx(1.9)] * 2
     assert [row.asked for row in benchmark_sweep.sweeps(True)] == [""] * 7
+
+
+def test_the_flows_workers_wait_for_no_large_library():
+    code = "import sys, studies.flow_case; print({'pandas', 'scipy.optimize'} & set(sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True).stdout == b"set()\n"
 
 
 def test_a_case_that_fails_spoils_a_sweeps_time():

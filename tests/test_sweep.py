@@ -19,7 +19,16 @@ import pcmc
 from generators import two_squares
 from pcmc.errors import FileError, OptionError, SweepError
 from pcmc.kernels import threads
-from pcmc.sweep import Sweep, provenance, read_store, run, solve_case, table, write_table
+from pcmc.sweep import (
+    Sweep,
+    local,
+    provenance,
+    read_store,
+    run,
+    solve_case,
+    table,
+    write_table,
+)
 from pcmc.sweep.bar import bar
 
 CHAOS = Sweep(
@@ -191,6 +200,39 @@ def test_faults_become_rows_and_the_others_go_on(tmp_path):
     assert "in misbehave" in told.loc[0, "output"]  # the traceback
     assert "about to die" in told.loc[5, "output"]
     assert told.loc[2, "wall_time"] >= 1.0
+
+
+def test_a_case_that_waits_for_one_that_kills_runs_on_another_child(tmp_path):
+    sweep = Sweep(sweep_cases.mortal, {"n": range(30)}, {"fatal": 12, "folder": str(tmp_path)})
+    found = run(sweep, tmp_path / "cases", workers=1)
+    begun = [int(line) for line in (tmp_path / "begun").read_text().split()]
+    assert begun == list(range(30))  # each once, in order
+    assert found.status.tolist() == ["killed" if n == 12 else "finished" for n in range(30)]
+    assert found.pid.nunique() == 2
+    (output,) = provenance(read_store(tmp_path / "cases")).output.dropna()
+    assert output == "this is case 12\n"  # of its own output only
+
+
+@pytest.mark.parametrize(("brief", "most"), [(60.0, 2), (0.0, 1)])
+def test_only_short_cases_wait_in_a_childs_pipe(brief, most, monkeypatch):
+    given = [0]
+
+    class Counted(local.Child):
+        def send(self, *arguments):
+            given.append(given[-1] + 1)
+            super().send(*arguments)
+
+        def receive(self, *arguments):
+            outcome = super().receive(*arguments)
+            given.append(given[-1] - 1)
+            return outcome
+
+    monkeypatch.setattr(local, "Child", Counted)
+    monkeypatch.setattr(local, "BRIEF", brief)
+    with ThreadPoolExecutor(1) as plain:
+        same(run(CHAOS, workers=1), run(CHAOS, executor=plain))
+    assert max(given) == most
+    assert given[-1] == 0
 
 
 def test_failed_cases_run_again_only_when_asked(tmp_path):

@@ -6,23 +6,22 @@ import os
 import signal
 import threading
 import time
-import uuid
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from ..errors import OptionError, SweepError
-from .executors import open_pool
+from .executors import Submit, open_pool
 from .grid import Sweep
-from .isolate import run_case
 from .store import Record, open_store
 from .table import table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -106,12 +105,11 @@ def run(
             if number not in records or (retry_failed and records[number].failed)
         }
         if todo:
-            team, finished = uuid.uuid4().hex, SimpleQueue[Future[dict[str, Any]] | None]()
+            finished = SimpleQueue[Future[dict[str, Any]] | None]()
             stack.enter_context(_interrupts(lambda: finished.put(None)))
-            pool = stack.enter_context(open_pool(team, executor, scheduler, workers))
-            pending = stack.enter_context(
-                _submitted(pool, team, sweep.case, todo, time_limit, finished)
-            )
+            pool = open_pool(sweep.case, time_limit, executor, scheduler, workers)
+            submit = stack.enter_context(pool)
+            pending = stack.enter_context(_submitted(submit, todo, finished))
             progress = _progress(records, todo, len(sweep))
             while pending and (future := _next(finished)) is not None:
                 number = pending.pop(future)
@@ -161,11 +159,8 @@ def _progress(
 
 @contextmanager
 def _submitted(
-    pool: Executor,
-    team: str,
-    case: str,
+    submit: Submit,
     todo: dict[int, dict[str, Any]],
-    time_limit: float | None,
     finished: SimpleQueue[Any],
 ) -> Iterator[dict[Future[dict[str, Any]], int]]:
     """Give all cases to the pool; futures come out of ``finished``; those left are cancelled."""
@@ -173,7 +168,7 @@ def _submitted(
     try:
         for number, parameters in todo.items():
             try:
-                future = pool.submit(run_case, team, case, parameters, time_limit)
+                future = submit(parameters)
             except RuntimeError as error:  # shut down, or broken
                 raise SweepError(
                     f"the executor takes no cases ({error}); give a new one"

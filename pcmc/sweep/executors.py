@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
-from concurrent.futures import Executor, ThreadPoolExecutor
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager, suppress
 from typing import Any
 
 from ..errors import MissingExtra, OptionError, SweepError
 from .child import version
-from .isolate import retire
+from .isolate import retire, run_case
+from .local import LocalPool
+
+Submit = Callable[[Mapping[str, Any]], "Future[dict[str, Any]]"]
 
 OWN_VERSION = version("pcmc")
 CONNECT = 10.0  # seconds a scheduler has to answer, and then to show a worker
@@ -19,24 +23,28 @@ CONNECT = 10.0  # seconds a scheduler has to answer, and then to show a worker
 
 @contextmanager
 def open_pool(
-    team: str, executor: Executor | None, scheduler: str | None, workers: int | None
-) -> Iterator[Executor]:
-    """The executor to use; at the end the sweep's child processes are ended."""
+    case: str,
+    time_limit: float | None,
+    executor: Executor | None,
+    scheduler: str | None,
+    workers: int | None,
+) -> Iterator[Submit]:
+    """What runs a case, given its parameters; at the end the sweep's child processes are ended."""
+    team = uuid.uuid4().hex
     if scheduler is not None:
         with _cluster(team, scheduler) as pool:
-            yield pool
+            yield lambda parameters: pool.submit(run_case, team, case, parameters, time_limit)
     elif executor is not None:
         try:
-            yield executor
+            yield lambda parameters: executor.submit(run_case, team, case, parameters, time_limit)
         finally:
             retire(team)
     else:
-        pool = ThreadPoolExecutor(workers or _processors())
+        local = LocalPool(case, workers or _processors(), time_limit)
         try:
-            yield pool
+            yield local.submit
         finally:
-            retire(team)
-            pool.shutdown(cancel_futures=True)
+            local.close()
 
 
 @contextmanager

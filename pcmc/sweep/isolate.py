@@ -13,6 +13,7 @@ suddenly, reads the end of its input and leaves.
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import signal
@@ -21,6 +22,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Any
@@ -50,11 +52,15 @@ class Child:
             process_group=0 if os.name == "posix" else None,
             creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
+        # the child itself ends at a time limit; this is for one that cannot
+        self._deadline, self._closed = math.inf, threading.Event()
+        threading.Thread(target=self._watch, daemon=True).start()
 
     def load(self, case: str) -> None:
         """Have the child import the case function; SweepError if it cannot."""
         try:
-            kind, text = self._ask((sys.path, case))
+            self._tell((sys.path, case))
+            kind, text = self._hear()
         except (EOFError, OSError, pickle.UnpicklingError):
             kind, text = "failed", self._end()[1]
         if kind == "failed":
@@ -63,17 +69,18 @@ class Child:
                 f" install its package where the workers run:\n{text.strip()}"
             )
 
-    def run(self, parameters: dict[str, Any], time_limit: float | None) -> dict[str, Any]:
-        """The outcome of one case: the fields of a record from ``status`` on."""
-        self.log.seek(0)
-        self.log.truncate()
+    def send(self, parameters: Mapping[str, Any], time_limit: float | None) -> None:
+        """Hand the child a case, which it runs after those it was given before."""
+        with suppress(OSError):  # it has ended, and ``receive`` says how
+            self._tell((parameters, time_limit))
+
+    def receive(self, time_limit: float | None) -> dict[str, Any]:
+        """The outcome of the first case without one: the fields of a record from ``status`` on."""
         started, begin = datetime.now(UTC), time.perf_counter()
-        # the child ends itself; this is for one that is stopped, or whose children hold its pipe
-        backstop = threading.Timer((time_limit or 0.0) + GRACE, self.kill)
         if time_limit is not None:
-            backstop.start()
+            self._deadline = begin + time_limit + GRACE
         try:
-            outcome: dict[str, Any] = self._ask((parameters, time_limit))
+            outcome: dict[str, Any] = self._hear()
             return outcome
         except (EOFError, OSError, pickle.UnpicklingError):
             elapsed = time.perf_counter() - begin
@@ -97,7 +104,7 @@ class Child:
                 },
             }
         finally:
-            backstop.cancel()
+            self._deadline = math.inf
 
     @property
     def alive(self) -> bool:
@@ -114,18 +121,27 @@ class Child:
 
     def close(self) -> None:
         """End the process and free its files."""
+        self._closed.set()
         self.kill()
         self.process.wait()
         for stream in (self.process.stdin, self.process.stdout, self.log):
             with suppress(OSError):
                 stream.close()  # type: ignore[union-attr]
 
-    def _ask(self, message: object) -> Any:
+    def _tell(self, message: object) -> None:
         assert self.process.stdin is not None
-        assert self.process.stdout is not None
         self.process.stdin.write(pickle.dumps(message))
         self.process.stdin.flush()
+
+    def _hear(self) -> Any:
+        assert self.process.stdout is not None
         return pickle.load(self.process.stdout)
+
+    def _watch(self) -> None:
+        """Kill a child that overran: one that is stopped, or whose own children hold its pipe."""
+        while not self._closed.wait(GRACE / 4):
+            if time.perf_counter() > self._deadline:
+                self.kill()
 
     def _end(self) -> tuple[int, str]:
         self.kill()
@@ -207,7 +223,7 @@ _lock = threading.Lock()
 
 
 def run_case(
-    team: str, case: str, parameters: dict[str, Any], time_limit: float | None
+    team: str, case: str, parameters: Mapping[str, Any], time_limit: float | None
 ) -> dict[str, Any]:
     """Run one case in a child process of ``team`` and return its outcome.
 
@@ -227,7 +243,8 @@ def run_case(
         mine = _teams[team]
     child = mine.borrow(case)
     try:
-        return child.run(parameters, time_limit)
+        child.send(parameters, time_limit)
+        return child.receive(time_limit)
     finally:
         mine.give_back(child)
 

@@ -6,9 +6,7 @@ import inspect
 from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import fields
 from importlib import import_module
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from ..energy import gradient
 from ..errors import OptionError, unknown
@@ -16,6 +14,9 @@ from ..solvers import METHODS, solve
 from ..solvers.result import Result
 from .child import resolve
 from .grid import checked
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Parts = tuple[Callable[..., Any], dict[str, Any], dict[str, Any]]
 

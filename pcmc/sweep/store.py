@@ -14,7 +14,7 @@ import os
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from warnings import warn
@@ -71,7 +71,7 @@ class Store:
         ------
         FileError : the disk is full or fails. What was stored before stays whole.
         """
-        self._write(_line(asdict(record)))
+        self._write(_line(vars(record)))
         self.records[record.case] = record
 
     def _write(self, line: bytes) -> None:

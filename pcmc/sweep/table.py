@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from ..errors import FileError, MissingExtra
 from ..files import whole
 from .store import Record
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def table(records: Iterable[Record]) -> pd.DataFrame:
@@ -35,6 +36,8 @@ def provenance(records: Iterable[Record]) -> pd.DataFrame:
 
 
 def _frame(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
+    import pandas as pd  # here: the workers of a sweep start before it, or never need it
+
     ordered = sorted(rows, key=lambda row: int(row["case"]))
     return pd.DataFrame(ordered, columns=None if ordered else ["case"]).set_index("case")
 

@@ -1,0 +1,36 @@
+"""One case of Fig. 16's grid, apart from its study: what a worker need not import, it need not wait for."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from generators import two_caps
+from pcmc import Surface, solve
+
+PAPER = {"gamma": 0.9, "xi": 0.2, "tau": 0.5, "floor_power": 5}  # Secs. 3.3, 3.4
+T0 = 0.01
+
+
+def flow_case(
+    alpha_wall: float, alpha_large: float, alpha_small: float, edge_length: float, iterations: int
+) -> dict[str, Any]:
+    """How the paper's flow ends at three tensions; one case of the sweep."""
+    surface = initial(edge_length).retensioned(
+        {"wall": alpha_wall, "large": alpha_large, "small": alpha_small}
+    )
+    options: dict[str, Any] = {**PAPER, "t0": T0, "tolerance": None, "iterations": iterations}
+    result = solve(surface, "nesterov", **options)
+    return {
+        "status": result.status.name.lower(),
+        "iterations_taken": result.iterations,
+        "gradient_squared": result.rows[-1]["gradient_squared"],
+        "energy": result.energy,
+        "forced_steps": sum(not row["armijo_held"] for row in result.rows),
+    }
+
+
+@cache
+def initial(edge_length: float) -> Surface:
+    """Example 2's initial shape: a worker builds it once for all its cases."""
+    return two_caps(edge_length)
