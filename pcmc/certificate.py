@@ -218,7 +218,8 @@ def _verdict(
             return Verdict.NO_EQUILIBRIUM, excess
         # a solver that ended badly settles what a coarse mesh leaves open
         if ratio > 1.0 + (0.0 if status in ENDED_BADLY else coarseness(surface)):
-            why = f"the pressure is {ratio:.2f} times what the boundary's tension could carry"
+            times = f"{ratio:.2f}" if ratio < 1e4 else f"{ratio:.3g}"
+            why = f"the pressure is {times} times what the boundary's tension could carry"
             return Verdict.NO_EQUILIBRIUM, why
         if status == "DIVERGED":
             return Verdict.NO_EQUILIBRIUM, "the surface inflates without bound"

@@ -13,6 +13,7 @@ from .errors import SurfaceError
 from .topology import Topology
 
 ZERO_AREA = 1e-14  # of the squared longest edge: below this a triangle has no direction in floats
+LARGEST = 1e50  # of a coordinate, tension or pressure: the squares of forces stay finite
 RESTING = 1e-12  # height, relative to the size, at which a vertex counts as lying on Π
 
 
@@ -37,6 +38,12 @@ def positions(vertices: npt.ArrayLike) -> Floats:
         raise SurfaceError(
             f"vertices[{bad[0]}] = {X[bad[0]].tolist()} is not finite ({len(bad)} such vertices);"
             " replace or remove it"
+        )
+    bad = np.flatnonzero((np.abs(X) > LARGEST).any(axis=1))
+    if len(bad):
+        raise SurfaceError(
+            f"vertices[{bad[0]}] = {X[bad[0]].tolist()} is farther out than {LARGEST:g}"
+            f" ({len(bad)} such vertices); use a larger unit of length"
         )
     return X
 

@@ -60,6 +60,12 @@ class Patch:
             raise SurfaceError(
                 f"patch {self.name!r}: pressure must be finite, found {self.pressure}"
             )
+        for key in ("tension", "pressure"):
+            if abs(getattr(self, key)) > check.LARGEST:
+                raise SurfaceError(
+                    f"patch {self.name!r}: {key} must be at most {check.LARGEST:g}, found"
+                    f" {getattr(self, key)}; use a larger unit of force"
+                )
         if self.tension == 0.0 and self.pressure != 0.0:
             raise SurfaceError(
                 f"patch {self.name!r}: a patch under pressure {self.pressure} needs a tension > 0;"

@@ -208,6 +208,8 @@ def test_no_equilibrium_from_the_load_alone():
     assert found.load_ratio == pytest.approx(1.0 / 0.9, rel=0.03)
     assert found.verdict is Verdict.NO_EQUILIBRIUM
     assert f"{found.load_ratio:.2f} times what the boundary's tension could carry" in found.detail
+    huge = certify(spherical_cap(0.25, alpha=1e-40)).detail
+    assert huge == "the pressure is 4.96e+39 times what the boundary's tension could carry"
     assert certify(spherical_cap(0.25, alpha=0.55)).verdict is Verdict.NOT_CONVERGED
 
 

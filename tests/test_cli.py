@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import builtins
+import os
 import signal
 import subprocess
 import sys
 import tomllib
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -152,6 +154,15 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["solve", "none.obj"], "none.obj: cannot be read"),
         (["solve", "none.toml"], "none.toml: cannot be read"),
         (["solve", "roof.toml", "-o", "x.obk"], "did you mean '.obj'"),
+        (["solve", "roof"], "Known: .toml, .pcmc"),
+        (["certify", "roof.txt"], "Known: .toml, .pcmc"),
+        (["solve", "roof.toml", "-o", "roof.png"], "a picture has an option of its own"),
+        (["solve", "roof.toml", "--picture", "roof.obj"], "a picture is written as .png"),
+        (["convert", "roof.toml", "roof.png"], "roof.png: unknown suffix"),
+        (["remesh", "roof.toml", "--edge-length", "1", "-o", "x.png"], "x.png: unknown suffix"),
+        (["solve", "roof.toml", "--folder", "roof.toml/new"], "roof.toml is a file"),
+        (["solve", "roof.toml", "--tension", "1e300"], "tension must be at most 1e+50"),
+        (["plot", "roof.toml", "x.png", "--view", "nan,3"], "two angles"),
         (["solve", "roof.toml", "--method", "newtn"], "did you mean 'newton'"),
         (["solve", "roof.toml", "--target", "minimal"], "minimum"),
         (["solve", "roof.toml", "--tension", "rof=1"], "did you mean 'roof'"),
@@ -161,6 +172,7 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["plot", "roof.toml", "x.jpg"], ".png"),
         (["plot", "roof.toml", "x.png", "--colour", "eror"], "did you mean 'error'"),
         (["sweep", "generators:two_squares", "alpha_aux"], "expected NAME=VALUE"),
+        (["sweep", "generators:two_squares", "alpha_aux=1,"], "expected NAME=VALUE"),
         (["sweep", "generators:two_square", "alpha_aux=1,2"], "cannot be found"),
         (["sweep", "generators:two_squares", "alpa=1,2"], "unknown parameter"),
         (
@@ -172,7 +184,8 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["plot", "roof.toml", "away/x.png"], "there is no folder away"),
         (["plot", "roof.toml", "x.png", "--view", "1,2,3"], "unknown view"),
         (["explore"], "give a file or --example"),
-        (["explore", "--example", "two_square"], "two_square"),
+        (["explore", "--example", "two_square"], "did you mean 'two_squares'"),
+        (["explore", "--example", "no.such:thing"], "--example no.such:thing: No module"),
         (["explore", "--example", "two_squares", "--set", "a=1"], "'a'"),
     ],
 )
@@ -184,6 +197,54 @@ def test_bad_input_is_2_in_one_line(folder, capsys, arguments, message):
     assert err.count("\n") == 1
     assert message in err
     assert [p.name for p in folder.iterdir()] == ["roof.toml"]
+
+
+def test_the_version(capsys):
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out == f"pcmc {version('pcmc')}\n"
+
+
+def test_why_cases_of_a_sweep_failed_is_said_once(folder, capsys):
+    given = ["sweep", "generators:two_squares", "alpha_aux=1,a,b", "n=2", "--workers", "1"]
+    assert cli.main(given) == 1
+    out = capsys.readouterr().out
+    assert out.count("raised") == 4
+    assert "\ncase 1: raised: " in out
+    assert "'a'" in out.split("case 1: ")[1]
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
+def test_letters_that_the_terminal_lacks_are_written_otherwise(folder, encoding):
+    text = SMALL.replace("roof = ", '"größe, ō" = ')
+    (folder / "roof.toml").write_text(text, encoding="utf-8")
+    code = "import sys; from pcmc.cli import main; sys.exit(main())"
+    for command, name in (("solve", "stable: at rest"), ("certify", "gr\\xf6\\xdfe, \\u014d")):
+        if encoding == "cp1252":
+            name = name.replace("\\xf6\\xdf", "öß")
+        run = [
+            sys.executable,
+            "-c",
+            code,
+            command,
+            "roof.toml",
+            *(["-o", "ō.obj"] * (command == "solve")),
+        ]
+        done = subprocess.run(
+            run, capture_output=True, timeout=120, check=False,
+            env=os.environ | {"PYTHONIOENCODING": encoding},
+        )  # fmt: skip
+        assert (done.stderr, done.returncode) == (b"", 0 if command == "solve" else 1)
+        assert name in done.stdout.decode(encoding)
+    assert pcmc.read("ō.obj").patches[0].name == "größe, ō"
+
+
+def test_an_error_of_the_system_names_the_file(folder, monkeypatch, capsys):
+    def broken(*_, **__):
+        raise OSError(28, "No space left on device", "roof.pcmc")
+
+    monkeypatch.setattr("pcmc.project.running.solve", broken)
+    assert cli.main(["solve", "roof.toml"]) == 2
+    assert capsys.readouterr().err == "pcmc: error: roof.pcmc: No space left on device\n"
 
 
 def test_notes_are_one_line(solved, capsys):

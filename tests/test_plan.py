@@ -314,7 +314,8 @@ TURNED = join(arc(WEST, [0, 3.85], EAST), arc(EAST, [0, -3.85], WEST))  # octago
             {"outline": circle([0, 0], 4), "holes": [TURNED], "edge_length": 3.5},
             "the outline and hole 1 cross near .* smaller edge_length",
         ),
-        ({"edge_length": 30.0}, "every vertex .* smaller edge_length"),
+        ({"edge_length": 20.0}, "every vertex .* smaller edge_length"),
+        ({"edge_length": 30.0}, "edge_length=30 is longer than the plan, 23.32 from corner"),
         ({"edge_length": 1e-4}, "about 5.5e\\+10 triangles"),
     ],
 )  # fmt: skip

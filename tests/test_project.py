@@ -9,7 +9,7 @@ import pytest
 
 import pcmc
 from pcmc.errors import FileError, OptionError
-from pcmc.project import build, check_outputs, load, run
+from pcmc.project import build, check_names, check_outputs, load, run
 
 ROOF = Path(__file__).resolve().parent.parent / "notebooks" / "roof.toml"
 SMALL = """
@@ -129,7 +129,12 @@ def test_a_bad_value_is_told_in_a_line(small, old, new, message):
         ('supports = "x"', r"line 3: supports must be a list"),
         ("patches = 3", r"line 3: plan\.patches must be a table, found 3"),
         ("patches = {roof = 3}", r"plan\.patches\.roof must be a table, found 3"),
-        ('patches = {roof = {tension = 2.0, at = "b"}}', "wrong kind"),
+        (
+            'patches = {roof = {tension = 2.0, at = "b"}}',
+            "'roof': at must be a point .x, y. .*found 'b'",
+        ),
+        ("patches = {roof = {tension = 2.0, at = 3}}", "at must be a point .* found 3"),
+        ("patches = {roof = {tension = 2.0, at = [1, nan]}}", "at must be a point"),
         ('patches = {roof = {tension = "b"}}', "tension must be a number"),
         ('holes = [{curve = {circle = {centre = [1, 1], radius = "x"}}}]', "wrong kind"),
         ('dividers = [{curve = [[2, 0], [2, 3]], wall = "a"}]\ntension = 2.0', "tension"),
@@ -205,8 +210,12 @@ def test_output_names_are_checked_before_any_work(tmp_path):
         check_outputs([tmp_path / "a.obj"])
     with pytest.raises(FileError, match="named twice"):
         check_outputs([tmp_path / "b.obj", tmp_path / "b.obj"])
-    with pytest.raises(FileError, match=r"did you mean '.obj'"):
-        check_outputs([tmp_path / "b.obk"])
+    with pytest.raises(FileError, match=r"b.obk: unknown suffix .*did you mean '.obj'"):
+        check_names(["b.obk"])
+    with pytest.raises(FileError, match=r"b.png: .*a picture has an option of its own"):
+        check_names(["b.png"])
+    with pytest.raises(FileError, match=r"b.jpg: a picture is written as .png"):
+        check_names([], "b.jpg")
     with pytest.raises(FileError, match="there is no folder"):
         check_outputs([tmp_path / "away" / "b.obj"])
     check_outputs([tmp_path / "away" / "b.obj"], tmp_path / "away")
@@ -214,8 +223,40 @@ def test_output_names_are_checked_before_any_work(tmp_path):
 
 def test_a_folder_that_may_not_be_written_to_is_refused_before_any_work(small, monkeypatch):
     monkeypatch.setattr("os.access", lambda path, mode: False)
+    monkeypatch.setattr("pcmc.project.running.surface_of", None)
     with pytest.raises(FileError, match="is read-only"):
         run(small)
+    with pytest.raises(FileError, match="is read-only"):
+        run(small, small.parent / "new" / "one")
+    with pytest.raises(FileError, match=r"small.toml is a file; the output needs a folder"):
+        run(small, small / "new")
+    assert [p.name for p in small.parent.iterdir()] == ["small.toml"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"roof.obj"', '"roof.obk"', "roof.obk: unknown suffix '.obk'; did you mean '.obj'"),
+        ("files =", 'picture = "roof.jpg"\nfiles =', "roof.jpg: a picture is written as .png"),
+    ],
+)
+def test_names_of_output_are_told_with_the_project(small, old, new, message):
+    with pytest.raises(FileError, match=message) as caught:
+        load(changed(small, old, new))
+    assert str(caught.value).startswith(f"{small}: ")
+
+
+@pytest.mark.parametrize("text", ["[plan]\ngröße = 1", "[größe]", "[plan]\na = {süd = 1}"])
+def test_letters_beyond_a_to_z_need_quotes_and_this_is_said(small, text):
+    small.write_text(text, encoding="utf-8")
+    with pytest.raises(FileError, match=r"not TOML: .*letters beyond a-z stand in quotes"):
+        load(small)
+    small.write_text("[plan", encoding="utf-8")
+    with pytest.raises(FileError, match=r"at end of document\)$"):
+        load(small)
+    small.write_text("# größe\nplan = ]", encoding="utf-8")
+    with pytest.raises(FileError, match=r"at line 2, column 8\)$"):
+        load(small)
 
 
 def test_a_folder_that_is_not_there(small):
@@ -307,7 +348,9 @@ def test_a_project_is_read_with_the_mark_of_windows_editors(small):
 
 
 def test_a_bad_view_is_refused_before_any_work(small):
-    for view, message in (('"diagnal"', "did you mean 'diagonal'"), ("[30]", "two angles")):
+    for view, message in (
+        ('"diagnal"', "did you mean 'diagonal'"), ("[30]", "two angles"), ("[nan, 30]", "two angles"),
+    ):  # fmt: skip
         text = small.read_text(encoding="utf-8")
         changed(small, "files =", f"view = {view}\nfiles =")
         with pytest.raises(FileError, match=message):

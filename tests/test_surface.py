@@ -38,6 +38,7 @@ def more(point, *triangles, patch=0):
 
 BAD = {
     "nan": (vertices(2, 1, np.nan, 0), r"vertices\[2\] = .* is not finite \(1 such"),
+    "far": (vertices(2, 1, 1e51, 0), r"vertices\[2\] = .* is farther out than 1e\+50 \(1 such"),
     "infinite": (vertices([3, 4], np.inf), r"vertices\[3\] = .* is not finite \(2 such"),
     "flat vertices": (
         {"vertices": np.zeros((5, 2))},
@@ -130,6 +131,8 @@ def test_the_square_itself_is_good():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (("roof", 1e300), r"patch 'roof': tension must be at most 1e\+50, found 1e\+300"),
+        (("roof", 1.0, -1e51), r"patch 'roof': pressure must be at most 1e\+50"),
         (("roof", -1.0), r"patch 'roof': tension must be a finite number ≥ 0, found -1\.0"),
         (("roof", np.nan), "patch 'roof': tension must be .* found nan"),
         (("roof", np.inf), "patch 'roof': tension must be .* found inf"),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
+from typing import Annotated
+
 import typer
 
 from .showing import convert, explore, plot
@@ -20,6 +23,23 @@ app = typer.Typer(
     130 stopped by Ctrl-C.
     """,
 )
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        print("pcmc", version("pcmc"))
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Say it and leave."),
+    ] = False,
+) -> None:
+    pass
+
 
 for name, act, what in (
     ("solve", solve_, "Solve a surface or a project, certify and write it."),

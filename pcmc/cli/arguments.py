@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from .. import project as projects
-from ..errors import OptionError
-from ..io import read
+from ..errors import FileError, OptionError, unknown
+from ..io import FORMATS, read
 from ..surface import Surface
 
 TOML = ".toml"
@@ -45,7 +45,15 @@ Colour = Annotated[
 
 def surface_in(file: Path) -> Surface:
     """A surface from its file, or the one that a project starts from."""
+    check_input(file)
     return projects.build(file) if file.suffix.lower() == TOML else read(file)
+
+
+def check_input(file: Path) -> None:
+    """Refuse a file that is neither a project nor a surface by its name."""
+    suffix = file.suffix.lower()
+    if suffix not in (TOML, *FORMATS):
+        raise FileError(f"{file}: {unknown('suffix', suffix, [TOML, *FORMATS])}")
 
 
 def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str] | None) -> Surface:
@@ -75,7 +83,7 @@ def values_of(text: str) -> tuple[str, list[Any]]:
     (('alpha', [2, 4.5]), ('wall', ['upright']))
     """
     name, sign, values = text.partition("=")
-    if not (name and sign and values):
+    if not (name and sign and all(values.split(","))):
         raise OptionError(f"expected NAME=VALUE or NAME=V1,V2, found {text!r}")
     return name, [_value(one) for one in values.split(",")]
 

@@ -34,6 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for kind in (FileWarning, FreeSurfaceWarning):
             warnings.simplefilter("always", kind)
         warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")
+        _any_letter(sys.stdout)
         with endings():
             return _run(sys.argv[1:] if arguments is None else list(arguments))
 
@@ -50,8 +51,12 @@ def _run(arguments: list[str]) -> int:
     except BrokenPipeError:  # the reader of a pipe has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return NOT_CERTIFIED
-    except (PcmcError, MissingExtra, OSError) as error:
+    except (PcmcError, MissingExtra) as error:
         _say(f"error: {error}")
+        return BAD_INPUT
+    except OSError as error:
+        where = "" if error.filename is None else f"{error.filename}: "
+        _say(f"error: {where}{error.strerror or error}")
         return BAD_INPUT
     except Exception as error:
         if isinstance(error, exits.Abort):
@@ -76,6 +81,12 @@ def _command() -> tuple[Callable[..., Any], ModuleType]:
     from .app import app
 
     return typer.main.get_command(app), typer
+
+
+def _any_letter(stream: Any) -> None:
+    r"""Have letters that the terminal's or a pipe's encoding lacks written as \\xf6 instead of failing."""
+    if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
+        stream.reconfigure(errors="backslashreplace")
 
 
 def _interrupted() -> int:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from .. import project as projects
-from ..errors import FileError, OptionError
+from ..errors import FileError, OptionError, unknown
 from ..interrupts import held
 from ..io import load, write
 from ..surface import Surface
@@ -41,6 +41,7 @@ def convert(
     Example:
       pcmc convert roof.pcmc roof.3dm
     """
+    projects.check_names([output])
     projects.check_outputs([output])
     surface = retensioned(surface_in(file), tension, pressure)
     kept = _kept(file) if not (tension or pressure) else {}
@@ -123,8 +124,14 @@ def _example(name: str, parameters: dict[str, Any]) -> Surface:
     from ..sweep.child import resolve
 
     try:
+        if ":" not in name:
+            known: Any = resolve("generators:__all__")
+            if name not in known:
+                raise OptionError(unknown("example", name, known))
         build = resolve(name if ":" in name else f"generators:{name}")
         inspect.signature(build).bind(**parameters)
+    except OptionError:
+        raise
     except (ImportError, AttributeError, ValueError, TypeError) as error:
         raise OptionError(f"--example {name}: {error}") from None
     surface: Surface = build(**parameters)

@@ -13,7 +13,7 @@ from .. import project as projects
 from ..certificate import certify
 from ..io import write
 from ..remesh import remesh
-from .arguments import TOML, Input, Pressures, Settings, retensioned, surface_in
+from .arguments import TOML, Input, Pressures, Settings, check_input, retensioned, surface_in
 from .codes import NOT_CERTIFIED, OK, code, names, report
 from .progress import working
 
@@ -71,6 +71,7 @@ def _project(
     file: Path, folder: Path | None, output: list[Path] | None, picture: Path | None
 ) -> projects.Project:
     """The project, with the output asked for in place of its own."""
+    check_input(file)
     if file.suffix.lower() != TOML:
         return projects.Project(file, files=output or (), picture=picture, folder=folder)
     project = projects.load(file).in_folder(file.parent if folder is None else folder)
@@ -121,6 +122,7 @@ def remesh_(
       pcmc remesh roof.pcmc --edge-length 0.25 -o fine.pcmc
     """
     stage = projects.Remeshing(edge_length, near_curves, chord=chord, when="before")
+    projects.check_names(output)
     projects.check_outputs(output)
     if not solved:
         with working() as say:

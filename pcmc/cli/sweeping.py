@@ -55,6 +55,7 @@ def sweep(
       pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
     """
     from ..sweep import run, write_table
+    from ..sweep.store import FAILED
 
     for path, suffixes in ((csv, (".csv", ".parquet")), (store, ())):
         _check_place(path, suffixes)
@@ -72,6 +73,7 @@ def sweep(
         write_table(csv, table)
     columns = [c for c in (*grid, "status", "verdict", "targets_met") if c in table]
     print(table[columns].to_string())
+    _say_failures(table[table["status"].isin(FAILED)])
     if len(table) < len(cases):
         return INTERRUPTED
     good = table["verdict"].isin(["stable", "neutral"]) & table.get("targets_met", True)
@@ -90,6 +92,13 @@ def _cases(what: str, grid: dict[str, Any], fixed: dict[str, Any], method: str |
             " as generators:two_caps"
         )
     return Sweep(solve_case, grid, {"generator": what, "method": method or "newton", **fixed})
+
+
+def _say_failures(failed: Any) -> None:
+    """Why cases failed, each reason once."""
+    for message, cases in failed.groupby("message", sort=False):
+        others = f" and {len(cases) - 1} more" if len(cases) > 1 else ""
+        print(f"case {cases.index[0]}{others}: {cases['status'].iloc[0]}: {message}")
 
 
 def _check_place(path: Path | None, suffixes: tuple[str, ...]) -> None:

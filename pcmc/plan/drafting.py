@@ -74,6 +74,12 @@ def _check_size(plan: Plan) -> None:
             f"edge_length={plan.edge_length:g} would make about {count:.2g} triangles; at most"
             f" {MOST} are allowed"
         )
+    size = float(np.hypot(np.ptp(x), np.ptp(y)))
+    if plan.edge_length > size:
+        raise PlanError(
+            f"edge_length={plan.edge_length:g} is longer than the plan, {size:.4g} from corner to"
+            " corner; use a smaller one"
+        )
 
 
 def _lines(plan: Plan) -> tuple[list[Line], list[Curve]]:

@@ -74,6 +74,18 @@ class Area:
     pressure: float = 1.0
     at: Any = None
 
+    def __post_init__(self) -> None:
+        if self.at is None:
+            return
+        try:
+            points = np.atleast_2d(np.asarray(self.at, dtype=float))
+        except (TypeError, ValueError):
+            points = np.empty(0)
+        if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+            raise OptionError(
+                f"patch {self.name!r}: at must be a point [x, y] or a list of such, found {self.at!r}"
+            )
+
 
 @dataclass(frozen=True, eq=False)
 class Plan:

@@ -24,7 +24,7 @@
 """
 
 from .file import Project, build, load, surface_of
-from .output import COLOURS, check_outputs, check_picture, paint, save, write_all
+from .output import COLOURS, check_names, check_outputs, check_picture, paint, save, write_all
 from .remeshing import Remeshing
 from .running import Outcome, carry_out, reporter, run, settle, uninterrupted
 from .varied import check_varied, digest, is_project, varied
@@ -36,6 +36,7 @@ __all__ = [
     "Remeshing",
     "build",
     "carry_out",
+    "check_names",
     "check_outputs",
     "check_picture",
     "check_varied",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,7 +15,7 @@ from ..errors import FileError, OptionError, PcmcError
 from ..plan import Plan, plan_from
 from ..surface import Surface
 from .keys import check_keys, entries, options_of, tables
-from .output import check_picture
+from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
 
 if TYPE_CHECKING:
@@ -92,9 +93,17 @@ def read_data(path: Path) -> tuple[str, dict[str, Any]]:
     except UnicodeDecodeError as error:
         raise FileError(f"{path}: byte {error.start} is not text; is it a TOML file?") from None
     except tomllib.TOMLDecodeError as error:
-        raise FileError(f"{path}: not TOML: {error}") from None
+        raise FileError(f"{path}: not TOML: {error}{_quotes(text, str(error))}") from None
     check_keys(path, text, data)
     return text, data
+
+
+def _quotes(text: str, said: str) -> str:
+    """What to do where TOML stops at a letter beyond a-z."""
+    place = re.search(r"at line (\d+), column (\d+)", said)
+    if place is None or text.split("\n")[int(place[1]) - 1][int(place[2]) - 1 :][:1].isascii():
+        return ""
+    return "; names with letters beyond a-z stand in quotes"
 
 
 def project_of(path: Path, data: Mapping[str, Any]) -> Project:
@@ -137,6 +146,7 @@ def _project(path: Path, data: Mapping[str, Any]) -> Project:
         raise OptionError(f"output files: expected a list of names, found {files!r}")
     if not isinstance(picture, str | None):
         raise OptionError(f"output picture: expected a name, found {picture!r}")
+    check_names(files, picture)
     view, colour = output.get("view", "diagonal"), output.get("colour", "patches")
     check_picture(view, colour)
     return Project(

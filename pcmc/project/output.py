@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
 from collections.abc import Callable, Iterable
@@ -109,8 +110,21 @@ def check_picture(view: Any, colour: str) -> None:
     if isinstance(view, str):
         if view not in VIEWS:
             raise OptionError(unknown("view", view, VIEWS))
-    elif len(view) != 2 or not all(isinstance(angle, int | float) for angle in view):
+    elif len(view) != 2 or not all(
+        isinstance(angle, int | float) and math.isfinite(angle) for angle in view
+    ):
         raise OptionError(f"view: expected a name or two angles in degrees, found {view!r}")
+
+
+def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> None:
+    """Refuse names of files that hold no surface, and of a picture that is none."""
+    for file in files:
+        suffix = Path(file).suffix.lower()
+        if suffix not in io.FORMATS:
+            hint = "; a picture has an option of its own" if suffix == ".png" else ""
+            raise FileError(f"{file}: {unknown('suffix', suffix, io.FORMATS)}{hint}")
+    if picture is not None and Path(picture).suffix.lower() != ".png":
+        raise FileError(f"{picture}: a picture is written as .png; name it so")
 
 
 def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
@@ -119,9 +133,6 @@ def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
     if made is not None and made.exists() and not made.is_dir():
         raise FileError(f"{made}: is a file; the output needs a folder")
     for path in paths:
-        suffix = path.suffix.lower()
-        if suffix not in (*io.FORMATS, ".png"):
-            raise FileError(f"{path}: {unknown('suffix', suffix, [*io.FORMATS, '.png'])}")
         if path.is_dir():
             raise FileError(f"{path}: is a folder; give the name of a file")
         place = os.path.normcase(path.absolute())
@@ -131,5 +142,9 @@ def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
         folder = path.parent
         if folder != made and not folder.is_dir():
             raise FileError(f"{path}: there is no folder {folder}; make it first")
-        if folder.is_dir() and not os.access(folder, os.W_OK):
-            raise FileError(f"{path}: cannot be written (the folder {folder} is read-only)")
+        there = next(f for f in (folder.absolute(), *folder.absolute().parents) if f.exists())
+        if not there.is_dir():
+            raise FileError(f"{path}: {there} is a file; the output needs a folder")
+        if not os.access(there, os.W_OK):
+            shown = folder if folder.is_dir() else there
+            raise FileError(f"{path}: cannot be written (the folder {shown} is read-only)")

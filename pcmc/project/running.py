@@ -15,7 +15,7 @@ from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from .file import Project, load, surface_of
-from .output import PathLike, Say, check_outputs, save, silent
+from .output import PathLike, Say, check_names, check_outputs, save, silent
 
 if TYPE_CHECKING:
     from ..design import Design
@@ -83,6 +83,7 @@ def carry_out(
 ) -> Outcome:  # fmt: skip
     """A project already loaded, as ``run``; ``changed`` is applied to the surface it starts from."""
     say, outputs = progress or silent, project.outputs
+    check_names(project.files, project.picture)
     check_outputs(outputs, project.folder)
     say("reading" if project.plan is None else "meshing the plan")
     start = surface_of(project)
