@@ -17,12 +17,16 @@ Units: E force·length, ∇E force, with tension in force/length and pressure in
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.sparse import coo_array, csr_array
 
 from . import kernels
 from .arrays import Floats
 from .surface import Surface
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
 def energy(surface: Surface) -> float:
@@ -94,6 +98,8 @@ def hessian(surface: Surface) -> csr_array:
     >>> bool(abs(hessian(flat) @ flat.vertices.ravel() - 0).max() < 2)
     True
     """
+    from scipy.sparse import coo_array, csr_array
+
     blocks = np.empty((surface.m, 3, 3, 3, 3))
     kernels.hessian_blocks(
         surface.vertices, surface.faces, surface.patch_of_face, np.array(surface.plane.point),

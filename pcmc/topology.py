@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from .arrays import Bools, Ints
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array  # at run time where it is needed: many surfaces never ask
 
 SHEET, CURVE, POINT = 0, 1, 2
 
@@ -182,6 +184,8 @@ def vertex_kind(ends: Ints, vertex_count: int) -> Ints:
 
 def components(edges: Ints, vertex_count: int) -> Ints:
     """(n,) int: label of each vertex's connected part."""
+    from scipy.sparse.csgraph import connected_components
+
     return connected_components(_adjacency(edges, vertex_count), directed=False)[1]
 
 
@@ -209,6 +213,8 @@ def _touched(edges: Ints, vertex_count: int) -> Bools:
 
 
 def _adjacency(edges: Ints, vertex_count: int) -> csr_array:
+    from scipy.sparse import coo_array, csr_array
+
     rows, columns = edges[:, 0], edges[:, 1]
     index = np.arange(1, len(edges) + 1)
     half = coo_array((index, (rows, columns)), shape=(vertex_count, vertex_count))
@@ -226,6 +232,8 @@ def _split_at(pairs: Ints, stop: Bools, vertex_count: int) -> tuple[Ints, Ints]:
 
 def _chain(graph: csr_array, start: int, closed: bool) -> Ints:
     """Vertices of a path or a ring in order from ``start``."""
+    from scipy.sparse.csgraph import breadth_first_order
+
     order, before = breadth_first_order(graph, start, directed=False)
     if not closed or len(order) < 3:
         return order

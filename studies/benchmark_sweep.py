@@ -26,8 +26,13 @@ def sweeps(quick: bool) -> list[Row]:
 
     The start of the workers counts in both times, so a short sweep gains less by the second.
     """
+    with tempfile.TemporaryDirectory() as folder:
+        return _rows(Path(folder) / "mesh", quick)
+
+
+def _rows(mesh: Path, quick: bool) -> list[Row]:
     tensions = FEW if quick else TENSIONS
-    flow = flow_sweep(SHORT if quick else ITERATIONS, tensions)
+    flow = flow_sweep(mesh, SHORT if quick else ITERATIONS, tensions)
     geometric = geometric_sweep(tensions)
     rows = []
     for what, sweep, repeats, most in (
@@ -42,7 +47,7 @@ def sweeps(quick: bool) -> list[Row]:
             Row(f"{what}, 2 workers over 1", one / two, "times", size,
                 least=None if quick else RATIO),
         ]  # fmt: skip
-    start = sweep_seconds(flow_sweep(1, tensions[:1]), 1)
+    start = sweep_seconds(flow_sweep(mesh, 1, tensions[:1]), 1)
     return [*rows, Row("start of a worker, with a case of one iteration", start, "s")]
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import pandas as pd
 
 from pcmc.errors import SweepError
@@ -11,12 +14,19 @@ from .folder import Folder
 
 
 def run_sweep(
-    folder: Folder, name: str, sweep: Sweep, *, workers: int | None = None, limit: float = 120.0
+    folder: Folder,
+    name: str,
+    sweep: Sweep,
+    *,
+    workers: int | None = None,
+    limit: float = 120.0,
+    scratch: Sequence[Path] = (),
 ) -> pd.DataFrame:
     """A row per case, in the grid's order. Times go to ``name_times``.
 
     While it runs, the cases are stored in the study's folder ``build``, which no commit takes in. A
-    run that was stopped goes on from there; one that ends takes the store away.
+    run that was stopped goes on from there; one that ends takes the store and the ``scratch`` files of its
+    cases away.
 
     Raises
     ------
@@ -32,7 +42,8 @@ def run_sweep(
         )
     times = provenance(read_store(store))[["wall_time"]].round(3)
     folder.write_table(f"{name}_times", times.reset_index())
-    store.unlink()
+    for path in (store, *scratch):
+        path.unlink()
     if not any(store.parent.iterdir()):
         store.parent.rmdir()
     return table

@@ -25,11 +25,13 @@ from studies.study import perform
 RESULTS = Path(__file__).parents[1] / "results"
 
 
-def test_flow_at_three_triples():
-    near = alpha_grid.flow_case(4.0, 4.0, 3.0, 1.2, 200)
+def test_flow_at_two_triples(tmp_path):
+    mesh = tmp_path / "mesh"
+    sweep = alpha_grid.flow_sweep(mesh, 200, [1.0])
+    near = alpha_grid.flow_case(str(mesh), 4.0, 4.0, 3.0, 200)
     assert near["status"] == "iteration_limit"
     assert near["gradient_squared"] < alpha_grid.CONVERGED
-    assert alpha_grid.flow_case(1.0, 1.0, 1.0, 1.2, 200)["status"] == "diverged"
+    assert alpha_grid.flow_case(**next(iter(sweep)))["status"] == "diverged"
 
 
 def test_branches_start_from_what_shares_a_patch_then_from_the_nearest():

@@ -178,6 +178,37 @@ def test_a_full_disk_stops_the_sweep_with_nothing_lost(stored, monkeypatch, tmp_
     same(run(SWEEP, path, workers=1), frame)
 
 
+def test_a_disk_that_fails_later_stops_the_sweep(stored, monkeypatch, tmp_path):
+    """Some file systems find room for a line only when it is forced to the disk."""
+    path, force = tmp_path / "s.jsonl", os.fsync
+
+    def fail(descriptor):
+        raise OSError(errno.EDQUOT, os.strerror(errno.EDQUOT))
+
+    monkeypatch.setattr(store_module, "FORCE_EVERY", 0.0)
+    monkeypatch.setattr(store_module.os, "fsync", fail)
+    with pytest.raises(FileError, match=r"quota exceeded.* 0 cases stored before it are safe"):
+        run(SWEEP, path, workers=1)
+    monkeypatch.setattr(store_module.os, "fsync", force)
+    same(run(SWEEP, path, workers=1), stored[2])
+
+
+@pytest.mark.parametrize(("every", "forced"), [(0.0, 6), (3600.0, 1)])
+def test_every_record_is_forced_to_the_disk_in_the_end(
+    every, forced, stored, monkeypatch, tmp_path
+):
+    path, force, sizes = tmp_path / "s.jsonl", os.fsync, []
+    monkeypatch.setattr(store_module, "FORCE_EVERY", every)
+    monkeypatch.setattr(
+        store_module.os, "fsync", lambda d: (force(d), sizes.append(os.fstat(d).st_size))
+    )
+    with store_module.open_store(path, SWEEP) as store:
+        for record in read_store(stored[0]):
+            store.append(record)
+    assert len(sizes) == forced
+    assert sizes[-1] == path.stat().st_size
+
+
 def test_a_disk_full_at_the_header_runs_no_case(monkeypatch, tmp_path):
     def refuse(descriptor, data):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import OptionError, SweepError
 from .executors import Submit, open_pool
 from .grid import Sweep
-from .store import Record, open_store
+from .store import FORCE_EVERY, Record, open_store
 from .table import table
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def run(
     Parameters
     ----------
     sweep : the cases.
-    store : file that each record is forced to as soon as it is there. Run the same sweep with the
+    store : file that each record is written to as soon as it is there. Run the same sweep with the
         same file again after a crash, and it goes on from there. None: keep records in memory only.
     executor : where to run; left open at the end. Default: ``workers`` local processes.
     scheduler : address of a Dask scheduler whose workers run the cases: ``"tcp://127.0.0.1:8786"``.
@@ -111,7 +111,8 @@ def run(
             submit = stack.enter_context(pool)
             pending = stack.enter_context(_submitted(submit, todo, finished))
             progress = _progress(records, todo, len(sweep))
-            while pending and (future := _next(finished)) is not None:
+            idle = (lambda: None) if kept is None else kept.force
+            while pending and (future := _next(finished, idle)) is not None:
                 number = pending.pop(future)
                 record = Record(number, todo[number], **_outcome(future))
                 if kept is not None:
@@ -181,12 +182,13 @@ def _submitted(
             future.cancel()
 
 
-def _next(finished: SimpleQueue[Any]) -> Future[dict[str, Any]] | None:
-    """The next finished future, or None to stop."""
+def _next(finished: SimpleQueue[Any], idle: Callable[[], None]) -> Future[dict[str, Any]] | None:
+    """The next finished future, or None to stop; ``idle`` is called while there is none."""
     while True:
         with suppress(Empty):  # Windows tells of Ctrl-C only between waits
-            future: Future[dict[str, Any]] | None = finished.get(timeout=1.0)
+            future: Future[dict[str, Any]] | None = finished.get(timeout=FORCE_EVERY)
             return future
+        idle()
 
 
 def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any]:
