@@ -1,4 +1,4 @@
-"""Pinched walls written and read: whole where patches share vertices, as they stand where they do not."""
+"""Pinched walls written and read: whole where a format can tell of them, else as they stand."""
 
 from functools import partial
 
@@ -6,6 +6,7 @@ import meshio
 import numpy as np
 import pytest
 import pyvista
+import rhino3dm
 from shapes import rotation
 from starts import stationary, two_squares
 
@@ -13,9 +14,11 @@ import pcmc
 from pcmc import Plane, Surface, certify
 from pcmc.contact import resting, walls
 from pcmc.errors import FileError, FileWarning, SurfaceError
+from pcmc.io import load
+from pcmc.io.flat import KEY
 
 WHOLE = ["pcmc", "fe", "dmp", "obj", "ply", "vtp", "vtu"]
-APART = ["stl", "glb", "gltf", "3dm"]
+APART = ["glb", "gltf", "3dm"]
 
 
 def flat():
@@ -57,23 +60,110 @@ def test_a_pinched_surface_is_read_as_it_was(make, suffix, tmp_path):
 
 
 @pytest.mark.parametrize("suffix", APART)
+@pytest.mark.parametrize("make", [flat, partly, turned])
+def test_walls_without_height_come_back_where_patches_are_written_apart(make, suffix, tmp_path):
+    surface = make()
+    path = tmp_path / f"pinched.{suffix}"
+    pcmc.write(path, surface, scalars=SCALARS[suffix](surface))
+    again = pcmc.read(path)
+    digits = 1e-15 if suffix == "3dm" else 1e-6
+    order = np.lexsort(([p.name for p in again.patches],))
+    assert [again.patches[k] for k in order] == sorted(surface.patches, key=lambda p: p.name)
+    assert (again.n, again.m) == (surface.n, surface.m)
+    assert (again.fixed.sum(), again.on_plane.sum()) == (
+        surface.fixed.sum(),
+        surface.on_plane.sum(),
+    )
+    for patch in surface.patches:  # each triangle of each patch at its place
+        corners = [
+            np.sort(s.vertices[s.faces[s.patch_faces([s.patch_index(patch.name)])]].sum(axis=1), 0)
+            for s in (surface, again)
+        ]
+        np.testing.assert_allclose(corners[1], corners[0], rtol=0, atol=10 * digits * surface.size)
+    rests, back = resting(surface, walls(surface)), resting(again, walls(again))
+    np.testing.assert_allclose(
+        np.sort(again.vertices[back], axis=0), np.sort(surface.vertices[rests], axis=0), atol=1e-14
+    )
+    one = certify(surface)
+    assert pcmc.energy(again) == pytest.approx(one.energy, rel=10 * digits)
+    two = certify(again) if suffix == "3dm" else pcmc.solve(again, target="stationary").certificate
+    assert (two.verdict, two.index, two.pinched.sum()) == (
+        one.verdict,
+        one.index,
+        one.pinched.sum(),
+    )
+    assert two.residual < 1e-10
+    if suffix != "3dm":
+        assert len(load(path).scalars["height"]) == again.n
+
+
+SCALARS = {
+    "3dm": lambda surface: {},
+    "glb": lambda surface: {"height": surface.plane.height(surface.vertices)},
+}
+SCALARS["gltf"] = SCALARS["glb"]
+
+
 @pytest.mark.parametrize(("make", "names"), [(flat, 2), (partly, 3)])
-def test_where_patches_are_apart_what_stands_is_kept(make, names, suffix, tmp_path):
+def test_where_nothing_can_be_told_what_stands_is_kept(make, names, tmp_path):
     surface = make()
     with pytest.warns(FileWarning, match=r"cannot carry \d+ triangles of walls without height"):
-        pcmc.write(tmp_path / f"pinched.{suffix}", surface)
-    again = pcmc.read(tmp_path / f"pinched.{suffix}")
+        pcmc.write(tmp_path / "pinched.stl", surface)
+    again = pcmc.read(tmp_path / "pinched.stl")
     assert [p.name for p in again.patches] == ["left", "right", "wall"][:names]
     rests = resting(surface, walls(surface))
     place = np.linalg.norm(again.vertices[:, None] - surface.vertices[rests], axis=2)
     assert (place.min(axis=0) < 1e-6).all()
-    if suffix != "stl":
-        assert again.on_plane[place.argmin(axis=0)].all()
-        assert pcmc.energy(again) == pytest.approx(pcmc.energy(surface), rel=1e-6)
+
+
+def rhino_changed(path, change):
+    model = rhino3dm.File3dm.Read(str(path))
+    change(model)
+    assert model.Write(str(path), 7)
+
+
+def moved(model):
+    shift = rhino3dm.Transform.Translation(1e-3, 0.0, 0.0)
+    assert all(item.Geometry.Transform(shift) for item in model.Objects)
+
+
+def without_the_wall(model):
+    for item in list(model.Objects):
+        if item.Attributes.Name == "wall":
+            model.Objects.Delete(item.Attributes.Id)
+
+
+@pytest.mark.parametrize("change", [moved, without_the_wall])
+def test_walls_of_a_surface_changed_elsewhere_are_left_out_and_this_is_said(change, tmp_path):
+    surface, path = partly(), tmp_path / "pinched.3dm"
+    pcmc.write(path, surface)
+    rhino_changed(path, change)
+    with pytest.warns(FileWarning, match="walls without height were left out: the surface has"):
+        again = pcmc.read(path)
+    assert again.m < surface.m
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["{", "[]", '{"vertices": [[0, 0, 0]]}', None],
+)
+def test_a_damaged_description_of_walls_is_refused(text, tmp_path):
+    path = tmp_path / "pinched.3dm"
+    pcmc.write(path, flat())
+
+    def damage(model):
+        told = text or model.Layers[0].GetUserString(KEY).replace(
+            '"faces": [[', '"faces": [[9999, '
+        )
+        model.Layers[0].SetUserString(KEY, told)
+
+    rhino_changed(path, damage)
+    with pytest.raises(FileError, match=r"pinched\.3dm: its description of walls is damaged"):
+        pcmc.read(path)
 
 
 def test_a_standing_wall_is_written_without_a_warning(tmp_path):
-    for suffix in APART:
+    for suffix in [*APART, "stl"]:
         pcmc.write(tmp_path / f"standing.{suffix}", two_squares(4))
 
 

@@ -86,7 +86,14 @@ def load(path: str | os.PathLike[str]) -> Contents:
         with path.open("rb"):
             pass
         contents = without_unused(module.read(path))
-        return merged(contents) if getattr(module, "MERGE", False) else contents
+        if not getattr(module, "MERGE", False):
+            return contents
+        contents = merged(contents)
+        if contents.walls is not None:
+            from .flat import with_walls  # needs scipy.spatial, as merging does
+
+            contents = with_walls(contents)
+        return contents
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror or error})") from None
     except UnicodeDecodeError as error:
@@ -107,8 +114,9 @@ def write(
     """Write a surface as the suffix says; the file appears whole or not at all.
 
     A wall below a junction that rests on Π has triangles without area. Formats that write every patch
-    apart (.stl, .glb, .gltf, .3dm) join patches again by place and cannot keep them: they get the
-    surface as it stands, its resting junction sliding on Π.
+    apart (.stl, .glb, .gltf, .3dm) show the surface as it stands, without them; .glb, .gltf and .3dm say
+    beside it how those walls are, which ``read`` puts back. From .stl, and where the surface was changed
+    in between, the junction comes back sliding on Π.
 
     Parameters
     ----------
@@ -127,18 +135,25 @@ def write(
         raise FileError(f"{path}: the patch name {broken[0]!r} has a line break in it; rename it")
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
     kept = (getattr(module, "SCALARS", False), getattr(module, "FACE_SCALARS", True))
-    faces = surface.m
     lost = [k for k, v in scalars.items() if not (kept[0] and (kept[1] or len(v) == surface.n))]
     if certificate is not None and not getattr(module, "CERTIFICATE", False):
         lost.append("certificate")
+    told = None
     if getattr(module, "APART", False):
         below = walls(surface)
-        surface = pinched(surface, below, resting(surface, below))
-        if surface.m < faces:
-            lost.append(f"{faces - surface.m} triangles of walls without height")
+        shown = pinched(surface, below, resting(surface, below))
+        if shown.m < surface.m and getattr(module, "WALLS", False):
+            from .flat import walls_told
+
+            told = walls_told(surface, shown)
+        elif shown.m < surface.m:
+            lost.append(f"{surface.m - shown.m} triangles of walls without height")
+        surface = shown
     try:
         with whole(path) as temporary:
-            module.write(temporary, surface, scalars=scalars, certificate=_values(certificate))
+            module.write(
+                temporary, surface, scalars=scalars, certificate=_values(certificate), walls=told
+            )
     except OSError as error:
         raise FileError(f"{path}: cannot be written ({error.strerror or error})") from None
     except PcmcError as error:

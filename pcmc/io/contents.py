@@ -35,6 +35,7 @@ class Contents:
     notes : sentences on what was changed in reading ("3 quads were cut into triangles").
     joined : whether patches share their vertices for certain, as in what was written here. Then
         vertices at one place are meant: a wall without height below a junction that rests on Π.
+    walls : what ``flat.walls_told`` wrote, where patches were written apart and such walls are there.
     """
 
     vertices: Floats
@@ -47,6 +48,7 @@ class Contents:
     certificate: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     joined: bool = False
+    walls: str | None = None
 
 
 def support_of(surface: Surface) -> Ints:

@@ -1,7 +1,8 @@
 """glTF 2.0 (.glb, .gltf in one file): a mesh per patch, in single precision.
 
 glTF's y axis points up and ours is z: coordinates are turned on the way out and back. Supports and
-scalars at vertices are attributes of the vertices, tensions, pressures and plane metadata of the scene.
+scalars at vertices are attributes of the vertices, tensions, pressures, plane and walls without height
+metadata of the scene.
 """
 
 from __future__ import annotations
@@ -20,15 +21,18 @@ from ..errors import FileError
 from ..palette import patch_colors
 from ..surface import Surface
 from .contents import Contents, described, description, support_of
+from .flat import KEY
 from .optional import library, reading
 from .scenes import from_meshes
 
-SCALARS = MERGE = APART = True
+SCALARS = MERGE = APART = WALLS = True
 FACE_SCALARS = False
 SUPPORT = "_SUPPORT"
 
 
-def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any) -> None:
+def write(
+    path: Path, surface: Surface, scalars: Mapping[str, Floats], walls: str | None, **_: Any
+) -> None:
     """One file, buffers within."""
     trimesh = library("trimesh")
     data = {SUPPORT: support_of(surface).astype(np.float32)}
@@ -51,6 +55,8 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any)
         mesh.visual = trimesh.visual.TextureVisuals(material=material)
         scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name)
     scene.metadata["pcmc"] = description(surface)
+    if walls is not None:
+        scene.metadata[KEY] = walls
     if path.suffix.lower() == ".glb":
         path.write_bytes(trimesh.exchange.gltf.export_glb(scene, include_normals=True))
     else:
@@ -78,4 +84,5 @@ def read(path: Path) -> Contents:
     return replace(
         found, vertices=X, scalars=scalars,
         support=None if support is None else np.round(support).astype(np.int8),
+        walls=scene.metadata.get(KEY),
     )  # fmt: skip

@@ -29,8 +29,8 @@ FORMAT = "pcmc surface"
 
 
 def write(
-    path: Path, surface: Surface, scalars: Mapping[str, Floats], certificate: Mapping[str, Any]
-) -> None:
+    path: Path, surface: Surface, scalars: Mapping[str, Floats], certificate: Mapping[str, Any], **_: Any,
+) -> None:  # fmt: skip
     """The archive; the same surface gives the same bytes."""
     found = {
         k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object

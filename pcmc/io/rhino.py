@@ -1,6 +1,6 @@
 """Rhino (.3dm): a layer per patch with its mesh in double precision, in the patch's colour.
 
-Tensions, pressures and plane are the layers' user text; supports are point clouds on the layers "fixed"
+Tensions, pressures, plane and walls without height are the layers' user text; supports are point clouds on the layers "fixed"
 and "sliding". Scalars are lost.
 """
 
@@ -16,6 +16,7 @@ from ..arrays import Floats, Ints
 from ..errors import FileError
 from ..palette import patch_colors
 from ..surface import Surface
+from . import flat
 from .contents import (
     FIXED,
     FREE,
@@ -30,14 +31,14 @@ from .merge import TOLERANCE
 from .optional import library, reading
 from .polygons import triangulate
 
-MERGE = APART = True
+MERGE = APART = WALLS = True
 KEY = "pcmc"
 HELD = {"fixed": FIXED, "sliding": SLIDING}
 VERSION = 7  # of Rhino's format
 COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255)}
 
 
-def write(path: Path, surface: Surface, **_: Any) -> None:
+def write(path: Path, surface: Surface, walls: str | None, **_: Any) -> None:
     """Layers "patches::<name>" in metres; the plan's lengths are what they are."""
     rhino = library("rhino3dm")
     model = rhino.File3dm()
@@ -58,6 +59,8 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
             mesh.Faces.AddFace(*corners)
         mesh.Normals.ComputeNormals()
         model.Objects.AddMesh(mesh, attributes)
+    if walls is not None:
+        model.Layers[0].SetUserString(flat.KEY, walls)  # of the whole model, so once
     support = support_of(surface)
     for name, kind in HELD.items():
         held = surface.vertices[support == kind]
@@ -91,13 +94,15 @@ def read(path: Path) -> Contents:
     names: list[str] = []
     held: dict[int, list[Floats]] = {FIXED: [], SLIDING: []}
     about, others, start = Description(), 0, 0
+    walls: str | None = None
     for item in model.Objects:
         place, geometry = item.Attributes.LayerIndex, item.Geometry
         layer = model.Layers[place] if 0 <= place < len(model.Layers) else None
         name = path.stem if layer is None else layer.Name
         told = None if layer is None else layer.GetUserString(KEY)
-        if told:
+        if layer is not None and told:
             about = described(told)
+            walls = layer.GetUserString(flat.KEY) or walls
         if isinstance(geometry, rhino.Mesh):
             points = _coordinates(geometry.Vertices.ToPoint3dArray())
             faces = np.array([geometry.Faces[k] for k in range(geometry.Faces.Count)]).reshape(
@@ -131,6 +136,7 @@ def read(path: Path) -> Contents:
         support,
         about.plane,
         notes=notes,
+        walls=walls,
     )
 
 
