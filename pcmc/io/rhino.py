@@ -1,7 +1,7 @@
 """Rhino (.3dm): a layer per patch with its mesh in double precision, in the patch's colour.
 
-Tensions, pressures, plane and walls without height are the layers' user text; supports are point clouds on the layers "fixed"
-and "sliding". Scalars are lost.
+Tensions, pressures, plane and walls without height are the layers' user text; supports are point clouds
+on the layers "fixed" and "sliding". Scalars are lost.
 """
 
 from __future__ import annotations
