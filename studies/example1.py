@@ -150,7 +150,9 @@ def _shape_numbers(junction: pd.DataFrame, records: pd.DataFrame) -> dict[str, f
         for name, n in (("coarse", COARSE), ("fine", FINE)):
             found[f"largest_{method}_{name}"] = records[f"largest_error_{method}"][_main(2.0, n)]
             found[f"mean_{method}_{name}"] = records[f"mean_error_{method}"][_main(2.0, n)]
-    other = [junction.turn[f"wall{wall:g}-n{COARSE}-parallel-printed"] for wall in WALLS]
+    parallel = [f"wall{wall:g}-n{COARSE}-parallel-printed" for wall in WALLS]
+    other = [junction.turn[name] for name in parallel]
+    found["height_3_parallel"] = junction.height[parallel[-1]]
     found["least_turn_step_parallel"] = min(b - a for a, b in pairwise(other))
     return found
 

@@ -24,6 +24,8 @@ HOLDS, NEAR, DIFFERS, MISSING = "reproduced", "near", "differs", "not measured"
 REPRODUCED, CONDITIONAL, NOT = (
     "reproduced", "conditionally reproduced", "not reproduced",
 )  # fmt: skip
+OWN = "; our addition"
+FIGURE_COLUMNS = ["figure", "shows", "study", "label", "claims", "reason"]
 RELATIONS = {
     "=": lambda ours, paper, tolerance: abs(ours - paper) <= tolerance,
     "<": lambda ours, paper, tolerance: ours < paper,
@@ -44,9 +46,12 @@ class Claim:
     tolerance : half a unit of the last printed digit, for "=".
     near : relative difference (to the paper's) up to which a number that differs is called near.
     figures : which figures rest on it.
-    needed : whether a figure is not reproduced where this fails; otherwise it is a condition.
+    own : an addition of ours beside the paper's claims, which no figure's label counts.
     given : an input of the paper's, which a study merely has to use.
     bound : whether ``paper`` is a number that we chose to stand for the paper's words.
+    instead : ``ours`` of another claim that says the same of another reading of the paper, or of
+        another mesh; where this one fails and that one holds, that reading is the condition.
+    fails : how it reads where it does not hold, with {ours}, {paper} and {instead} in it.
     """
 
     says: str
@@ -57,9 +62,11 @@ class Claim:
     tolerance: float = 0.0
     near: float = 0.0
     figures: tuple[str, ...] = ()
-    needed: bool = True
+    own: bool = False
     given: bool = False
     bound: bool = False
+    instead: str = ""
+    fails: str = ""
 
     @property
     def kind(self) -> str:
@@ -93,13 +100,19 @@ class Finding:
         """Ours less the paper's."""
         return self.ours - self.paper
 
-    @property
-    def sentence(self) -> str:
-        """The claim without its example, and what we find, in words."""
+    def reason(self, instead: float = math.nan) -> str:
+        """The claim without its example, and what we find, in words that stand alone."""
+        digits = 4 if self.claim.kind == "sentence" else 5
+        ours, printed = f"{self.ours:.4g}", f"{self.paper:.{digits}g}"
+        if self.claim.fails:
+            return self.claim.fails.format(ours=ours, paper=printed, instead=f"{instead:.4g}")
         says = self.claim.says.partition(": ")[2] or self.claim.says
-        bound = self.claim.relation if self.claim.relation != "=" else ""
-        word = "printed" if self.claim.kind == "number" else "to hold"
-        return f"{says}: {self.ours:.4g}, {word} {bound}{self.paper:.5g}"
+        if self.claim.kind == "sentence":
+            return f"{says}: ours {ours}, to hold it must be {self.claim.relation} {printed}"
+        if self.claim.relation != "=":
+            return f"{says}: ours {ours}, printed {self.claim.relation} {printed}"
+        share = f" ({self.difference / self.paper:+.1%})" if self.paper else ""
+        return f"{says}: ours {ours}, printed {printed}{share}"
 
 
 @cache
@@ -117,6 +130,16 @@ def paper(path: Path = PAPER) -> tuple[list[Claim], list[Figure]]:
             raise FileError(
                 f"{path}: {claim.says!r} names figure {missing.pop()}, which is not there"
             )
+        if claim.instead and claim.instead not in {other.ours for other in claims}:
+            raise FileError(
+                f"{path}: {claim.says!r} names claim {claim.instead}, which is not there"
+            )
+        try:
+            claim.fails.format(ours=0, paper=0, instead=0)
+        except (KeyError, IndexError, ValueError):
+            raise FileError(
+                f"{path}: {claim.says!r}: fails may hold {{ours}}, {{paper}} and {{instead}} only"
+            ) from None
     return claims, figures
 
 
@@ -141,22 +164,33 @@ def judge(claim: Claim, measured: Mapping[str, float]) -> Finding:
     return Finding(claim, value, ours, verdict)
 
 
-def label(figure: Figure, findings: Sequence[Finding]) -> tuple[str, str]:
-    """A figure's label and the reason for it, from the findings that it rests on.
+def label(figure: Figure, findings: Sequence[Finding]) -> tuple[str, str, str]:
+    """A figure's label, how many of the paper's claims about it hold, and the reason.
 
-    Not reproduced: a needed claim fails or nothing was measured. Conditionally: a claim is only
-    near, one that is not needed fails, or the figure holds something that the text does not tell.
+    What the paper says or prints about the figure decides: neither its inputs nor our own additions
+    count. Not reproduced: a claim fails, and so does its other reading if it has one; or nothing was
+    measured. Conditionally: a claim holds on its other reading only, or is only near, or what the
+    figure holds is not in the text. Reproduced: every claim holds as it stands.
     """
     mine = [f for f in findings if figure.number in f.claim.figures]
+    claims = [f for f in mine if not (f.claim.own or f.claim.given)]
+    held = [f for f in claims if f.verdict == HOLDS]
+    near = sum(f.verdict == NEAR for f in claims)
+    count = f"{len(held)} of {len(claims)}" + (f", {near} near" if near else "")
     if all(f.verdict == MISSING for f in mine):
-        return NOT, f"nothing is measured for it; run the study {figure.study}"
-    failed = [f for f in mine if f.verdict in (DIFFERS, MISSING) and f.claim.needed]
-    if failed:
-        return NOT, _reason(failed)
-    conditions = [f for f in mine if f.verdict != HOLDS]
-    if conditions or figure.unknown:
-        return CONDITIONAL, "; ".join(filter(None, (_reason(conditions), figure.unknown)))
-    return REPRODUCED, ""
+        return NOT, count, f"nothing is measured for it; run the study {figure.study}"
+    other = {f.claim.ours: f for f in findings if f.verdict == HOLDS or f.verdict == NEAR}
+    inputs = [f for f in mine if f.claim.given and f.verdict != HOLDS]
+    failed = [f for f in claims if f.verdict in (DIFFERS, MISSING)]
+    lost = [f for f in failed if f.claim.instead not in other]
+    if not claims:
+        count = "inputs only"
+    if lost or inputs:
+        return NOT, count, _reason([*inputs, *lost], other)
+    if len(held) < len(claims) or figure.unknown:
+        reason = _reason([f for f in claims if f.verdict != HOLDS], other)
+        return CONDITIONAL, count, "; ".join(filter(None, (reason, figure.unknown)))
+    return REPRODUCED, count, ""
 
 
 def compare(measured: Mapping[str, float]) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -169,7 +203,7 @@ def compare(measured: Mapping[str, float]) -> tuple[pd.DataFrame, pd.DataFrame]:
                 "study": f.claim.ours.split(".")[0],
                 "kind": f.claim.kind,
                 "what": f.claim.says,
-                "where": f.claim.where,
+                "where": f.claim.where + (OWN if f.claim.own else ""),
                 "relation": f.claim.relation,
                 "paper": f.paper,
                 "ours": f.ours,
@@ -180,7 +214,7 @@ def compare(measured: Mapping[str, float]) -> tuple[pd.DataFrame, pd.DataFrame]:
         ]
     )
     rows = [(f.number, f.shows, f.study, *label(f, findings)) for f in figures]
-    return comparison, pd.DataFrame(rows, columns=["figure", "shows", "study", "label", "reason"])
+    return comparison, pd.DataFrame(rows, columns=FIGURE_COLUMNS)
 
 
 def read_measured(results: Path) -> dict[str, float]:
@@ -191,8 +225,9 @@ def read_measured(results: Path) -> dict[str, float]:
     }
 
 
-def _reason(findings: Sequence[Finding]) -> str:
-    return "; ".join(f.sentence for f in findings)
+def _reason(findings: Sequence[Finding], other: Mapping[str, Finding]) -> str:
+    ours = {key: finding.ours for key, finding in other.items()}
+    return "; ".join(f.reason(ours.get(f.claim.instead, math.nan)) for f in findings)
 
 
 def _build(kind: type[Any], entry: Mapping[str, Any], path: Path) -> Any:

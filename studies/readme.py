@@ -8,7 +8,7 @@ from pathlib import Path
 from pcmc.errors import FileError
 
 from .folder import Folder, write_bytes
-from .report import HEADS, comparison_cells, figure_cells, given_sentence
+from .report import FIGURES, HEADS, comparison_cells, figure_cells, given_sentence
 
 
 def write_readme(readme: Path, results: Path) -> None:
@@ -43,10 +43,9 @@ def comparison(results: Path) -> list[str]:
     numbers, sentences = (
         table(HEADS[kind], comparison_cells(found, kind)) for kind in ("number", "sentence")
     )
-    head = ["Figure", "What it shows", "Label", "Reason"]
     return [
         *numbers, "", given_sentence(found), "",
-        *table(head, figure_cells(figures)), "",
+        *table(FIGURES, figure_cells(figures)), "",
         "<details><summary>What the paper says in words, measured</summary>", "", *sentences, "",
         "</details>",
     ]  # fmt: skip

@@ -18,6 +18,7 @@ HEADS = {
     "sentence": ["What the paper says", "Where", "To hold", "Ours", "Verdict"],
     "number": ["What the paper prints", "Where", "Paper", "Ours", "Difference", "Verdict"],
 }
+FIGURES = ["Figure", "What it shows", "Label", "Claims that hold", "Why not more"]
 COLOURS = {"reproduced": "green", "near": "yellow", "conditionally reproduced": "yellow"}
 
 
@@ -31,9 +32,9 @@ def write_comparison(results: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 def show(comparison: pd.DataFrame, figures: pd.DataFrame, console: Console) -> None:
     """The figures, then the comparison: sentences, and last the printed numbers."""
-    table = Table("figure", "what it shows", "label", "reason")
-    for number, shows, name, reason in figure_cells(figures):
-        table.add_row(number, shows, _coloured(name), reason)
+    table = Table(*FIGURES)
+    for number, shows, name, claims, reason in figure_cells(figures):
+        table.add_row(number, shows, _coloured(name), claims, reason)
     console.print(table)
     for kind, head in HEADS.items():
         table = Table(*head)
@@ -77,7 +78,7 @@ def comparison_cells(comparison: pd.DataFrame, kind: str) -> list[list[str]]:
 
 
 def figure_cells(figures: pd.DataFrame) -> list[list[str]]:
-    columns = figures[["figure", "shows", "label", "reason"]].fillna("").astype(str)
+    columns = figures[["figure", "shows", "label", "claims", "reason"]].fillna("").astype(str)
     return [list(row) for row in columns.itertuples(index=False)]
 
 

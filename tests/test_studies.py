@@ -119,21 +119,46 @@ def test_claim_between_two_of_our_numbers():
     assert judge(claim, {"s.fine": 2.0}).verdict == "not measured"
 
 
-def test_label_of_a_figure_follows_from_its_claims():
-    needed = Claim("Ex. 1: needed", "Sec. 1", "s.a", 1.0, tolerance=0.1, near=0.5, figures=("1",))
-    extra = Claim("Ex. 1: extra", "Sec. 1", "s.b", 1.0, figures=("1",), needed=False)
-    figure = Figure("1", "a shape", "s")
+def test_label_of_a_figure_follows_from_the_papers_claims():
+    first = Claim("Ex. 1: first", "Sec. 1", "s.a", 1.0, tolerance=0.1, near=0.5, figures=("1",))
+    second = Claim("Ex. 1: second", "Sec. 1", "s.b", 2.0, "<", figures=("1",), instead="s.c",
+                   fails="b is {ours}, printed {paper}; otherwise {instead}")  # fmt: skip
+    third = Claim("Ex. 1: third", "Sec. 1", "s.c", 2.0, "<", figures=("1",), own=True)
+    side = Claim("Ex. 1: side", "Sec. 1", "s.d", 4.0, figures=("1",), given=True)
+    failed = "b is 3, printed 2; otherwise "
 
-    def labelled(a, b, unknown=""):
-        findings = [judge(claim, {"s.a": a, "s.b": b}) for claim in (needed, extra)]
+    def labelled(a=1.0, b=1.0, c=1.0, d=4.0, unknown=""):
+        measured = {"s.a": a, "s.b": b, "s.c": c, "s.d": d}
+        findings = [judge(claim, measured) for claim in (first, second, third, side)]
         return label(Figure("1", "a shape", "s", unknown), findings)
 
-    assert labelled(1.0, 1.0) == (REPRODUCED, "")
-    assert labelled(1.0, 1.0, "its scale") == (CONDITIONAL, "its scale")
-    assert labelled(1.0, 2.0) == (CONDITIONAL, "extra: 2, printed 1")
-    assert labelled(1.4, 1.0) == (CONDITIONAL, "needed: 1.4, printed 1")
-    assert labelled(9.0, 1.0) == (NOT, "needed: 9, printed 1")
-    assert label(figure, [])[0] == NOT
+    assert labelled() == (REPRODUCED, "2 of 2", "")
+    assert labelled(c=9.0) == (REPRODUCED, "2 of 2", "")  # ours, and no claim of the paper's
+    assert labelled(unknown="its scale") == (CONDITIONAL, "2 of 2", "its scale")
+    assert labelled(b=3.0) == (CONDITIONAL, "1 of 2", failed + "1")
+    assert labelled(b=3.0, c=9.0) == (NOT, "1 of 2", failed + "nan")
+    near = "first: ours 1.4, printed 1 (+40.0%)"
+    assert labelled(a=1.4) == (CONDITIONAL, "1 of 2, 1 near", near)
+    assert labelled(a=1.4, b=3.0)[2] == f"{near}; {failed}1"
+    assert labelled(a=9.0) == (NOT, "1 of 2", "first: ours 9, printed 1 (+800.0%)")
+    assert labelled(d=5.0) == (NOT, "2 of 2", "side: ours 5, printed 4 (+25.0%)")
+    assert label(Figure("1", "a shape", "s"), [])[0] == NOT
+    assert label(Figure("1", "", "s", "all"), [judge(side, {"s.d": 4.0})])[1] == "inputs only"
+
+
+def test_reasons_say_what_is_measured():
+    bound = judge(Claim("Ex. 1: flat", "", "s.a", 0.5, "<", bound=True), {"s.a": 0.7})
+    assert bound.reason() == "flat: ours 0.7, to hold it must be < 0.5"
+    printed = judge(Claim("Ex. 1: rest", "", "s.a", 0.5, "<"), {"s.a": 0.7})
+    assert printed.reason() == "rest: ours 0.7, printed < 0.5"
+
+
+def test_no_claim_says_the_same_as_another_or_leans_on_the_one_before():
+    claims, _ = paper()
+    says = [claim.says.partition(": ")[2] for claim in claims]
+    leaning = ("and ", "so ", "the same ")
+    assert not [s for s in says if s.startswith(leaning) or " there" in s]
+    assert len({claim.says for claim in claims}) == len(claims)
 
 
 def test_every_figure_of_the_examples_rests_on_claims_of_a_study_that_exists():
@@ -156,6 +181,8 @@ def test_paper_file_with_a_wrong_relation_or_key_is_refused(tmp_path):
         ('paper=1\nrelation="~"', "relation must be"),
         ('paper=1\nfigures=["7"]', "names figure 7"),
         ("paper=1\nnearly=3", "nearly"),
+        ('paper=1\ninstead="s.d"', "names claim s.d"),
+        ('paper=1\nfails="{theirs}"', "fails may hold"),
     ):
         bad.write_text(entry + line)
         paper.cache_clear()
