@@ -358,4 +358,5 @@ def test_a_start_of_pure_noise_ends_and_says_how(backend, target, seed):
     else:
         assert found.verdict in (Verdict.DEGENERATE, Verdict.NOT_CONVERGED, Verdict.NO_EQUILIBRIUM)
         assert found.detail
-    assert triangle_quality(result.surface.vertices, surface.faces).min() >= 0.0
+    noisy, mended = (triangle_quality(Y, surface.faces).min() for Y in (X, result.surface.vertices))
+    assert noisy < 0.1 < 0.3 < mended
