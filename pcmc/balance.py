@@ -30,10 +30,16 @@ def load_ratio(surface: Surface) -> float:
     ends = surface.vertices[topo.edges[boundary]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     capacity = float(surface.tensions[edge_patch[boundary]] @ length)
+    return abs(load(surface)) / capacity if capacity > 0.0 else 0.0
+
+
+def load(surface: Surface) -> float:
+    """Σ p A_T ν_T · n: the force of the pressure along Π's normal n, which the supports carry."""
     corners = surface.vertices[surface.faces]
     vector = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    push = surface.pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
-    return float(abs(push)) / capacity if capacity > 0.0 else 0.0
+    return float(
+        surface.pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
+    )
 
 
 def coarseness(surface: Surface) -> float:
@@ -50,7 +56,7 @@ def coarseness(surface: Surface) -> float:
     X, topo = surface.vertices, surface.topology
     ends = X[topo.edges[topo.boundary_edge]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    corners = X[surface.faces[surface.pressures[surface.patch_of_face] != 0.0]]
+    corners = X[surface.faces[~surface.walls[surface.patch_of_face]]]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
     plan = 0.5 * abs(float(across @ np.array(surface.plane.normal)))
     if not len(length) or plan == 0.0:
@@ -78,6 +84,39 @@ def unbalanced(standing: Surface, pinchable: Bools) -> str:
                 f"the tensions at the junction {names} cannot balance: {tensions[-1]:g} > {others}"
             )
     return ""
+
+
+def pressure_left(surface: Surface) -> Floats:
+    """(e,) the pressures of the triangles at each edge, each counted along its sense there.
+
+    Where it is zero along every edge that may leave its support, the forces of the pressure do not
+    depend on which point of Π the volumes are seen from (see ``pcmc.energy``).
+    """
+    topo, F = surface.topology, surface.faces
+    sense = np.where(F[:, [1, 2, 0]] < F[:, [2, 0, 1]], 1.0, -1.0)
+    pressure = surface.pressures[surface.patch_of_face, None] * sense
+    left = np.bincount(topo.edge_of_face.ravel(), pressure.ravel(), len(topo.edges))
+    return np.asarray(left, dtype=float)
+
+
+def seen_from_point(surface: Surface) -> str:
+    """Names where the shape depends on the point of Π, as pressures do not cancel; or empty."""
+    left = pressure_left(surface)
+    held = surface.fixed | surface.on_plane
+    open_edges = ~held[surface.topology.edges].all(axis=1)
+    largest = np.abs(surface.pressures).max(initial=0.0)
+    found = np.flatnonzero(open_edges & (np.abs(left) > 1e-12 * largest))
+    if not len(found):
+        return ""
+    edge = found[0]
+    at = (surface.topology.edge_of_face == edge).any(axis=1)
+    names = " | ".join(surface.patches[k].name for k in np.unique(surface.patch_of_face[at]))
+    place = surface.vertices[surface.topology.edges[edge]].mean(axis=0).round(4).tolist()
+    return (
+        f"along {len(found)} edges that nothing holds ({names} near {place}) the pressures leave"
+        f" {abs(left[edge]):.3g} over, which acts from there to the point of Π: the shape depends on"
+        " that point; a wall takes the pressure of one room less that of the other"
+    )
 
 
 def conormal_sum(surface: Surface) -> Floats:

@@ -13,8 +13,17 @@ import numpy as np
 import pandas as pd
 
 from .arrays import Bools, Floats, Ints
-from .balance import boundary_table, coarseness, junction_table, load_ratio, reactions, unbalanced
-from .contact import Walls, pinched, resting, standing_structure, walls
+from .balance import (
+    boundary_table,
+    coarseness,
+    junction_table,
+    load,
+    load_ratio,
+    reactions,
+    seen_from_point,
+    unbalanced,
+)
+from .contact import Walls, excess, pinched, resting, standing_structure, walls
 from .curvature import METHODS, curvature_error, mean_curvature
 from .energy import energy_and_gradient, patch_areas, volume
 from .factor import SingularMatrix
@@ -48,7 +57,8 @@ class Certificate:
     Attributes
     ----------
     verdict, detail : what the surface is, and what exactly (which mode, patch or place).
-    residual : ‖Bᵀ∇E‖ over ``scale``; the forces left in the motion space, relative.
+    residual : ‖Bᵀ∇E‖ over ``scale``: the forces left in the motion space, and the pull on pinched
+        vertices beyond what their wall holds, relative.
     scale : norm of the single triangles' tension forces, force.
     energy, volume : E (force·length) and the volume under pressure (length³).
     index : Morse index; None where the surface is not at rest. Rigid motions are not counted.
@@ -60,6 +70,8 @@ class Certificate:
     junctions : a row a junction curve: length, forces left and Σ α n, force/length.
     boundaries : a row a held boundary curve: length, reaction, largest reaction per length. A corner
         gives each of its curves an equal part of its reaction; per length it counts whole.
+    load, support : forces along Π's normal, of the pressure and of all supports; they add up to 0
+        but for what the mesh leaves along the sheets.
     reactions : (n,3) force that each support exerts on the surface.
     pinched : (k,) vertices where a junction rests on Π and its wall has no height.
     load_ratio : pressure along Π's normal over the most that the boundary's tension could carry; see
@@ -81,6 +93,8 @@ class Certificate:
     patches: pd.DataFrame
     junctions: pd.DataFrame
     boundaries: pd.DataFrame
+    load: float
+    support: float
     reactions: Floats
     pinched: Ints
     load_ratio: float
@@ -121,6 +135,7 @@ class Certificate:
             ("triangle quality", f"{self.quality:.3f} (sliding walls {self.walls_quality:.3f})"),
             ("pinched vertices", str(len(self.pinched))),
             ("load over capacity", f"{self.load_ratio:.3f}"),
+            ("load, reactions", f"{self.load:.6g}, {self.support:.6g} along the plane's normal"),
         ]
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
         tables = [
@@ -159,19 +174,20 @@ def certify(
     space = motion_space(standing, frame, X)
     value, forces = energy_and_gradient(standing, X, supports=False)
     scale = force_scale(standing, frame, X)
-    residual = float(np.linalg.norm(space.pull(forces))) / scale
+    unheld = excess(standing, below, rests)
+    residual = float(np.hypot(np.linalg.norm(space.pull(forces)), np.linalg.norm(unheld))) / scale
     quality, walls_quality = _quality(standing, below)
     system = None
     if residual <= tolerance and quality > COLLAPSED:
         system = _system(standing, frame, space)
     values, fields = _modes(system, modes)
-    ratio = load_ratio(standing)
+    ratio, carried = load_ratio(standing), reactions(standing)
     verdict, detail = _verdict(
         surface, residual, tolerance, quality, system, values, ratio, status, below.pinchable
     )
     return Certificate(
         verdict=verdict,
-        detail=detail,
+        detail="; ".join(filter(None, (detail, _pulled_off(unheld), seen_from_point(standing)))),
         residual=residual,
         scale=scale,
         energy=value,
@@ -185,7 +201,9 @@ def certify(
         patches=_patch_table(surface, standing),
         junctions=junction_table(standing, space.project(forces)),
         boundaries=boundary_table(standing),
-        reactions=reactions(standing),
+        load=load(standing),
+        support=float((carried @ np.array(surface.plane.normal)).sum()),
+        reactions=carried,
         pinched=np.flatnonzero(rests),
         load_ratio=ratio,
         status=status,
@@ -244,6 +262,17 @@ def _verdict(
     return Verdict.STABLE, ""
 
 
+def _pulled_off(unheld: Floats) -> str:
+    """Names the resting vertices that the sheets pull harder than the wall holds; or empty."""
+    found = np.flatnonzero(unheld)
+    if not len(found):
+        return ""
+    return (
+        f"at {len(found)} pinched vertices, the first {found[0]}, the sheets pull harder than the"
+        " wall can: it stands off there once solved"
+    )
+
+
 def _where_collapsed(surface: Surface, sliding: Bools) -> str:
     """Names the worst triangle outside the patches that may pinch, and what pressed on it."""
     X, topo = surface.vertices, surface.topology
@@ -256,7 +285,8 @@ def _where_collapsed(surface: Surface, sliding: Bools) -> str:
     said = f"worst is face {face} of patch {name!r} near {place}, quality {outer[face]:.1e}"
     reach = 1.5 * float(np.median(edge_lengths(surface)))
     near = np.linalg.norm(X - corners.mean(axis=0), axis=1) <= reach
-    if (near & surface.fixed).any() and (near & topo.on_junction & ~surface.fixed).any():
+    slips = (near & surface.fixed).any() and (near & topo.on_junction & ~surface.fixed).any()
+    if slips and (near & surface.on_plane).any():
         said += (
             "; the junction there slips along a support, which does not hold its end: hold the bottom"
             " of its wall"

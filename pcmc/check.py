@@ -152,7 +152,7 @@ def _vanished(F: Ints, patch: Ints, patches: Sequence[Any], held: Bools, low: Bo
     Such a wall has a vertex on Π that nothing holds there and that a sheet under pressure shares. Of
     its faces those may have no area that have two vertices on Π, one of them not held.
     """
-    wall = np.array([p.pressure == 0.0 for p in patches])[patch]
+    wall = np.array([p.auxiliary for p in patches])[patch]
     rests = low & ~held
     outer = np.zeros(len(low), dtype=bool)
     outer[F[~wall]] = True

@@ -25,6 +25,7 @@ from .topology import topology
 
 SNAP = 1e-3  # of a crest edge: a vertex this near to hanging straight below a crest vertex does
 FLAT = 1e-9  # height of the crest, relative to the size, below which it tells no rows apart
+SLACK = 1e-9  # of the capacity: an excess below is rounding
 LEAN = 4.0  # crest heights that a wall vertex may stand off from straight below the crest
 
 
@@ -46,7 +47,7 @@ class Walls:
     anchored : (n,) bool, fixed crest vertices on Π, where a wall ends in a corner.
     edges : (k,2) crest edges.
     tension : (k,) tension of the wall below each of those edges.
-    side : (n,) +1 or -1, the side of Π a vertex stands on.
+    side : (n,) +1 or -1, the side of Π a vertex stands on; on Π, the side it is pushed to.
     pinchable : (patches,) bool, the patches that are such walls.
     """
 
@@ -68,11 +69,11 @@ def walls(surface: Surface) -> Walls:
     n = surface.n
     height = surface.plane.height(surface.vertices)
     outer = np.zeros(n, dtype=bool)
-    outer[surface.faces[surface.pressures[surface.patch_of_face] != 0.0]] = True
+    outer[surface.faces[~surface.walls[surface.patch_of_face]]] = True
     pinchable = np.zeros(len(surface.patches), dtype=bool)
     hanging, edges, tension = [], [np.empty((0, 2), dtype=np.int64)], [np.empty(0)]
     for index, patch in enumerate(surface.patches):
-        if patch.pressure != 0.0:
+        if not patch.auxiliary:
             continue
         faces = surface.faces[surface.patch_of_face == index]
         members = np.unique(faces)
@@ -100,7 +101,7 @@ def walls(surface: Surface) -> Walls:
         anchored=above & surface.fixed & low,
         edges=crest,
         tension=np.concatenate(tension),
-        side=np.where(height < 0.0, -1.0, 1.0),
+        side=np.where(np.where(low, _pushed(surface), height) < 0.0, -1.0, 1.0),
         pinchable=pinchable,
     )
 
@@ -212,6 +213,15 @@ def pull_and_capacity(surface: Surface, below: Walls, rests: Bools) -> tuple[Flo
     return pull, np.where(rests, capacity, 0.0)
 
 
+def excess(surface: Surface, below: Walls, rests: Bools) -> Floats:
+    """(n,) the pull on each resting vertex of a pinched surface beyond what its wall can take, force.
+
+    At rest there is none: a junction that is pulled harder stands off Π.
+    """
+    pull, capacity = pull_and_capacity(surface, below, rests)
+    return np.where(pull > capacity * (1.0 + SLACK), pull - capacity, 0.0)
+
+
 def crest_spacing(surface: Surface, below: Walls) -> Floats:
     """(n,) the shorter crest edge at each crest vertex, length; infinite elsewhere."""
     ends = surface.vertices[below.edges]
@@ -222,16 +232,13 @@ def crest_spacing(surface: Surface, below: Walls) -> Floats:
     return spacing
 
 
-def lifted(surface: Surface, below: Walls, free: Bools, fraction: float = 0.05) -> Surface:
+def lifted(surface: Surface, below: Walls, free: Bools, fraction: float | Floats) -> Surface:
     """The full surface with the given resting vertices raised off Π by a fraction of their spacing.
 
-    The wall below comes back hanging from them.
+    The fraction may be one for each vertex (n,). The wall below comes back hanging from them.
     """
-    spacing = crest_spacing(surface, below)
-    X = surface.vertices.copy()
-    X[free] += (fraction * spacing[free] * below.side[free])[:, None] * np.array(
-        surface.plane.normal
-    )
+    rise = fraction * np.where(free, crest_spacing(surface, below), 0.0) * below.side
+    X = surface.vertices + rise[:, None] * np.array(surface.plane.normal)
     back = free[below.ends].any(axis=1)
     place = hung(surface, below, X)
     X[below.hanging[back]] = place[below.hanging[back]]
@@ -353,5 +360,16 @@ def _down(surface: Surface, below: Walls, rests: Bools) -> Bools:
     return down
 
 
+def _pushed(surface: Surface) -> Floats:
+    """(n,) force along Π's normal with which the pressure of the sheets pushes each vertex."""
+    corners = surface.vertices[surface.faces]
+    vector = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    force = (surface.pressures * ~surface.walls)[surface.patch_of_face] / 6.0
+    push = force * (vector @ np.array(surface.plane.normal))
+    return np.asarray(
+        np.bincount(surface.faces.ravel(), np.repeat(push, 3), surface.n), dtype=float
+    )
+
+
 def _of_walls(surface: Surface) -> Bools:
-    return surface.pressures[surface.patch_of_face] == 0.0
+    return surface.walls[surface.patch_of_face]

@@ -28,10 +28,12 @@ class Patch:
     ----------
     name : str, unique in its surface.
     tension : α ≥ 0, force per length. At rest the patch has mean curvature pressure / (2 α).
-    pressure : p, force per area along the positive normal; 0 for an auxiliary patch (a wall). It is
-        a difference, that below the patch less that above it. So a wall between two rooms of
-        pressures p_1 and p_2 carries p_1 - p_2, its normal pointing from room 1 to room 2; see
-        ``pcmc.energy`` for what E means where it does not.
+    pressure : p, force per area along the positive normal. It is a difference, that below the patch
+        less that above it. So a wall between two rooms of pressures p_1 and p_2 carries p_1 - p_2,
+        its normal pointing from room 1 to room 2; see ``pcmc.energy`` for what E means where it does
+        not.
+    wall : whether the patch stands between rooms and is no roof: its cone is no part of the volume,
+        and it may pinch. A patch without pressure is a wall in any case.
 
     >>> Patch("roof", tension=2.0).target_curvature
     0.25
@@ -40,9 +42,11 @@ class Patch:
     name: str
     tension: float
     pressure: float = 1.0
+    wall: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", str(self.name))
+        object.__setattr__(self, "wall", bool(self.wall))
         for key in ("tension", "pressure"):
             value = getattr(self, key)
             try:
@@ -69,13 +73,13 @@ class Patch:
         if self.tension == 0.0 and self.pressure != 0.0:
             raise SurfaceError(
                 f"patch {self.name!r}: a patch under pressure {self.pressure} needs a tension > 0;"
-                " only a wall (pressure=0) may have tension 0"
+                " only a wall between equal pressures (pressure=0) may have tension 0"
             )
 
     @property
     def auxiliary(self) -> bool:
-        """Whether the patch is a wall: no pressure acts on it."""
-        return self.pressure == 0.0
+        """Whether the patch is a wall: said to be one, or without pressure."""
+        return self.wall or self.pressure == 0.0
 
     @property
     def target_curvature(self) -> float:
@@ -196,6 +200,11 @@ class Surface:
     def topology(self) -> Topology:
         """Edges, curves and points, from the faces alone; shared by all moved copies."""
         return topology(self.faces, self.patch_of_face, len(self.vertices))
+
+    @cached_property
+    def walls(self) -> Bools:
+        """(k,) bool: which patches are walls."""
+        return np.array([p.auxiliary for p in self.patches])
 
     @cached_property
     def tensions(self) -> Floats:

@@ -5,7 +5,7 @@ import pytest
 from shapes import rotation, shaken
 from starts import double_bubble, four_fans, two_caps, two_squares
 
-from pcmc import Plane, Surface, energy, solve
+from pcmc import Patch, Plane, Surface, Verdict, certify, energy, solve
 from pcmc.contact import (
     beside,
     crest_spacing,
@@ -283,3 +283,66 @@ def test_the_wall_stands_just_below_the_tension_that_keeps_it_down():
     assert complementary(above.surface)[0].sum() == 7
     assert above.energy == pytest.approx(low.energy, rel=1e-3)  # the triangles may lie elsewhere
     assert complementary(below.surface)[0].sum() < 7
+
+
+@pytest.mark.parametrize("n", [6, 8, 10, 12])
+@pytest.mark.parametrize("alpha_aux", [2.2, 2.4, 2.5, 2.6, 2.7, 2.8])
+def test_any_strength_of_wall_settles(n, alpha_aux):
+    """Near the strength that keeps the junction down it stands off by less than 1/1000 of an edge."""
+    result = solve(two_squares(n, alpha_aux=alpha_aux), target="stationary")
+    assert result.converged
+    assert result.certificate.residual < 1e-11
+    rests, pull, capacity = complementary(result.surface)
+    assert (pull <= capacity * (1 + 1e-9)).all()
+    heights = result.surface.plane.height(result.surface.vertices)
+    assert (heights[walls(result.surface).can_rest & ~rests] > 0.0).all()
+
+
+def mirrored(surface, how):
+    """The surface hanging below Π: with its pressure turned round, or its faces."""
+    faces = surface.faces if how == "pressure" else surface.faces[:, ::-1]
+    sign = -1.0 if how == "pressure" else 1.0
+    return Surface(
+        surface.vertices * [1, 1, -1], faces, surface.patch_of_face,
+        [Patch(p.name, p.tension, sign * p.pressure) for p in surface.patches],
+        fixed=surface.fixed, on_plane=surface.on_plane,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("how", ["pressure", "faces"])
+def test_below_the_plane_walls_pinch_and_stand_off_alike(how):
+    above = solve(two_squares(6, alpha_aux=3.0))
+    below = solve(mirrored(two_squares(6, alpha_aux=3.0), how))
+    assert below.energy == pytest.approx(above.energy, rel=1e-12)
+    assert len(below.certificate.pinched) == len(above.certificate.pinched) == 5
+    lifted_up = solve(above.surface.retensioned({"wall": 1.0}))
+    lifted_down = solve(below.surface.retensioned({"wall": 1.0}))
+    assert len(lifted_down.certificate.pinched) == 0
+    assert lifted_down.energy == pytest.approx(lifted_up.energy, rel=1e-12)
+
+
+@pytest.mark.parametrize("weak", [0.0, 0.1, 1.0])
+def test_a_wall_too_weak_for_its_junction_is_not_at_rest(weak):
+    surface = solve(two_squares(8, alpha_aux=3.0)).surface.retensioned({"wall": weak})
+    found = certify(surface)
+    assert found.verdict is Verdict.NOT_CONVERGED
+    assert found.residual > 0.05
+    assert "at 7 pinched vertices" in found.detail
+
+
+def test_a_wall_under_pressure_pinches_like_one_without():
+    """Where its height vanishes so does what presses on it."""
+    given = two_squares(6, alpha_aux=3.0)
+    plain = solve(given)
+    patches = [Patch(p.name, p.tension, p.pressure, wall=p.auxiliary) for p in given.patches]
+    wall = given.patch_index("wall")
+    patches[wall] = Patch("wall", 3.0, 1e-3, wall=True)
+    pressed = solve(
+        Surface(
+            given.vertices, given.faces, given.patch_of_face, patches, fixed=given.fixed,
+            on_plane=given.on_plane,
+        )
+    )  # fmt: skip
+    assert pressed.converged
+    assert len(pressed.certificate.pinched) == 5
+    assert pressed.energy == pytest.approx(plain.energy, rel=1e-6)  # vertices lie elsewhere

@@ -57,7 +57,7 @@ def check_input(file: Path) -> None:
 
 
 def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str] | None) -> Surface:
-    loaded = [patch.name for patch in surface.patches if patch.pressure != 0.0]
+    loaded = [patch.name for patch in surface.patches if not patch.auxiliary]
     return surface.retensioned(
         _by_name(loaded, tension, "--tension"), _by_name(loaded, pressure, "--pressure")
     )

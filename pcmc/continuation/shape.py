@@ -51,7 +51,7 @@ class Shape:
         self.surface = pinched(surface, self.below, self.rests)
         self.frame: Structure = standing_structure(self.surface, self.below, self.rests)
         self.judged: Ints = self.surface.faces[~self.below.pinchable[self.surface.patch_of_face]]
-        self.pressed: Floats = (surface.pressures != 0.0).astype(float)
+        self.pressed: Floats = (~surface.walls).astype(float)
         self._backend = backend
         self._carrier: Carrier | None = None
         self._travels = bool(((self.frame.kind != SHEET) & ~self.surface.fixed).any())
@@ -102,6 +102,10 @@ class Shape:
     def volume_gradient(self, X: Floats) -> Floats:
         """(n,3) its gradient, supports applied, length²."""
         return weighted_gradient(self.surface, X, np.zeros_like(self.pressed), -self.pressed)
+
+    def top(self, X: Floats) -> int:
+        """The highest vertex over Π."""
+        return int(self.surface.plane.height(X).argmax())
 
     def height(self, X: Floats) -> float:
         """Height of the highest vertex over Π, length."""

@@ -326,7 +326,7 @@ def _measured(surface: Surface, tension: Floats, pressure: Floats) -> tuple[Floa
 def _indicator(surface: Surface, of: str | None) -> Floats:
     """(k,) 1 for the chosen patches, 0 for the others."""
     if of is None:
-        return (surface.pressures != 0.0).astype(float)
+        return (~surface.walls).astype(float)
     one = np.zeros(len(surface.patches))
     one[surface.patch_index(of)] = 1.0
     return one

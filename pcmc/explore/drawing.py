@@ -98,11 +98,11 @@ def reactions_per_length(surface: Surface, reactions: Floats) -> Floats:
 def findings(surface: Surface, found: Certificate) -> dict[str, Any]:
     """The certificate in numbers, for the page's table."""
     height = surface.plane.height(surface.vertices)
-    under_pressure = surface.pressures != 0.0
+    roof = ~surface.walls
     return {
         **found.numbers(),
         "height": float(height.max()),
-        "area": float(patch_areas(surface)[under_pressure].sum()),
+        "area": float(patch_areas(surface)[roof].sum()),
         "patches": [
             {"name": row["patch"], "mean_H": row["mean_H"], "area": row["area"]}
             for row in found.patches.to_dict(orient="records")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -156,7 +156,7 @@ def description(surface: Surface) -> str:
     """Patches, plane and counts as JSON, for the comment or metadata of a format that has one."""
     point, normal = surface.plane.point, surface.plane.normal
     return json.dumps({
-        "patches": [[p.name, p.tension, p.pressure] for p in surface.patches],
+        "patches": [astuple(p) for p in surface.patches],
         "plane": [point, normal],
         "counts": [surface.n, surface.m],
     })  # fmt: skip

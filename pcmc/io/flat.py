@@ -9,7 +9,7 @@ walls as they are, and on reading it takes their place.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -33,7 +33,7 @@ def walls_told(surface: Surface, shown: Surface) -> str:
         "above": np.isin(used, surface.faces[~wall]).tolist(),
         "faces": local.reshape(-1, 3).tolist(),
         "patch": surface.patch_of_face[wall].tolist(),
-        "patches": [[p.name, p.tension, p.pressure] for p in surface.patches],
+        "patches": [astuple(p) for p in surface.patches],
         "shown": int(np.count_nonzero(shown.pressures[shown.patch_of_face] == 0.0)),
     })  # fmt: skip
 

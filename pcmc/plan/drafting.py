@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -42,7 +43,8 @@ def surface(plan: Plan) -> Surface:
     raised = np.column_stack([mesh.points, height])
     inner = np.arange(len(raised)) >= len(drawn.points)
     X = to_space(polished(raised, mesh.triangles, inner, GOOD_ANGLE), plan.plane)
-    walls, wall_patches = _walls(plan, drawn, lines, X, base, fixed)
+    pressure = np.array([p.pressure for p in patches])[patch_of_face]
+    walls, wall_patches = _walls(plan, drawn, lines, mesh.triangles, pressure, X, base, fixed)
     return Surface(
         np.concatenate([X, walls.vertices]),
         np.concatenate([mesh.triangles, walls.faces]),
@@ -195,10 +197,15 @@ def _located(areas: Sequence[Area], mesh: PlanarMesh, count: int, centroid: Floa
 
 
 def _walls(
-    plan: Plan, drawn: Arrangement, lines: Sequence[Line], X: Floats, base: Floats, fixed: Bools
-) -> tuple[Standing, list[Patch]]:
+    plan: Plan, drawn: Arrangement, lines: Sequence[Line], triangles: Ints, pressure: Floats,
+    X: Floats, base: Floats, fixed: Bools,
+) -> tuple[Standing, list[Patch]]:  # fmt: skip
+    """The walls and their patches: one for each divider, and for each difference of pressure at it.
+
+    A wall between rooms takes the pressure of the one on its divider's left less that on its right.
+    """
     first = 1 + len(plan.holes)
-    walled = [d for d in plan.dividers if d.wall is not None]
+    kinds: list[tuple[int, float]] = []
     floor, level = np.zeros(len(X)), np.zeros(len(X), dtype=bool)
     tops = []
     for chain in drawn.chains:
@@ -211,7 +218,11 @@ def _walls(
             floor[chain.vertices] = base[chain.vertices]
         else:
             level[chain.vertices] = True
-        tops.append(WallTop(chain.vertices, walled.index(divider), divider.bottom != "sliding"))
+        one, two = chain.vertices[:2]
+        kind = (chain.line - first, _beside(triangles, pressure, one, two))
+        if kind not in kinds:
+            kinds.append(kind)
+        tops.append(WallTop(chain.vertices, kinds.index(kind), divider.bottom != "sliding"))
     mixed = np.flatnonzero(level & (floor != 0.0))
     if len(mixed):
         raise PlanError(
@@ -219,4 +230,22 @@ def _walls(
             " whose bottom is on the plane; give both the same bottom"
         )
     walls = stand(X, tops, plan.edge_length, plan.plane, fixed, floor)
-    return walls, [Patch(d.name, d.wall, pressure=0.0) for d in walled]
+    order = sorted(range(len(kinds)), key=lambda k: kinds[k][0])
+    walls = replace(walls, label=np.argsort(order)[walls.label] if kinds else walls.label)
+    return walls, [_wall_patch(plan, kinds, k) for k in order]
+
+
+def _beside(triangles: Ints, pressure: Floats, one: int, two: int) -> float:
+    """Pressure on the left of the edge from vertex ``one`` to ``two`` less that on its right."""
+    ahead = np.roll(triangles, -1, axis=1)
+    left = ((triangles == one) & (ahead == two)).any(axis=1)
+    right = ((triangles == two) & (ahead == one)).any(axis=1)
+    return float(pressure[left].sum() - pressure[right].sum())
+
+
+def _wall_patch(plan: Plan, kinds: Sequence[tuple[int, float]], number: int) -> Patch:
+    divider = plan.dividers[kinds[number][0]]
+    alike = [k for k, (line, _) in enumerate(kinds) if line == kinds[number][0]]
+    suffix = f"-{alike.index(number) + 1}" if len(alike) > 1 else ""
+    assert divider.wall is not None
+    return Patch(divider.name + suffix, divider.wall, kinds[number][1], wall=True)

@@ -27,8 +27,10 @@ class Divider:
     ----------
     curve : a Curve or its plain data; each end on the outline, a hole or another divider. What is
         drawn beyond the outline or across a hole is left out.
-    wall : tension of the wall, force/length, ≥ 0; None for no wall.
-    name : of the wall's patch; by default "wall 1", "wall 2", … in order.
+    wall : tension of the wall, force/length, ≥ 0; None for no wall. Between areas of different
+        pressures the difference acts on it, so that the shape is that of rooms under those pressures.
+    name : of the wall's patch; by default "wall 1", "wall 2", … in order. Where the difference of
+        pressure changes along the divider, each part is a patch of its own: "wall 1-1", "wall 1-2".
     bottom : "sliding" on Π; "held" on Π in all directions; or "sloped": held in all directions on
         the surface that the boundary curves span (for boundaries that leave Π). A sliding wall
         that ends on a straight edge tends to slip along it to where it is shorter; hold it, or end

@@ -54,7 +54,8 @@ def add_walls(
     """Put a wall, down to Π, under every border between two patches that has none.
 
     The walls share a vertical line where borders meet, and have rows as fine as the mesh. The wall
-    under the border of "a" and "b" is the patch "wall-a-b"; its normals point from a to b.
+    under the border of "a" and "b" is the patch "wall-a-b"; its normals point from a to b, and its
+    pressure is that of a less that of b: what acts on a wall between the two rooms.
 
     Parameters
     ----------
@@ -85,7 +86,8 @@ def add_walls(
     walled = [(c, pair) for c, pair in zip(borders, pair_of, strict=True) if pair in chosen]
     if not walled:
         return surface
-    label, patches = _labels([c for c, _ in walled], [pair for _, pair in walled], chosen)
+    pressure = {p.name: p.pressure for p in surface.patches}
+    label, patches = _labels([c for c, _ in walled], [pair for _, pair in walled], chosen, pressure)
     tops = [
         WallTop(_directed(surface, c), label[place], bottom == "held")
         for place, (c, _) in enumerate(walled)
@@ -244,6 +246,7 @@ def _labels(
     borders: Sequence[Curve],
     pairs: Sequence[tuple[str, str]],
     tension: Mapping[tuple[str, str], float],
+    pressure: Mapping[str, float],
 ) -> tuple[list[int], list[Patch]]:
     """A label for each border, and the labels' patches: one for each pair of names.
 
@@ -266,7 +269,10 @@ def _labels(
     for pair, number in names:
         alike = [n for p, n in names if p == pair]
         suffix = "" if number < 0 else f"-{alike.index(number) + 1}"
-        patches.append(Patch(f"wall-{pair[0]}-{pair[1]}{suffix}", tension[pair], pressure=0.0))
+        between = pressure[pair[0]] - pressure[pair[1]]
+        patches.append(
+            Patch(f"wall-{pair[0]}-{pair[1]}{suffix}", tension[pair], between, wall=True)
+        )
     return label, patches
 
 

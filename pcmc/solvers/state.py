@@ -8,10 +8,10 @@ from ..arrays import Bools, Floats, Ints
 from ..contact import (
     Walls,
     crest_spacing,
+    excess,
     hung,
     lifted,
     pinched,
-    pull_and_capacity,
     resting,
     settled,
     standing_structure,
@@ -23,6 +23,8 @@ from ..quality import compare, redistribution, worst_quality
 from ..surface import Surface
 
 LOW = 5e-3  # height, in spacings along the crest, at which a sinking junction is set to rest
+LIFT = 5e-2  # height, in the same, to which one that rests is lifted at first
+CAUTION = 0.25  # by which both are multiplied each time that a vertex is lifted again
 POOR = 2 / 3  # of the quality that is cared for: once spreading has failed, what is left to mend
 CARES = 60  # times that the vertices are spread at most
 RELEASES = 30  # times that resting junctions are lifted at most
@@ -51,6 +53,7 @@ class State:
         self.evaluations = 0
         self.version = 0
         self.cares, self.releases = CARES, RELEASES
+        self.caution: Floats = np.ones(surface.n)  # less where a vertex has been lifted in vain
         self._care_from, self._care_below = care, np.inf  # quality and residual that ask for it
         self._pinch(resting(surface, self.walls))
 
@@ -124,7 +127,8 @@ class State:
         height = self.surface.plane.height(X)
         above = self.walls.side * height
         sinks = above < self.walls.side * self.surface.plane.height(self.X)
-        down = standing & ((above <= 0.0) | (sinks & (above <= LOW * self.spacing)))
+        low = LOW * self.caution * self.spacing
+        down = standing & ((above <= 0.0) | (sinks & (above <= low)))
         X[down] -= height[down, None] * np.array(self.surface.plane.normal)
         X = hung(self.surface, self.walls, X, self.space)
         return X, down
@@ -165,15 +169,17 @@ class State:
         self.measure()
         return True
 
+    def overpulled(self) -> Bools:
+        """(n,) resting vertices that the sheets pull harder than the wall can hold."""
+        return excess(self.surface.moved(self.X), self.walls, self.rests) > 0.0
+
     def release(self) -> bool:
         """Lift the resting vertices that the sheets pull harder than the wall can hold."""
-        if not self.rests.any() or self.releases <= 0:
-            return False
-        pull, capacity = pull_and_capacity(self.surface.moved(self.X), self.walls, self.rests)
-        free = self.rests & (pull > capacity * (1 + 1e-9))
-        if not free.any():
+        free = self.overpulled()
+        if self.releases <= 0 or not free.any():
             return False
         self.releases -= 1
-        self.full = lifted(self.result_surface(), self.walls, free)
+        self.full = lifted(self.result_surface(), self.walls, free, LIFT * self.caution)
+        self.caution[free] *= CAUTION
         self._pinch(self.rests & ~free)
         return True
