@@ -312,6 +312,7 @@ def figure(folder: Folder) -> None:
         y="relative error", title="closed forms: energy, and mean distance from the exact surface",
     )  # fmt: skip
     ok = records[records.status == "converged"]
+    times = times.merge(ok[["family", "level"]])
     for key in ("largest", "mean"):
         convergence(
             {f.title: (mine.edge_length, mine[f"{key}_error_cotangent"]) for f in FAMILIES
