@@ -19,6 +19,10 @@ from .topology import Topology, topology
 
 Vector = tuple[float, float, float]
 
+FAR = (
+    30.0  # sizes: farther from the point of Π, volumes seen from there lose more than three digits
+)
+
 
 @dataclass(frozen=True)
 class Patch:
@@ -50,6 +54,8 @@ class Patch:
         for key in ("tension", "pressure"):
             value = getattr(self, key)
             try:
+                if isinstance(value, bool):
+                    raise TypeError
                 object.__setattr__(self, key, float(value))
             except (TypeError, ValueError):
                 raise SurfaceError(
@@ -202,6 +208,38 @@ class Surface:
         return topology(self.faces, self.patch_of_face, len(self.vertices))
 
     @cached_property
+    def uncancelled(self) -> Floats:
+        """(e,) the pressures left over at each edge that may leave its support, force/area.
+
+        Each triangle's counts along its sense there. Where all are zero, no force depends on which
+        point of Π the volumes are seen from.
+        """
+        topo, F = self.topology, self.faces
+        sense = np.where(F[:, [1, 2, 0]] < F[:, [2, 0, 1]], 1.0, -1.0)
+        pressure = self.pressures[self.patch_of_face, None] * sense
+        left = np.bincount(topo.edge_of_face.ravel(), pressure.ravel(), len(topo.edges))
+        held = (self.fixed | self.on_plane)[topo.edges].all(axis=1)
+        rounding = 1e-12 * np.abs(self.pressures).max(initial=0.0)
+        return np.where(held | (np.abs(left) <= rounding), 0.0, left)
+
+    @cached_property
+    def origin(self) -> Floats:
+        """(3,) the point that volumes are seen from: that of Π.
+
+        Drawn far from it, as in a survey's coordinates, a surface would lose its digits in volumes of
+        that size; there it is the middle of the surface or, if vertices slide, the point of Π below.
+        Forces are the same as long as the pressures cancel along all edges that nothing holds; where
+        they do not, the point of Π it remains.
+        """
+        point, middle = np.array(self.plane.point), self.vertices.mean(axis=0)
+        near = np.linalg.norm(middle - point) <= FAR * self.size
+        if near or self.uncancelled.any():
+            return point
+        if self.on_plane.any():
+            middle = middle - self.plane.height(middle) * np.array(self.plane.normal)
+        return np.asarray(middle)
+
+    @cached_property
     def walls(self) -> Bools:
         """(k,) bool: which patches are walls."""
         return np.array([p.auxiliary for p in self.patches])
@@ -229,10 +267,14 @@ class Surface:
         return names.index(name)
 
     def moved(self, vertices: npt.ArrayLike) -> Surface:
-        """The same surface with its vertices elsewhere, (n,3); faces, supports, patches are shared."""
+        """The same surface with its vertices elsewhere, (n,3); faces, supports, patches are shared.
+
+        Sliding vertices must stay on Π. Triangles may collapse: ``solve`` mends what it can.
+        """
         X = check.positions(vertices)
         if X.shape != self.vertices.shape:
             raise SurfaceError(f"vertices: expected shape {self.vertices.shape}, found {X.shape}")
+        check.on_plane(self.plane.height(X), self.on_plane, self.size)
         X.setflags(write=False)
         return self._with(vertices=X)
 
@@ -261,4 +303,6 @@ class Surface:
         names = ("vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane")
         for name in (*names, "topology"):
             other.__dict__[name] = changes.get(name, getattr(self, name))
+        if "patches" not in changes:  # seen from one point all along a solver's way
+            other.__dict__["origin"] = self.origin
         return other

@@ -125,7 +125,10 @@ def test_a_bad_value_is_told_in_a_line(small, old, new, message):
     ("line", "message"),
     [
         ("dividers = 3", r"line 3: dividers must be a list, found 3"),
-        ("holes = {curve = 3}", r"line 3: holes must be a list"),
+        (
+            "holes = {curve = 3}",
+            r"line 3: holes must be a list, found .*; write \[\[plan.holes\]\]",
+        ),
         ('supports = "x"', r"line 3: supports must be a list"),
         ("patches = 3", r"line 3: plan\.patches must be a table, found 3"),
         ("patches = {roof = 3}", r"plan\.patches\.roof must be a table, found 3"),

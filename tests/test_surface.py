@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from shapes import octahedron, pyramid, three_patches
+from starts import two_squares
 
 from pcmc import Patch, Plane, Surface
 from pcmc.errors import FreeSurfaceWarning, OptionError, PcmcError, SurfaceError
@@ -131,6 +132,7 @@ def test_the_square_itself_is_good():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (("roof", True), r"patch 'roof': tension must be a number, found True"),
         (("roof", 1e300), r"patch 'roof': tension must be at most 1e\+50, found 1e\+300"),
         (("roof", 1.0, -1e51), r"patch 'roof': pressure must be at most 1e\+50"),
         (("roof", -1.0), r"patch 'roof': tension must be a finite number ≥ 0, found -1\.0"),
@@ -263,3 +265,9 @@ def test_every_error_is_one_family():
     assert issubclass(SurfaceError, PcmcError)
     assert issubclass(OptionError, PcmcError)
     assert issubclass(PcmcError, ValueError)
+
+
+def test_moving_keeps_sliding_vertices_on_the_plane():
+    surface = two_squares(4)
+    with pytest.raises(SurfaceError, match="slides on the plane but lies 0.5 away"):
+        surface.moved(surface.vertices + [0, 0, 0.5])

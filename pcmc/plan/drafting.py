@@ -20,6 +20,7 @@ from .roof import EDGES, Area, Plan
 from .walls import Standing, WallTop, stand
 
 MOST = 5_000_000  # triangles
+STEEPEST = 10.0  # initial rise over the plan's size
 GOOD_ANGLE = 28.0  # degrees; below it the slope has spoilt a triangle that was good in plan
 
 
@@ -67,7 +68,7 @@ def _meshed(plan: Plan, drawn: Arrangement, holes: Sequence[Sequence[float]]) ->
 
 
 def _check_size(plan: Plan) -> None:
-    """An edge length that is a slip must not fill the memory."""
+    """A length that is a slip must not fill the memory, or lead to errors that do not name it."""
     x, y = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2].T
     area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
     count = area / (np.sqrt(0.1875) * plan.edge_length**2)
@@ -82,6 +83,20 @@ def _check_size(plan: Plan) -> None:
             f"edge_length={plan.edge_length:g} is longer than the plan, {size:.4g} from corner to"
             " corner; use a smaller one"
         )
+    if plan.rise is not None and plan.rise > STEEPEST * size:
+        raise PlanError(
+            f"rise={plan.rise:g} is more than {STEEPEST:g} times the plan's size, {size:.4g}; use a"
+            " smaller one"
+        )
+    for hole in plan.holes:
+        extent = float(
+            np.ptp(hole.curve.local(plan.plane).at(hole.curve.dense)[:, :2], axis=0).max()
+        )
+        if extent <= SNAP * plan.edge_length:
+            raise PlanError(
+                f"{hole.name} is only {extent:g} wide, too little for edges of length"
+                f" {plan.edge_length:g}; leave it out, or use a smaller edge_length"
+            )
 
 
 def _lines(plan: Plan) -> tuple[list[Line], list[Curve]]:

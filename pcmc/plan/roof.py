@@ -232,7 +232,10 @@ def _areas(spec: Any) -> tuple[Area, ...]:
 def _support(spec: Any, number: int) -> Any:
     """A point (2,) or (3,), or a Curve."""
     if isinstance(spec, Sequence | np.ndarray) and len(spec) in (2, 3) and np.ndim(spec) == 1:
-        return np.array(spec, dtype=float)
+        point = np.array(spec, dtype=float)
+        if not np.isfinite(point).all():
+            raise OptionError(f"support {number}: the point {point.tolist()} is not finite")
+        return point
     return _curve(spec, f"support {number}")
 
 
@@ -247,11 +250,12 @@ def _known_keys(values: Any, kind: Any, what: str) -> None:
 
 def _one_of(value: str, known: Sequence[str], what: str) -> None:
     if value not in known:
-        raise OptionError(unknown(what, value, known))
+        raise OptionError(f"{what}: {unknown('value', value, known)}")
 
 
 def _positive(value: float, what: str) -> None:
-    if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not (number and math.isfinite(value) and value > 0):
         raise OptionError(f"{what} must be a finite number > 0, found {value!r}")
 
 

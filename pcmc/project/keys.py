@@ -80,7 +80,10 @@ def _check_list(
 ) -> None:
     if not isinstance(table.get(key, []), list):
         line = _line(text, place, key)
-        raise FileError(f"{path}: line {line}: {key} must be a list, found {table[key]!r:.60}")
+        hint = f"; write [[{'.'.join((*place, key))}]]" if isinstance(table[key], Mapping) else ""
+        raise FileError(
+            f"{path}: line {line}: {key} must be a list, found {table[key]!r:.60}{hint}"
+        )
 
 
 def _section_keys(section: str, table: Any) -> list[str]:
