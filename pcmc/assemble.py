@@ -75,7 +75,7 @@ def assemble(
     """Values of hessian · Bᵀ(∂²E)B + stiffness · Bᵀ(L_α⊗I)B in the kept pattern."""
     data = np.zeros(len(kept.indices))
     _assemble(
-        X, frame.faces, frame.patch_of_face, np.array(surface.plane.point), surface.tensions,
+        X, frame.faces, frame.patch_of_face, surface.origin, surface.tensions,
         surface.pressures, space.basis, space.dimension, space.start, kept.indptr, kept.offset,
         hessian, stiffness, data,
     )  # fmt: skip

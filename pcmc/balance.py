@@ -86,26 +86,10 @@ def unbalanced(standing: Surface, pinchable: Bools) -> str:
     return ""
 
 
-def pressure_left(surface: Surface) -> Floats:
-    """(e,) the pressures of the triangles at each edge, each counted along its sense there.
-
-    Where it is zero along every edge that may leave its support, the forces of the pressure do not
-    depend on which point of Π the volumes are seen from (see ``pcmc.energy``).
-    """
-    topo, F = surface.topology, surface.faces
-    sense = np.where(F[:, [1, 2, 0]] < F[:, [2, 0, 1]], 1.0, -1.0)
-    pressure = surface.pressures[surface.patch_of_face, None] * sense
-    left = np.bincount(topo.edge_of_face.ravel(), pressure.ravel(), len(topo.edges))
-    return np.asarray(left, dtype=float)
-
-
 def seen_from_point(surface: Surface) -> str:
     """Names where the shape depends on the point of Π, as pressures do not cancel; or empty."""
-    left = pressure_left(surface)
-    held = surface.fixed | surface.on_plane
-    open_edges = ~held[surface.topology.edges].all(axis=1)
-    largest = np.abs(surface.pressures).max(initial=0.0)
-    found = np.flatnonzero(open_edges & (np.abs(left) > 1e-12 * largest))
+    left = surface.uncancelled
+    found = np.flatnonzero(left)
     if not len(found):
         return ""
     edge = found[0]

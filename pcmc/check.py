@@ -15,6 +15,7 @@ from .topology import Topology
 ZERO_AREA = 1e-14  # of the squared longest edge: below this a triangle has no direction in floats
 LARGEST = 1e50  # of a coordinate, tension or pressure: the squares of forces stay finite
 RESTING = 1e-12  # height, relative to the size, at which a vertex counts as lying on Π
+ROUNDED = 8.0 * float(np.finfo(float).eps)  # the same, relative to the coordinates
 
 
 def finite_vector(value: Any, what: str) -> tuple[float, float, float]:
@@ -128,7 +129,7 @@ def mesh(
     longest = (sides**2).sum(axis=2).max(axis=1)
     flat = twice <= ZERO_AREA * longest
     if flat.any():
-        low = np.abs(height) <= RESTING * np.linalg.norm(np.ptp(X, axis=0))
+        low = lying(height, X)
         flat &= ~_vanished(F, patch, patches, held, low)
     bad = np.flatnonzero(flat)
     if len(bad):
@@ -159,6 +160,12 @@ def _vanished(F: Ints, patch: Ints, patches: Sequence[Any], held: Bools, low: Bo
     pinched = np.zeros(len(patches), dtype=bool)
     pinched[patch[wall & (rests & outer)[F].any(axis=1)]] = True
     return wall & pinched[patch] & (low[F].sum(axis=1) >= 2) & rests[F].any(axis=1)
+
+
+def lying(height: Floats, X: Floats) -> Bools:
+    """(n,) whether vertices at these heights over Π lie on it, to rounding of their coordinates."""
+    size = float(np.linalg.norm(np.ptp(X, axis=0)))
+    return np.abs(height) <= max(RESTING * size, ROUNDED * float(np.abs(X).max(initial=0.0)))
 
 
 def on_plane(height: Floats, sliding: Bools, size: float) -> None:

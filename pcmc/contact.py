@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from .arrays import Bools, Floats, Ints
-from .check import RESTING
+from .check import lying
 from .energy import energy_and_gradient
 from .motion import MotionSpace, Structure, structure
 from .surface import Surface
@@ -89,7 +89,7 @@ def walls(surface: Surface) -> Walls:
     crest = np.concatenate(edges)
     above = np.zeros(n, dtype=bool)
     above[crest] = True
-    low = np.abs(height) <= RESTING * surface.size
+    low = lying(height, surface.vertices)
     below, ends, along, share, lean = _joined(hanging)
     return Walls(
         hanging=below,
@@ -153,7 +153,7 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
 def resting(surface: Surface, below: Walls) -> Bools:
     """(n,) junction vertices that rest on Π, seen from the positions."""
     height = surface.plane.height(surface.vertices)
-    return below.can_rest & (np.abs(height) <= RESTING * surface.size)
+    return below.can_rest & lying(height, surface.vertices)
 
 
 def pinched(surface: Surface, below: Walls, rests: Bools) -> Surface:

@@ -44,7 +44,7 @@ def energy(surface: Surface) -> float:
 def energy_at(surface: Surface, X: Floats) -> float:
     """E of the surface with its vertices at X (n,3)."""
     areas, volumes = kernels.areas_and_volumes(
-        X, surface.faces, surface.patch_of_face, np.array(surface.plane.point), len(surface.patches)
+        X, surface.faces, surface.patch_of_face, surface.origin, len(surface.patches)
     )
     return float(surface.tensions @ areas - surface.pressures @ volumes)
 
@@ -58,7 +58,7 @@ def energy_and_gradient(
     """
     areas, volumes, gradient = kernels.measure(
         surface.vertices if X is None else X, surface.faces, surface.patch_of_face,
-        np.array(surface.plane.point), surface.tensions, surface.pressures, workers,
+        surface.origin, surface.tensions, surface.pressures, workers,
     )  # fmt: skip
     if supports:
         apply_supports(surface, gradient)
@@ -103,7 +103,7 @@ def hessian(surface: Surface) -> csr_array:
 
     blocks = np.empty((surface.m, 3, 3, 3, 3))
     kernels.hessian_blocks(
-        surface.vertices, surface.faces, surface.patch_of_face, np.array(surface.plane.point),
+        surface.vertices, surface.faces, surface.patch_of_face, surface.origin,
         surface.tensions, surface.pressures, blocks,
     )  # fmt: skip
     unknowns = 3 * surface.faces[:, :, None] + np.arange(3)
@@ -132,6 +132,6 @@ def volume(surface: Surface) -> float:
 
 def _areas_and_volumes(surface: Surface) -> tuple[Floats, Floats]:
     return kernels.areas_and_volumes(
-        surface.vertices, surface.faces, surface.patch_of_face, np.array(surface.plane.point),
+        surface.vertices, surface.faces, surface.patch_of_face, surface.origin,
         len(surface.patches),
     )  # fmt: skip

@@ -49,7 +49,7 @@ class Linearisation:
         change = np.zeros_like(self.X)
         turn = np.zeros(len(self.X))
         _along(
-            self.X, d, frame.faces, frame.patch_of_face, np.array(surface.plane.point),
+            self.X, d, frame.faces, frame.patch_of_face, surface.origin,
             surface.tensions, surface.pressures, self.sheets, change, turn,
         )  # fmt: skip
         where = frame.curve[self.bends]

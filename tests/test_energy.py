@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import cap, hexagon, octahedron, pyramid, rotation, shaken, three_patches
 
-from generators import two_squares
+from generators import two_caps, two_squares
 from pcmc import Patch, Plane, Surface, energy, gradient, hessian, kernels
 from pcmc.energy import (
     apply_supports,
@@ -132,12 +132,13 @@ def test_taylor_slopes_of_every_term(term, seed):
     surface = generic()
     moves = np.random.default_rng(seed).standard_normal((surface.n, 3))
     (_, dA, HA), (_, dV, HV) = terms(surface)
+    loose = replace(surface, on_plane=())
 
     def area(X):
-        return patch_areas(surface.moved(X)).sum()
+        return patch_areas(loose.moved(X)).sum()
 
     def held(X):
-        return patch_volumes(surface.moved(X)).sum()
+        return patch_volumes(loose.moved(X)).sum()
 
     value, first, second = {
         "area": (area, dA, HA),
@@ -421,3 +422,35 @@ def test_taylor_slopes_under_unequal_pressures(wall, point):
     second = first - 0.5 * steps**2 * curve
     np.testing.assert_allclose(np.diff(np.log2(np.abs(first))), -2.0, atol=0.1)
     np.testing.assert_allclose(np.diff(np.log2(np.abs(second))), -3.0, atol=0.3)
+
+
+def test_far_from_the_plane_s_point_volumes_are_seen_from_near_by():
+    """Forces keep their digits, and energies and volumes differ by a constant at most."""
+    near = two_caps(1.2)
+    shift = np.array([5e5, 5e6, 0.0])
+    far = Surface(
+        near.vertices + shift, near.faces, near.patch_of_face, near.patches, fixed=near.fixed,
+        on_plane=near.on_plane,
+    )  # fmt: skip
+    assert np.linalg.norm(far.origin - far.vertices.mean(axis=0)) < near.size
+    assert far.origin[2] == 0.0
+    np.testing.assert_allclose(
+        gradient(far), gradient(near), atol=1e-8 * np.abs(gradient(near)).max()
+    )
+    assert volume(far) == pytest.approx(volume(near), rel=1e-8)
+    assert far.moved(far.vertices + np.array([1e3, 0, 0])).origin is far.origin
+
+
+def test_where_pressures_do_not_cancel_the_point_of_the_plane_stays():
+    """The force of what is left over depends on it."""
+    near = two_caps(1.2)
+    patches = [
+        Patch(p.name, p.tension, p.pressure * (1 + (k == 0))) for k, p in enumerate(near.patches)
+    ]
+    far = Surface(
+        near.vertices + np.array([5e5, 0, 0]), near.faces, near.patch_of_face, patches,
+        fixed=near.fixed, on_plane=near.on_plane,
+    )  # fmt: skip
+    assert far.uncancelled.any()
+    assert far.origin.tolist() == [0.0, 0.0, 0.0]
+    assert not near.uncancelled.any()

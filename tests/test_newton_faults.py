@@ -134,6 +134,9 @@ def test_a_loose_tolerance_ends_early(backend):
         ({"target": "minimal"}, "unknown target 'minimal'; did you mean 'minimum'"),
         ({"levels": -1}, "levels: expected a whole number ≥ 0, found -1"),
         ({"levles": 1}, "unknown option of method 'newton' 'levles'; did you mean 'levels'"),
+        ({"care": "x"}, "care: expected a finite number ≥ 0 and < 1, found 'x'"),
+        ({"inflation": 0.5}, "inflation: expected a finite number > 1, found 0.5"),
+        ({"inflation": float("nan")}, "inflation: expected a finite number > 1, found nan"),
         (
             {"backend": "pardisso"},
             "unknown factorisation backend 'pardisso'; did you mean 'pardiso'",
@@ -143,6 +146,36 @@ def test_a_loose_tolerance_ends_early(backend):
 def test_options_are_checked_by_name(backend, option, message):
     with pytest.raises(OptionError, match=f"^{message}"):
         solve(two_squares(4), **{"backend": backend} | option)
+
+
+def test_a_lost_run_tells_of_the_saddle_it_met(backend):
+    result = solve(four_fans(7), backend=backend)
+    assert result.status is Status.DEGENERATE
+    assert "a saddle of index 2 is near: target='stationary' returns it" in result.message
+    assert solve(four_fans(7), target="stationary").certificate.index == 2
+
+
+def test_stopped_on_the_second_way_the_first_one_counts_if_it_came_farther(backend):
+    """The second way starts again at residual 0.2 and is stopped there."""
+    seen = []
+
+    def callback(progress):
+        seen.append(progress.row)
+        if progress.row["step"] == "start" and len(seen) > 1:
+            raise StopIteration
+
+    result = solve(four_fans(7), callback=callback, backend=backend)
+    assert result.status is Status.STOPPED
+    assert len(result.history) == len(seen) - 1
+    assert result.history["residual"].iloc[-1] < seen[-1]["residual"]
+    assert result.energy == result.history["energy"].iloc[-1]
+    assert result.energy == pytest.approx(energy(result.surface), rel=1e-12)
+
+
+def test_a_collapsed_surface_is_no_start(backend):
+    surface = two_squares(4)
+    with pytest.raises(SurfaceError, match="all vertices are at one point"):
+        solve(surface.moved(0.0 * surface.vertices), backend=backend)
 
 
 def test_a_backend_that_is_not_installed_is_said_so(backend, monkeypatch):

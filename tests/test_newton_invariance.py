@@ -160,3 +160,23 @@ def test_a_saddle_is_left_the_same_way():
     assert "saddle" in ways[0]["step"].to_list()
     assert ways[1]["step"].to_list() == ways[0]["step"].to_list()
     np.testing.assert_allclose(ways[1]["energy"], ways[0]["energy"], rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["two squares", "pinched squares", "two caps", "fans", "hall"])
+@pytest.mark.parametrize("shift", [(1e3, -2e3, 0.0), (5e5, 5e6, 800.0)])
+def test_drawn_in_a_survey_s_coordinates(name, shift):
+    """Only Π's height moves along: its point stays at the origin. Positions keep what digits they have."""
+    surface, shift = SURFACES[name](), np.array(shift)
+    plane = Plane(np.array(surface.plane.point) + shift * [0, 0, 1], surface.plane.normal)
+    there = solve(rebuilt(surface, surface.vertices + shift, plane), target="stationary")
+    here = solve(surface, target="stationary")
+    assert there.converged
+    assert there.certificate.residual < 1e-9
+    assert there.certificate.verdict is here.certificate.verdict
+    assert len(there.certificate.pinched) == len(here.certificate.pinched)
+    lost = 10.0 * np.spacing(np.abs(shift).max()) + 1e-12 * surface.size
+    np.testing.assert_allclose(there.surface.vertices - shift, here.surface.vertices, atol=lost)
+    np.testing.assert_allclose(
+        there.certificate.reactions, here.certificate.reactions,
+        atol=1e-7 * np.abs(here.certificate.reactions).max(),
+    )  # fmt: skip

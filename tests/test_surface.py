@@ -269,5 +269,5 @@ def test_every_error_is_one_family():
 
 def test_moving_keeps_sliding_vertices_on_the_plane():
     surface = two_squares(4)
-    with pytest.raises(SurfaceError, match="slides on the plane but lies 0.5 away"):
-        surface.moved(surface.vertices + [0, 0, 0.5])
+    with pytest.raises(SurfaceError, match=r"slides on the plane but lies 0\.5 away"):
+        surface.moved(surface.vertices + np.array([0, 0, 0.5]))

@@ -137,6 +137,11 @@ class Line:
                 found[f"pressure {patch.name}"] = self.pressures[i] + self.pressure_rates[i] * value
         return found
 
+    def energy_rate(self, surface: Surface, X: Floats) -> float:
+        """∂E/∂λ = Σ w_i A_i - Σ u_i V_i at X (n,3)."""
+        areas, volumes, _ = _measured(surface, X, self.tension_rates, self.pressure_rates)
+        return float(self.tension_rates @ areas - self.pressure_rates @ volumes)
+
     def gradient(self, surface: Surface, X: Floats) -> Floats:
         """∂∇E/∂λ = Σ w_i ∇A_i - Σ u_i ∇V_i (n,3), supports applied."""
         return weighted_gradient(surface, X, self.tension_rates, self.pressure_rates)
@@ -144,9 +149,15 @@ class Line:
 
 def weighted_gradient(surface: Surface, X: Floats, areas: Floats, volumes: Floats) -> Floats:
     """Σ areas_i ∇A_i - Σ volumes_i ∇V_i (n,3), supports applied."""
-    origin = np.array(surface.plane.point)
-    vectors = kernels.measure(X, surface.faces, surface.patch_of_face, origin, areas, volumes)[2]
-    return apply_supports(surface, vectors)
+    return apply_supports(surface, _measured(surface, X, areas, volumes)[2])
+
+
+def _measured(
+    surface: Surface, X: Floats, areas: Floats, volumes: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """A_i and V_i (k,) at X, and Σ areas_i ∇A_i - Σ volumes_i ∇V_i (n,3)."""
+    origin = surface.origin
+    return kernels.measure(X, surface.faces, surface.patch_of_face, origin, areas, volumes)
 
 
 def _rates(surface: Surface, weights: Mapping[str, float]) -> Floats:

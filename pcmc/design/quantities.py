@@ -291,7 +291,7 @@ def _force_slope(surface: Surface, v: int, pull: Floats) -> Floats:
     blocks = np.empty((len(F), 3, 3, 3, 3))
     kernels.hessian_blocks(
         surface.vertices, F, np.ascontiguousarray(surface.patch_of_face[around]),
-        np.array(surface.plane.point), surface.tensions, 0.0 * surface.pressures, blocks,
+        surface.origin, surface.tensions, 0.0 * surface.pressures, blocks,
     )  # fmt: skip
     slope = np.zeros_like(surface.vertices)
     row, corner = np.nonzero(np.equal(F, v))
@@ -318,7 +318,7 @@ def _by_patch(surface: Surface, v: int) -> tuple[Floats, Floats]:
 def _measured(surface: Surface, tension: Floats, pressure: Floats) -> tuple[Floats, Floats, Floats]:
     """Areas, volumes (k,) and ∇(Σ αA - pV) (n,3) with these tensions and pressures."""
     return kernels.measure(
-        surface.vertices, surface.faces, surface.patch_of_face, np.array(surface.plane.point),
+        surface.vertices, surface.faces, surface.patch_of_face, surface.origin,
         tension, pressure,
     )  # fmt: skip
 

@@ -187,7 +187,7 @@ class _AtRest:
         tension, pressure = (one, zero) if parameter.kind == "tension" else (zero, one)
         return kernels.measure(
             self.standing.vertices, self.standing.faces, self.standing.patch_of_face,
-            np.array(self.standing.plane.point), tension, pressure,
+            self.standing.origin, tension, pressure,
         )[2]  # fmt: skip
 
     def _moved(self, s: Floats) -> Floats:

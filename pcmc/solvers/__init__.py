@@ -40,6 +40,8 @@ def solve(
     ------
     OptionError
         For an unknown method or option, with the nearest known one, or a value it may not have.
+    SurfaceError
+        For what is no Surface, or one whose vertices are all at one point.
 
     Examples
     --------
@@ -60,6 +62,8 @@ def solve(
         raise OptionError(unknown("method", method, METHODS))
     if callback is not None and not callable(callback):
         raise OptionError(f"callback: expected a function of a Progress, found {callback!r}")
+    if surface.size == 0.0:
+        raise SurfaceError("solve: all vertices are at one point; there is no shape to start from")
     module = import_module(f".{method}", __package__)
     chosen = build(getattr(module, METHODS[method]), method, options)
     result: Result = getattr(module, method)(surface, chosen, callback)

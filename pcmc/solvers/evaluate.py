@@ -41,7 +41,7 @@ class Evaluator:
 
     def __init__(self, surface: Surface) -> None:
         self.count = 0
-        self._mesh = surface.faces, surface.patch_of_face, np.array(surface.plane.point)
+        self._mesh = surface.faces, surface.patch_of_face, surface.origin
         self._weights = surface.tensions, surface.pressures
         self._supports = surface.fixed, surface.on_plane, np.array(surface.plane.normal)
         self._single = len(kernels.blocks(surface.m, kernels.threads())) == 1

@@ -66,6 +66,8 @@ class NewtonOptions:
         check.whole("iterations", self.iterations)
         check.choice("target", self.target, TARGETS)
         check.whole("levels", self.levels)
+        check.number("care", self.care, least=0.0, below=1.0)
+        check.number("inflation", self.inflation, above=1.0)
 
 
 @dataclass
@@ -76,6 +78,7 @@ class _Log:
     rows: list[dict[str, Any]] = field(default_factory=list)
     evaluations: int = 0
     factorisations: int = 0
+    note: str = ""
 
     def row(self, state: State, stepper: Stepper, level: int) -> None:
         row = {
@@ -112,13 +115,14 @@ def newton(surface: Surface, options: NewtonOptions, callback: Callback | None) 
         iterations=len(log.rows) - 1,
         evaluations=log.evaluations,
         rows=log.rows,
+        note=log.note,
     )
 
 
 def _finish(
     surface: Surface, options: NewtonOptions, log: _Log, level: int
 ) -> tuple[State, Status]:
-    """Solve on one mesh; where the way is lost, once more on another."""
+    """Solve on one mesh; where the way is lost, once more from the same start on another way."""
     state, status = _attempt(surface, options, log, level)
     if status not in LOST:
         return state, status
@@ -127,13 +131,15 @@ def _finish(
     other, found = _attempt(
         surface, replace(options, target="stationary"), log, level, 0 if downwards else DESCENTS
     )
-    if found is Status.STOPPED:
+    if found is Status.STOPPED and other.relative < state.relative:
         return other, found
-    sound = found is Status.CONVERGED and other.worst >= POOR
-    if sound and (not downwards or certify(other.result_surface(), modes=0).index == 0):
-        return other, found
+    if found is Status.CONVERGED and other.worst >= POOR:
+        index = certify(other.result_surface(), modes=0).index if downwards else 0
+        if index == 0:
+            return other, found
+        log.note = f"a saddle of index {index} is near: target='stationary' returns it"
     del log.rows[rows:]
-    return state, status
+    return state, found if found is Status.STOPPED else status
 
 
 def _attempt(

@@ -60,6 +60,7 @@ class Result:
     rows : the rows of ``history``, each a mapping of its columns.
     history : a row per iteration (per evaluation for ``"lbfgs"``) with at least ``evaluation``,
         ``energy`` and ``gradient_squared`` (‖∇E‖², the paper's squared sum).
+    note : what else the solver found on its way, for the message.
     """
 
     surface: Surface
@@ -69,6 +70,7 @@ class Result:
     iterations: int
     evaluations: int
     rows: Sequence[Mapping[str, Any]] = field(repr=False)
+    note: str = ""
 
     @property
     def converged(self) -> bool:
@@ -92,7 +94,7 @@ class Result:
     @property
     def message(self) -> str:
         """A sentence that says why the solver stopped and what to do."""
-        return f"{self.method}: {self.status.value}"
+        return "; ".join(filter(None, (f"{self.method}: {self.status.value}", self.note)))
 
 
 @dataclass(frozen=True, eq=False)
