@@ -5,7 +5,6 @@ Everything here is found on the mesh of the grid. Tensions are triples (wall, la
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -214,10 +213,10 @@ def finer_case(tensions: list[float], edge_length: float) -> dict[str, Any]:
     }
 
 
-def branches(records: pd.DataFrame, open_cases: Bools, tries: Sequence[int]) -> list[list[Any]]:
+def branches(records: pd.DataFrame, open_cases: Bools, tries: int) -> list[list[Any]]:
     """For each open case the tensions asked for and those to start from, as ``branch_case`` takes them.
 
-    ``tries``: how many starts each open case is given.
+    ``tries``: how many starts a case is given at most.
     """
     columns = [f"alpha_{name}" for name in PATCHES]
     sound = records[(records.status == "converged") & (records.quality > SOUND)]
@@ -225,7 +224,4 @@ def branches(records: pd.DataFrame, open_cases: Bools, tries: Sequence[int]) -> 
         return []
     places = sound[columns].to_numpy()
     targets = records.loc[open_cases, columns].to_numpy()
-    return [
-        [target.tolist(), *starts(target, places)[:count]]
-        for target, count in zip(targets, tries, strict=True)
-    ]
+    return [[target.tolist(), *starts(target, places)[:tries]] for target in targets]

@@ -14,7 +14,8 @@ reason is looked for in this order:
   at the fold.
 - *slip*: the branch ends otherwise. The junction runs into a corner of the outline and the triangles there
   collapse, or the branch turns back a long way before any way down opens: that is the mesh, not the
-  surface (``stability`` tells why corners do not hold a crest). No × of the grid is left with it.
+  surface (``stability`` tells why corners do not hold a crest). No × of the grid is left with it; it is
+  said only after ``TRIES`` equilibria, in case the branch from another one folds, or arrives.
 
 An equilibrium of one mesh may be that mesh's own. ``finer`` seeks each on a mesh of half the edge length.
 """
@@ -51,7 +52,7 @@ from .folder import Folder
 from .panels import category_panels
 from .study import Study
 
-TRIES, TRIES_FOR_CROSS = 2, 6  # equilibria from which a branch is sought
+TRIES = 8  # equilibria from which a branch is sought
 WEAK = 4.0  # tension of a patch up to which its equilibria are weakened further
 THIN = 0.05  # triangle quality of an equilibrium that leans on its mesh
 FOLD_LENGTHS = (EDGE_LENGTH, 0.6, 0.3)  # of the meshes on which the patches' folds are sought
@@ -115,9 +116,7 @@ def _search(folder: Folder, records: pd.DataFrame) -> None:
     at_rest = (records.status == "converged").to_numpy()
     open_cases = ~at_rest & balanced(triples) & ~_weak(folder, triples)
     columns = ["ending", "share", *_FOUND, *_ENDS]
-    crossed = records.flow_status.isin(FAILED).to_numpy()[open_cases]
-    tries = np.where(crossed, TRIES_FOR_CROSS, TRIES).tolist()
-    towards = branches(records, np.asarray(open_cases), tries)
+    towards = branches(records, np.asarray(open_cases), TRIES)
     _table(folder, "branches", branch_case, {"towards": towards}, columns)
     weakest = triples[:, 1:].min(axis=1) <= WEAK
     sound = triples[at_rest & weakest & (records.quality > SOUND).to_numpy()]
@@ -285,9 +284,9 @@ STUDY = Study(
     parameters={
         "tensions": TENSIONS,
         "edge_length": EDGE_LENGTH,
-        "tries": (TRIES, TRIES_FOR_CROSS),
+        "tries": TRIES,
         "steps": STEPS,
     },
-    seconds=240,
+    seconds=300,
     paper=False,
 )

@@ -51,10 +51,13 @@ def test_each_open_case_gets_its_number_of_starts():
             (4.0, 3.0, 6.0, "stalled", 0.5)]  # fmt: skip
     records = pd.DataFrame(rows, columns=[*alpha_grid.AXES, "status", "quality"])
     open_cases = (records.status == "stalled").to_numpy()
-    assert branches(records, open_cases, [1, 2]) == [
-        [[4.0, 6.0, 3.0], [4.0, 4.0, 3.0]], [[4.0, 3.0, 6.0], [4.0, 3.0, 2.0], [4.0, 4.0, 3.0]],
-    ]  # fmt: skip
-    assert branches(records.assign(status="stalled"), open_cases, [1, 2]) == []
+    first = [[[4.0, 6.0, 3.0], [4.0, 4.0, 3.0]], [[4.0, 3.0, 6.0], [4.0, 3.0, 2.0]]]
+    assert branches(records, open_cases, 1) == first
+    others = ([4.0, 3.0, 2.0], [4.0, 4.0, 3.0])
+    assert branches(records, open_cases, 2) == [
+        [*case, other] for case, other in zip(first, others, strict=True)
+    ]
+    assert branches(records.assign(status="stalled"), open_cases, 2) == []
 
 
 def test_a_patch_held_all_around_folds_below_half_its_radius():
