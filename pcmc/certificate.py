@@ -240,7 +240,8 @@ def _verdict(
             why = f"the pressure is {times} times what the boundary's tension could carry"
             return Verdict.NO_EQUILIBRIUM, why
         if status == "DIVERGED":
-            return Verdict.NO_EQUILIBRIUM, "the surface inflates without bound"
+            why = "the surface inflates without bound (seen on this way; no proof for others)"
+            return Verdict.NO_EQUILIBRIUM, why
         if status == "VANISHED":
             return Verdict.NO_EQUILIBRIUM, "nothing holds the surface, and it shrinks to nothing"
     if status == "DEGENERATE" or quality <= COLLAPSED:

@@ -19,9 +19,7 @@ from .topology import Topology, topology
 
 Vector = tuple[float, float, float]
 
-FAR = (
-    30.0  # sizes: farther from the point of Π, volumes seen from there lose more than three digits
-)
+FAR = 30.0  # sizes from the point of Π: farther, volumes seen from it lose over three digits
 
 
 @dataclass(frozen=True)

@@ -265,7 +265,7 @@ def test_the_solvers_ending_counts():
     surface = solve(spherical_cap(0.25)).surface
     away = certify(two_squares(4), status="DIVERGED")
     assert away.verdict is Verdict.NO_EQUILIBRIUM
-    assert away.detail == "the surface inflates without bound"
+    assert away.detail.startswith("the surface inflates without bound (seen on this way")
     assert certify(surface, status="DIVERGED").verdict is Verdict.STABLE
     assert certify(surface, status="DEGENERATE").verdict is Verdict.DEGENERATE
     assert certify(surface, status="CONVERGED").verdict is Verdict.STABLE

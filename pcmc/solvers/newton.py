@@ -98,8 +98,11 @@ class _Log:
             self.callback(Progress(len(self.rows) - 1, state.result_surface, row))
 
 
-def newton(surface: Surface, options: NewtonOptions, callback: Callback | None) -> Result:
+def newton(
+    surface: Surface, options: NewtonOptions | None = None, callback: Callback | None = None
+) -> Result:
     """Solve with the geometric solver; see ``pcmc.solve``."""
+    options = options or NewtonOptions()
     _refuse_loose_parts(surface)
     log = _Log(callback)
     for level in range(options.levels + 1):
