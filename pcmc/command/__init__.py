@@ -1,7 +1,7 @@
 """What the shell starts as ``pcmc``: Ctrl-C ends it in one line from its first moment to its last.
 
-To import pcmc takes a good part of a second, and whatever lies in the package is imported after it. So this is
-installed beside it, as ``pcmc_command``, and needs nothing.
+To import pcmc takes a good part of a second, and whatever lies in the package is imported after it. So
+this is installed beside it, as ``pcmc_command``, and needs nothing.
 """
 
 from __future__ import annotations
