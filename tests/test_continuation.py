@@ -8,8 +8,10 @@ from tables import same
 from generators import four_fans, spherical_cap, two_caps, two_squares
 from pcmc import Direction, Parameter, certify, follow, solve
 from pcmc.continuation import Ending, FollowOptions
+from pcmc.continuation.between import GOALS, root
 from pcmc.continuation.point import Lost, at_parameter, correct
 from pcmc.continuation.shape import Shape
+from pcmc.continuation.tracing import Tracer
 from pcmc.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.plot import diagram
 
@@ -201,6 +203,56 @@ def test_goals_are_met_exactly(small_cap, goal, value):
     assert branch.last is branch.surfaces[len(branch.points) - 1]
 
 
+@pytest.mark.parametrize("above", [False, True])
+@pytest.mark.parametrize("goal", ["parameter", "energy"])
+def test_goal_that_a_step_passes_twice_is_met_the_first_time(small_cap, goal, above):
+    """λ and E turn at the fold: both ends of the step over it lie on one side of the goal."""
+    start = small_cap
+    if above:
+        start = follow(small_cap, "cap", until={"height": 1.5}, step=-0.05).last
+    whole = follow(start, "cap", step=-0.05, folds=1)
+    fold, ends = whole.folds.iloc[0], whole.points.iloc[-2:]
+    value = 0.5 * (fold[goal] + ends[goal].min())
+    assert fold[goal] < value < ends[goal].min()
+    branch = follow(start, "cap", until={goal: value}, step=-0.05)
+    assert branch.ending is Ending.REACHED
+    assert branch.points[goal].iloc[-1] == pytest.approx(value, rel=1e-9)
+    assert ends.arclength.iloc[0] < branch.points.arclength.iloc[-1] < fold.arclength
+    assert not len(branch.folds)
+
+
+def test_goal_beyond_the_fold_of_the_same_step_is_met_after_it(small_cap):
+    whole = follow(small_cap, "cap", step=-0.05, until={"height": 1.5})
+    fold = whole.folds.iloc[0]
+    after = int((whole.points.arclength < fold.arclength).sum())
+    height = 0.5 * (fold.height + whole.points.height[after])
+    branch = follow(small_cap, "cap", until={"height": height}, step=-0.05)
+    assert branch.points.height.iloc[-1] == pytest.approx(height, rel=1e-9)
+    assert len(branch.points) == after + 1
+    assert branch.folds.parameter[0] == pytest.approx(fold.parameter, rel=1e-6)
+
+
+@pytest.mark.parametrize("parameter", ["wall", Parameter("left", "pressure")], ids=str)
+def test_rates_of_goals_are_their_slopes_along_the_branch(parameter):
+    weights = {parameter: 1.0} if isinstance(parameter, str) else {}
+    line = Direction(weights, {} if weights else {"left": 1.0})
+    start = two_squares(4, alpha_aux=1.0).retensioned({}, {"left": 0.9})  # not alike: one apex
+    start = solve(start, target="stationary").surface
+    tracer = Tracer(start, line.line(start), {}, FollowOptions(), None)
+    stretch = tracer.step(0.05).stretch
+    for name in GOALS:
+        ahead, behind = (stretch.value(name, t) for t in (1e-3, -1e-3))
+        slope = stretch.rate(name, stretch.here)
+        assert slope == pytest.approx((ahead - behind) / 2e-3, rel=1e-3)
+        assert abs(slope) > 1e-2
+
+
+def test_root_of_a_function_that_does_not_quite_change_sign():
+    assert root(lambda t: t - 0.25, 0.0, 1.0, 1e-12) == pytest.approx(0.25)
+    assert root(lambda t: t + 1e-9, 0.0, 1.0, 1e-12) == 0.0
+    assert root(lambda t: t - 1.0 - 1e-9, 0.0, 1.0, 1e-12) == 1.0
+
+
 def test_stop_gives_the_sense_and_where_it_is_now_there_is_nothing_to_do(small_cap):
     up, down = (follow(small_cap, "cap", stop) for stop in (0.7, 0.55))
     assert up.last.tensions[0] == pytest.approx(0.7, rel=1e-9)
@@ -314,6 +366,19 @@ def test_new_mesh_on_the_way_keeps_to_the_branch(small_cap):
     assert branch.points.residual.max() <= 1e-10
     exact = tension_of_height(branch.points.height.to_numpy())
     assert branch.points.parameter.to_numpy() == pytest.approx(exact, rel=0.05)
+
+
+@pytest.mark.slow
+def test_new_mesh_does_not_leap_over_a_goal(small_cap):
+    pytest.importorskip("mmgpy")
+    options = {"step": -0.05, "care": 0.93, "remesh": 0.25}
+    branch = follow(small_cap, "cap", until={"height": 0.8}, steps=2, **options)
+    before, after = branch.points.volume.iloc[-1], certify(branch.surfaces[2]).volume
+    assert after == pytest.approx(before)
+    goal = before + 0.03  # of the mesh made anew after that point it has 0.06 more
+    met = follow(small_cap, "cap", until={"volume": goal}, steps=4, **options)
+    assert met.ending is Ending.REACHED
+    assert met.points.volume.iloc[-1] == pytest.approx(goal, rel=1e-9)
 
 
 # --------------------------------------------------------------------------------------- pictures

@@ -15,9 +15,10 @@ from ..errors import MissingExtra, OptionError, SurfaceError, unknown
 from ..solvers import options as check
 from ..solvers.result import Callback
 from ..surface import Surface
+from .between import GOALS
 from .direction import Direction
 from .options import Ending, FollowOptions
-from .tracing import GOALS, Tracer
+from .tracing import Tracer
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,25 +1,25 @@
 """From point to point along a branch: steps, events between them, and the mesh.
 
 A step goes along the tangent, and Newton's method brings it back onto the branch (`point`). Steps
-shorten where the branch bends. Where the number of negative eigenvalues or the sense of λ differs between
-two points, the branch is searched in between, on the mesh of the first.
+shorten where the branch bends. Where a goal, a fold or a change of index lies between two points, the
+branch is searched there (`between`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from ..arrays import Floats
-from ..energy import energy_at
 from ..errors import OptionError, SurfaceError
 from ..remesh import remesh
 from ..rigid import rigid_modes, rigid_motions
 from ..solvers import solve
 from ..solvers.result import Callback, Progress
 from ..surface import Surface
+from .between import EXACT, Stretch, passes, quantity
 from .direction import Line
 from .options import Ending, FollowOptions
 from .point import (
@@ -40,7 +40,6 @@ from .point import (
 from .shape import Shape
 
 AT_REST = 1e-4  # relative residual up to which a surface counts as near enough to start from
-EXACT = 2e-5  # arclength to which events are located, and so λ relative to its scale
 SPOILT = 0.7  # ratio of triangle qualities, new to old, below which a step is refused
 NEAR = 0.02  # length of a step at which new contact, solved for by itself, still counts as the same
 BEND = 0.1  # correction over step length that sets the next step
@@ -49,11 +48,10 @@ BENT = 0.5  # correction over step length above which a step is refused
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A step that succeeded: its length, the correction over it, where it led, what lies between."""
+    """A step that succeeded: the stretch gone, the correction over its length, what lies between."""
 
-    length: float
+    stretch: Stretch
     bend: float
-    there: Station
     at_goal: bool
     events: list[dict[str, Any]]
 
@@ -107,7 +105,7 @@ class Tracer:
         """Follow to the end; why it ended, and the last difficulty."""
         try:
             self.record()
-            if any(getattr(self.here, _FIELD[name]) == v for name, v in self.goals.items()):
+            if any(quantity(self.here, name) == goal for name, goal in self.goals.items()):
                 return Ending.REACHED, ""
             return self.advance()
         except (StopIteration, KeyboardInterrupt):
@@ -127,8 +125,8 @@ class Tracer:
                         collapsed = isinstance(lost, Collapsed)
                         return Ending.DEGENERATE if collapsed else Ending.LOST, why
             self.events += step.events
-            self.arclength += step.length
-            self.here = step.there
+            self.arclength += step.stretch.length
+            self.here = step.stretch.there
             self.record()
             if step.at_goal:
                 return Ending.REACHED, ""
@@ -157,12 +155,13 @@ class Tracer:
         if found.shape.quality(found.X) < SPOILT * min(here.quality, self.options.care):
             raise Collapsed("triangles collapse")
         there = examine(found, self.line, self.scale, here)
-        goal = self.goal(there, length)
+        stretch = Stretch(self.line, self.scale, here, there, length, self.solution)
+        goal = stretch.goal(self.goals)
         if goal is not None:
-            if there.shape is not here.shape:
+            if not stretch.same_mesh:
                 raise Lost("the contact of a wall with the plane changes just before the goal")
-            length, there = goal
-        return Step(length, bend, there, goal is not None, self.search(there, length))
+            stretch = stretch.cut(goal)
+        return Step(stretch, bend, goal is not None, self.search(stretch))
 
     def bend(self, found: Solution, length: float) -> float:
         """How far the point found is from the tangent, over the length of the step."""
@@ -196,9 +195,7 @@ class Tracer:
             growth = float((shape.volume_gradient(here.X) * here.direction).sum())
             return at_volume(shape, here.volume + t * growth)
         if self.options.control == "height":
-            height = shape.surface.plane.height(X)
-            top = int(height.argmax())
-            return at_height(shape, top, float(height[top]))
+            return at_height(shape, shape.top(X), shape.height(X))
         return across(X, value, *here.row(self.scale))
 
     def resettled(self, touched: Touched) -> Solution:
@@ -234,8 +231,8 @@ class Tracer:
     def settle(self, near: Station, X: Floats) -> None:
         """Go to the point of the branch at X, across the tangent of a station of the same mesh.
 
-        Not where that is an event in itself, unless the mesh is very poor: on the old mesh the event
-        will be found in its place.
+        Not past a goal; and not where that is an event in itself, unless the mesh is very poor. On the
+        old mesh both will be found in their places.
         """
         here = self.here
         border = across(X, near.value, *near.row(self.scale))
@@ -244,52 +241,19 @@ class Tracer:
             after = examine(found, self.line, self.scale, near)
         except Lost:
             return
+        if passes(here, after, self.goals):
+            return
         events = self.unlocated(here, after, 0.0)
         if after.quality > here.quality and not (events and here.quality > 0.5 * self.options.care):
             self.events += events
             self.here = after
 
-    # -- goals and events ----------------------------------------------------------------------
+    # -- events --------------------------------------------------------------------------------
 
-    def goal(self, there: Station, length: float) -> tuple[float, Station] | None:
-        """Where the first goal between here and there is met."""
-        places = []
-        for name, value in self.goals.items():
-            before, after = getattr(self.here, _FIELD[name]), getattr(there, _FIELD[name])
-            if (before - value) * (after - value) < 0.0:
-                measured = self.measure(name)
-                places.append(_root(lambda t: measured(t) - value, length, 1e-12))  # noqa: B023
-            elif after == value:
-                places.append(length)
-        if not places:
-            return None
-        t = min(places)
-        return t, there if t == length else self.station(t)
-
-    def measure(self, name: str) -> Callable[[float], float]:
-        """A quantity of the branch as a function of arclength from here."""
-        here = self.here
-
-        def of(t: float) -> float:
-            if t == 0.0:
-                return float(getattr(here, _FIELD[name]))
-            found = self.solution(t)
-            if name == "parameter":
-                return found.value
-            if name == "energy":
-                return energy_at(self.line.applied(here.shape.surface, found.value), found.X)
-            return here.shape.volume(found.X) if name == "volume" else here.shape.height(found.X)
-
-        return of
-
-    def station(self, t: float) -> Station:
-        """The point of the branch at arclength t from here, examined."""
-        return examine(self.solution(t), self.line, self.scale, self.here)
-
-    def search(self, there: Station, length: float) -> list[dict[str, Any]]:
-        """The events between here and there, in their order."""
-        here = self.here
-        if there.shape is not here.shape:
+    def search(self, stretch: Stretch) -> list[dict[str, Any]]:
+        """The events on a stretch, in their order."""
+        here, there, length = stretch.here, stretch.there, stretch.length
+        if not stretch.same_mesh:
             return [
                 self.event("contact", there, length, here.index, there.index),
                 *self.unlocated(here, there, length),
@@ -297,52 +261,17 @@ class Tracer:
         if length <= 2.0 * EXACT:
             return self.unlocated(here, there, length)
         found = []
-        if here.slope * there.slope < 0.0:
-            t = self.fold(length)
-            found.append((t, self.event("fold", self.station(t), t, here.index, there.index)))
+        if stretch.fold is not None:
+            at = stretch.station(stretch.fold)
+            event = self.event("fold", at, stretch.fold, here.index, there.index)
+            found.append((stretch.fold, event))
         sign = 1 if there.index > here.index else -1
         index = here.index
-        for t, count in self.crossings(there, length):
-            at = self.station(t)
+        for t, count in stretch.index_changes():
+            at = stretch.station(t)
             found.append((t, self.event("index", at, t, index, index + sign * count)))
             index += sign * count
         return [event for _, event in sorted(found, key=lambda pair: pair[0])]
-
-    def fold(self, length: float) -> float:
-        """Arclength from here at which λ is extreme."""
-        from scipy.optimize import minimize_scalar  # here, so that importing pcmc stays quick
-
-        sign = math.copysign(1.0, self.here.slope)
-        value = self.measure("parameter")
-        found = minimize_scalar(
-            lambda t: -sign * value(t), bounds=(0.0, length), method="bounded",
-            options={"xatol": max(EXACT, 1e-3 * length)},
-        )  # fmt: skip
-        return float(found.x)
-
-    def crossings(self, there: Station, length: float) -> list[tuple[float, int]]:
-        """Arclengths at which eigenvalues change sign, with how many do so at each."""
-        here = self.here
-        known = {0.0: here.eigenvalues, length: there.eigenvalues}
-
-        def eigenvalue(t: float, rank: int) -> float:
-            if t not in known:
-                known[t] = self.station(t).eigenvalues
-            values = known[t]
-            return float(values[min(rank, len(values) - 1)])
-
-        low, high = sorted((here.index, there.index))
-        places = sorted(
-            _root(lambda t: eigenvalue(t, rank), length, EXACT)  # noqa: B023
-            for rank in range(low, high)
-        )
-        groups: list[tuple[float, int]] = []
-        for t in places:
-            if groups and t - groups[-1][0] <= 3.0 * EXACT:
-                groups[-1] = (groups[-1][0], groups[-1][1] + 1)
-            else:
-                groups.append((t, 1))
-        return groups
 
     def unlocated(self, before: Station, after: Station, length: float) -> list[dict[str, Any]]:
         """Events between two points too near to each other, or too different, to search between."""
@@ -386,17 +315,3 @@ class Tracer:
     def surface(self) -> Surface:
         """The surface at the last point."""
         return self.line.applied(self.here.shape.whole(self.here.X), self.here.value)
-
-
-def _root(function: Callable[[float], float], length: float, accuracy: float) -> float:
-    """Where a function changes sign on [0, length]; the end where it does not quite."""
-    from scipy.optimize import brentq
-
-    first, last = function(0.0), function(length)
-    if first * last >= 0.0:
-        return 0.0 if abs(first) < abs(last) else length
-    return float(brentq(function, 0.0, length, xtol=accuracy))
-
-
-_FIELD = {"parameter": "value", "energy": "energy", "volume": "volume", "height": "height"}
-GOALS = tuple(_FIELD)
