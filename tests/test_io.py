@@ -94,6 +94,20 @@ def test_gltf_says_that_face_scalars_are_lost(tmp_path):
         pcmc.write(tmp_path / "a.glb", tent(), scalars={"load": np.zeros(12)})
 
 
+@pytest.mark.parametrize("suffix", [".glb", ".gltf"])
+def test_single_precision_is_enough_in_a_survey_s_coordinates(tmp_path, suffix):
+    near = tent()
+    shift = np.array([5e5, 5e6, 0.0])
+    far = pcmc.Surface(
+        near.vertices + shift, near.faces, near.patch_of_face, near.patches, fixed=near.fixed,
+        on_plane=near.on_plane,
+    )  # fmt: skip
+    pcmc.write(tmp_path / f"far{suffix}", far)
+    back = pcmc.read(tmp_path / f"far{suffix}")
+    assert back.n == far.n
+    assert cKDTree(far.vertices).query(back.vertices)[0].max() < 1e-6 * far.size
+
+
 def test_native_keeps_the_certificate(tmp_path):
     told = {"verdict": "stable", "residual": np.float64(1e-13), "areas": np.array([1.0, 0.1])}
     pcmc.write(tmp_path / "a.pcmc", tent(), certificate=told)

@@ -1,7 +1,8 @@
 """glTF 2.0 (.glb, .gltf in one file): a mesh per patch, in single precision.
 
-glTF's y axis points up and ours is z: coordinates are turned on the way out and back. Supports and
-scalars at vertices are attributes of the vertices, tensions, pressures, plane and walls without height
+glTF's y axis points up and ours is z: coordinates are turned on the way out and back. A surface far from
+the origin, as in a survey's coordinates, is written around its middle, where the nodes place it: single
+precision keeps seven digits only. Supports and scalars at vertices are attributes of the vertices, tensions, pressures, plane and walls without height
 metadata of the scene.
 """
 
@@ -19,7 +20,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import FileError
 from ..palette import patch_colors
-from ..surface import Surface
+from ..surface import FAR, Surface
 from .contents import Contents, described, description, support_of
 from .flat import KEY
 from .optional import library, reading
@@ -40,6 +41,11 @@ def write(
         if len(values) == surface.n:
             data["_" + re.sub(r"\W+", "_", name)] = values.astype(np.float32)
     turned = surface.vertices[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
+    place = np.eye(4)
+    middle = turned.mean(axis=0)
+    if np.linalg.norm(middle) > FAR * surface.size:
+        place[:3, 3] = np.round(middle)
+        turned = turned - place[:3, 3]
     scene = trimesh.Scene()
     for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
         faces = surface.faces[surface.patch_of_face == k]
@@ -53,7 +59,7 @@ def write(
             roughnessFactor=0.9, doubleSided=True,
         )  # fmt: skip
         mesh.visual = trimesh.visual.TextureVisuals(material=material)
-        scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name)
+        scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name, transform=place)
     scene.metadata["pcmc"] = description(surface)
     if walls is not None:
         scene.metadata[KEY] = walls
