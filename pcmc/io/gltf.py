@@ -2,8 +2,8 @@
 
 glTF's y axis points up and ours is z: coordinates are turned on the way out and back. A surface far from
 the origin, as in a survey's coordinates, is written around its middle, where the nodes place it: single
-precision keeps seven digits only. Supports and scalars at vertices are attributes of the vertices, tensions, pressures, plane and walls without height
-metadata of the scene.
+precision keeps seven digits only. Supports and scalars at vertices are attributes of the vertices,
+tensions, pressures, plane and walls without height metadata of the scene.
 """
 
 from __future__ import annotations
