@@ -40,13 +40,17 @@ def positions(vertices: npt.ArrayLike) -> Floats:
             f"vertices[{bad[0]}] = {X[bad[0]].tolist()} is not finite ({len(bad)} such vertices);"
             " replace or remove it"
         )
+    return X
+
+
+def within_reach(X: Floats) -> None:
+    """Coordinates up to LARGEST: a solver may run beyond, but not start there."""
     bad = np.flatnonzero((np.abs(X) > LARGEST).any(axis=1))
     if len(bad):
         raise SurfaceError(
             f"vertices[{bad[0]}] = {X[bad[0]].tolist()} is farther out than {LARGEST:g}"
             f" ({len(bad)} such vertices); use a larger unit of length"
         )
-    return X
 
 
 def face_array(faces: npt.ArrayLike, n: int) -> Ints:
@@ -168,9 +172,10 @@ def lying(height: Floats, X: Floats) -> Bools:
     return np.abs(height) <= max(RESTING * size, ROUNDED * float(np.abs(X).max(initial=0.0)))
 
 
-def on_plane(height: Floats, sliding: Bools, size: float) -> None:
-    """Sliding vertices must lie on Π to 1e-9 of the size."""
-    bad = np.flatnonzero(sliding & (np.abs(height) > 1e-9 * size))
+def on_plane(height: Floats, sliding: Bools, X: Floats, size: float) -> None:
+    """Sliding vertices must lie on Π to 1e-9 of the size, or to rounding of their coordinates."""
+    near = max(1e-9 * size, ROUNDED * float(np.abs(X).max(initial=0.0)))
+    bad = np.flatnonzero(sliding & (np.abs(height) > near))
     if len(bad):
         raise SurfaceError(
             f"vertex {bad[0]} slides on the plane but lies {height[bad[0]]:.3g} away from it"

@@ -163,6 +163,7 @@ class Surface:
         if not isinstance(self.plane, Plane):
             raise SurfaceError(f"plane: expected a Plane, found {self.plane!r}")
         X = check.positions(self.vertices)
+        check.within_reach(X)
         F = check.face_array(self.faces, len(X))
         patch = check.patch_array(self.patch_of_face, len(F), self.patches)
         fixed = check.mask(self.fixed, len(X), "fixed")
@@ -176,7 +177,7 @@ class Surface:
         object.__setattr__(self, "patches", tuple(self.patches))
         height = self.plane.height(X)
         check.mesh(X, F, patch, self.topology, self.patches, fixed | sliding, height)
-        check.on_plane(height, sliding, self.size)
+        check.on_plane(height, sliding, X, self.size)
         if not (fixed.any() or sliding.any()):
             warnings.warn(
                 "no vertex is fixed or on the plane: translations are free, so only closed"
@@ -272,7 +273,7 @@ class Surface:
         X = check.positions(vertices)
         if X.shape != self.vertices.shape:
             raise SurfaceError(f"vertices: expected shape {self.vertices.shape}, found {X.shape}")
-        check.on_plane(self.plane.height(X), self.on_plane, self.size)
+        check.on_plane(self.plane.height(X), self.on_plane, X, self.size)
         X.setflags(write=False)
         return self._with(vertices=X)
 
