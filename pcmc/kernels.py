@@ -32,7 +32,7 @@ compiled = numba.njit(cache=True, nogil=True, error_model="numpy")
 
 
 @compiled
-def _measure_block(X, F, patch, origin, tension, pressure, first, last, area, volume, G):
+def measure_block(X, F, patch, origin, tension, pressure, first, last, area, volume, G):
     """Add the areas, volumes and E-gradient of triangles first..last to area, volume and G."""
     ox, oy, oz = origin[0], origin[1], origin[2]
     current = patch[first]
@@ -130,19 +130,6 @@ def _add_cross(block, v, scale):
 
 
 @compiled
-def corner_cotangents(X, F, out):
-    """Fill out (m,3) with the cotangent of the angle at each corner (0 for a zero-area triangle)."""
-    for f in range(len(F)):
-        for k in range(3):
-            i, j, l = F[f, k], F[f, (k + 1) % 3], F[f, (k + 2) % 3]
-            ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
-            wx, wy, wz = X[l, 0] - X[i, 0], X[l, 1] - X[i, 1], X[l, 2] - X[i, 2]
-            nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-            twice = sqrt(nx * nx + ny * ny + nz * nz)
-            out[f, k] = (ux * wx + uy * wy + uz * wz) / twice if twice > 0.0 else 0.0
-
-
-@compiled
 def area_vectors(X, F):
     """Σ A_T ν_T (n,3) and Σ A_T (n,) over the triangles around each vertex."""
     vector, area = np.zeros(X.shape), np.zeros(len(X))
@@ -224,7 +211,7 @@ def measure(
     gradient = np.zeros((parts, *X.shape))
 
     def work(part: int, first: int, last: int) -> None:
-        _measure_block(
+        measure_block(
             X, F, patch, origin, tension, pressure, first, last,
             area[part], volume[part], gradient[part],
         )  # fmt: skip

@@ -121,11 +121,6 @@ class Topology:
         """(n,) int: label of the connected part that each vertex belongs to."""
         return components(self.edges, self.vertex_count)
 
-    @cached_property
-    def adjacency(self) -> csr_array:
-        """(n,n) sparse pattern of the edges, with each edge's index + 1 as the value."""
-        return _adjacency(self.edges, self.vertex_count)
-
     def _curves(self, mask: Bools, stop: np.ndarray) -> tuple[Curve, ...]:
         chosen = np.flatnonzero(mask)
         pairs = self.edges[chosen]

@@ -131,13 +131,6 @@ def test_two_parts_are_two_components():
     assert label[0] != label[7]
 
 
-def test_adjacency_numbers_the_edges():
-    t = three_patches().topology
-    for number, (a, b) in enumerate(t.edges.tolist()):
-        assert t.adjacency[a, b] == t.adjacency[b, a] == number + 1
-    assert t.adjacency.nnz == 2 * len(t.edges)
-
-
 def test_neighbours_along_a_curve_are_those_before_and_after():
     t = three_patches(3).topology
     edges = t.edges[t.curve_edge]

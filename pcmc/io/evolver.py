@@ -32,8 +32,6 @@ from .expressions import constant, linear
 from .polygons import triangulate
 from .text import rows
 
-SUFFIXES = (".fe", ".dmp")
-
 HEADER = """\
 // Piecewise constant-mean-curvature surface, written by pcmc.
 // total_energy is E = sum tension * area - sum pressure * volume, volumes seen from the origin.

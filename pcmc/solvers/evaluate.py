@@ -53,7 +53,7 @@ class Evaluator:
         if self._single:  # the same sums as kernels.measure, without what it spends on threads
             area, volume, G = np.zeros_like(tension), np.zeros_like(tension), np.zeros(X.shape)
             m = len(self._mesh[0])
-            kernels._measure_block(X, *self._mesh, tension, pressure, 0, m, area, volume, G)
+            kernels.measure_block(X, *self._mesh, tension, pressure, 0, m, area, volume, G)
         else:
             area, volume, G = kernels.measure(X, *self._mesh, tension, pressure)
         squared = _hold(G, *self._supports)
