@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 
 from generators import bezier_hall, four_fans, two_caps, two_squares
-from pcmc import Surface, gradient, solve
+from pcmc import Surface, certify, gradient, solve
 
 from .flow import errors
 from .folder import Folder
@@ -34,11 +34,14 @@ def data(folder: Folder, short: bool) -> None:
         start = build()
         options: dict[str, Any] = {"iterations": 5} if short else {}
         result = solve(start, "newton", target="stationary", **options)
+        found = certify(result.surface, modes=0, status=result.status.name)
         rows.append(
             {
                 "example": name,
                 "triangles": start.m,
                 "status": result.status.name.lower(),
+                "verdict": found.verdict.name.lower(),
+                "index": -1 if found.index is None else found.index,
                 "energy": result.energy,
                 "gradient_squared": float((gradient(result.surface) ** 2).sum()),
                 **errors(result.surface),
@@ -62,11 +65,13 @@ def figure(folder: Folder) -> None:
     """The README's picture: Examples 4, 3 and 2, each drawn to the same size."""
     from pcmc.plot import panel
 
-    shapes = []
+    verdicts = folder.read_table("records").set_index("example").verdict
+    shapes, titles = [], []
     for name in ("example4", "example3", "example2"):
         surface = folder.read_mesh(name)["final"]
         shapes.append(surface.moved(surface.vertices / surface.size))
-    panel(shapes, folder.figure("shapes"), columns=3, supports=False)
+        titles.append(f"Example {name.removeprefix('example')}: {verdicts[name]}")
+    panel(shapes, folder.figure("shapes"), columns=3, supports=False, edges=False, titles=titles)
 
 
 STUDY = Study(

@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from pcmc import Surface, curvature_error
+from pcmc.arrays import Floats
 
 from .flow import METHODS, errors, external_area
 from .folder import Folder
+
+
+def error_percent(surface: Surface) -> Floats:
+    """(n,) size of the relative curvature error, %; NaN where there is no mean curvature."""
+    return 100.0 * np.abs(curvature_error(surface))
+
+
+def error_scale(*surfaces: Surface) -> dict[str, Any]:
+    """How ``error_percent`` is coloured: from 0, the palest, to the largest of all surfaces."""
+    largest = max(float(np.nanmax(error_percent(surface))) for surface in surfaces)
+    label = "|H − H̄| / H̄, % (none on boundaries and junctions)"
+    return {"label": label, "cmap": "YlGnBu", "limits": (0.0, largest)}
 
 
 def numbers(folder: Folder, case: str, stages: Mapping[str, Surface]) -> dict[str, float]:
@@ -45,8 +59,9 @@ def shapes(
     case: str,
     pictures: Mapping[str, tuple[str, str | None]],
     history: str,
+    walls_view: str | tuple[float, float] = "diagonal",
 ) -> None:
-    """For each stage its two views and its curvature error, and the history of E.
+    """For each stage its two views, its walls alone and its curvature error, and the history of E.
 
     ``pictures``: by stage the figure of its shape and, if there is one, the figure of its error.
     """
@@ -55,27 +70,30 @@ def shapes(
     stages = folder.read_mesh(case)
     for stage, (shape, error) in pictures.items():
         surface = stages[stage]
-        titles = ["(a) diagonal view", "(b) elevation view"]
+        roofs, walls = (
+            [p.name for p in surface.patches if p.auxiliary is x] for x in (False, True)
+        )
         panel(
-            [surface, surface], folder.figure(shape), views=["diagonal", "elevation"],
-            titles=titles, legend=True,
+            [surface] * 3, folder.figure(shape), views=["diagonal", "elevation", walls_view],
+            titles=["(a) diagonal view", "(b) elevation view", "the walls alone, larger"],
+            patches=[None, None, walls], one_scale=False, legend=True, width=1500,
         )  # fmt: skip
         if error is not None:
-            percent = 100.0 * curvature_error(surface)
             draw(
-                surface, folder.figure(error), view="plan", scalars=percent, label="error, %",
-                width=800,
+                surface, folder.figure(error), view="plan", scalars=error_percent(surface),
+                patches=roofs, width=800, legend=True, **error_scale(surface),
             )  # fmt: skip
     energy_history(folder, {"proposed method": case}, history)
 
 
-def energy_history(folder: Folder, cases: Mapping[str, str], name: str) -> None:
+def energy_history(folder: Folder, cases: Mapping[str, str], name: str, title: str = "") -> None:
     """E against the iteration for cases by their names in the picture."""
     from pcmc.plot import histories
 
     table = folder.read_table("histories")
     frames = {label: table[table.case == case] for label, case in cases.items()}
-    histories(frames, folder.figure(name), x="iteration", label="energy E")
+    histories(frames, folder.figure(name), x="iteration", label="energy E", dashes=len(cases) > 1,
+              title=title)  # fmt: skip
 
 
 def gradient_history(folder: Folder, cases: Mapping[str, str], name: str) -> None:

@@ -10,10 +10,11 @@ import numpy as np
 import pandas as pd
 
 from generators import two_squares
-from pcmc import Surface, curvature_error, mean_curvature, solve
+from pcmc import Surface, mean_curvature, solve
 from pcmc.solvers.result import Progress
 
-from .example import energy_history
+from .elevations import draw_elevations
+from .example import energy_history, error_percent, error_scale
 from .flow import (
     PAPER,
     SHORT_ITERATIONS,
@@ -201,27 +202,34 @@ def figure(folder: Folder) -> None:
 
     meshes = {wall: folder.read_mesh(_main(wall)) for wall in WALLS}
     start, end = meshes[2.0]["initial"], meshes[2.0]["final"]
-    draw(start, folder.figure("fig06"), numbers=mean_curvature(start), legend=True)
-    panel(
-        [start, *(stages["final"] for stages in meshes.values())], folder.figure("fig07"),
-        views="elevation", columns=2,
-        titles=["initial shape", *(f"α of the wall = {wall:g}" for wall in WALLS)],
-    )  # fmt: skip
-    draw(end, folder.figure("fig08"), numbers=mean_curvature(end), legend=True)
+    for surface, name in ((start, "fig06"), (end, "fig08")):
+        numbers = mean_curvature(surface)
+        draw(surface, folder.figure(name), numbers=numbers, patches=["left", "right"], legend=True)
+    titles = (
+        f"({letter}) α of the wall {wall:g}" for letter, wall in zip("bcde", WALLS, strict=True)
+    )
+    finals = (stages["final"] for stages in meshes.values())
+    shapes = {"(a) initial shape": start} | dict(zip(titles, finals, strict=True))
+    draw_elevations(shapes, folder.figure("fig07"), top=1.2)
     standing = folder.read_table("standing")
     heights = {
         "with momentum" if momentum else "without": (mine.iteration, mine.height)
         for momentum, mine in standing.groupby("momentum", sort=False)
     }
-    lines(heights, folder.figure("fig07-wall"), x="iteration", y="height of the wall, α 3")
+    lines(heights, folder.figure("fig07-wall"), x="iteration", y="height of the wall",
+          title="Example 1, wall of α 3: its middle sinks to the ground")  # fmt: skip
     pair = [end, folder.read_mesh(_main(2.0, FINE))["final"]]
     panel(
         pair, folder.figure("fig09"), views="plan", titles=["(a) coarse mesh", "(b) fine mesh"],
-        scalars=[100.0 * curvature_error(s) for s in pair], label="error, %",
+        scalars=[error_percent(s) for s in pair], patches=["left", "right"], legend=True,
+        **error_scale(*pair),
     )  # fmt: skip
-    for test, name in (("printed", "fig10"), ("sufficient", "fig10-sufficient")):
+    for test, name, what in (
+        ("printed", "fig10", "Eq. (25) as printed: the line search changes nothing"),
+        ("sufficient", "fig10-sufficient", "sufficient decrease instead: it lessens the rises"),
+    ):
         named = {v.replace("-", " "): f"fig10-{v}-{test}" for v in VARIANTS}
-        energy_history(folder, named, name)
+        energy_history(folder, named, name, title=f"Example 1, {what}")
 
 
 STUDY = Study(

@@ -90,7 +90,8 @@ def _patch(stages: dict[str, Surface], name: str) -> dict[str, float | str]:
 
 def figure(folder: Folder) -> None:
     """Figs. 11 to 15."""
-    shapes(folder, "main", {"initial": ("fig11", "fig12"), "final": ("fig13", "fig14")}, "fig15")
+    pictures = {"initial": ("fig11", "fig12"), "final": ("fig13", "fig14")}
+    shapes(folder, "main", pictures, "fig15", walls_view=(-165.0, 15.0))
     gradient_history(folder, {"the paper's flow": "main", "L-BFGS": "lbfgs"}, "methods")
 
 

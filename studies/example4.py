@@ -102,7 +102,8 @@ def _near_boundary(stages: Mapping[str, Surface]) -> pd.DataFrame:
 
 def figure(folder: Folder) -> None:
     """Figs. 22 to 25."""
-    shapes(folder, "main", {"initial": ("fig22", None), "best": ("fig23", "fig24")}, "fig25")
+    pictures = {"initial": ("fig22", None), "best": ("fig23", "fig24")}
+    shapes(folder, "main", pictures, "fig25", walls_view=(-120.0, 28.0))
 
 
 STUDY = Study(

@@ -4,7 +4,9 @@
   folds at the hemisphere, and the caps higher than that are saddles.
 - Example 2 over the plane of its two tensions: rays from the paper's (4, 3), each followed to the fold
   where the equilibrium ends, or to where the crest has run so far along an outline that triangles
-  collapse. Both ends depend on the mesh: the corners hold the crest less and less as it is refined.
+  collapse. A fold is an end of the branch. A collapse decides nothing: it depends on the mesh, whose
+  corners hold the crest less and less as it is refined, and on the finer one it comes before folds that
+  the coarser one reaches.
 - Example 3 as its walls pull harder: the tension at which the cross lets go of the middle. ``stability``
   seeks the same on meshes that start anew at each tension; their vertices lie otherwise along the shape,
   and its tensions are up to a fifth away on the same number of rings, below or above. Both fall with the
@@ -14,6 +16,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -35,6 +38,12 @@ FARTHEST = 3.0  # tension, as far as a ray is followed
 DRAWN = (45, 100, 230, 290)
 ENDS = {"folds": "fold", "degenerate": "mesh collapses", "lost": "lost", "reached": "goes on"}
 MARKERS = {"folds": "o", "degenerate": "s", "lost": "X", "reached": "^"}
+MEANINGS = {  # what an end says
+    "folds": "fold: no equilibrium beyond, on this branch",
+    "degenerate": "the mesh collapses beside a corner: undecided",
+    "lost": "the branch was lost: undecided",
+    "reached": "goes on: as far as it was followed",
+}
 RINGS = (5, 7, 10, 14, 20)
 WALLS = (0.5, 4.0)
 
@@ -175,7 +184,7 @@ def _cap_table(folder: Folder) -> pd.DataFrame:
 
 
 def figure(folder: Folder) -> None:
-    """The cap's diagram and errors, Example 2's boundary and shapes on it, Example 3's eigenvalues."""
+    """The cap's diagram and errors, where Example 2's rays end and shapes on it, Example 3's eigenvalues."""
     from pcmc.plot import convergence, diagram, lines, panel
 
     points, events = folder.read_table("cap_points"), folder.read_table("cap_events")
@@ -213,19 +222,21 @@ def figure(folder: Folder) -> None:
 
 
 def _draw_rays(folder: Folder) -> None:
-    """The ends of the rays in the plane of the tensions, joined round where the branches end."""
+    """The ends of the rays in the plane of the tensions, joined in the order of their directions.
+
+    Between two folds the line is whole: there an equilibrium ends. Next to an end that says something
+    of the mesh only, or that was not reached, it is dashed.
+    """
     from pcmc.plot.figure import CURVES, INK, SMALL, TEXT, finish, new, style
 
     rays = folder.read_table("rays")
-    figure = new(900, 760)
-    axes = style(figure.add_axes((0.11, 0.1, 0.86, 0.84)))
+    figure = new(900, 820)
+    axes = style(figure.add_axes((0.11, 0.09, 0.86, 0.84)))
     for color, (length, mine) in zip(CURVES, rays.groupby("edge_length", sort=False), strict=False):
         closed = pd.concat([mine, mine.iloc[:1]])
-        bound = closed.ending != "reached"
-        axes.plot(
-            closed.alpha_large.where(bound), closed.alpha_small.where(bound),
-            color=color, linewidth=1.0, label=f"edge length {length:g}",
-        )  # fmt: skip
+        for proved, x, y in _stretches(closed):
+            axes.plot(x, y, color=color, linewidth=1.0, linestyle="-" if proved else (0, (4, 3)))
+        axes.plot([], [], color=color, linewidth=1.0, label=f"edge length {length:g}")
         for ending, symbol in MARKERS.items():
             at = mine[mine.ending == ending]
             axes.plot(
@@ -233,21 +244,38 @@ def _draw_rays(folder: Folder) -> None:
                 markerfacecolor=color if ending == "folds" else "white", markeredgewidth=0.8,
             )  # fmt: skip
     axes.plot(*START, "*", color=INK, markersize=5.0, linestyle="", label="the paper's tensions")
-    present = [ending for ending in MARKERS if (rays.ending == ending).any()]
-    for ending in present:
-        filled = INK if ending == "folds" else "white"
-        axes.plot(
-            [], [], MARKERS[ending], color=INK, markersize=3.2, markerfacecolor=filled,
-            markeredgewidth=0.8, label=ENDS[ending],
-        )  # fmt: skip
-    axes.legend(fontsize=SMALL, frameon=False, labelcolor=INK, loc="upper left")
+    axes.plot([], [], color=INK, linewidth=1.0, label="between folds: it ends here on this mesh")
+    axes.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (4, 3)), label="undecided")
+    for ending, meaning in MEANINGS.items():
+        if (rays.ending == ending).any():
+            axes.plot(
+                [], [], MARKERS[ending], color=INK, markersize=3.2, markeredgewidth=0.8,
+                markerfacecolor=INK if ending == "folds" else "white", label=meaning,
+            )  # fmt: skip
+    axes.legend(fontsize=SMALL, frameon=False, labelcolor=INK, loc="upper left", handlelength=2.6)
+    axes.set_xlim(*_widened(rays.alpha_large))
+    axes.set_ylim(*_widened(rays.alpha_small, above=0.35))
     axes.set_xlabel("tension of the larger patch", fontsize=TEXT, color=INK)
     axes.set_ylabel("tension of the smaller patch", fontsize=TEXT, color=INK)
     axes.set_title(
-        f"Example 2 with walls of tension {WALL:g}: inside, an equilibrium exists",
+        f"Example 2, wall of tension {WALL:g}: how far its equilibrium was followed",
         fontsize=TEXT, color=INK,
     )  # fmt: skip
     finish(figure, folder.figure("boundary"))
+
+
+def _stretches(ends: pd.DataFrame) -> list[tuple[bool, list[float], list[float]]]:
+    """From each ray's end to the next, x and y, and whether both are folds."""
+    rows = list(ends[["ending", "alpha_large", "alpha_small"]].itertuples(index=False, name=None))
+    return [
+        (one[0] == two[0] == "folds", [one[1], two[1]], [one[2], two[2]])
+        for one, two in pairwise(rows)
+    ]
+
+
+def _widened(values: pd.Series[float], above: float = 0.06) -> tuple[float, float]:
+    low, high = float(values.min()), float(values.max())
+    return low - 0.06 * (high - low), high + above * (high - low)
 
 
 STUDY = Study(

@@ -190,11 +190,11 @@ def figure(folder: Folder) -> None:
             str(family): (rows.edge_length.to_numpy(), rows.gradient_squared.to_numpy())
             for family, rows in mine.sort_values("edge_length").groupby("family")
         }
-        if example in PRINTED:
-            ends = np.array([mine.edge_length.min(), mine.edge_length.max()])
-            curves["printed"] = (ends, np.full(2, PRINTED[str(example)]))
+        number = str(example).removeprefix("example")
         lines(
             curves, folder.figure(str(example)), x="edge length", y="‖∇E‖² at the last iteration",
+            title=f"Example {number}: where the flow ends, on meshes from fine to coarse",
+            levels={"printed": PRINTED[str(example)]} if example in PRINTED else {},
             xscale="log", yscale="log", markers=True,
         )  # fmt: skip
 

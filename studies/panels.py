@@ -24,8 +24,11 @@ def curve_panels(
     width: int = 1200,
     height: int = 250,
 ) -> None:
-    """Curves y(x) by label in panels by title, logarithmic axes, one scale, one legend below."""
-    from pcmc.plot.figure import CURVES, INK, SMALL, TEXT, finish, new, style
+    """Curves y(x) by label in panels by title, logarithmic axes, one scale, one legend below.
+
+    Where curves lie on each other, all of them are seen.
+    """
+    from pcmc.plot.figure import CURVES, INK, SMALL, TEXT, apart, finish, new, style
 
     rows = math.ceil(len(panels) / columns)
     top, left, foot, gap = 34.0, 96.0, 104.0, 62.0
@@ -36,6 +39,8 @@ def curve_panels(
         _range([pair[k] for curves in panels.values() for pair in curves.values()]) for k in (0, 1)
     )
     labels = list(dict.fromkeys(label for curves in panels.values() for label in curves))
+    looks = {label: {"color": CURVES[k % len(CURVES)], **apart(k, len(labels))}
+             for k, label in enumerate(labels)}  # fmt: skip
     for k, (title, curves) in enumerate(panels.items()):
         row, column = divmod(k, columns)
         x0, y1 = left + column * (side + 18.0), top + row * (height + gap) + height
@@ -43,8 +48,7 @@ def curve_panels(
         axes = style(figure.add_axes(place))
         axes.set(xscale="log", yscale="log", xlim=across, ylim=up)
         for label, (x, y) in curves.items():
-            color = CURVES[labels.index(label) % len(CURVES)]
-            axes.plot(x, y, color=color, linewidth=1.0, marker=".", markersize=2.0)
+            axes.plot(x, y, **looks[label])
         axes.tick_params(labelsize=SMALL - 0.8, pad=1.0)
         axes.set_title(title, fontsize=SMALL, color=INK, pad=2.5)
         if column:
@@ -53,7 +57,7 @@ def curve_panels(
             axes.set_ylabel(ylabel, fontsize=SMALL, color=INK, labelpad=2.0)
         if k + columns >= len(panels):
             axes.set_xlabel(xlabel, fontsize=SMALL, color=INK, labelpad=1.5)
-    _legend(figure, {label: CURVES[i % len(CURVES)] for i, label in enumerate(labels)}, TEXT)
+    _legend(figure, {}, TEXT, columns=3, lines=looks)
     finish(figure, path)
 
 
@@ -123,6 +127,7 @@ def _legend(
     size: float,
     columns: int = 4,
     symbols: Mapping[str, str] | None = None,
+    lines: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -134,8 +139,9 @@ def _legend(
         Line2D([], [], linestyle="", marker=symbol, label=label, **MARK)
         for label, symbol in (symbols or {}).items()
     ]
+    drawn += [Line2D([], [], label=label, **look) for label, look in (lines or {}).items()]
     figure.legend(
         handles=drawn,
         loc="lower center", ncols=columns, fontsize=size, frameon=False, labelcolor=INK,
-        handlelength=1.2, handleheight=0.8, borderaxespad=0.4,
+        handlelength=3.0 if lines else 1.2, handleheight=0.8, borderaxespad=0.4,
     )  # fmt: skip

@@ -54,12 +54,13 @@ def comparison(results: Path) -> list[str]:
 def solvers(results: Path) -> list[str]:
     """How each method ends on all the examples and resolutions of the study ``solvers``."""
     rows = Folder(results / "solvers").read_table("summary").to_dict("records")
-    head = ["Method", "At rest", "Largest residual", "Largest curvature error, median",
+    head = ["Method", "At rest", "Verdicts", "Largest residual", "Largest curvature error, median",
             "Worst triangle", "Evaluations, median"]  # fmt: skip
     cells = [
         [
             row["method"],
             f"{row['at_rest']} of {row['runs']}",
+            row["verdicts"],
             f"{row['largest_residual']:.1e}",
             f"{row['median_largest_error_variational']:.1e}",
             f"{row['worst_quality']:.2g}",

@@ -5,6 +5,11 @@ single triangles' forces: 0 at an equilibrium, whatever the triangles look like.
 prints, also holds forces along the surface, which only say how well the triangles are shaped. Sizes are
 modest and the flow stops at the paper's 1000 iterations, L-BFGS at 2000 evaluations, so that all of it
 takes about a minute. Times are processor times of one thread.
+
+Example 1 has a wall of α 1: with the paper's 2 it is a saddle on fine meshes. The geometric solver has two
+targets. "stationary" comes to the nearest equilibrium, a minimum or a saddle, as the flow would from a
+symmetric start. "minimum", its default, leaves saddles: from Example 3's it goes down until triangles
+collapse, and the verdict says which and why.
 """
 
 from __future__ import annotations
@@ -30,7 +35,9 @@ from .study import Study
 ITERATIONS, EVALUATIONS = 1000, 2000
 SAMPLES = 24  # of each run, evenly on a logarithmic scale
 REST = 1e-10  # relative residual below which a run counts as done
-GEOMETRIC = "the geometric solver"
+ALPHA_AUX = 1.0  # of Example 1's wall
+GEOMETRIC = 'geometric solver, target "stationary"'
+DEFAULT = 'geometric solver, target "minimum"'
 
 
 @dataclass(frozen=True)
@@ -45,7 +52,9 @@ class Example:
 
 
 EXAMPLES = (
-    Example("example1", "Example 1", partial(two_squares, alpha_aux=1.0), (4, 8, 16, 32), 0.005),
+    Example(
+        "example1", "Example 1", partial(two_squares, alpha_aux=ALPHA_AUX), (4, 8, 16, 32), 0.005
+    ),
     Example("example2", "Example 2", two_caps, (1.2, 0.8, 0.6, 0.4), 0.01),
     Example("example3", "Example 3", four_fans, (7, 10, 14, 28), 0.01),
     Example("example4", "Example 4", bezier_hall, (10.0, 7.0, 5.0, 3.6), 0.005),
@@ -58,6 +67,7 @@ METHODS: dict[str, tuple[str, dict[str, Any]]] = {
     "with sufficient decrease": ("nesterov", FLOW | {"armijo": "sufficient"}),
     "L-BFGS": ("lbfgs", {"tolerance": None, "evaluations": EVALUATIONS}),
     GEOMETRIC: ("newton", {"target": "stationary"}),
+    DEFAULT: ("newton", {"target": "minimum"}),
 }
 
 
@@ -87,7 +97,7 @@ def data(folder: Folder, short: bool) -> None:
     """``records`` and ``histories``; what depends on the machine is in ``times``, ``history_times``."""
     records, histories, times, clocks = [], [], [], []
     for label in METHODS:  # loads compiled code, so that no run is timed with it
-        _run(two_squares(3, alpha_aux=1.0), label, 0.005, short=True)
+        _run(two_squares(3, alpha_aux=ALPHA_AUX), label, 0.005, short=True)
     for example in EXAMPLES:
         for size in example.sizes[: 1 if short else None]:
             start = example.build(size)
@@ -129,6 +139,7 @@ def _run(
     record = {
         "status": result.status.name.lower(),
         "verdict": found.verdict.name.lower(),
+        "detail": found.detail,
         "iterations": result.iterations,
         "evaluations": result.evaluations,
         "factorisations": int(result.history.get("factorisation", pd.Series([0])).iloc[-1]),
@@ -143,8 +154,13 @@ def _run(
     return record, history, seconds
 
 
+def _counts(words: pd.Series[str]) -> str:
+    """Of each word how many there are, the most frequent first."""
+    return ", ".join(f"{n} {word}".replace("_", " ") for word, n in words.value_counts().items())
+
+
 def table(folder: Folder) -> dict[str, float]:
-    """``summary``: of each method, how many runs came to rest, and the worst triangles."""
+    """``summary``: of each method, how many runs came to rest, as what, and the worst triangles."""
     records = folder.read_table("records")
     records["at_rest"] = records.residual <= REST
     groups = records.groupby("method", sort=False)
@@ -152,6 +168,8 @@ def table(folder: Folder) -> dict[str, float]:
         {
             "runs": groups.size(),
             "at_rest": groups.at_rest.sum(),
+            "stable": groups.verdict.agg(lambda v: (v == "stable").sum()),
+            "verdicts": groups.verdict.agg(_counts),
             "largest_residual": groups.residual.max(),
             "median_residual": groups.residual.median(),
             "worst_quality": groups.quality.min(),
@@ -163,9 +181,12 @@ def table(folder: Folder) -> dict[str, float]:
     ).reset_index()
     folder.write_table("summary", summary)
     found = {}
-    for key, label in (("flow", "the paper's flow"), ("lbfgs", "L-BFGS"), ("newton", GEOMETRIC)):
+    for key, label in (
+        ("flow", "the paper's flow"), ("lbfgs", "L-BFGS"), ("newton", GEOMETRIC),
+        ("newton_minimum", DEFAULT),
+    ):  # fmt: skip
         (row,) = summary[summary.method == label].to_dict("records")
-        for column in ("runs", "at_rest", "largest_residual", "worst_quality"):
+        for column in ("runs", "at_rest", "stable", "largest_residual", "worst_quality"):
             found[f"{column}_{key}"] = float(row[column])
     return found
 
@@ -210,7 +231,7 @@ STUDY = Study(
         "sizes": {example.name: list(example.sizes) for example in EXAMPLES},
         "iterations": ITERATIONS,
         "evaluations": EVALUATIONS,
-        "alpha_aux_example1": 1.0,
+        "alpha_aux_example1": ALPHA_AUX,
     },
     seconds=60,
     paper=False,

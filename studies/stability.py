@@ -38,6 +38,8 @@ class Family:
     Attributes
     ----------
     build : from the number of edges along ``length`` to a surface.
+    length : of a wall.
+    roof : tension of what is not a wall.
     walls : the tensions that its walls are given.
     drawn : (size, tension) whose lowest mode is drawn.
     """
@@ -47,16 +49,17 @@ class Family:
     build: Callable[[int], Surface]
     sizes: Sequence[int]
     length: float
+    roof: float
     walls: Sequence[float]
     drawn: tuple[int, float] | None = None
 
 
 FAMILIES = (
-    Family("example3", "Example 3", four_fans, RINGS, 20.0, WALLS, (10, 3.0)),
+    Family("example3", "Example 3", four_fans, RINGS, 20.0, 10.0, WALLS, (10, 3.0)),
     Family("example3-rings", "Example 3, meshes of rings", partial(four_fans, mesh="rings"), RINGS,
-           20.0, WALLS),
-    Family("fig4", "Fig. 4", three_patches, RINGS, 10.0, WALLS, (10, 3.0)),
-    Family("example1", "Example 1", two_squares, (4, 8, 16, 32, 64), 4.0,
+           20.0, 10.0, WALLS),
+    Family("fig4", "Fig. 4", three_patches, RINGS, 10.0, 6.0, WALLS, (10, 3.0)),
+    Family("example1", "Example 1", two_squares, (4, 8, 16, 32, 64), 4.0, 2.0,
            (0.5, 1.0, 1.5, 2.0, 2.5, 3.0), (16, 2.0)),
 )  # fmt: skip
 CORNER_LENGTHS = (0.8, 0.6, 0.4, 0.3, 0.2)
@@ -249,12 +252,16 @@ def figure(folder: Folder) -> None:
                 title=f"{family.title}, walls {wall:g}: λ = {found.eigenvalues[0]:.3g},"
                       f" index {found.index}",
             )  # fmt: skip
-    titles = {family.name: family.title for family in FAMILIES}
+    known = critical.assign(critical_wall=critical.critical_wall.replace([0.0, math.inf], np.nan))
+    curves = {
+        family.title: (one.edge_length / family.length, one.critical_wall / family.roof)
+        for family in FAMILIES
+        for one in [known[known.family == family.name]]
+    }
     lines(
-        {titles[str(name)]: (one.edge_length, one.critical_wall.replace([0.0, math.inf], np.nan))
-         for name, one in critical.groupby("family", sort=False)},
-        folder.figure("critical"), x="edge length", y="wall tension above which it is a saddle",
-        xscale="log", markers=True,
+        curves, folder.figure("critical"), x="edge length / length of a wall", xscale="log",
+        y="tension of the walls / tension of the roofs", markers=True,
+        title="Above its curve a shape is a saddle: finer meshes hold weaker walls only",
     )  # fmt: skip
     _draw_crest(folder)
 
@@ -267,10 +274,9 @@ def _draw_crest(folder: Folder) -> None:
         f"edge length {length:g}": (one.distance, one.from_large)
         for length, one in crest.groupby("edge_length", sort=False)
     }
-    span = [crest.distance.min(), crest.distance.max()]
-    curves["the balanced cone"] = (span, [balanced.cone_from_large] * 2)
     lines(
         curves, folder.figure("crest"), x="distance from the corner", markers=True,
+        levels={"the balanced cone": balanced.cone_from_large},
         y="angle from the larger outline, degrees", title="Example 2: direction of the crest",
     )  # fmt: skip
 

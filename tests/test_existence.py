@@ -5,6 +5,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from studies import existence
 from studies.existence import EDGES, START, STUDY, exact_tension
 from studies.study import perform
 
@@ -50,3 +51,20 @@ def test_kept_walls_lose_stability_sooner_on_finer_meshes():
     assert walls.critical_wall.is_monotonic_decreasing
     assert walls.set_index("rings").critical_wall[7] == pytest.approx(2.1, abs=0.1)
     assert (walls.index_after == 2).all()
+
+
+def test_only_between_two_folds_is_the_end_decided():
+    ends = pd.DataFrame(
+        {
+            "ending": ["folds", "folds", "degenerate", "folds"],
+            "alpha_large": [1.0, 2.0, 3.0, 1.0],
+            "alpha_small": [5.0, 6.0, 7.0, 5.0],
+        }
+    )
+    stretches = existence._stretches(ends)
+    assert [decided for decided, _, _ in stretches] == [True, False, False]
+    assert stretches[0][1:] == ([1.0, 2.0], [5.0, 6.0])
+
+
+def test_every_way_to_end_has_a_mark_and_a_meaning():
+    assert set(existence.MARKERS) == set(existence.MEANINGS) == set(existence.ENDS)

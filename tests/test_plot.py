@@ -15,7 +15,7 @@ from pcmc import plot
 from pcmc.errors import FileError, MissingExtra, OptionError
 from pcmc.palette import WALLS, patch_colors, rgb
 from pcmc.plot import raster
-from pcmc.plot.figure import finish, new
+from pcmc.plot.figure import CURVES, finish, new
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
 
 RENDERERS = [
@@ -102,6 +102,35 @@ def test_patches_left_out_leave_no_lines_or_dots():
     image = plot.draw(surface, view="plan", patches=["left"], width=600)
     assert (image[:, 310:] == 255).all()
     assert (image[:, :290] < 250).any()
+
+
+def test_each_surface_may_show_patches_of_its_own():
+    surface = two_squares(4)
+    image = plot.panel([surface] * 2, views="plan", patches=[["left"], None], width=800)
+    left, right = image[:, :400], image[:, 400:]
+    assert (left[:, 210:] == 255).all()
+    assert (right[:, 210:390] < 250).any()
+    assert (left[:, :190] == right[:, :190]).all()
+    larger = plot.panel([surface] * 2, views="plan", patches=[["left"], None], width=800,
+                        one_scale=False)  # fmt: skip
+    assert (larger[:, 210:390] < 250).any()
+
+
+def test_legend_says_what_colours_and_dots_mean(monkeypatch):
+    surface, shown = two_squares(4, alpha_aux=1.0), []
+    legend = plot.pictures._legend
+    monkeypatch.setattr(
+        plot.pictures, "_legend", lambda f, names: (shown.append(names), legend(f, names))
+    )
+    plot.draw(surface, legend=True)
+    plot.draw(surface, legend=True, patches=["left", "right"])  # only the wall slides
+    plot.draw(surface, legend=True, scalars=pcmc.mean_curvature(surface))
+    plot.draw(surface, legend=True, scalars=np.ones(surface.m), supports=False)
+    assert [[name for name, _, _ in names] for names in shown] == [
+        ["left", "right", "wall", "fixed", "sliding"], ["left", "right", "fixed"],
+        ["no value", "fixed", "sliding"],
+    ]  # fmt: skip
+    assert [color for _, color, dot in shown[0] if dot] == [FIXED_DOT, SLIDING_DOT]
 
 
 @pytest.mark.skipif(not raster.opengl(), reason="the system has no OpenGL")
@@ -229,6 +258,29 @@ def test_convergence_shows_the_slope(monkeypatch):
     h = np.array([1.0, 0.5, 0.25])
     plot.convergence({"E": (h, 0.3 * h**2)})
     assert labels == ["E: slope 2.00"]
+
+
+def test_curves_on_each_other_are_all_seen_with_dashes():
+    x = np.linspace(0.0, 1.0, 50)
+    curves = dict.fromkeys(("below", "above"), (x, x))
+    colors = [rgb(color) for color in CURVES[:2]]
+    plain, dashed = (plot.lines(curves, dashes=d)[:, 200:700] for d in (False, True))
+    below, above = ([near(i, c).sum() for c in colors] for i in (plain, dashed))
+    assert below[0] < 0.02 * below[1]
+    assert 0.2 < above[0] / above[1] < 6.0
+
+
+def test_levels_go_across_and_short_logarithmic_axes_have_round_ticks(monkeypatch):
+    seen = []
+    monkeypatch.setattr(plot.curves, "_key", lambda axes, _: seen.append(axes))
+    plot.lines({"a": ([0.5, 1.5], [1, 2])}, xscale="log", levels={"bound": 1.5})
+    (axes,) = seen
+    assert axes.get_legend_handles_labels()[1] == ["a", "bound"]
+    assert axes.lines[1].get_xydata()[:, 1].tolist() == [1.5, 1.5]
+    ticks = [label.get_text() for label in axes.get_xticklabels()]
+    assert ticks == ["0.5", "0.6", "0.8", "1", "1.5"]
+    plot.lines({"a": ([0.001, 1.5], [1, 2])}, xscale="log")
+    assert len(seen[1].get_xticks(minor=True))
 
 
 BAD = {

@@ -147,7 +147,7 @@ def test_corner_of_example_2():
 
 
 def test_example_3_turns_into_a_saddle_as_its_walls_pull_harder(tmp_path, monkeypatch):
-    family = stability.Family("fans", "Fans", four_fans, (5,), 20.0, (0.5, 3.0), (5, 3.0))
+    family = stability.Family("fans", "Fans", four_fans, (5,), 20.0, 10.0, (0.5, 3.0), (5, 3.0))
     monkeypatch.setattr(stability, "FAMILIES", (family,))
     monkeypatch.setattr(stability, "CORNER_LENGTHS", (1.2,))
     perform(stability.STUDY, tmp_path, short=True)
@@ -219,8 +219,10 @@ def test_solvers_side_by_side_on_one_small_mesh(tmp_path, monkeypatch):
     perform(solvers.STUDY, tmp_path, short=True)
     folder = Folder(tmp_path / "solvers")
     summary = folder.read_table("summary").set_index("method")
-    assert summary.at_rest[solvers.GEOMETRIC] == 1
-    assert summary.at_rest.drop(solvers.GEOMETRIC).eq(0).all()
+    geometric = [solvers.GEOMETRIC, solvers.DEFAULT]
+    assert summary.at_rest[geometric].eq(1).all()
+    assert summary.verdicts[geometric].eq("1 stable").all()
+    assert summary.at_rest.drop(geometric).eq(0).all()
     histories = folder.read_table("histories")
     for _, mine in histories.groupby("method"):
         assert mine.evaluation.is_monotonic_increasing

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ..arrays import Floats
 from ..errors import OptionError, unknown
-from .figure import CURVES, INK, SMALL, TEXT, Image, finish, new, style
+from .figure import CURVES, INK, SMALL, TEXT, Image, apart, finish, new, style
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 Path = str | os.PathLike[str]
 SCALES = ("linear", "log")
 MARKERS = "osD^vPX"
+MOST = 6  # names in a legend inside the axes
 
 
 def lines(
@@ -31,12 +32,16 @@ def lines(
     xscale: str = "linear",
     yscale: str = "linear",
     markers: bool = False,
+    dashes: bool = False,
+    levels: Mapping[str, float] | None = None,
     width: int = 900,
     height: int = 560,
 ) -> Image:
     """Curves y(x) by label, each a pair of arrays; values that are not finite leave a gap.
 
-    On a "log" axis values ≤ 0 leave a gap too. ``x``, ``y`` are the axes' labels.
+    On a "log" axis values ≤ 0 leave a gap too. ``x``, ``y`` are the axes' labels. ``dashes`` draws
+    curves which lie on each other so that all are seen; ``levels`` are values of y by label, such as
+    bounds, drawn across.
     """
     for scale in (xscale, yscale):
         if scale not in SCALES:
@@ -46,11 +51,36 @@ def lines(
     axes.set_yscale(yscale)
     for k, (label, (xs, ys)) in enumerate(curves.items()):
         px, py = _curve(label, xs, ys, xscale, yscale)
-        marker = MARKERS[k % len(MARKERS)] if markers else None
-        axes.plot(px, py, color=CURVES[k % len(CURVES)], linewidth=1.1, marker=marker,
-                  markersize=2.8, label=label)  # fmt: skip
-    _key(axes, len(curves))
+        turn = k // len(CURVES)  # how often the colours have been gone through
+        look = (
+            apart(k, len(curves))
+            if dashes
+            else {"linewidth": 1.1, "linestyle": ("-", "--")[turn % 2]}
+        )
+        marker = MARKERS[(k + turn) % len(MARKERS)] if markers else None
+        axes.plot(px, py, color=CURVES[k % len(CURVES)], marker=marker, markersize=2.8, label=label,
+                  **look)  # fmt: skip
+    for label, level in (levels or {}).items():
+        axes.axhline(
+            level, color=INK, linewidth=0.9, linestyle=(0, (5, 3)), label=label, zorder=1.5
+        )
+    if xscale == "log":
+        _plain_ticks(axes.xaxis)
+    _key(axes, len(curves) + len(levels or {}))
     return finish(figure, path)
+
+
+def _plain_ticks(axis: Any) -> None:
+    """On a logarithmic axis shorter than a decade and a half: round numbers, written out."""
+    low, high = axis.get_view_interval()
+    if not 0.0 < low < high < 30.0 * low:
+        return
+    decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.log10(high))
+    steps = (1, 1.5, 2, 3, 4, 5, 6, 8) if high < 5.0 * low else (1, 2, 3, 5)
+    ticks = [step * decade for decade in decades for step in steps]
+    ticks = [tick for tick in ticks if low <= tick <= high]
+    axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
+    axis.set_ticks([], minor=True)
 
 
 def histories(
@@ -62,6 +92,7 @@ def histories(
     label: str = "",
     title: str = "",
     yscale: str | None = None,
+    dashes: bool = False,
     width: int = 900,
     height: int = 560,
 ) -> Image:
@@ -69,7 +100,7 @@ def histories(
 
     ``y`` is a column of each frame ("energy", "gradient_squared", ...); ``x`` another one, or the
     row number (iteration) when None. The scale is logarithmic unless y has values ≤ 0 or is the
-    energy.
+    energy. ``dashes`` as in ``lines``.
     """
     curves = {}
     for name, frame in frames.items():
@@ -82,7 +113,7 @@ def histories(
     return lines(
         curves, path, x=(x or "iteration").replace("_", " "), y=label or y.replace("_", " "),
         title=title, yscale=yscale or ("log" if positive and y != "energy" else "linear"),
-        width=width, height=height,
+        dashes=dashes, width=width, height=height,
     )  # fmt: skip
 
 
@@ -198,8 +229,15 @@ def _axes(width: int, height: int, title: str, x: str, y: str) -> tuple[Any, Any
 
 
 def _key(axes: Any, count: int) -> None:
-    if count > 1 or axes.get_legend_handles_labels()[1] not in ([], [""]):
-        axes.legend(fontsize=SMALL, frameon=False, labelcolor=INK, handlelength=1.8)
+    """A legend where there is something to tell apart; beside the axes where it would be long."""
+    if count > MOST:
+        left, foot, width, height = axes.get_position().bounds
+        axes.set_position((left, foot, 0.74 * width, height))
+        axes.legend(fontsize=SMALL, labelcolor=INK, handlelength=2.4, frameon=False,
+                    loc="upper left", bbox_to_anchor=(1.0, 1.0))  # fmt: skip
+    elif count > 1 or axes.get_legend_handles_labels()[1] not in ([], [""]):
+        axes.legend(fontsize=SMALL, labelcolor=INK, handlelength=3.2, facecolor="white",
+                    framealpha=0.8, edgecolor="none", borderpad=0.2)  # fmt: skip
 
 
 def _curve(

@@ -47,6 +47,17 @@ def style(axes: Any) -> Any:
     return axes
 
 
+def apart(k: int, count: int) -> dict[str, Any]:
+    """How to draw curve ``k`` of ``count`` so that those drawn before it are seen where it covers them.
+
+    The first is wide and solid, the others are thinner and thinner, dashed in each other's gaps.
+    """
+    if k == 0:
+        return {"linewidth": 2.6, "linestyle": "-"}
+    width = 1.6 - 0.6 * (k - 1) / max(1, count - 2)
+    return {"linewidth": width, "linestyle": (3.0 * (k % 2), (3.0, 3.0))}
+
+
 def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
     """The figure as an (h,w,3) image, written as a PNG if there is a path.
 

@@ -18,7 +18,7 @@ from ..surface import Surface
 from .colors import color_scale
 from .figure import DPI, INK, SMALL, TEXT, Image, finish, new
 from .raster import paint
-from .scene import View, mean_edge, scene, view_of
+from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, View, mean_edge, scene, view_of
 
 Path = str | os.PathLike[str]
 ViewName = str | tuple[float, float]
@@ -65,7 +65,7 @@ def draw(
     edges : the mesh's edges; by default where they are long enough to be told apart.
     numbers : (n,) values printed at the vertices that face the viewer, NaN not.
     form : the format of the numbers.
-    legend : the patches' names with their colours.
+    legend : what the colours mean: patches, or places without a value; supports.
     patches : names of those to draw, such as the walls; by default all.
     width : of the picture in pixels.
     renderer : "pyvista", "matplotlib", or "auto": pyvista where the system has OpenGL.
@@ -103,15 +103,17 @@ def panel(
     numbers: Sequence[npt.ArrayLike | None] | None = None,
     form: str = ".3f",
     legend: bool = False,
-    patches: Sequence[str] | None = None,
+    patches: Sequence[str] | Sequence[Sequence[str] | None] | None = None,
     one_scale: bool = True,
     width: int = 1200,
     renderer: str = "auto",
 ) -> Image:
     """Several surfaces in one picture, with one scale of colour.
 
-    ``views``, ``scalars`` and ``numbers`` are one per surface (``views`` may be one for all).
-    ``one_scale`` draws a length equally long everywhere; without it each surface fills its place.
+    ``views``, ``scalars``, ``numbers`` and ``patches`` are one per surface (``views`` and ``patches``
+    may be one for all).
+    ``one_scale`` draws a length equally long everywhere; without it what is drawn of each surface
+    fills its place.
     The rest is as in ``draw``.
     """
     if not len(surfaces):
@@ -121,23 +123,29 @@ def panel(
     named = _per_surface("titles", titles, count) if len(titles) else [""] * count
     values = _arrays("scalars", scalars, surfaces, faces=True)
     printed = _arrays("numbers", numbers, surfaces, faces=False)
+    parts = _parts(patches, count)
     scale = color_scale(values, limits, cmap)
     seen = [view_of(s, v) for s, v in zip(surfaces, given, strict=True)]
-    flat = [v.project(s.vertices) for s, v in zip(surfaces, seen, strict=True)]
+    flat = [
+        v.project(s.vertices if one_scale else s.vertices[_shown(s, part)])
+        for s, v, part in zip(surfaces, seen, parts, strict=True)
+    ]
     tiles, height = _arrange(flat, columns, width, TITLE if len(titles) else 0.0, one_scale)
-    names = _names(surfaces, patches) if legend else {}
+    spacings = [mean_edge(s) * tile.scale for s, tile in zip(surfaces, tiles, strict=True)]
+    dotted = [supports and spacing >= DOTS_FROM for spacing in spacings]
+    names = _meanings(surfaces, parts, values, dotted) if legend else []
     key = LEGEND * math.ceil(len(names) / NAMES)
     foot = (BAR if scale else 0.0) + key
     figure = new(width, height + foot)
     for k, tile in enumerate(tiles):
-        spacing, value, number = mean_edge(surfaces[k]) * tile.scale, values[k], printed[k]
+        value, number = values[k], printed[k]
         one = scene(
             surfaces[k],
             seen[k],
             None if scale is None or value is None else scale.rgb(value),
-            supports=supports and spacing >= DOTS_FROM,
-            edges=spacing >= EDGES_FROM if edges is None else edges,
-            patches=patches,
+            supports=dotted[k],
+            edges=spacings[k] >= EDGES_FROM if edges is None else edges,
+            patches=parts[k],
         )
         axes = _axes(figure, tile, height + foot)
         axes.imshow(paint(one, tile.low, tile.scale, tile.size, renderer), extent=tile.extent)
@@ -281,24 +289,57 @@ def _facing(surface: Surface, view: View) -> Bools:
     return np.bincount(F.ravel(), towards, surface.n) > 0.0
 
 
-def _names(surfaces: Sequence[Surface], patches: Sequence[str] | None) -> dict[str, Floats]:
-    """Colours of the patches shown, by name."""
-    colors: dict[str, Floats] = {}
-    for surface in surfaces:
+def _parts(patches: Any, count: int) -> list[Sequence[str] | None]:
+    """The names of the patches to draw, or None for all, for each surface."""
+    if patches is None or all(isinstance(entry, str) for entry in patches):
+        return [patches] * count
+    return _per_surface("patches", patches, count)
+
+
+def _shown(surface: Surface, patches: Sequence[str] | None) -> Bools:
+    """(n,) vertices of the patches drawn."""
+    shown = np.full(surface.n, patches is None)
+    faces = surface.patch_faces([surface.patch_index(name) for name in patches or ()])
+    shown[surface.faces[faces]] = True
+    return shown
+
+
+def _meanings(
+    surfaces: Sequence[Surface],
+    parts: Sequence[Sequence[str] | None],
+    values: Sequence[Floats | None],
+    dotted: Sequence[bool],
+) -> list[tuple[str, Any, bool]]:
+    """Name, colour and whether it is a dot, of all that a picture's colours can mean."""
+    colors: dict[str, Any] = {}
+    dots: dict[str, Any] = {}
+    for surface, part, value, supports in zip(surfaces, parts, values, dotted, strict=True):
+        shown = _shown(surface, part)
         for patch, color in zip(surface.patches, patch_colors(surface), strict=True):
-            if patches is None or patch.name in patches:
-                colors.setdefault(patch.name, color)
-    return colors
+            if value is None and (part is None or patch.name in part):
+                colors.setdefault(patch.name, tuple(color))
+        if value is not None and np.isnan(value[shown] if len(value) == surface.n else value).any():
+            colors["no value"] = NO_VALUE
+        if supports and surface.fixed[shown].any():
+            dots["fixed"] = FIXED_DOT
+        if supports and surface.on_plane[shown].any():
+            dots["sliding"] = SLIDING_DOT
+    return [(n, c, False) for n, c in colors.items()] + [(n, c, True) for n, c in dots.items()]
 
 
-def _legend(figure: Any, names: dict[str, Floats]) -> None:
+def _legend(figure: Any, names: Sequence[tuple[str, Any, bool]]) -> None:
+    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch as Swatch
 
+    drawn: list[Any] = [
+        Line2D([], [], linestyle="", marker="o", markersize=2.6, color=color, label=name)
+        if dot
+        else Swatch(facecolor=color, edgecolor=INK, linewidth=0.4, label=name)
+        for name, color, dot in names
+    ]
     figure.legend(
-        handles=[Swatch(facecolor=tuple(c), edgecolor=INK, linewidth=0.4, label=n)
-                 for n, c in names.items()],
-        loc="lower center", ncols=min(len(names), NAMES), fontsize=SMALL, frameon=False,
-        labelcolor=INK, handlelength=1.2, handleheight=1.0, borderaxespad=0.3,
+        handles=drawn, loc="lower center", ncols=min(len(names), NAMES), fontsize=SMALL,
+        frameon=False, labelcolor=INK, handlelength=1.2, handleheight=1.0, borderaxespad=0.3,
     )  # fmt: skip
 
 

@@ -107,7 +107,7 @@ def scene(
     P = surface.vertices[F]
     near = view.depth(P).mean(axis=1)
     light = _light(
-        _normals(surface, smooth=not edges)[shown], view, 0.45 if values is None else 0.22
+        _normals(surface, smooth=not edges)[shown], view, 0.45 if values is None else 0.08
     )
     if values is None:
         base = patch_colors(surface)[surface.patch_of_face[shown]]
