@@ -23,7 +23,7 @@ from .balance import (
     seen_from_point,
     unbalanced,
 )
-from .contact import Walls, excess, pinched, resting, standing_structure, walls
+from .contact import Walls, excess, standing
 from .curvature import METHODS, curvature_error, mean_curvature
 from .energy import energy_and_gradient, patch_areas, volume
 from .factor import SingularMatrix
@@ -166,28 +166,26 @@ def certify(
     >>> found.verdict.name, found.index, found.curvature_error < 1e-12
     ('STABLE', 0, True)
     """
-    below = walls(surface)
-    rests = resting(surface, below)
-    standing = pinched(surface, below, rests)
-    frame = standing_structure(standing, below, rests)
-    X = standing.vertices
-    space = motion_space(standing, frame, X)
-    value, forces = energy_and_gradient(standing, X, supports=False)
-    scale = force_scale(standing, frame, X)
-    unheld = excess(standing, below, rests)
+    found = standing(surface)
+    shown, below, rests, frame = found.surface, found.walls, found.rests, found.frame
+    X = shown.vertices
+    space = motion_space(shown, frame, X)
+    value, forces = energy_and_gradient(shown, X, supports=False)
+    scale = force_scale(shown, frame, X)
+    unheld = excess(shown, below, rests)
     residual = float(np.hypot(np.linalg.norm(space.pull(forces)), np.linalg.norm(unheld))) / scale
-    quality, walls_quality = _quality(standing, below)
+    quality, walls_quality = _quality(shown, below)
     system = None
     if residual <= tolerance and quality > COLLAPSED:
-        system = _system(standing, frame, space)
+        system = _system(shown, frame, space)
     values, fields = _modes(system, modes)
-    ratio, carried = load_ratio(standing), reactions(standing)
+    ratio, carried = load_ratio(shown), reactions(shown)
     verdict, detail = _verdict(
         surface, residual, tolerance, quality, system, values, ratio, status, below.pinchable
     )
     return Certificate(
         verdict=verdict,
-        detail="; ".join(filter(None, (detail, _pulled_off(unheld), seen_from_point(standing)))),
+        detail="; ".join(filter(None, (detail, _pulled_off(unheld), seen_from_point(shown)))),
         residual=residual,
         scale=scale,
         energy=value,
@@ -195,13 +193,13 @@ def certify(
         index=None if system is None else system.negative,
         eigenvalues=values,
         modes=fields,
-        curvature_error=_largest(pd.Series(np.abs(curvature_error(standing, "variational")))),
+        curvature_error=_largest(pd.Series(np.abs(curvature_error(shown, "variational")))),
         quality=quality,
         walls_quality=walls_quality,
-        patches=_patch_table(surface, standing),
-        junctions=junction_table(standing, space.project(forces)),
-        boundaries=boundary_table(standing),
-        load=load(standing),
+        patches=_patch_table(surface, shown),
+        junctions=junction_table(shown, space.project(forces)),
+        boundaries=boundary_table(shown),
+        load=load(shown),
         support=float((carried @ np.array(surface.plane.normal)).sum()),
         reactions=carried,
         pinched=np.flatnonzero(rests),

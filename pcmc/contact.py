@@ -191,9 +191,35 @@ def beside(below: Walls, rests: Bools) -> Bools:
     return mask & below.can_rest & ~rests
 
 
-def standing_structure(standing: Surface, below: Walls, rests: Bools) -> Structure:
-    """The ``motion.structure`` of a pinched surface: what rests follows the junction."""
-    return structure(standing, resting_crest(below, rests), beside(below, rests))
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """What of a surface stands, as the solver and the certificate see it.
+
+    Attributes
+    ----------
+    surface : the pinched surface; see ``pinched``.
+    walls, rests : of the whole surface; its junction vertices at rest on Π.
+    frame : what the vertices lie on; those that rest follow the junction.
+    """
+
+    surface: Surface
+    walls: Walls
+    rests: Bools
+    frame: Structure
+
+    @property
+    def judged(self) -> Ints:
+        """(k,3) the faces outside walls that may pinch, whose quality is judged."""
+        return self.surface.faces[~self.walls.pinchable[self.surface.patch_of_face]]
+
+
+def standing(surface: Surface, below: Walls | None = None, rests: Bools | None = None) -> Standing:
+    """What stands of a surface; with its walls, and what rests, seen from the positions if not given."""
+    below = walls(surface) if below is None else below
+    rests = resting(surface, below) if rests is None else rests
+    shown = pinched(surface, below, rests)
+    frame = structure(shown, resting_crest(below, rests), beside(below, rests))
+    return Standing(shown, below, rests, frame)
 
 
 def pull_and_capacity(surface: Surface, below: Walls, rests: Bools) -> tuple[Floats, Floats]:

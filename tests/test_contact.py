@@ -16,10 +16,9 @@ from pcmc.contact import (
     resting,
     resting_crest,
     settled,
-    standing_structure,
     walls,
 )
-from pcmc.motion import motion_space
+from pcmc.motion import motion_space, structure
 from pcmc.quality import triangle_quality
 from pcmc.solvers.state import State
 
@@ -113,9 +112,7 @@ def test_the_rows_of_a_wall_follow_its_crest():
 def test_with_a_motion_space_only_what_lies_along_the_wall():
     surface = shaken(two_squares(6), 0.02)
     below = walls(surface)
-    space = motion_space(
-        surface, standing_structure(surface, below, resting(surface, below)), surface.vertices
-    )
+    space = motion_space(surface, structure(surface), surface.vertices)
     X = surface.vertices.copy()
     X[below.can_rest] += [0.1, 0.0, 0.2]
     change = hung(surface, below, X, space) - X

@@ -7,7 +7,7 @@ from shapes import octahedron, rotation, shaken
 from starts import two_squares
 
 from pcmc import Plane, Surface, solve
-from pcmc.contact import pinched, resting, standing_structure, walls
+from pcmc.contact import standing
 from pcmc.energy import energy_and_gradient
 from pcmc.linearise import linearise
 from pcmc.motion import motion_space, structure
@@ -69,10 +69,8 @@ def test_sheets_that_slide_on_the_plane():
 
 def test_a_junction_beside_one_that_rests():
     surface = solve(two_squares(6, alpha_aux=2.5), target="stationary").surface
-    below = walls(surface)
-    rests = resting(surface, below)
-    standing = pinched(surface, below, rests)
-    frame = standing_structure(standing, below, rests)
+    found = standing(surface)
+    frame = found.frame
     assert frame.level.any()
-    moves = shaken(standing, 0.02)
+    moves = shaken(found.surface, 0.02)
     assert slope(moves, frame) == pytest.approx(2.0, abs=0.05)

@@ -7,7 +7,7 @@ from shapes import disc, pyramid, rotation, shaken, three_patches
 
 from generators import two_squares
 from pcmc import Patch, Plane, Surface, energy, gradient, solve
-from pcmc.contact import pinched, resting, resting_crest, standing_structure, walls
+from pcmc.contact import resting_crest, standing
 from pcmc.energy import energy_and_gradient
 from pcmc.motion import force_scale, motion_space, structure
 from pcmc.topology import CURVE, POINT, SHEET
@@ -176,17 +176,15 @@ def test_a_crest_at_rest_is_a_curve_whatever_meets_there():
 def test_where_a_standing_wall_begins_a_resting_vertex_keeps_to_the_crest():
     """Three curves meet there, two sheets' junction and the wall's foot; only the junction counts."""
     surface = solve(two_squares(6, alpha_aux=2.5), target="stationary").surface
-    below = walls(surface)
-    rests = resting(surface, below)
-    standing = pinched(surface, below, rests)
-    links = resting_crest(below, rests)
-    tip = np.unique(links[(below.can_rest & ~rests)[links[:, 1]], 0])
-    frame = standing_structure(standing, below, rests)
+    found = standing(surface)
+    frame, rests = found.frame, found.rests
+    links = resting_crest(found.walls, rests)
+    tip = np.unique(links[(found.walls.can_rest & ~rests)[links[:, 1]], 0])
     assert len(tip) == 2
     assert (frame.kind[tip] == CURVE).all()
-    space = motion_space(standing, frame, standing.vertices)
+    space = motion_space(found.surface, frame, found.surface.vertices)
     assert (space.dimension[tip] == 1).all()
-    one, two = standing.vertices[frame.beside[np.isin(frame.curve, tip)]].transpose(1, 0, 2)
+    one, two = found.surface.vertices[frame.beside[np.isin(frame.curve, tip)]].transpose(1, 0, 2)
     assert np.einsum("ij,ij->i", two - one, space.basis[tip, 0]) == pytest.approx(0.0, abs=1e-12)
 
 

@@ -9,13 +9,10 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..assemble import Pattern, assemble, pattern
 from ..contact import (
-    Walls,
+    excess,
     hung,
-    pinched,
-    pull_and_capacity,
-    resting,
     settled,
-    standing_structure,
+    standing,
     walls,
 )
 from ..descent import Carrier
@@ -23,14 +20,13 @@ from ..energy import energy_and_gradient, patch_volumes
 from ..factor import Factor, Factoriser, factoriser
 from ..kernels import area_vectors
 from ..modes import Stiffness, full_matrix, lumped_mass
-from ..motion import MotionSpace, Structure, force_scale, motion_space
+from ..motion import MotionSpace, force_scale, motion_space
 from ..quality import redistribution, triangle_quality
 from ..surface import Surface
 from ..topology import SHEET
 from .direction import Line, weighted_gradient
 
 SWEEPS = 20  # of redistribution at most
-SLACK = 1.01  # pull over capacity: nearer than that, what rests and what stands off is the same
 CLEAR = 1.02  # ratio of qualities that counts as better
 
 
@@ -46,11 +42,9 @@ class Shape:
 
     def __init__(self, surface: Surface, backend: str | None = None) -> None:
         self.full = surface
-        self.below: Walls = walls(surface)
-        self.rests: Bools = resting(surface, self.below)
-        self.surface = pinched(surface, self.below, self.rests)
-        self.frame: Structure = standing_structure(self.surface, self.below, self.rests)
-        self.judged: Ints = self.surface.faces[~self.below.pinchable[self.surface.patch_of_face]]
+        found = standing(surface)
+        self.surface, self.below, self.rests = found.surface, found.walls, found.rests
+        self.frame, self.judged = found.frame, found.judged
         self.pressed: Floats = (~surface.walls).astype(float)
         self._backend = backend
         self._carrier: Carrier | None = None
@@ -63,14 +57,10 @@ class Shape:
         """The motion space at X (n,3)."""
         return motion_space(self.surface, self.frame, X)
 
-    def forces(self, surface: Surface, X: Floats) -> Floats:
-        """B Bᵀ ∇E (n,3) with the frames and the gradient at X."""
-        return self.space(X).project(energy_and_gradient(surface, X)[1])
-
-    def residual(self, surface: Surface, X: Floats) -> float:
-        """‖Bᵀ∇E‖ over the norm of the single triangles' forces, at X."""
-        size = float(np.linalg.norm(self.forces(surface, X)))
-        return size / force_scale(surface, self.frame, X)
+    def residual(self, X: Floats) -> float:
+        """‖Bᵀ∇E‖ over the norm of the single triangles' forces, at X, the tensions being the first."""
+        left = self.space(X).pull(energy_and_gradient(self.surface, X)[1])
+        return float(np.linalg.norm(left)) / force_scale(self.surface, self.frame, X)
 
     def hessian(self, surface: Surface, space: MotionSpace, X: Floats) -> tuple[Floats, Factor]:
         """Values of Bᵀ(∂²E)B in the pattern, and its factor. The symbolic work is kept.
@@ -136,14 +126,12 @@ class Shape:
         X[down] -= self.surface.plane.height(X[down])[:, None] * normal
         return self.whole(hung(self.surface, self.below, X))
 
-    def pulled_off(self, line: Line, value: float, X: Floats) -> bool:
-        """Whether a resting junction vertex is pulled harder than its wall can hold at λ."""
+    def unheld(self, line: Line, value: float, X: Floats) -> Floats:
+        """(n,) the pull on resting junction vertices beyond what their walls can hold at λ, force."""
         if not self.rests.any():
-            return False
+            return np.zeros(self.full.n)
         below = replace(self.below, tension=walls(line.applied(self.full, value)).tension)
-        surface = line.applied(self.surface, value).moved(X)
-        pull, capacity = pull_and_capacity(surface, below, self.rests)
-        return bool((pull > SLACK * capacity).any())
+        return excess(line.applied(self.surface, value).moved(X), below, self.rests)
 
     # -- triangles -----------------------------------------------------------------------------
 

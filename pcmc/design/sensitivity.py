@@ -11,8 +11,9 @@ factor of Bᵀ(∂²E)B. A quantity q(X, λ) then changes by ⟨∂q/∂X, dX/d�
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,7 +23,7 @@ from .. import kernels
 from ..arrays import Floats
 from ..assemble import assemble, pattern
 from ..certificate import TOLERANCE
-from ..contact import Walls, hung, pinched, resting, standing_structure, walls
+from ..contact import Walls, excess, hung, standing
 from ..energy import energy_and_gradient
 from ..errors import OptionError, SurfaceError
 from ..factor import Factor, SingularMatrix, factoriser
@@ -33,11 +34,12 @@ from .quantities import Measure, Parameter, Target, measure
 
 ACCURACY = 1e-9  # relative, to which J s = b is solved
 LEFT = 1e-6  # the same, above which there is no solution
+TARGET, PARAMETER = "a Target", "a Parameter or the name of a patch"
 AT_FOLD = "sensitivities: the surface stands at a fold, where they are infinite"
 
 
 def sensitivities(
-    surface: Surface, of: Sequence[Target], to: Sequence[Parameter | str]
+    surface: Surface, of: Target | Iterable[Target], to: Parameter | str | Iterable[Parameter | str]
 ) -> pd.DataFrame:
     """Derivatives dq/dλ of quantities with respect to tensions and pressures, at rest.
 
@@ -47,8 +49,8 @@ def sensitivities(
     Parameters
     ----------
     surface : a surface at rest, as ``pcmc.solve`` returns it.
-    of : quantities; whether their targets have values does not matter.
-    to : parameters, or names of patches for their tensions.
+    of : one or several quantities; whether their targets have values does not matter.
+    to : one or several parameters, or names of patches for their tensions.
 
     Returns
     -------
@@ -58,7 +60,7 @@ def sensitivities(
     Raises
     ------
     SurfaceError : the surface is not at rest, or stands exactly at a fold.
-    OptionError : a patch that does not exist, a quantity that cannot be measured.
+    OptionError : none of them, a patch that does not exist, a quantity that cannot be measured.
 
     Examples
     --------
@@ -74,25 +76,25 @@ def sensitivities(
     apex of roof             -0.397748
     curvature of roof        -0.500000
     """
-    parameters = as_parameters(to)
+    if not isinstance(surface, Surface):
+        raise SurfaceError(f"sensitivities: expected a Surface, found {type(surface).__name__}")
+    targets, parameters = as_targets(of), as_parameters(to)
     standing, directions = _answers(surface, parameters)
-    rows = [
-        slopes(standing, measure(standing, target), parameters, directions)
-        for target in as_targets(of)
-    ]
     return pd.DataFrame(
-        rows, index=[t.label for t in of], columns=[p.label for p in parameters], dtype=float
-    )
+        [slopes(standing, measure(standing, t), parameters, directions) for t in targets],
+        index=[t.label for t in targets], columns=[p.label for p in parameters], dtype=float,
+    )  # fmt: skip
 
 
-def as_parameters(given: Sequence[Parameter | str]) -> list[Parameter]:
-    """Parameters; a name stands for that patch's tension."""
-    if isinstance(given, str | Parameter):
-        given = [given]
-    made = [Parameter(p) if isinstance(p, str) else p for p in given]
+def as_parameters(given: Parameter | str | Iterable[Parameter | str]) -> list[Parameter]:
+    """One parameter or several as a list; a name stands for that patch's tension."""
+    made = [
+        Parameter(p) if isinstance(p, str) else p
+        for p in _listed(given, (str, Parameter), PARAMETER)
+    ]
     for p in made:
         if not isinstance(p, Parameter):
-            raise OptionError(f"expected a Parameter or the name of a patch, found {p!r}")
+            raise OptionError(f"expected {PARAMETER}, found {p!r}")
     labels = [p.label for p in made]
     for k, label in enumerate(labels):
         if label in labels[:k]:
@@ -100,13 +102,25 @@ def as_parameters(given: Sequence[Parameter | str]) -> list[Parameter]:
     return made
 
 
-def as_targets(given: Sequence[Target]) -> list[Target]:
-    """The targets, checked for their type."""
-    targets: list[Target] = [given] if isinstance(given, Target) else list(given)
+def as_targets(given: Target | Iterable[Target]) -> list[Target]:
+    """One target or several as a list."""
+    targets = _listed(given, (Target,), TARGET)
     for t in targets:
         if not isinstance(t, Target):
-            raise OptionError(f"expected a Target, found {t!r}")
+            raise OptionError(f"expected {TARGET}, found {t!r}")
     return targets
+
+
+def _listed(given: Any, single: tuple[type, ...], what: str) -> list[Any]:
+    """What is given alone, or by anything that can be gone through, even once only."""
+    if isinstance(given, single):
+        return [given]
+    if isinstance(given, str | bytes) or not isinstance(given, Iterable):
+        raise OptionError(f"expected {what}, or several of them, found {given!r}")
+    listed = list(given)
+    if not listed:
+        raise OptionError(f"expected {what}, or several of them, found none")
+    return listed
 
 
 def slopes(
@@ -142,27 +156,27 @@ class _AtRest:
 
     @classmethod
     def of(cls, surface: Surface) -> _AtRest:
-        below = walls(surface)
-        rests = resting(surface, below)
-        standing = pinched(surface, below, rests)
-        frame = standing_structure(standing, below, rests)
-        X = standing.vertices
-        space = motion_space(standing, frame, X)
-        gradient = energy_and_gradient(standing, X)[1]
-        left = np.linalg.norm(space.pull(gradient))
-        if left > TOLERANCE * force_scale(standing, frame, X):
+        found = standing(surface)
+        shown, below, rests, frame = found.surface, found.walls, found.rests, found.frame
+        X = shown.vertices
+        space = motion_space(shown, frame, X)
+        gradient = energy_and_gradient(shown, X)[1]
+        unheld = np.linalg.norm(excess(shown, below, rests))
+        left = np.hypot(np.linalg.norm(space.pull(gradient)), unheld)
+        residual = float(left) / force_scale(shown, frame, X)
+        if residual > TOLERANCE:
             raise SurfaceError(
-                f"sensitivities: the surface is not at rest (relative residual"
-                f" {left / force_scale(standing, frame, X):.1e}); solve it first"
+                f"sensitivities: the surface is not at rest (relative residual {residual:.1e});"
+                " solve it first"
             )
         kept = pattern(frame, space)
         try:
-            factor = factoriser(kept).factor(assemble(standing, frame, space, kept, X))
+            factor = factoriser(kept).factor(assemble(shown, frame, space, kept, X))
         except SingularMatrix:
             raise SurfaceError(AT_FOLD) from None
         follows = bool((below.can_rest & ~rests).any())
-        linear = linearise(standing, frame, space, X, gradient)
-        return cls(standing, below, follows, space, linear, factor)
+        linear = linearise(shown, frame, space, X, gradient)
+        return cls(shown, below, follows, space, linear, factor)
 
     def answer(self, parameter: Parameter) -> Floats:
         """dX/dλ (n,3)."""

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Floats
-from ..contact import pinched, resting, walls
+from ..contact import standing
 from ..errors import FileError, FileWarning, PcmcError, unknown
 from ..files import whole
 from ..surface import Plane, Surface
@@ -140,8 +140,7 @@ def write(
         lost.append("certificate")
     told = None
     if getattr(module, "APART", False):
-        below = walls(surface)
-        shown = pinched(surface, below, resting(surface, below))
+        shown = standing(surface).surface
         if shown.m < surface.m and getattr(module, "WALLS", False):
             from .flat import walls_told
 

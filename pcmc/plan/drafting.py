@@ -17,7 +17,7 @@ from .lift import dome, spanned
 from .lines import SNAP, Drawn, Kind, Line
 from .planar import PlanarMesh, locate, signed_areas, triangulate
 from .roof import EDGES, Area, Plan
-from .walls import Standing, WallTop, stand
+from .walls import Added, WallTop, stand
 
 MOST = 5_000_000  # triangles
 STEEPEST = 10.0  # initial rise over the plan's size
@@ -214,7 +214,7 @@ def _located(areas: Sequence[Area], mesh: PlanarMesh, count: int, centroid: Floa
 def _walls(
     plan: Plan, drawn: Arrangement, lines: Sequence[Line], triangles: Ints, pressure: Floats,
     X: Floats, base: Floats, fixed: Bools,
-) -> tuple[Standing, list[Patch]]:  # fmt: skip
+) -> tuple[Added, list[Patch]]:  # fmt: skip
     """The walls and their patches: one for each divider, and for each difference of pressure at it.
 
     A wall between rooms takes the pressure of the one on its divider's left less that on its right.

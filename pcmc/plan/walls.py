@@ -35,7 +35,7 @@ class WallTop:
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class Added:
     """What walls add to a mesh: vertices after its own, faces with a label each, supports."""
 
     vertices: Floats
@@ -114,7 +114,7 @@ def stand(
     plane: Plane,
     fixed: Bools,
     floor: Floats | None = None,
-) -> Standing:
+) -> Added:
     """The walls under the given upper edges.
 
     A wall is developed into the plane (length along its foot, height), meshed there with its upper
@@ -146,7 +146,7 @@ def stand(
     held, sliding = (np.zeros(len(new), dtype=bool) for _ in range(2))
     held[sorted(builder.fixed_new)] = True
     sliding[sorted(builder.sliding_new)] = True
-    return Standing(to_space(new, plane), faces, label, held, sliding & ~held)
+    return Added(to_space(new, plane), faces, label, held, sliding & ~held)
 
 
 class _Builder:

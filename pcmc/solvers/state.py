@@ -11,14 +11,13 @@ from ..contact import (
     excess,
     hung,
     lifted,
-    pinched,
     resting,
     settled,
-    standing_structure,
+    standing,
     walls,
 )
 from ..energy import energy_and_gradient, energy_at
-from ..motion import MotionSpace, Structure, force_scale, motion_space
+from ..motion import MotionSpace, force_scale, motion_space
 from ..quality import compare, redistribution, worst_quality
 from ..surface import Surface
 
@@ -58,11 +57,10 @@ class State:
         self._pinch(resting(surface, self.walls))
 
     def _pinch(self, rests: Bools) -> None:
-        self.rests = rests
-        self.surface = pinched(self.full, self.walls, rests)
+        found = standing(self.full, self.walls, rests)
+        self.rests, self.surface, self.frame = rests, found.surface, found.frame
+        self.judged: Ints = found.judged
         self.X: Floats = self.surface.vertices.copy()
-        self.frame: Structure = standing_structure(self.surface, self.walls, rests)
-        self.judged: Ints = self.surface.faces[~self.walls.pinchable[self.surface.patch_of_face]]
         self.version += 1
         self.space: MotionSpace = motion_space(self.surface, self.frame, self.X)
         self.measure()
