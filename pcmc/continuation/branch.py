@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from typing import Any
 
@@ -38,7 +38,7 @@ class Branch:
     parameter: Direction
     points: pd.DataFrame
     events: pd.DataFrame
-    surfaces: Mapping[int, Surface]
+    surfaces: Mapping[int, Surface] = field(repr=False)
     ending: Ending
     detail: str = ""
 
@@ -88,14 +88,16 @@ def follow(
     Raises
     ------
     OptionError : an unknown patch, option or column, or a value that it may not have.
-    SurfaceError : the surface is not at rest, or not held.
+    SurfaceError : the surface is not at rest, or not held against rigid motions.
 
     Notes
     -----
-    Folds and changes of index are located to 2e-5 of arclength on the mesh as it stands there. Where
-    vertices stand along the surface matters as much as the mesh's fineness does, to second order in the
-    edge length, so other steps find a fold a little elsewhere: the cap's by 6e-5 with 5 rings, 2e-5
-    with 10. Of two folds within one step neither is seen; shorten ``largest``.
+    Changes of index are located to 2e-5 of arclength on the mesh as it stands there, folds to that or a
+    thousandth of the step, which λ hardly feels. Where vertices stand along the surface matters as much
+    as the mesh's fineness does, to second order in the edge length, so other steps find a fold a little
+    elsewhere: the cap's by 6e-5 with 5 rings, 2e-5 with 10. A goal passed twice within a step, before a
+    fold and behind it, is met the first time. Of two folds within one step neither is seen; shorten
+    ``largest``.
 
     Examples
     --------
@@ -112,6 +114,8 @@ def follow(
     """
     if not isinstance(surface, Surface):
         raise SurfaceError(f"follow: expected a Surface, found {type(surface).__name__}")
+    if callback is not None and not callable(callback):
+        raise OptionError(f"callback: expected a function of a Progress, found {callback!r}")
     chosen = check.build(FollowOptions, "follow", options)
     if chosen.remesh is not None and find_spec("mmgpy") is None:
         raise MissingExtra("mmgpy", "remesh")

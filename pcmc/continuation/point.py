@@ -182,7 +182,7 @@ def correct(
     for iteration in range(ITERATIONS + 1):
         surface = line.applied(shape.surface, value)
         space = shape.space(X)
-        right = space.pull(shape.forces(surface, X))
+        right = space.pull(energy_and_gradient(surface, X)[1])
         residual = float(np.linalg.norm(right)) / force_scale(surface, shape.frame, X)
         g = border.value(X, value)
         if residual <= tolerance and abs(g) <= 1e-9:

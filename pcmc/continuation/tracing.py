@@ -89,9 +89,11 @@ class Tracer:
         if not (moves or shape.rests.any()):  # a wall that is gone may come back
             raise OptionError("the parameter moves nothing: no vertex of what it names is free")
         try:
-            residual = shape.residual(shape.surface, X)
+            residual = shape.residual(X)
             if not residual <= AT_REST:
                 raise Lost(f"relative residual {residual:.1e}")
+            if shape.unheld(self.line, value, X).any():
+                raise Lost("a junction is pulled off the plane harder than its wall can hold")
             border = at_parameter(value, self.scale)
             found = correct(shape, self.line, X, value, border, self.options.tolerance)
             return examine(found, self.line, self.scale, math.copysign(1.0, self.options.step))
@@ -145,7 +147,7 @@ class Tracer:
         here = self.here
         try:
             found = self.solution(length)
-            if found.shape.pulled_off(self.line, found.value, found.X):
+            if found.shape.unheld(self.line, found.value, found.X).any():
                 raise Touched(found.X, found.value)
         except Touched as touched:
             found = self.resettled(touched)
@@ -210,9 +212,7 @@ class Tracer:
             raise Lost(f"contact of a wall with the plane changes, and {result.message}")
         again = Shape(result.surface, self.options.backend)
         X = again.surface.vertices
-        return Solution(
-            again, X, touched.value, again.residual(again.surface, X), result.iterations
-        )
+        return Solution(again, X, touched.value, again.residual(X), result.iterations)
 
     def tend(self) -> None:
         """Spread the triangles where they are poor, or remesh, and return to the branch."""
