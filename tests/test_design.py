@@ -9,7 +9,7 @@ import pytest
 from shapes import pyramid
 
 import pcmc
-from generators import double_bubble, joined_caps, spherical_cap, two_caps
+from generators import double_bubble, joined_caps, spherical_cap, two_caps, two_squares
 from pcmc import Design, Parameter, Patch, Target, meet, sensitivities
 from pcmc.design import Reach
 from pcmc.design.quantities import QUANTITIES, measure
@@ -208,6 +208,31 @@ def test_a_patch_without_influence_has_slope_zero(roof):
     assert sensitivities(roof, [Target("curvature", "north")], ["east"]).iloc[0, 0] == 0.0
 
 
+@pytest.mark.parametrize(
+    ("of", "to"),
+    [
+        (Target("apex"), "roof"),
+        (Target("apex"), Parameter("roof")),
+        ((t for t in [Target("apex")]), (name for name in ["roof"])),
+        ({"only": Target("apex")}.values(), {"roof": 1.0}),
+    ],
+    ids=["alone", "Parameter", "generators", "views"],
+)
+def test_one_quantity_and_parameter_alone_or_several_by_any_iterable(of, to):
+    """h² = 1/8: dh/dα = -h (1 + h²)."""
+    table = sensitivities(pyramid(height=8**-0.5), of, to)
+    assert (table.index.tolist(), table.columns.tolist()) == (["apex"], ["tension of roof"])
+    assert table.iloc[0, 0] == pytest.approx(-(8**-0.5) * 1.125)
+
+
+def test_a_junction_pulled_off_by_more_than_its_wall_holds_is_not_at_rest():
+    pinched = pcmc.solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
+    assert len(pcmc.certify(pinched).pinched) == 5
+    assert np.isfinite(sensitivities(pinched, Target("volume"), "left").to_numpy()).all()
+    with pytest.raises(SurfaceError, match=r"not at rest \(relative residual .*; solve it first"):
+        sensitivities(pinched.retensioned({"wall": 1.0}), Target("volume"), "left")
+
+
 # Targets met
 
 
@@ -284,6 +309,28 @@ def test_of_many_solutions_tensions_keep_their_ratios(roof):
     change = design.parameters["value"] / design.parameters["start"]
     assert change["tension of north"] < 0.9
     assert np.ptp(change) < 0.1 * (1.0 - change.mean())
+
+
+@pytest.mark.parametrize("height", [1.2, 3.0])
+def test_heights_that_only_a_coarse_mesh_carries_are_met(height):
+    """α h / √(1 + h²) = 1/3: at h = 1.2 the load is 1.15 times what the smooth boundary carries."""
+    design = meet(pyramid(), Target("apex", "roof", height), "roof")
+    assert design.met
+    assert design.surface.tensions[0] == pytest.approx(
+        np.sqrt(1 + height**2) / height / 3, rel=1e-6
+    )
+
+
+def test_points_that_are_not_worth_a_solve_are_rows_without_one():
+    seen: list[pd.Series] = []
+    start = cap().retensioned({"cap": 0.3})
+    design = meet(start, Target("apex", None, 0.3), "cap", callback=seen.append)
+    assert design.met
+    status = design.history.status
+    assert status[0] == "overloaded"
+    assert design.history["tension of cap"][0] == 0.3
+    assert design.history[["apex", "misfit"]].iloc[0].isna().all()
+    assert design.solves == (status != "overloaded").sum() < len(status) == len(seen)
 
 
 def test_a_height_just_below_the_limit_is_met():
@@ -370,8 +417,17 @@ def test_the_limit_of_solves():
         (lambda: meet(pyramid(), [Target("apex", "rof", 1.0)], ["roof"]), "did you mean 'roof'"),
         (lambda: meet(pyramid(), [Target("apex", "roof", 1.0)], ["rof"]), "did you mean 'roof'"),
         (lambda: meet(pyramid(), [Target("apex", "roof")], ["roof"]), "give value"),
-        (lambda: meet(pyramid(), [], ["roof"]), "at least one target"),
-        (lambda: meet(pyramid(), [Target("apex", None, 1.0)], []), "at least one target"),
+        (lambda: meet(pyramid(), [], ["roof"]), "expected a Target, or several of them, found none"),
+        (lambda: meet(pyramid(), [Target("apex", None, 1.0)], []), "name of a patch.*found none"),
+        (lambda: meet(pyramid(), "apex", ["roof"]), "a Target, or several of them, found 'apex'"),
+        (lambda: meet(pyramid(), Target("apex", None, 1.0), 3), "or several of them, found 3"),
+        (lambda: meet(pyramid(), Target("apex", None, 1.0), "roof", callback=3), "a function of a row"),
+        (lambda: meet([], Target("apex", None, 1.0), "roof"), "meet: expected a Surface, found list"),
+        (lambda: sensitivities([], Target("apex"), "roof"), "expected a Surface, found list"),
+        (lambda: sensitivities(pyramid(), 3, "roof"), "expected a Target, or several of them, found 3"),
+        (lambda: sensitivities(pyramid(), Target("apex"), ()), "name of a patch.*found none"),
+        (lambda: sensitivities(pyramid(), ["apex"], "roof"), "expected a Target, found 'apex'"),
+        (lambda: Parameter(3), "Parameter: expected the name of a patch, found 3"),
         (lambda: meet(pyramid(), [Target("height", (9, 9), 1.0)], ["roof"]), "no patch is over"),
         (lambda: meet(pyramid(), [Target("apex", None, 1.0)], ["roof"], solves=0), "solves"),
         (lambda: meet(pyramid(), [Target("apex", None, 1.0)], ["roof"], tolerance=0), "tolerance"),
@@ -431,13 +487,113 @@ def test_a_callback_sees_each_solve_and_its_exceptions_pass_through():
         meet(cap(), [Target("apex", None, 0.3)], ["cap"], callback=stop)
 
 
-def test_an_interrupted_solve_interrupts_the_search(monkeypatch):
-    def interrupted(surface, method, **options):
-        def callback(progress):
-            raise StopIteration
+# Stopped on request
 
-        return pcmc.solve(surface, method, callback, **options)
 
-    monkeypatch.setattr("pcmc.design.meeting.solve", interrupted)
+def stop_after(count, error=StopIteration):
+    seen = []
+
+    def callback(row):
+        seen.append(row)
+        if len(seen) == count:
+            raise error
+
+    return callback
+
+
+@pytest.mark.parametrize("error", [StopIteration, KeyboardInterrupt])
+def test_stopped_by_its_callback_it_returns_the_best_so_far(error):
+    design = meet(cap(), Target("apex", None, 0.9), "cap", callback=stop_after(2, error))
+    assert design.reach is Reach.STOPPED
+    assert not design.met
+    assert len(design.history) == design.solves == 2
+    best = design.history.loc[design.history.misfit.idxmin()]
+    assert design.certificate.certified
+    assert (
+        design.surface.tensions[0] == best["tension of cap"] == design.parameters["value"].iloc[0]
+    )
+    assert design.targets["found"].iloc[0] == best["apex"] == design.surface.vertices[:, 2].max()
+    assert np.isnan(design.targets["limit"].iloc[0])
+    assert design.message.startswith(Reach.STOPPED.value)
+    assert f"wanted 0.9, so far {best['apex']:.6g}" in design.message
+
+
+def test_stopped_where_the_targets_are_met_they_are_met():
+    whole = meet(cap(), Target("apex", None, 0.3), "cap")
+    design = meet(cap(), Target("apex", None, 0.3), "cap", callback=stop_after(whole.solves))
+    assert design.reach is Reach.MET
+
+
+def interrupted(monkeypatch, count):
+    """Ctrl-C in the middle of the solve of this number."""
+    solves = []
+
+    def solve(surface, method, callback=None, **options):
+        solves.append(surface)
+
+        def pressed(progress):
+            raise KeyboardInterrupt
+
+        return pcmc.solve(surface, method, pressed if len(solves) == count else callback, **options)
+
+    monkeypatch.setattr("pcmc.design.search.solve", solve)
+
+
+def test_ctrl_c_in_a_solve_ends_the_search_with_the_best_so_far(monkeypatch):
+    interrupted(monkeypatch, 3)
+    design = meet(cap(), Target("apex", None, 0.9), "cap")
+    assert design.reach is Reach.STOPPED
+    assert design.history.status.tolist() == ["converged", "converged", "stopped"]
+    assert design.result.converged
+    assert design.targets["misfit"].abs().iloc[0] == design.history.misfit.min()
+
+
+def test_ctrl_c_between_solves_ends_the_search_with_the_best_so_far(monkeypatch):
+    def pressed(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pcmc.design.search.sensitivities", pressed)
+    design = meet(cap(), Target("apex", None, 0.9), "cap")
+    assert (design.reach, design.solves) == (Reach.STOPPED, 1)
+    assert design.result.converged
+
+
+@pytest.mark.parametrize("tension", [1.5, 0.3])
+def test_stopped_before_any_equilibrium_it_returns_the_surface_given(monkeypatch, tension):
+    """0.3 carries no cap: no solve is tried, and the callback stops at that row."""
+    start = cap().retensioned({"cap": tension})
+    interrupted(monkeypatch, 1)
+    design = meet(start, Target("apex", None, 0.9), "cap", callback=stop_after(1))
+    assert design.reach is Reach.STOPPED
+    assert design.history.status.tolist() == ["stopped" if tension == 1.5 else "overloaded"]
+    assert design.result.status.name == "STOPPED"
+    np.testing.assert_array_equal(design.surface.vertices, start.vertices)
+    assert design.parameters["value"].iloc[0] == design.surface.tensions[0] == tension
+    assert design.targets["found"].iloc[0] == start.vertices[:, 2].max()
+
+
+def test_a_command_stopped_while_it_meets_targets_ends(tmp_path):
+    from pcmc import project
+
+    file = tmp_path / "roof.toml"
+    file.write_text(
+        """
+        [plan]
+        edge_length = 1.0
+        outline = [[0, 0], [4, 0], [4, 3], [0, 3]]
+        patches = {roof = {tension = 2.0}}
+        [targets]
+        meet = [{quantity = "apex", value = 0.6}]
+        vary = ["roof"]
+        [output]
+        files = ["roof.pcmc"]
+        """
+    )
+
+    def pressed(words):
+        if words.startswith("meeting"):
+            raise KeyboardInterrupt
+
     with pytest.raises(KeyboardInterrupt):
-        meet(cap(), [Target("apex", None, 0.3)], ["cap"])
+        project.run(file, progress=pressed)
+    assert [path.name for path in tmp_path.iterdir()] == ["roof.toml"]

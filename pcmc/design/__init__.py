@@ -1,6 +1,7 @@
 """Meeting a goal: the tensions and pressures that give a surface what is wanted of it."""
 
-from .meeting import Design, Reach, meet
+from .meeting import meet
+from .outcome import Design, Reach
 from .quantities import Parameter, Target
 from .sensitivity import sensitivities
 

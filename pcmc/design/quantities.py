@@ -111,6 +111,8 @@ class Parameter:
     high: float | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.patch, str):
+            raise OptionError(f"Parameter: expected the name of a patch, found {self.patch!r}")
         if self.kind not in KINDS:
             raise OptionError(unknown("kind of parameter", self.kind, KINDS))
         _finite(self.low, f"{self.label}: low")

@@ -154,12 +154,15 @@ def reporter(say: Say) -> Callable[[Progress], None]:
 
 
 def _aim(project: Project, surface: Surface, say: Say) -> Design:
-    from ..design import meet  # needed by projects with targets only
+    from ..design import Reach, meet  # needed by projects with targets only
 
     if project.method != "newton":
         raise OptionError(f"targets are met with method 'newton' only, found {project.method!r}")
     count = iter(range(1, 10**6))
-    return meet(
-        surface, list(project.targets), list(project.vary),
+    design = meet(
+        surface, project.targets, project.vary,
         callback=lambda row: say(f"meeting the targets: solve {next(count)}"), **project.options,
     )  # fmt: skip
+    if design.reach is Reach.STOPPED:  # as in ``uninterrupted``
+        raise KeyboardInterrupt
+    return design
