@@ -280,7 +280,7 @@ def _widened(values: pd.Series[float], above: float = 0.06) -> tuple[float, floa
 
 STUDY = Study(
     "existence",
-    "where equilibria end: the cap's fold, Example 2's boundary of existence, Example 3's walls",
+    "where equilibria end: the cap's fold, how far Example 2's goes, Example 3's walls",
     data,
     table,
     figure,
