@@ -23,9 +23,7 @@ from .state import State
 SHIFTS = (0.0, 0.25, 1.0, 4.0)  # of the stiffness, tried in turn until the matrix is positive
 LENGTHS = (1.0, 0.5, 0.25, 0.125)  # of a Newton step, tried in turn
 REFRESH = 6  # descent steps between two factorisations of the Laplacian
-DRIFT = (
-    0.1  # of an edge: the farthest that a step drifts along a rigid motion which nothing resists
-)
+DRIFT = 0.1  # of an edge: how far a step drifts at most along a rigid motion that nothing resists
 ROUNDING = 1e3 * float(np.finfo(float).eps)
 
 
