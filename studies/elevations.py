@@ -52,7 +52,7 @@ def draw_elevations(shapes: Mapping[str, Surface], path: Path, *, top: float) ->
 
 
 def _walls(surface: Surface) -> Ints:
-    return np.flatnonzero(surface.pressures[surface.patch_of_face] == 0.0)
+    return np.flatnonzero(surface.walls[surface.patch_of_face])
 
 
 def _paint(axes: Any, surface: Surface, faces: Ints, axis: int) -> None:
