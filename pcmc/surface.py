@@ -44,7 +44,7 @@ class Patch:
     name: str
     tension: float
     pressure: float = 1.0
-    wall: bool = False
+    wall: bool = field(default=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", str(self.name))
