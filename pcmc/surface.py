@@ -226,7 +226,8 @@ class Surface:
         """(3,) the point that volumes are seen from: that of Π.
 
         Drawn far from it, as in a survey's coordinates, a surface would lose its digits in volumes of
-        that size; there it is the middle of the surface or, if vertices slide, the point of Π below.
+        that size; there it is the point of Π below the middle of the surface, so that a volume over Π
+        is the same wherever it is drawn, or that middle, where it is as far above Π and nothing slides.
         Forces are the same as long as the pressures cancel along all edges that nothing holds; where
         they do not, the point of Π it remains.
         """
@@ -234,8 +235,9 @@ class Surface:
         near = np.linalg.norm(middle - point) <= FAR * self.size
         if near or self.uncancelled.any():
             return point
-        if self.on_plane.any():
-            middle = middle - self.plane.height(middle) * np.array(self.plane.normal)
+        height = float(self.plane.height(middle))
+        if self.on_plane.any() or abs(height) <= FAR * self.size:
+            middle = middle - height * np.array(self.plane.normal)
         return np.asarray(middle)
 
     @cached_property

@@ -14,6 +14,7 @@ from pcmc import Design, Parameter, Patch, Target, meet, sensitivities
 from pcmc.design import Reach
 from pcmc.design.quantities import QUANTITIES, measure
 from pcmc.design.sensitivity import as_parameters
+from pcmc.energy import apply_supports
 from pcmc.errors import OptionError, SurfaceError
 from pcmc.plan import plan_from
 
@@ -147,6 +148,42 @@ def test_heights_are_the_meshs_own(roof):
     assert measure(roof, Target("apex")).value == max(
         measure(roof, Target("apex", name)).value for name in ("corner", "north", "east")
     )
+
+
+def drawn_at(surface, shift):
+    return pcmc.Surface(
+        surface.vertices + shift, surface.faces, surface.patch_of_face, surface.patches,
+        surface.fixed, surface.on_plane, surface.plane,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("make", [cap, lambda: two_caps(1.2)], ids=["cap", "two caps"])
+@pytest.mark.parametrize("shift", [(1e3, -2e3, 0.0), (5e5, 5e6, 0.0)])
+def test_volumes_over_the_plane_are_the_same_wherever_it_is_drawn(make, shift):
+    near = make()
+    far = drawn_at(near, np.array(shift))
+    whole = measure(near, Target("volume"))
+    found = measure(far, Target("volume"))
+    assert found.value == pytest.approx(whole.value, rel=1e-7)
+    assert pcmc.energy(far) == pytest.approx(pcmc.energy(near), rel=1e-7)
+    free = near.free
+    np.testing.assert_allclose(found.position[free], whole.position[free], atol=1e-8)
+
+
+def test_a_patchs_volume_is_seen_from_the_point_of_the_plane_however_far():
+    """V_i = ⅓ Σ ⟨x - p, A ν⟩ over its triangles."""
+    far = drawn_at(two_caps(1.2), np.array([1e3, -2e3, 0.0]))
+    target, name = Target("volume", "large"), "large"
+    X = far.vertices[far.faces[far.patch_of_face == far.patch_index(name)]]
+    vector = 0.5 * np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0])
+    found = measure(far, target)
+    assert found.value == pytest.approx(np.einsum("fd,fd", X.mean(axis=1), vector) / 3.0, rel=1e-10)
+    direction = apply_supports(far, np.random.default_rng(2).standard_normal(far.vertices.shape))
+    ahead, behind = (
+        measure(far.moved(far.vertices + t * direction), target).value for t in (1e-4, -1e-4)
+    )
+    slope = float((found.position * direction).sum())
+    assert slope == pytest.approx((ahead - behind) / 2e-4, rel=1e-6)
 
 
 def test_points_are_in_the_coordinates_of_a_tilted_plane():

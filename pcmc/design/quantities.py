@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import kernels
 from ..arrays import Bools, Floats, Ints
-from ..balance import held_lengths
+from ..balance import held_lengths, reactions
 from ..errors import OptionError, unknown
 from ..plan.curves import frame
 from ..surface import Surface
@@ -221,9 +221,15 @@ def _area(surface: Surface, of: str | None) -> Measure:
 
 
 def _volume(surface: Surface, of: str | None) -> Measure:
+    """Seen from the point p of Π, however far: V = V_o + ⅓ ⟨o - p, Σ A_T ν_T⟩, o the surface's origin."""
     one = _indicator(surface, of)
     _, volumes, slope = _measured(surface, np.zeros_like(one), -one)
-    return Measure(float(one @ volumes), slope)
+    X, F = surface.vertices, surface.faces[_chosen(surface, of)]
+    away = surface.origin - np.array(surface.plane.point)
+    vector = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]).sum(axis=0)
+    for c in range(3):
+        np.add.at(slope, F[:, c], np.cross(X[F[:, c - 2]] - X[F[:, c - 1]], away) / 6.0)
+    return Measure(float(one @ volumes + away @ vector / 6.0), slope)
 
 
 def _curvature(surface: Surface, of: str) -> Measure:
@@ -255,9 +261,7 @@ def _reaction(surface: Surface, of: str | None) -> Measure:
     if not len(mine):
         raise OptionError(f"reaction of {of}: nothing holds that patch's boundary")
     ends, share = topo.edges[edge], held_lengths(surface)
-    force = _measured(surface, surface.tensions, 0.0 * surface.pressures)[2]
-    force -= _pushes(surface, surface.pressures)
-    force[surface.on_plane] -= surface.plane.along(force[surface.on_plane])
+    force = reactions(surface)
     vertices = np.unique(topo.edges[mine])
     size = np.linalg.norm(force[vertices], axis=1) / share[vertices]
     v, value = int(vertices[size.argmax()]), float(size.max())
