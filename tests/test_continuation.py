@@ -7,6 +7,7 @@ from tables import same
 
 from generators import four_fans, spherical_cap, two_caps, two_squares
 from pcmc import Direction, Parameter, certify, follow, solve
+from pcmc.contact import pull_and_capacity, standing
 from pcmc.continuation import Ending, FollowOptions
 from pcmc.continuation.between import GOALS, root
 from pcmc.continuation.point import Lost, at_parameter, correct
@@ -356,6 +357,19 @@ def test_junction_that_rests_on_the_plane_is_lifted_when_its_wall_pulls_less():
     assert len(before.pinched) == 5 > len(after.pinched) > 0
     for surface in branch.surfaces.values():
         assert certify(surface).residual <= 1e-9
+
+
+def test_junction_stands_off_as_soon_as_its_wall_pulls_less_than_the_sheets():
+    start = solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
+    found = standing(start)
+    pull, capacity = pull_and_capacity(found.surface, found.walls, found.rests)
+    least = 3.0 * float((pull[found.rests] / capacity[found.rests]).max())
+    for part, resting in ((1.001, 5), (0.995, 3)):
+        branch = follow(start, "wall", part * least)
+        assert branch.ending is Ending.REACHED
+        after = certify(branch.last)
+        assert len(after.pinched) == resting
+        assert after.residual <= 1e-9
 
 
 @pytest.mark.slow

@@ -8,13 +8,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..assemble import Pattern, assemble, pattern
-from ..contact import (
-    excess,
-    hung,
-    settled,
-    standing,
-    walls,
-)
+from ..contact import excess, hung, settled, standing, walls
 from ..descent import Carrier
 from ..energy import energy_and_gradient, patch_volumes
 from ..factor import Factor, Factoriser, factoriser

@@ -23,7 +23,7 @@ from .. import kernels
 from ..arrays import Floats
 from ..assemble import assemble, pattern
 from ..certificate import TOLERANCE
-from ..contact import Walls, excess, hung, standing
+from ..contact import Standing, excess, hung, standing
 from ..energy import energy_and_gradient
 from ..errors import OptionError, SurfaceError
 from ..factor import Factor, SingularMatrix, factoriser
@@ -79,9 +79,9 @@ def sensitivities(
     if not isinstance(surface, Surface):
         raise SurfaceError(f"sensitivities: expected a Surface, found {type(surface).__name__}")
     targets, parameters = as_targets(of), as_parameters(to)
-    standing, directions = _answers(surface, parameters)
+    shown, directions = _answers(surface, parameters)
     return pd.DataFrame(
-        [slopes(standing, measure(standing, t), parameters, directions) for t in targets],
+        [slopes(shown, measure(shown, t), parameters, directions) for t in targets],
         index=[t.label for t in targets], columns=[p.label for p in parameters], dtype=float,
     )  # fmt: skip
 
@@ -124,14 +124,14 @@ def _listed(given: Any, single: tuple[type, ...], what: str) -> list[Any]:
 
 
 def slopes(
-    standing: Surface, found: Measure, parameters: Sequence[Parameter], directions: Floats
+    surface: Surface, found: Measure, parameters: Sequence[Parameter], directions: Floats
 ) -> Floats:
     """(parameters,) dq/dλ of a measured quantity, given dX/dλ (parameters,n,3)."""
     slope = np.einsum("pnd,nd->p", directions, found.position)
     for k, parameter in enumerate(parameters):
         explicit = found.tension if parameter.kind == "tension" else found.pressure
         if explicit is not None:
-            slope[k] += explicit[standing.patch_index(parameter.patch)]
+            slope[k] += explicit[surface.patch_index(parameter.patch)]
     return slope
 
 
@@ -140,15 +140,17 @@ def _answers(surface: Surface, parameters: Sequence[Parameter]) -> tuple[Surface
     for parameter in parameters:
         surface.patch_index(parameter.patch)
     at_rest = _AtRest.of(surface)
-    return at_rest.standing, np.stack([at_rest.answer(p) for p in parameters])
+    return at_rest.found.surface, np.stack([at_rest.answer(p) for p in parameters])
 
 
 @dataclass(frozen=True, eq=False)
 class _AtRest:
-    """A surface at rest, its linearisation factorised."""
+    """What stands of a surface at rest, its linearisation factorised.
 
-    standing: Surface
-    below: Walls
+    ``follows``: whether walls hang from a crest that moves.
+    """
+
+    found: Standing
     follows: bool
     space: MotionSpace
     linear: Linearisation
@@ -176,13 +178,13 @@ class _AtRest:
             raise SurfaceError(AT_FOLD) from None
         follows = bool((below.can_rest & ~rests).any())
         linear = linearise(shown, frame, space, X, gradient)
-        return cls(shown, below, follows, space, linear, factor)
+        return cls(found, follows, space, linear, factor)
 
     def answer(self, parameter: Parameter) -> Floats:
         """dX/dλ (n,3)."""
         right = -self.space.pull(self._force(parameter))
         if not np.any(right):
-            return np.zeros_like(self.standing.vertices)
+            return np.zeros_like(self.found.surface.vertices)
         size = self.space.size
         steps: list[float] = []
         s, _ = gmres(
@@ -196,12 +198,12 @@ class _AtRest:
 
     def _force(self, parameter: Parameter) -> Floats:
         """∂(∇E)/∂λ (n,3)."""
-        one, zero = np.zeros((2, len(self.standing.patches)))
-        one[self.standing.patch_index(parameter.patch)] = 1.0
+        shown = self.found.surface
+        one, zero = np.zeros((2, len(shown.patches)))
+        one[shown.patch_index(parameter.patch)] = 1.0
         tension, pressure = (one, zero) if parameter.kind == "tension" else (zero, one)
         return kernels.measure(
-            self.standing.vertices, self.standing.faces, self.standing.patch_of_face,
-            self.standing.origin, tension, pressure,
+            shown.vertices, shown.faces, shown.patch_of_face, shown.origin, tension, pressure,
         )[2]  # fmt: skip
 
     def _moved(self, s: Floats) -> Floats:
@@ -209,6 +211,6 @@ class _AtRest:
         d = self.space.push(s)
         if not self.follows:
             return d
-        X = self.standing.vertices
-        ahead = hung(self.standing, self.below, X + d, self.space)
-        return ahead - hung(self.standing, self.below, X, self.space)
+        shown, walls = self.found.surface, self.found.walls
+        ahead = hung(shown, walls, shown.vertices + d, self.space)
+        return ahead - hung(shown, walls, shown.vertices, self.space)
