@@ -372,6 +372,21 @@ def test_junction_stands_off_as_soon_as_its_wall_pulls_less_than_the_sheets():
         assert after.residual <= 1e-9
 
 
+def test_ctrl_c_while_a_contact_is_solved_for_ends_the_branch(monkeypatch):
+    start = solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
+
+    def pressed(progress):
+        raise KeyboardInterrupt
+
+    def interrupted(surface, method, **options):
+        return solve(surface, method, pressed, **options)
+
+    monkeypatch.setattr("pcmc.continuation.tracing.solve", interrupted)
+    branch = follow(start, "wall", 2.51)
+    assert branch.ending is Ending.STOPPED
+    assert len(branch.points) > 0 == len(branch.events)
+
+
 @pytest.mark.slow
 def test_new_mesh_on_the_way_keeps_to_the_branch(small_cap):
     pytest.importorskip("mmgpy")

@@ -17,7 +17,7 @@ from ..errors import OptionError, SurfaceError
 from ..remesh import remesh
 from ..rigid import rigid_modes, rigid_motions
 from ..solvers import solve
-from ..solvers.result import Callback, Progress
+from ..solvers.result import Callback, Progress, Status
 from ..surface import Surface
 from .between import EXACT, Stretch, passes, quantity
 from .direction import Line
@@ -208,6 +208,8 @@ class Tracer:
             surface, "newton", target="stationary", tolerance=self.options.tolerance,
             backend=self.options.backend,
         )  # fmt: skip
+        if result.status is Status.STOPPED:  # solvers keep Ctrl-C to themselves
+            raise KeyboardInterrupt
         if not result.converged:
             raise Lost(f"contact of a wall with the plane changes, and {result.message}")
         again = Shape(result.surface, self.options.backend)
