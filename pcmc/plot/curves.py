@@ -231,10 +231,12 @@ def _axes(width: int, height: int, title: str, x: str, y: str) -> tuple[Any, Any
 def _key(axes: Any, count: int) -> None:
     """A legend where there is something to tell apart; beside the axes where it would be long."""
     if count > MOST:
-        left, foot, width, height = axes.get_position().bounds
-        axes.set_position((left, foot, 0.74 * width, height))
-        axes.legend(fontsize=SMALL, labelcolor=INK, handlelength=2.4, frameon=False,
-                    loc="upper left", bbox_to_anchor=(1.0, 1.0))  # fmt: skip
+        names = axes.legend(fontsize=SMALL, labelcolor=INK, handlelength=2.4, frameon=False,
+                            loc="upper left", bbox_to_anchor=(1.0, 1.0))  # fmt: skip
+        figure = axes.figure
+        beside = names.get_window_extent(figure.canvas.get_renderer()).width / figure.bbox.width
+        left, foot, _, height = axes.get_position().bounds
+        axes.set_position((left, foot, 0.985 - left - beside, height))
     elif count > 1 or axes.get_legend_handles_labels()[1] not in ([], [""]):
         axes.legend(fontsize=SMALL, labelcolor=INK, handlelength=3.2, facecolor="white",
                     framealpha=0.8, edgecolor="none", borderpad=0.2)  # fmt: skip
