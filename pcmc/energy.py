@@ -4,11 +4,11 @@
     A_i = Σ_T ½ |(q_j - p) × (q_{j+1} - p)|        (9a), (10a)
     V_i = (1/6) Σ_T ⟨p, q_j × q_{j+1}⟩             (10b), positions seen from the point of Π
 
-V_i is the volume of the cone from the point of Π to patch i. At a junction the sides of the cones meet.
-Where the pressures there, each counted along its patch's normal, cancel (equal patches and a wall of
-pressure 0; or patches of pressures p_1 and p_2 and a wall of p_1 - p_2, its normal pointing from room 1
-to room 2), so do the sides: Σ p V is the pressures of the rooms times their volumes, wherever on Π the
-point is. Where they do not (p_1 ≠ p_2 and a wall of pressure 0, as (11) admits), the difference acts on
+V_i is the volume of the cone from the point of Π (or, far from it, ``Surface.origin``) to patch i. At a
+junction the sides of the cones meet. Where the pressures there, each counted along its patch's normal,
+cancel (equal patches and a wall of pressure 0; or patches of pressures p_1 and p_2 and a wall of
+p_1 - p_2, its normal pointing from room 1 to room 2), so do the sides: Σ p V is the pressures of the
+rooms times their volumes, wherever on Π the point is. Where they do not (p_1 ≠ p_2 and a wall of pressure 0, as (11) admits), the difference acts on
 the side of the cones, the triangles between junction and point, as it would on a wall there; E, and the
 shape at rest, then depend on the point.
 
@@ -121,7 +121,7 @@ def patch_areas(surface: Surface) -> Floats:
 
 
 def patch_volumes(surface: Surface) -> Floats:
-    """(k,) signed volume V_i of each patch's cone to the point of Π, length³ (10b)."""
+    """(k,) signed volume V_i of each patch's cone to ``surface.origin``, length³ (10b)."""
     return _areas_and_volumes(surface)[1]
 
 
