@@ -8,9 +8,9 @@ V_i is the volume of the cone from the point of Π (or, far from it, ``Surface.o
 junction the sides of the cones meet. Where the pressures there, each counted along its patch's normal,
 cancel (equal patches and a wall of pressure 0; or patches of pressures p_1 and p_2 and a wall of
 p_1 - p_2, its normal pointing from room 1 to room 2), so do the sides: Σ p V is the pressures of the
-rooms times their volumes, wherever on Π the point is. Where they do not (p_1 ≠ p_2 and a wall of pressure 0, as (11) admits), the difference acts on
-the side of the cones, the triangles between junction and point, as it would on a wall there; E, and the
-shape at rest, then depend on the point.
+rooms times their volumes, wherever on Π the point is. Where they do not (p_1 ≠ p_2 and a wall of
+pressure 0, as (11) admits), the difference acts on the side of the cones, the triangles between junction
+and point, as it would on a wall there; E, and the shape at rest, then depend on the point.
 
 Units: E force·length, ∇E force, with tension in force/length and pressure in force/length².
 """
