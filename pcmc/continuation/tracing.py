@@ -44,6 +44,7 @@ SPOILT = 0.7  # ratio of triangle qualities, new to old, below which a step is r
 NEAR = 0.02  # length of a step at which new contact, solved for by itself, still counts as the same
 BEND = 0.1  # correction over step length that sets the next step
 BENT = 0.5  # correction over step length above which a step is refused
+WEARY = 7  # Newton steps of a correction: one that took more may have ended on another branch
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +153,8 @@ class Tracer:
         except Touched as touched:
             found = self.resettled(touched)
         bend = self.bend(found, length)
+        if found.iterations > WEARY and found.shape is here.shape:
+            raise Lost("the correction hardly converges")
         if here.shape.turned(here.X, found.X):
             raise Collapsed("triangles turn over")
         if found.shape.quality(found.X) < SPOILT * min(here.quality, self.options.care):
