@@ -72,7 +72,7 @@ CATEGORIES = {
     "none: a patch below its fold": "#D6604D",
     "none: tensions cannot balance": "#E6E6E6",
     "none: a fold on the way": "#F4A582",
-    "none: the junction slips": "#FFF2AE",
+    "undecided: the junction slips": "#FFF2AE",
     "none found": "#BDBDBD",
 }
 
@@ -162,7 +162,7 @@ def table(folder: Folder) -> dict[str, float]:
     found = {f"cases_{k}": float(counts.get(name, 0)) for k, name in enumerate(CATEGORIES)}
     crossed = cases[cases.crossed]
     least = folder.read_table("weakening").groupby("patch").least.min()
-    slipped = crossed.category.isin(["none: the junction slips", "none found"])
+    slipped = crossed.category.isin(["undecided: the junction slips", "none found"])
     return found | {
         "cases": float(len(cases)),
         "crosses": float(len(crossed)),
