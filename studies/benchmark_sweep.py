@@ -17,7 +17,7 @@ from .alpha_grid_geometric import geometric_sweep
 from .timing import Row, median
 
 FEW, SHORT = TENSIONS[::3], 10  # tensions and iterations of the quick form
-REPEATS = 3  # of the flow's sweeps, which take seconds; the geometric solver's are run once
+REPEATS = 5  # of the flow's sweeps, which take seconds; the geometric solver's are run once
 RATIO = 1.7
 
 

@@ -4,6 +4,8 @@ import io
 import json
 import os
 import signal
+import subprocess
+import sys
 import threading
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
@@ -421,3 +423,23 @@ def test_solve_case_in_a_sweep():
 def test_solve_case_refuses_unknown_names_before_any_case(fixed, words):
     with pytest.raises(OptionError, match=words):
         Sweep("pcmc.sweep:solve_case", {"alpha": [1.0]}, {"method": "nesterov"} | fixed)
+
+
+POSTPONED = """
+import sys
+import numpy
+from pcmc.sweep.child import postpone
+postpone("numpy.f2py")
+postpone("numpy.no_such_part")
+postpone("no_such_package.part")
+import scipy.linalg
+print("numpy.f2py.crackfortran" in sys.modules)
+print(callable(numpy.f2py.run_main), "numpy.f2py.crackfortran" in sys.modules)
+"""
+
+
+def test_what_no_case_needs_is_imported_when_it_is_used():
+    found = subprocess.run(
+        [sys.executable, "-c", POSTPONED], capture_output=True, text=True, check=True
+    )
+    assert found.stdout.split() == ["False", "True", "True"]

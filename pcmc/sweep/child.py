@@ -10,6 +10,7 @@ import faulthandler
 import gc
 import importlib
 import importlib.metadata
+import importlib.util
 import os
 import pickle
 import platform
@@ -97,6 +98,21 @@ def run(
     return fields
 
 
+def postpone(name: str) -> None:
+    """Have a module of an imported package run when something in it is used, not when it is named."""
+    package, _, last = name.rpartition(".")
+    if package not in sys.modules or name in sys.modules:
+        return
+    found = importlib.util.find_spec(name)
+    if found is None or found.loader is None:
+        return
+    found.loader = importlib.util.LazyLoader(found.loader)
+    module = importlib.util.module_from_spec(found)
+    sys.modules[name] = module
+    found.loader.exec_module(module)
+    setattr(sys.modules[package], last, module)
+
+
 def provenance() -> dict[str, Any]:
     """Where this process runs and with what."""
     told: dict[str, Any] = {"host": platform.node(), "pid": os.getpid()}
@@ -139,6 +155,8 @@ def main() -> None:
         try:
             gc.disable()  # looking for garbage takes a fifth of the time of large imports
             function = resolve(case)
+            # scipy names all that numpy has; these tables take long to make and no case needs them
+            postpone("numpy.f2py")
         except Exception:
             _reply(answers, ("failed", traceback.format_exc(limit=-3)))
             return
