@@ -97,7 +97,7 @@ def test_sweeps_are_timed_whole_and_in_turn(monkeypatch):
     monkeypatch.setattr(benchmark_sweep, "sweep_seconds", seconds)
     rows = benchmark_sweep.sweeps(False)
     flow, geometric = ([(case, 512, k) for k in (1, 2)] for case in ("flow_case", "solve_case"))
-    assert asked == flow * 3 + geometric + [("flow_case", 1, 1)]
+    assert asked == flow * benchmark_sweep.REPEATS + geometric + [("flow_case", 1, 1)]
     assert [row.asked for row in rows] == ["", "≤ 60", "≥ 1.7", "", "≤ 300", "≥ 1.7", ""]
     assert [row.value for row in rows if "over" in row.what] == [pytest.approx(1.9)] * 2
     assert [row.asked for row in benchmark_sweep.sweeps(True)] == [""] * 7
