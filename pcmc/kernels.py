@@ -182,14 +182,20 @@ def blocks(count: int, workers: int) -> list[tuple[int, int]]:
 
 
 def run_blocks(work: Callable[[int, int, int], None], count: int, workers: int | None) -> int:
-    """Call ``work(part, first, last)`` for each block, on threads if there are several; return how many."""
-    ranges = blocks(count, workers or threads())
-    if len(ranges) == 1:
-        work(0, 0, count)
-    else:
-        with ThreadPoolExecutor(len(ranges)) as pool:
-            list(pool.map(lambda part: work(part, *ranges[part]), range(len(ranges))))
-    return len(ranges)
+    """Call ``work(part, first, last)`` for each block, on threads if there are several; return how many.
+
+    The first block is done by the caller: its processor is awake, and the others' threads go elsewhere.
+    """
+    first, *others = blocks(count, workers or threads())
+    if not others:
+        work(0, *first)
+        return 1
+    with ThreadPoolExecutor(len(others)) as pool:
+        waiting = [pool.submit(work, part, *block) for part, block in enumerate(others, start=1)]
+        work(0, *first)
+        for each in waiting:
+            each.result()
+    return 1 + len(others)
 
 
 def measure(

@@ -76,7 +76,7 @@ def speed(results: Path) -> list[str]:
     rows = Folder(results / "benchmark").read_table("full")
     text = rows[["what", "unit", "asked", "met", "remark"]].fillna("").astype(str)
     cells = [
-        [line.what, f"{median:.3g} {line.unit}", line.asked, line.met, line.remark]
+        [line.what, f"{median:.4g} {line.unit}", line.asked, line.met, line.remark]
         for line, median in zip(text.itertuples(), rows["median"], strict=True)
     ]
     return table(["What", "Median", "Asked", "Met", ""], cells)
