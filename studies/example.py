@@ -9,8 +9,9 @@ import numpy as np
 
 from pcmc import Surface, curvature_error
 from pcmc.arrays import Floats
+from pcmc.curvature import METHODS
 
-from .flow import METHODS, errors, external_area
+from .flow import errors, external_area
 from .folder import Folder
 
 

@@ -19,6 +19,7 @@ from pcmc import (
     target_curvature,
 )
 from pcmc.arrays import Floats, Ints
+from pcmc.curvature import METHODS
 from pcmc.energy import patch_areas
 from pcmc.quality import minimum_angle, triangle_quality
 from pcmc.solvers.result import Progress
@@ -27,7 +28,6 @@ from .flow_case import PAPER
 from .folder import Folder
 
 SHORT_ITERATIONS = 12
-METHODS = ("cotangent", "variational")
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ def errors(surface: Surface) -> dict[str, float]:
     """Largest and mean |H - H̄| / H̄ inside the patches under pressure, by both definitions."""
     found = {}
     for method in METHODS:
-        error = np.abs(curvature_error(surface, method))  # type: ignore[arg-type]
+        error = np.abs(curvature_error(surface, method))
         found[f"largest_error_{method}"] = float(np.nanmax(error))
         found[f"mean_error_{method}"] = float(np.nanmean(error))
     return found
@@ -167,7 +167,7 @@ def curvature_table(surfaces: Mapping[str, Surface]) -> pd.DataFrame:
         columns: dict[str, Any] = {"mesh": name, "vertex": rows, "x": x, "y": y, "z": z}
         columns["target"] = target[rows]
         for method in METHODS:
-            columns[method] = mean_curvature(surface, method)[rows]  # type: ignore[arg-type]
+            columns[method] = mean_curvature(surface, method)[rows]
             columns[f"error_{method}"] = columns[method] / target[rows] - 1.0
         tables.append(pd.DataFrame(columns))
     return pd.concat(tables, ignore_index=True)

@@ -126,7 +126,7 @@ def groups(surface: Surface) -> dict[str, Bools]:
     near = np.zeros(surface.n, dtype=bool)
     touched = _corners(surface)[topology.edges]
     near[topology.edges[touched.any(axis=1)]] = True
-    pressed = surface.patch_faces(np.flatnonzero(surface.pressures != 0.0))  # type: ignore[arg-type]
+    pressed = surface.patch_faces(np.flatnonzero(~surface.walls).tolist())
     sheet = np.zeros(surface.n, dtype=bool)
     sheet[surface.faces[pressed]] = True
     junction = topology.on_junction

@@ -6,11 +6,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import fields
 from numbers import Integral, Real
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import OptionError, unknown
 
-Options = TypeVar("Options")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Options = TypeVar("Options", bound="DataclassInstance")
 
 
 def number(
@@ -30,15 +33,18 @@ def number(
     """
     limits = [(above, ">"), (least, "≥"), (below, "<")]
     text = " and ".join(f"{sign} {limit:g}" for limit, sign in limits if limit is not None)
-    good = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
-    if not good or not (
-        (above is None or value > above)  # type: ignore[operator]
-        and (least is None or value >= least)  # type: ignore[operator]
-        and (below is None or value < below)  # type: ignore[operator]
+    found = math.nan
+    if isinstance(value, Real) and not isinstance(value, bool):
+        found = float(value)
+    if not (
+        math.isfinite(found)
+        and (above is None or found > above)
+        and (least is None or found >= least)
+        and (below is None or found < below)
     ):
         expected = f"expected a finite number {text}".rstrip()
         raise OptionError(f"{name}: {expected}, found {value!r}")
-    return float(value)  # type: ignore[arg-type]
+    return found
 
 
 def whole(name: str, value: object, least: int = 0) -> int:
@@ -76,7 +82,7 @@ def choice(name: str, value: object, known: Sequence[str]) -> str:
 
 def build(kind: type[Options], method: str, given: dict[str, Any]) -> Options:
     """The options dataclass of a method from keyword arguments."""
-    names = [f.name for f in fields(kind)]  # type: ignore[arg-type]
+    names = [f.name for f in fields(kind)]
     for name in given:
         if name not in names:
             raise OptionError(unknown(f"option of method {method!r}", name, names))

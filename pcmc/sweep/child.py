@@ -11,6 +11,8 @@ import gc
 import importlib
 import importlib.metadata
 import importlib.util
+import io
+import operator
 import os
 import pickle
 import platform
@@ -31,10 +33,8 @@ def resolve(case: str) -> Callable[..., Any]:
     5.0
     """
     module, _, name = case.partition(":")
-    found: Any = importlib.import_module(module)
-    for part in name.split("."):
-        found = getattr(found, part)
-    return found  # type: ignore[no-any-return]
+    found: Callable[..., Any] = operator.attrgetter(name)(importlib.import_module(module))
+    return found
 
 
 def scalar(value: object) -> bool | int | float | str | None:
@@ -147,7 +147,8 @@ def main() -> None:
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)  # what a case prints must not get between the answers
-    sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)
     faulthandler.enable()
     try:
         path, case = pickle.load(requests)

@@ -115,7 +115,7 @@ def checked(check: Callable[..., object]) -> Callable[[Callable[..., Any]], Call
     """
 
     def mark(function: Callable[..., Any]) -> Callable[..., Any]:
-        function.check = check  # type: ignore[attr-defined]
+        function.__dict__["check"] = check
         return function
 
     return mark

@@ -124,9 +124,9 @@ class Child:
         self._closed.set()
         self.kill()
         self.process.wait()
-        for stream in (self.process.stdin, self.process.stdout, self.log):
+        for stream in filter(None, (self.process.stdin, self.process.stdout, self.log)):
             with suppress(OSError):
-                stream.close()  # type: ignore[union-attr]
+                stream.close()
 
     def _tell(self, message: object) -> None:
         assert self.process.stdin is not None

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import time
 import zlib
 from collections.abc import Iterator
@@ -255,15 +256,15 @@ def _records(path: Path, data: bytes) -> tuple[dict[int, Record], int]:
 def _lock(path: Path, descriptor: int) -> None:
     """Keep a second sweep off the store for as long as this process has it open."""
     try:
-        if os.name == "posix":
-            import fcntl
-
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        else:
+        if sys.platform == "win32":
             import msvcrt
 
             os.lseek(descriptor, 2**30, os.SEEK_SET)  # one byte far behind the data
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         raise FileError(
             f"{path}: another sweep is writing to it; wait for it, or name another file"
