@@ -60,7 +60,7 @@ class Certificate:
     residual : ‖Bᵀ∇E‖ over ``scale``: the forces left in the motion space, and the pull on pinched
         vertices beyond what their wall holds, relative.
     scale : norm of the single triangles' tension forces, force.
-    energy, volume : E (force·length) and the volume under pressure (length³).
+    energy, volume : E (force·length) and the volume under the roof (length³).
     index : Morse index; None where the surface is not at rest. Rigid motions are not counted.
     eigenvalues : lowest second variations per unit area and displacement, force/length³, ascending.
     modes : (k,n,3) the displacement fields that belong to them, unit mass.
@@ -229,9 +229,9 @@ def _verdict(
     if not surface.tensions.any():
         return Verdict.NEUTRAL, "no patch has a tension: every shape is at rest"
     if residual > tolerance:
-        excess = unbalanced(surface, sliding)
-        if excess:
-            return Verdict.NO_EQUILIBRIUM, excess
+        too_strong = unbalanced(surface, sliding)
+        if too_strong:
+            return Verdict.NO_EQUILIBRIUM, too_strong
         # a solver that ended badly settles what a coarse mesh leaves open
         if ratio > 1.0 + (0.0 if status in ENDED_BADLY else coarseness(surface)):
             times = f"{ratio:.2f}" if ratio < 1e4 else f"{ratio:.3g}"
