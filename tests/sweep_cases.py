@@ -1,5 +1,6 @@
 """Case functions for the tests of the sweep engine. Cheap to import: workers load this file."""
 
+import asyncio
 import fcntl
 import math
 import os
@@ -31,6 +32,8 @@ def answers(what):
         "list": {"numbers": [1.0, 2.0]},
         "parameter": {"what": 1.0},
         "nothing": {},
+        "huge": {"n": 10**5000},
+        "half a character": {"s": "\ud800"},
     }[what]
 
 
@@ -41,6 +44,10 @@ def misbehave(how, marker=""):
         raise ArithmeticError("no root\nin sight")
     if how == "exit":
         sys.exit(3)
+    if how == "interrupt":
+        raise KeyboardInterrupt
+    if how == "cancel":
+        raise asyncio.CancelledError("late")
     if how == "hang":
         time.sleep(3600)
     if how == "stop":
@@ -65,6 +72,29 @@ def mortal(n, fatal, folder):
     if n == fatal:
         os._exit(7)
     return {"pid": os.getpid()}
+
+
+def forked(n):
+    """Come back twice."""
+    os.fork()
+    return {"square": n * n}
+
+
+def daemon(n):
+    """Leave a process that no kill of the case reaches, and hang."""
+    if os.fork() == 0:
+        os.setsid()
+        time.sleep(20.0)
+        os._exit(0)
+    time.sleep(3600.0)
+
+
+def chatter(how):
+    """Say far too much, then fail."""
+    if how == "raise":
+        raise ValueError("x" * 10**6)
+    print("€" * 10**6, "the end €")
+    os._exit(7)
 
 
 def surroundings(n):

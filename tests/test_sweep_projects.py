@@ -206,6 +206,29 @@ def test_the_store_of_another_project_is_refused_and_kept(roof, capsys):
     assert (roof.parent / "s.jsonl").read_bytes() == kept
 
 
+def test_ctrl_c_before_the_first_case_writes_no_table(roof, capsys, monkeypatch):
+    monkeypatch.setattr("pcmc.sweep.engine._next", lambda *_: None)
+    given = ["sweep", "roof.toml", *GRID[:1], "--csv", "t.csv", "--workers", "1"]
+    assert cli.main(given) == 130
+    assert capsys.readouterr().out == ""
+    assert not (roof.parent / "t.csv").exists()
+
+
+def test_time_limit_and_failed_cases_again(roof, capsys):
+    given = ["sweep", "roof.toml", "west.tension=3,3.2", "--store", "s.jsonl", "--workers", "1"]
+    assert cli.main([*given, "--time-limit", "0.001"]) == 1
+    assert "timed out: stopped at its time limit of 0.001 s" in capsys.readouterr().out
+    assert cli.main(given) == 1
+    assert cli.main([*given, "--retry-failed"]) == 0
+
+
+def test_a_table_without_its_library_is_refused_before_any_case(roof, capsys, monkeypatch):
+    monkeypatch.setattr("pcmc.cli.sweeping.find_spec", lambda name: None)
+    assert cli.main(["sweep", "roof.toml", *GRID[:1], "--csv", "t.parquet", "--store", "s"]) == 2
+    assert "pcmc[files]" in capsys.readouterr().err
+    assert [p.name for p in roof.parent.iterdir()] == ["roof.toml"]
+
+
 def test_a_project_changed_while_it_is_swept_is_noticed(roof):
     sweep = project_sweep("roof.toml", {"west.tension": [3.0, 3.2]})
     roof.write_text(TEXT.replace("0.8", "0.81"), encoding="utf-8")
@@ -224,6 +247,11 @@ def test_a_project_changed_while_it_is_swept_is_noticed(roof):
         (["none.toml", "west.tension=3,4"], "none.toml: cannot be read"),
         (["none.obj", "west.tension=3,4"], "none.obj: cannot be read"),
         (["roof.toml", "west.tension=3,4", "--store", "."], "is a folder"),
+        (["roof.toml", "west.tension=3,4", "--time-limit", "inf"], "time_limit (seconds;"),
+        (
+            ["roof.toml", "west.tension=3,4", "--store", "./t.csv", "--csv", "t.csv"],
+            "name two files",
+        ),
         (["roof.toml", "west.tension=3,4", "--store", "no/s"], "there is no folder"),
     ],
 )

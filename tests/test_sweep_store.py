@@ -71,6 +71,14 @@ def test_a_damaged_line_is_told_and_run_again(stored):
     assert [progress.record.case for progress in seen] == [2]
 
 
+def test_a_line_of_another_kind_is_told_too(stored):
+    """Two stores put together have a header in the middle."""
+    path, data, frame = stored
+    path.write_bytes(data + data)
+    with pytest.warns(FileWarning, match="line 8 is damaged"):
+        same(table(read_store(path)), frame)
+
+
 def test_every_changed_byte_is_noticed(stored):
     _, data, _ = stored
     line = data.split(b"\n")[2]
@@ -128,6 +136,10 @@ def test_paths_that_cannot_be_opened(tmp_path):
     (tmp_path / "file").write_bytes(b"")
     with pytest.raises(FileError, match="cannot be opened for writing"):
         run(SWEEP, tmp_path / "file" / "s.jsonl", workers=1)
+    with pytest.raises(FileError, match=r"cannot be opened \(File name too long\)"):
+        run(SWEEP, tmp_path / ("x" * 300), workers=1)
+    with pytest.raises(FileError, match="is no regular file"):
+        run(SWEEP, "a\0b", workers=1)
     with pytest.raises(FileError, match="cannot be read"):
         read_store(tmp_path / "missing.jsonl")
 
@@ -150,6 +162,40 @@ def test_two_sweeps_cannot_write_to_one_store(tmp_path):
     with open_store(path, SWEEP), pytest.raises(FileError, match="another sweep is writing to it"):
         run(SWEEP, path, workers=1)
     assert len(run(SWEEP, path, workers=1)) == 6
+
+
+def test_a_disk_without_locks_is_told(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    with pytest.raises(FileError, match=r"cannot be locked \(No locks available\)"):
+        run(SWEEP, tmp_path / "s.jsonl", workers=1)
+
+
+FORKS = """
+import os, signal, sys, time
+from pcmc.sweep.store import open_store
+from test_sweep_store import SWEEP
+with open_store(sys.argv[1], SWEEP):
+    if os.fork() == 0:
+        time.sleep(60.0)
+        os._exit(0)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_fork_of_a_killed_sweep_does_not_hold_its_store(tmp_path):
+    """The workers of a process pool outlive their parent when it is killed."""
+    path, environment = tmp_path / "s.jsonl", os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    killed = subprocess.Popen(
+        [sys.executable, "-c", FORKS, str(path)], env=environment, start_new_session=True
+    )
+    try:
+        assert killed.wait() == -signal.SIGKILL
+        assert len(run(SWEEP, path, workers=1)) == 6
+    finally:
+        os.killpg(killed.pid, signal.SIGKILL)
 
 
 # ---- a full disk
@@ -274,7 +320,8 @@ def test_ten_kills_at_random_instants_change_nothing(tmp_path):
 def test_workers_leave_when_the_sweep_is_killed(tmp_path):
     script = (
         "import sys; from pcmc.sweep import Sweep, run\n"
-        "run(Sweep('sweep_cases:holding', {'n': [1, 2]}, {'folder': sys.argv[1]}), workers=1)"
+        "given = {'folder': sys.argv[1], 'pause': 3600.0}\n"
+        "run(Sweep('sweep_cases:holding', {'n': [1, 2]}, given), workers=1, time_limit=None)"
     )
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     killed = subprocess.Popen([sys.executable, "-c", script, str(tmp_path)], env=environment)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from ..errors import FileError, OptionError
+from ..errors import FileError, MissingExtra, OptionError
 from ..io import FORMATS
 from .arguments import TOML, values_of
 from .codes import INTERRUPTED, NOT_CERTIFIED, OK
@@ -41,6 +42,12 @@ def sweep(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, tcp://HOST:8786.")
     ] = None,
+    time_limit: Annotated[
+        float, typer.Option(metavar="SECONDS", help="After so long a case is stopped.")
+    ] = 600.0,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Run stored cases that failed once more.")
+    ] = False,
 ) -> int:
     """Solve for every combination of the values; exit code 0 if all are certified.
 
@@ -59,6 +66,10 @@ def sweep(
 
     for path, suffixes in ((csv, (".csv", ".parquet")), (store, ())):
         _check_place(path, suffixes)
+    if csv is not None and store is not None and csv.resolve() == store.resolve():
+        raise OptionError(f"{csv} cannot be both the store and the table; name two files")
+    if csv is not None and csv.suffix == ".parquet" and find_spec("pyarrow") is None:
+        raise MissingExtra("pyarrow", "files")
     given: dict[str, list[Any]] = {}
     for name, found in map(values_of, values):
         if name in given:
@@ -68,7 +79,12 @@ def sweep(
     fixed = {name: found[0] for name, found in given.items() if len(found) == 1}
     with sweeping() as draw:
         cases = _cases(what, grid, fixed, method)
-        table = run(cases, store, scheduler=scheduler, workers=workers, on_record=draw)
+        table = run(
+            cases, store, scheduler=scheduler, workers=workers, time_limit=time_limit,
+            retry_failed=retry_failed, on_record=draw,
+        )  # fmt: skip
+    if table.empty:
+        return INTERRUPTED
     if csv is not None:
         write_table(csv, table)
     columns = [c for c in (*grid, "status", "verdict", "targets_met") if c in table]

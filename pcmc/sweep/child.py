@@ -16,7 +16,9 @@ import operator
 import os
 import pickle
 import platform
+import signal
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
@@ -24,6 +26,9 @@ from datetime import UTC, datetime
 from typing import Any, BinaryIO
 
 WORDS = ("status", "verdict", "message")  # keys of a case's answer that hold text about the case
+OUTPUT = 4000  # characters kept of what a failed case says
+LONGEST = 1024  # bits of a whole number, the range of floats; far longer ones have no decimal text
+ORPHANED = 1.0  # seconds between looks whether the parent lives
 
 
 def resolve(case: str) -> Callable[..., Any]:
@@ -40,18 +45,34 @@ def resolve(case: str) -> Callable[..., Any]:
 def scalar(value: object) -> bool | int | float | str | None:
     """The plain Python value of a number, text, truth value or None; a TypeError for all else.
 
+    All else includes what no file can hold: texts with half a character, whole numbers beyond floats.
+
     >>> import numpy as np
     >>> scalar(np.float64(0.1)), scalar(np.int32(3)), scalar(np.bool_(True))
     (0.1, 3, True)
     """
-    if getattr(value, "shape", None) == () and hasattr(value, "item"):
+    masked = hasattr(value, "mask")  # numpy would make a 0 of it
+    if getattr(value, "shape", None) == () and hasattr(value, "item") and not masked:
         value = value.item()
     if value is None or isinstance(value, bool):
         return value
+    if isinstance(value, int) and value.bit_length() > LONGEST:
+        raise TypeError(f"expected a number, found a whole one of {value.bit_length()} bits")
+    if isinstance(value, str) and value != whole_text(value):
+        raise TypeError(f"expected a text of whole characters, found {value!r:.80}")
     for kind in (int, float, str):
         if isinstance(value, kind):
             return kind(value)  # subclasses print themselves in ways of their own
     raise TypeError(f"expected a number, a text, a truth value or None, found {value!r:.80}")
+
+
+def whole_text(text: str) -> str:
+    r"""The text with halves of characters, which no file can hold, spelt out.
+
+    >>> whole_text("\u00fc \ud800")
+    '\u00fc \\ud800'
+    """
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def answer(values: object, parameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -82,16 +103,19 @@ def run(
 ) -> dict[str, Any]:
     """Run one case; the outcome without its provenance. The process exits at the time limit."""
     started, begin, extra = datetime.now(UTC), time.perf_counter(), {}
+    process = os.getpid()
     if time_limit is not None:
         # a watchdog of C: it works while compiled code holds the interpreter or the parent is dead
         faulthandler.dump_traceback_later(time_limit, exit=True)
     try:
         fields = answer(function(**parameters), parameters)
-    except (Exception, SystemExit) as error:
-        text = "".join(traceback.format_exception_only(error)).strip()
+    except BaseException as error:  # nobody but the case can have raised it: Ctrl-C goes elsewhere
+        text = whole_text("".join(traceback.format_exception_only(error)).strip()[:OUTPUT])
         fields = {"status": "raised", "verdict": "", "message": text, "numbers": {}}
-        extra = {"output": traceback.format_exc()}
+        extra = {"output": whole_text(traceback.format_exc()[-OUTPUT:])}
     finally:
+        if os.getpid() != process:
+            os._exit(0)  # a fork that the case has made; the case itself answers
         faulthandler.cancel_dump_traceback_later()
     fields["wall_time"] = time.perf_counter() - begin
     fields["provenance"] = {"started": started.isoformat(timespec="milliseconds"), **extra}
@@ -137,6 +161,22 @@ def _forget_output() -> None:
     os.ftruncate(2, 0)
 
 
+def _cut_forks_off(*pipes: BinaryIO) -> None:
+    """Take the pipes from every process that a case forks: it must neither answer nor hold them open."""
+    nothing = os.open(os.devnull, os.O_RDWR)
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(
+            after_in_child=lambda: [os.dup2(nothing, pipe.fileno(), False) for pipe in pipes]
+        )
+
+
+def _outlive(parent: int) -> None:
+    """End this process and what it started soon after its parent, in the middle of a case too."""
+    while os.getppid() == parent:  # for ever on Windows, where the case is run to its end
+        time.sleep(ORPHANED)
+    os.killpg(0, signal.SIGKILL)
+
+
 def _reply(stream: BinaryIO, message: object) -> None:
     stream.write(pickle.dumps(message))
     stream.flush()
@@ -150,6 +190,8 @@ def main() -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
     faulthandler.enable()
+    _cut_forks_off(requests, answers)
+    threading.Thread(target=_outlive, args=(os.getppid(),), daemon=True).start()
     try:
         path, case = pickle.load(requests)
         sys.path[:] = path

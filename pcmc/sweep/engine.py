@@ -15,6 +15,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from ..errors import OptionError, SweepError
+from ..solvers import options as check
 from .executors import Submit, open_pool
 from .grid import Sweep
 from .store import FORCE_EVERY, Record, open_store
@@ -22,6 +23,8 @@ from .table import table
 
 if TYPE_CHECKING:
     import pandas as pd
+
+LONGEST = threading.TIMEOUT_MAX  # seconds that a time limit may have
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,8 @@ def run(
     sweep : the cases.
     store : file that each record is written to as soon as it is there. Run the same sweep with the
         same file again after a crash, and it goes on from there. None: keep records in memory only.
-    executor : where to run; left open at the end. Default: ``workers`` local processes.
+    executor : where to run; left open at the end. Processes of it finish the cases they have begun,
+        after Ctrl-C too. Default: ``workers`` local processes.
     scheduler : address of a Dask scheduler whose workers run the cases: ``"tcp://127.0.0.1:8786"``.
     workers : local processes; default one for each processor.
     time_limit : seconds a case may take; None for no limit.
@@ -75,7 +79,7 @@ def run(
 
     Returns
     -------
-    DataFrame : one row per case (see ``table``). After Ctrl-C, which ends the workers at once,
+    DataFrame : one row per case (see ``table``). After Ctrl-C, which ends local workers at once,
         only the cases stored so far: fewer rows than ``len(sweep)``.
 
     Raises
@@ -95,7 +99,7 @@ def run(
     1        2  finished    1.0
     2        3  finished    1.5
     """
-    _check_options(executor, scheduler, workers, time_limit)
+    _check_options(executor, scheduler, workers, time_limit, on_record)
     with ExitStack() as stack:
         kept = None if store is None else stack.enter_context(open_store(store, sweep))
         records = {} if kept is None else dict(kept.records)
@@ -131,15 +135,24 @@ def _check_options(
     scheduler: str | None,
     workers: int | None,
     time_limit: float | None,
+    on_record: object,
 ) -> None:
     given = {"executor": executor, "scheduler": scheduler, "workers": workers}
     names = [name for name, value in given.items() if value is not None]
     if len(names) > 1:
         raise OptionError(f"{' and '.join(names)} exclude each other; give one of them")
-    if workers is not None and workers < 1:
-        raise OptionError(f"workers must be at least 1, found {workers}")
-    if time_limit is not None and not time_limit > 0.0:
-        raise OptionError(f"time_limit must be positive seconds or None, found {time_limit}")
+    if executor is not None and not isinstance(executor, Executor):
+        raise OptionError(f"executor: expected one of concurrent.futures, found {executor!r:.80}")
+    if scheduler is not None and not isinstance(scheduler, str):
+        raise OptionError(f"scheduler: expected 'tcp://host:8786', found {scheduler!r:.80}")
+    if on_record is not None and not callable(on_record):
+        raise OptionError(f"on_record: expected a function of a Progress, found {on_record!r:.80}")
+    if workers is not None:
+        check.whole("workers", workers, least=1)
+    if time_limit is not None:
+        check.number(
+            "time_limit (seconds; None for no limit)", time_limit, above=0.0, below=LONGEST
+        )
 
 
 def _progress(

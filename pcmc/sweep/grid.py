@@ -7,7 +7,7 @@ import inspect
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -58,6 +58,11 @@ class Sweep:
         grid: Mapping[str, Sequence[Any]],
         fixed: Mapping[str, Any] | None = None,
     ) -> None:
+        for what, values in (("grid", grid), ("fixed", fixed or {})):
+            if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
+                raise OptionError(
+                    f"{what}: expected a dict by parameter names, found {values!r:.60}"
+                )
         object.__setattr__(self, "case", case if isinstance(case, str) else _path(case))
         object.__setattr__(self, "grid", {name: _axis(name, grid[name]) for name in grid})
         fixed = {name: _plain(value, name) for name, value in (fixed or {}).items()}
@@ -145,7 +150,7 @@ def _path(function: Callable[..., Any]) -> str:
 
 
 def _axis(name: str, values: object) -> list[Any]:
-    if isinstance(values, str | bytes | Mapping) or not hasattr(values, "__iter__"):
+    if isinstance(values, str | bytes | Mapping | Set) or not np.iterable(values):
         raise OptionError(
             f"grid[{name!r}] must be a list of values, found {values!r:.60}; a single value belongs"
             " to fixed"
@@ -167,7 +172,7 @@ def _plain(value: object, where: str) -> Any:
         if not all(isinstance(key, str) for key in value):
             raise OptionError(f"parameter {where}: keys must be texts, found {list(value)!r:.60}")
         return {key: _plain(item, f"{where}[{key!r}]") for key, item in value.items()}
-    if isinstance(value, list | tuple | np.ndarray) and np.ndim(value):
+    if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim):
         return [_plain(item, f"{where}[{i}]") for i, item in enumerate(value)]
     try:
         return scalar(value)

@@ -31,7 +31,6 @@ from ..errors import SweepError
 from . import child as child_script
 
 GRACE = 2.0  # seconds a child may overrun its time limit before it is killed from outside
-OUTPUT = 4000  # characters kept of what a case printed before it died
 ONE_THREAD = {
     f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA", "NUMEXPR")
 } | {"VECLIB_MAXIMUM_THREADS": "1", "PCMC_THREADS": "1"}
@@ -146,9 +145,10 @@ class Child:
     def _end(self) -> tuple[int, str]:
         self.kill()
         code = self.process.wait()
-        self.log.seek(0)
+        length = self.log.seek(0, os.SEEK_END)
+        self.log.seek(max(0, length - 4 * child_script.OUTPUT))  # bytes: a character has at most 4
         output = self.log.read().decode("utf-8", "replace")
-        return code, output[-OUTPUT:]
+        return code, output[-child_script.OUTPUT :]
 
 
 def _cause(code: int) -> str:
@@ -245,6 +245,9 @@ def run_case(
     try:
         child.send(parameters, time_limit)
         return child.receive(time_limit)
+    except BaseException:  # Ctrl-C in a process pool: the next case must not get this one's answer
+        child.close()
+        raise
     finally:
         mine.give_back(child)
 

@@ -112,6 +112,21 @@ class Store:
             ) from error
 
 
+_open: set[int] = set()  # descriptors of this process's stores
+
+
+def _let_go() -> None:
+    """In a fork of this process, a pool's worker say: it would hold the lock for as long as it lives."""
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for descriptor in _open:
+        os.dup2(nothing, descriptor, False)
+    os.close(nothing)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_let_go)
+
+
 @contextmanager
 def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
     """Open the store of ``sweep`` for appending, making it or recovering what a crash left.
@@ -128,6 +143,7 @@ def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
     except OSError as error:
         raise FileError(f"{path}: cannot be opened for writing ({error.strerror})") from error
+    _open.add(descriptor)
     try:
         _lock(path, descriptor)
         data = path.read_bytes()
@@ -144,6 +160,7 @@ def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
         finally:
             store.force()
     finally:
+        _open.discard(descriptor)
         os.close(descriptor)
 
 
@@ -167,7 +184,11 @@ def read_store(path: str | os.PathLike[str]) -> list[Record]:
 
 def _regular(path: Path) -> None:
     """Refuse a folder, a pipe or a device, of which some can be read without end."""
-    if path.exists() and not path.is_file():
+    try:
+        found = path.exists() and not path.is_file()
+    except OSError as error:
+        raise FileError(f"{path}: cannot be opened ({error.strerror})") from error
+    if found or "\0" in str(path):
         raise FileError(f"{path}: is no regular file; name a file on a disk")
 
 
@@ -244,13 +265,17 @@ def _difference(found: dict[str, Any], wanted: dict[str, Any]) -> str:
 def _records(path: Path, data: bytes) -> tuple[dict[int, Record], int]:
     """The records after the header, and the length of the data up to the last whole line."""
     *lines, cut_off = data.split(b"\n")
-    parsed = [_parse(line) for line in lines]
-    for number, fields in enumerate(parsed, start=1):
-        if fields is None:
-            text = f"{path}: line {number} is damaged; its case counts as not yet run"
+    found = {}
+    for number, line in enumerate(lines[1:], start=2):
+        told = _parse(line)
+        if told is not None and told.keys() == Record.__annotations__.keys():
+            found[told["case"]] = Record(**told)
+        else:
+            text = (
+                f"{path}: line {number} is damaged; unless a later line has its case, it is not run"
+            )
             warn(text, FileWarning, stacklevel=4)
-    found = [Record(**fields) for fields in parsed[1:] if fields is not None]
-    return {record.case: record for record in found}, len(data) - len(cut_off)
+    return found, len(data) - len(cut_off)
 
 
 def _lock(path: Path, descriptor: int) -> None:
@@ -265,7 +290,11 @@ def _lock(path: Path, descriptor: int) -> None:
             import fcntl
 
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
+    except (BlockingIOError, PermissionError) as error:
         raise FileError(
             f"{path}: another sweep is writing to it; wait for it, or name another file"
+        ) from error
+    except OSError as error:
+        raise FileError(
+            f"{path}: cannot be locked ({error.strerror}); name a file on another disk"
         ) from error

@@ -76,7 +76,7 @@ def _to_parquet(path: Path, frame: pd.DataFrame) -> None:
     for name, column in frame.reset_index().items():
         try:
             columns[name] = pa.Array.from_pandas(column)
-        except (pa.ArrowInvalid, pa.ArrowTypeError):
+        except (pa.ArrowInvalid, pa.ArrowTypeError, OverflowError):
             texts = [None if value is None else str(value) for value in column]
             columns[name] = pa.array(texts, pa.string())
     pq.write_table(pa.table(columns), path)
