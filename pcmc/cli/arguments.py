@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -43,6 +44,22 @@ Colour = Annotated[
 ]
 
 
+def number(text: str | float) -> float:
+    """A number as an option has it; what else is found there is said, which typer's own parser hides."""
+    try:
+        return float(text)
+    except ValueError:
+        raise typer.BadParameter(f"expected a number, found {text!r}") from None
+
+
+def whole(text: str | int) -> int:
+    """A whole number as an option has it; see ``number``."""
+    try:
+        return int(text)
+    except ValueError:
+        raise typer.BadParameter(f"expected a whole number, found {text!r}") from None
+
+
 def surface_in(file: Path) -> Surface:
     """A surface from its file, or the one that a project starts from."""
     check_input(file)
@@ -67,12 +84,14 @@ def _by_name(names: list[str], given: list[str] | None, option: str) -> dict[str
     """Values by patch from NAME=VALUE, and VALUE for those named; the later ones win."""
     found: dict[str, float] = {}
     for text in given or ():
-        name, _, value = text.rpartition("=")
+        name, sign, value = text.rpartition("=")
         try:
-            number = float(value)
+            amount = float(value)
         except ValueError:
-            raise OptionError(f"{option}: expected NAME=NUMBER or NUMBER, found {text!r}") from None
-        found |= {name: number} if name else dict.fromkeys(names, number)
+            amount = math.nan
+        if (sign and not name) or math.isnan(amount):
+            raise OptionError(f"{option}: expected NAME=NUMBER or NUMBER, found {text!r}")
+        found |= {name: amount} if name else dict.fromkeys(names, amount)
     return found
 
 

@@ -43,4 +43,4 @@ def sweeping() -> Iterator[Any]:
 
 
 def _live() -> bool:
-    return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+    return sys.stderr is not None and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"

@@ -13,6 +13,8 @@ from ..errors import FileWarning, FreeSurfaceWarning, MissingExtra, PcmcError
 from ..interrupts import endings
 from .codes import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
+NARROW = ("strict", "surrogateescape")  # the second in the locale C
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command.
@@ -65,7 +67,8 @@ def _run(arguments: list[str]) -> int:
             return int(error.exit_code)
         if not hasattr(error, "format_message"):  # those of the command line have it
             raise
-        _say(f"error: {error.format_message()} (pcmc --help shows what there is)")
+        path = getattr(getattr(error, "ctx", None), "command_path", "pcmc")
+        _say(f"error: {error.format_message()} ({path} --help shows what there is)")
         return BAD_INPUT
 
 
@@ -85,7 +88,7 @@ def _command() -> tuple[Callable[..., Any], ModuleType]:
 
 def _any_letter(stream: Any) -> None:
     r"""Have letters that the terminal's or a pipe's encoding lacks written as \\xf6 instead of failing."""
-    if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
+    if getattr(stream, "errors", None) in NARROW and hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")
 
 
@@ -95,5 +98,7 @@ def _interrupted() -> int:
 
 
 def _say(text: str) -> None:
-    """One line on stderr."""
+    """One line on stderr, which is None where the shell closed it."""
+    if sys.stderr is None:
+        return
     print("pcmc: " + " ".join(text.split()), file=sys.stderr)

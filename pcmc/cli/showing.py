@@ -24,6 +24,7 @@ from .arguments import (
     surface_in,
     values_of,
     view_of,
+    whole,
 )
 from .codes import OK
 from .progress import working
@@ -91,7 +92,9 @@ def explore(
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Of the example.")
     ] = None,
     host: Annotated[str, typer.Option(metavar="ADDRESS", help="To listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(metavar="NUMBER", help="0 for any that is free.")] = 0,
+    port: Annotated[
+        int, typer.Option(parser=whole, metavar="NUMBER", help="0 for any that is free.")
+    ] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page.")] = True,
 ) -> int:
     """Explore a surface in the browser until Ctrl-C.

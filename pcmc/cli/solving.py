@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,9 +13,21 @@ from .. import project as projects
 from ..certificate import certify
 from ..io import write
 from ..remesh import remesh
-from .arguments import TOML, Input, Pressures, Settings, check_input, retensioned, surface_in
+from .arguments import (
+    TOML,
+    Input,
+    Pressures,
+    Settings,
+    check_input,
+    number,
+    retensioned,
+    surface_in,
+)
 from .codes import NOT_CERTIFIED, OK, code, names, report
 from .progress import working
+
+if TYPE_CHECKING:
+    from ..design import Design
 
 
 def solve_(
@@ -61,10 +73,22 @@ def solve_(
     print(f"{outcome.surface.m} triangles; {outcome.result.message}")
     if outcome.design is not None:
         print(f"targets {outcome.design.message}")
+        if outcome.design.met:
+            print(_with(outcome.design))
     report(outcome.certificate, list(outcome.files))
     if project.outputs and not outcome.files:
         print("nothing written (--anyway writes it all the same)")
     return OK if outcome.good else NOT_CERTIFIED
+
+
+def _with(design: Design) -> str:
+    """What the search found: the targets' quantities, and the parameters that give them.
+
+    A sentence of ``design.message`` has them where a target is missed.
+    """
+    found = (f"{label} {value:.6g}" for label, value in design.targets["found"].items())
+    values = (f"{label} {value:.6g}" for label, value in design.parameters["value"].items())
+    return f"{', '.join(found)}, with {', '.join(values)}"
 
 
 def _project(
@@ -96,19 +120,25 @@ def certify_(file: Input, tension: Settings = None, pressure: Pressures = None) 
 
 def remesh_(
     file: Input,
-    edge_length: Annotated[float, typer.Option(metavar="LENGTH", help="Of the triangles.")],
+    edge_length: Annotated[
+        float, typer.Option(parser=number, metavar="LENGTH", help="Of the triangles.")
+    ],
     output: Annotated[
         list[Path],
         typer.Option("-o", "--output", metavar="FILE", help="To write; may be repeated."),
     ],
     near_curves: Annotated[
         float | None,
-        typer.Option(metavar="LENGTH", help="Edge length at junctions and boundaries."),
+        typer.Option(
+            parser=number, metavar="LENGTH", help="Edge length at junctions and boundaries."
+        ),
     ] = None,
     chord: Annotated[
         float | None,
         typer.Option(
-            metavar="LENGTH", help="Largest distance to the smooth surface: finer where it curves."
+            parser=number,
+            metavar="LENGTH",
+            help="Largest distance to the smooth surface: finer where it curves.",
         ),
     ] = None,
     solved: Annotated[
@@ -136,4 +166,7 @@ def remesh_(
         outcome = projects.carry_out(project, say)
     print(f"{outcome.surface.m} triangles; {outcome.result.message}")
     report(outcome.certificate, list(outcome.files))
-    return OK if outcome.good else NOT_CERTIFIED
+    if outcome.files:
+        return OK
+    print("nothing written (--no-solve writes the new mesh as it is)")
+    return NOT_CERTIFIED

@@ -11,7 +11,7 @@ import typer
 
 from ..errors import FileError, MissingExtra, OptionError
 from ..io import FORMATS
-from .arguments import TOML, values_of
+from .arguments import TOML, number, values_of, whole
 from .codes import INTERRUPTED, NOT_CERTIFIED, OK
 from .progress import sweeping
 
@@ -37,13 +37,15 @@ def sweep(
         Path | None, typer.Option(metavar="FILE", help="Table to write (.csv or .parquet).")
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(metavar="NUMBER", help="Local processes; default: all.")
+        int | None,
+        typer.Option(parser=whole, metavar="NUMBER", help="Local processes; default: all."),
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, tcp://HOST:8786.")
     ] = None,
     time_limit: Annotated[
-        float, typer.Option(metavar="SECONDS", help="After so long a case is stopped.")
+        float,
+        typer.Option(parser=number, metavar="SECONDS", help="After so long a case is stopped."),
     ] = 600.0,
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Run stored cases that failed once more.")

@@ -1,0 +1,82 @@
+"""What is typed wrong is told as it was typed, and the command speaks where a terminal can do little."""
+
+from __future__ import annotations
+
+import io
+import sys
+
+import pytest
+
+from pcmc import cli
+from tests.test_project import SMALL
+
+REMESH = ["remesh", "roof.toml", "-o", "x.obj", "--edge-length"]
+SWEEP = ["sweep", "roof.toml", "roof.tension=2,3"]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "roof.toml").write_text(SMALL, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([*REMESH, "abc"], "'--edge-length': expected a number, found 'abc'"),
+        ([*REMESH, "1", "--near-curves", "0,5"], "'--near-curves': expected a number, found '0,5'"),
+        ([*REMESH, "1", "--chord="], "'--chord': expected a number, found ''"),
+        (["explore", "--port", "80a"], "'--port': expected a whole number, found '80a'"),
+        ([*SWEEP, "--workers", "2.5"], "'--workers': expected a whole number, found '2.5'"),
+        ([*SWEEP, "--time-limit", "1m"], "'--time-limit': expected a number, found '1m'"),
+        (["solve", "roof.toml", "--tension", "=4"], "expected NAME=NUMBER or NUMBER, found '=4'"),
+        (["solve", "roof.toml", "--pressure", "nan"], "--pressure: expected NAME=NUMBER"),
+    ],
+)
+def test_a_number_that_is_none_is_shown_with_its_option(folder, capsys, arguments, message):
+    assert cli.main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert message in err
+
+
+def test_the_help_named_is_that_of_the_command(folder, capsys):
+    assert cli.main(["remesh", "roof.toml", "--edge", "1"]) == 2
+    assert "(pcmc remesh --help shows what there is)" in capsys.readouterr().err
+    assert cli.main(["slove"]) == 2
+    assert "(pcmc --help shows what there is)" in capsys.readouterr().err
+
+
+def test_met_targets_are_told_with_the_tensions_that_meet_them(folder, capsys):
+    aim = '[targets]\nmeet = [{quantity = "apex", of = "roof", value = 1.0}]\nvary = ["roof"]\n'
+    (folder / "high.toml").write_text(SMALL.split("[output]")[0] + aim, encoding="utf-8")
+    assert cli.main(["solve", "high.toml"]) == 0
+    out = capsys.readouterr().out
+    assert "apex of roof 1, with tension of roof 1." in out
+
+
+def test_a_new_mesh_that_is_not_certified_is_not_written_and_that_is_said(folder, capsys):
+    low = SMALL.replace("tension = 2.0", "tension = 0.2")
+    (folder / "low.toml").write_text(low, encoding="utf-8")
+    assert cli.main(["remesh", "low.toml", "--edge-length", "0.9", "-o", "x.obj"]) == 1
+    assert "nothing written (--no-solve writes" in capsys.readouterr().out
+    assert not (folder / "x.obj").exists()
+
+
+@pytest.mark.parametrize("errors", ["strict", "surrogateescape"])  # the second in the locale C
+def test_letters_that_the_locale_lacks_are_escaped(folder, monkeypatch, errors):
+    (folder / "roof.toml").write_text(SMALL.replace("roof =", '"Nordflügel" ='), encoding="utf-8")
+    shown = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(shown, encoding="ascii", errors=errors))
+    cli.main(["certify", "roof.toml"])
+    sys.stdout.flush()
+    assert b"Nordfl\\xfcgel" in shown.getvalue()
+
+
+def test_without_stderr_it_works_all_the_same(folder, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "stderr", None)  # as where the shell closes it: pcmc ... 2>&-
+    assert cli.main(["solve", "roof.toml"]) == 0
+    assert "stable" in capsys.readouterr().out
+    assert cli.main(["solve", "rof.toml"]) == 2
+    assert capsys.readouterr().out == ""
