@@ -35,7 +35,8 @@ def two_squares(
     alpha, alpha_aux : tension of the patches "left" and "right", and of the "wall"; force/length.
     side, height : length of a square's side and initial height, length.
     diagonals : "symmetric", each quarter's diagonals pointing to its patch's centre, so that no
-        corner of the outline is cut off by a triangle that cannot move; or "parallel", all one way.
+        corner of the outline is cut off by a triangle that cannot move, and the two patches mirror
+        images; or "parallel", all one way.
 
     Returns
     -------
@@ -77,7 +78,8 @@ def _squares(number: Ints, n: int, diagonals: str) -> Ints:
     i, j = np.indices(a.shape)
     rising = np.ones(a.shape, dtype=bool)
     if diagonals == "symmetric":
-        rising = (2 * (i % n) + 1 < n) == (2 * j + 1 < n)
+        left = (2 * i + 1 < n) == (2 * j + 1 < n)
+        rising = np.where(i < n, left, ~left[::-1])
     first = np.where(rising[..., None], np.stack([a, b, c], -1), np.stack([a, b, d], -1))
     second = np.where(rising[..., None], np.stack([a, c, d], -1), np.stack([b, c, d], -1))
     return np.stack([first, second], axis=2).reshape(-1, 3)

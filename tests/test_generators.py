@@ -119,6 +119,15 @@ def test_two_squares_cover_their_plan(diagonals):
     assert surface.patch_faces([0, 1]).sum() == 4 * 36
 
 
+@pytest.mark.parametrize("n", [3, 4, 5])
+def test_the_two_squares_are_mirror_images(n):
+    """Else the junction is pulled to one side, and over a wall that is down it slides away."""
+    surface = generators.two_squares(n)
+    middles = surface.vertices[surface.faces[surface.patch_of_face < 2]].mean(axis=1).round(9) + 0.0
+    image = np.unique(middles * [-1, 1, 1] + 0.0, axis=0)
+    np.testing.assert_array_equal(image, np.unique(middles, axis=0))
+
+
 def test_symmetric_diagonals_leave_no_triangle_that_cannot_move():
     held = {
         diagonals: generators.two_squares(4, diagonals=diagonals)
