@@ -2,7 +2,8 @@
 
 - inside a sheet: the unit vertex normal (the normalised vector area);
 - on a curve where sheets meet or end: the plane perpendicular to the curve;
-- at a point where such curves meet: all three directions;
+- at a point where such curves meet, or which sheets share that have no edge in common there: all
+  three directions;
 - always within what the support allows: nothing where fixed, along Π where sliding.
 
 The remaining directions only slide vertices along the shape and belong to mesh quality. Faces without
@@ -20,7 +21,16 @@ import numpy as np
 from . import kernels
 from .arrays import Bools, Floats, Ints
 from .surface import Surface
-from .topology import CURVE, POINT, SHEET, Topology, curve_neighbours, topology, vertex_kind
+from .topology import (
+    CURVE,
+    POINT,
+    SHEET,
+    Topology,
+    components,
+    curve_neighbours,
+    topology,
+    vertex_kind,
+)
 
 PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
 
@@ -32,9 +42,10 @@ class Structure:
     Attributes
     ----------
     active : (m,) bool, faces with a tension or a pressure.
-    faces, patch_of_face : the active faces alone.
+    faces, patch_of_face : the active faces alone; those without pressure turned over where that gives
+        a sheet one side.
     kind : (n,) SHEET, CURVE or POINT: how many edges end there at which active sheets meet, end, or
-        change tension or pressure.
+        change tension, pressure or side.
     curve, beside : (c,) vertices on a curve, and their neighbours along it (c,2).
     idle : (n,) vertices of no active face.
     level : (n,) curve vertices beside one that rests on Π: their tangent is taken along Π.
@@ -97,25 +108,37 @@ def structure(surface: Surface, crest: Ints | None = None, level: Bools | None =
 
     Two sheets of equal tension and pressure that meet with no pulling wall between them are one
     smooth sheet: their common curve can slide along it freely and carries no motion of its own.
+    Without pressure they are so whichever way their faces run; a Möbius band keeps a curve across.
     """
     pulls = (surface.tensions != 0.0) | (surface.pressures != 0.0)
     active = pulls[surface.patch_of_face]
     faces = np.ascontiguousarray(surface.faces[active])
     patch = np.ascontiguousarray(surface.patch_of_face[active])
     kinds = np.unique(np.stack([surface.tensions, surface.pressures]), axis=1, return_inverse=True)
-    topo = topology(faces, np.asarray(kinds[1]).ravel()[patch].astype(np.int32), surface.n)
-    edges = topo.edges[topo.curve_edge]
+    alike = np.asarray(kinds[1]).ravel()[patch].astype(np.int32)
+    topo = topology(faces, alike, surface.n)
+    if (topo.one_way_edge & ~topo.seam_edge).any():
+        turned = _against_the_others(topo) & (surface.pressures[patch] == 0.0)
+        faces[turned] = faces[turned][:, ::-1]
+        topo = topology(faces, alike, surface.n)
+    edges = topo.edges[topo.curve_edge | topo.one_way_edge]
     links = np.concatenate([edges, edges[:, ::-1]])
     if crest is not None and len(crest):
         links = np.concatenate([links[~np.isin(links[:, 0], crest[:, 0])], crest])
     curve, beside = curve_neighbours(links, surface.n)
+    kind = vertex_kind(links[:, 0], surface.n)
+    shared = _fans(faces, topo.edge_of_face, topo.edges, surface.n) > 1
+    if crest is not None:
+        shared[crest[:, 0]] = False
+    kind[shared] = POINT
+    curve, beside = curve[~shared[curve]], beside[~shared[curve]]
     idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
     return Structure(
         active=active,
         faces=faces,
         patch_of_face=patch,
         topology=topo,
-        kind=vertex_kind(links[:, 0], surface.n),
+        kind=kind,
         curve=curve,
         beside=beside,
         idle=idle,
@@ -176,6 +199,20 @@ def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
     return first, np.cross(directions, first)
 
 
+def _against_the_others(topo: Topology) -> Bools:
+    """(m,) faces to turn over so that each sheet has one side; none of a sheet that has only one."""
+    flat = topo.edge_of_face.ravel()
+    smooth = (topo.valence == 2) & ~topo.seam_edge
+    hit = np.flatnonzero(smooth[flat])
+    one, other = (hit[np.argsort(flat[hit], kind="stable")] // 3).reshape(-1, 2).T
+    # every face twice, as it is and turned over: what hangs together runs the same way
+    m = len(topo.faces)
+    across = topo.one_way_edge[smooth] * m
+    second = np.append(other + across, other + m - across)
+    label = components(np.stack([np.append(one, one + m), second], axis=1), 2 * m)
+    return np.asarray(label[:m] > label[m:])
+
+
 def _within_plane(
     normal: Floats, tangent: Floats, sliding: Ints, basis: Floats, dimension: Ints
 ) -> None:
@@ -200,6 +237,29 @@ def _within_plane(
         basis[chosen[single], 0] = across[single] / length[single, None]
         basis[chosen[~single], 0], basis[chosen[~single], 1] = first[0], second[0]
         dimension[chosen] = np.where(single, 1, 2)
+
+
+@kernels.compiled
+def _fans(F: Ints, edge_of_face: Ints, edges: Ints, n: int) -> Ints:
+    """(n,) how many parts the triangles around each vertex fall into that share no edge there."""
+    parent = np.arange(2 * len(edges))  # node 2 e + s is the end edges[e, s] of edge e
+    for f in range(len(F)):
+        for c in range(3):
+            one, two = edge_of_face[f, c - 1], edge_of_face[f, c - 2]
+            a = 2 * one + (edges[one, 1] == F[f, c])
+            b = 2 * two + (edges[two, 1] == F[f, c])
+            while parent[a] != a:
+                parent[a] = parent[parent[a]]
+                a = parent[a]
+            while parent[b] != b:
+                parent[b] = parent[parent[b]]
+                b = parent[b]
+            parent[max(a, b)] = min(a, b)
+    count = np.zeros(n, dtype=np.int64)
+    for k in range(len(parent)):
+        if parent[k] == k:
+            count[edges[k // 2, k % 2]] += 1
+    return count
 
 
 @kernels.compiled

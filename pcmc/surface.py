@@ -213,9 +213,8 @@ class Surface:
         Each triangle's counts along its sense there. Where all are zero, no force depends on which
         point of Π the volumes are seen from.
         """
-        topo, F = self.topology, self.faces
-        sense = np.where(F[:, [1, 2, 0]] < F[:, [2, 0, 1]], 1.0, -1.0)
-        pressure = self.pressures[self.patch_of_face, None] * sense
+        topo = self.topology
+        pressure = self.pressures[self.patch_of_face, None] * topo.sense
         left = np.bincount(topo.edge_of_face.ravel(), pressure.ravel(), len(topo.edges))
         held = (self.fixed | self.on_plane)[topo.edges].all(axis=1)
         rounding = 1e-12 * np.abs(self.pressures).max(initial=0.0)

@@ -56,6 +56,18 @@ class Topology:
     valence: Ints
 
     @cached_property
+    def sense(self) -> Ints:
+        """(m,3) int: +1 where a face runs along the edge of ``edge_of_face`` as its row does, else -1."""
+        ascends = self.faces[:, [1, 2, 0]] < self.faces[:, [2, 0, 1]]
+        return np.where(ascends, np.int8(1), np.int8(-1))
+
+    @cached_property
+    def one_way_edge(self) -> Bools:
+        """(e,) bool: edges between two triangles that run along it the same way: the side changes."""
+        total = np.bincount(self.edge_of_face.ravel(), self.sense.ravel(), len(self.edges))
+        return (self.valence == 2) & (total != 0.0)
+
+    @cached_property
     def boundary_edge(self) -> Bools:
         """(e,) bool: edges of a single triangle."""
         return self.valence == 1

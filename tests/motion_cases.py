@@ -23,6 +23,27 @@ def seam() -> Surface:
     return Surface(flat, F, side, [Patch("south", 2.0), Patch("north", 2.0)], fixed=held)
 
 
+def against() -> Surface:
+    """Two films without pressure, one sheet, whose faces run against each other."""
+    surface = seam()
+    faces = surface.faces.copy()
+    faces[surface.patch_of_face == 1] = faces[surface.patch_of_face == 1][:, ::-1]
+    films = [Patch("south", 2.0, pressure=0.0), Patch("north", 2.0, pressure=0.0)]
+    return Surface(surface.vertices, faces, surface.patch_of_face, films, fixed=surface.fixed)
+
+
+def touching() -> Surface:
+    """Two roofs that share nothing but their tops, one upside down."""
+    X = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0.2, 0.1, 0.4]]
+    F = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    lid = np.where(F == 4, 4, F + 5)[:, ::-1]
+    X += [[1.3, 1, 1], [-1, 1.2, 1], [-0.8, -1, 0.9], [1, -1, 1]]
+    return Surface(
+        X, [*F, *lid], [0] * 4 + [1] * 4, [Patch("floor", 1.3), Patch("lid", 1.3)],
+        fixed=[0, 1, 2, 3, 5, 6, 7, 8],
+    )  # fmt: skip
+
+
 SURFACES = {
     "pyramid": lambda: pyramid(1.3),
     "closed": lambda: shaken(octahedron(0.7)),
@@ -32,5 +53,7 @@ SURFACES = {
     "three patches, tilted": lambda: shaken(three_patches(plane=TILTED)),
     "wall without tension": lambda: shaken(two_squares(3, alpha_aux=0.0)),
     "seam": seam,
+    "faces against each other": against,
+    "touching": touching,
     "bubbles": lambda: shaken(double_bubble(1.2)),
 }

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from motion_cases import SURFACES, TILTED, seam
+from motion_cases import SURFACES, TILTED, against, seam, touching
 from shapes import disc, pyramid, rotation, shaken, three_patches
 
 from generators import two_squares
@@ -164,6 +164,70 @@ def test_a_seam_is_smooth_until_tension_or_pressure_differ():
     assert (structure(surface.retensioned({"north": 3.0})).kind[middle] == CURVE).all()
     pushed = surface.retensioned(pressures={"north": 0.5})
     assert (structure(pushed).kind[middle] == CURVE).all()
+
+
+def test_films_are_one_sheet_whichever_way_their_faces_run():
+    """Where two patches ran against each other their normals cancelled, and with them the forces."""
+    one, other = seam(), against()
+    frame = structure(other)
+    assert (frame.kind[[6, 7, 8]] == SHEET).all()
+    turned = (frame.faces != other.faces).any(axis=1)
+    assert set(other.patch_of_face[turned].tolist()) in ({0}, {1})
+    held = [*range(6), *range(9, 15)]
+    here, there = (
+        solve(Surface(one.vertices, F, one.patch_of_face, other.patches, fixed=held))
+        for F in (one.faces, other.faces)
+    )
+    assert there.converged
+    np.testing.assert_allclose(there.surface.vertices, here.surface.vertices, atol=1e-12)
+    # under pressure they are pushed apart: what they share is a curve
+    pushed = other.retensioned(pressures={"south": 0.3, "north": 0.3})
+    assert (structure(pushed).kind[[6, 7, 8]] == CURVE).all()
+
+
+def moebius(count: int = 24) -> Surface:
+    """A band of two patches with half a twist, its edge held; no way of running suits both ends."""
+    angle = 2.0 * np.pi * np.arange(count) / count
+    out = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    half = 0.3 * (np.cos(0.5 * angle)[:, None] * out + np.sin(0.5 * angle)[:, None] * [0, 0, 1])
+    X = np.concatenate([out + half, out, out - half])
+    F = []
+    for i in range(count):
+        here = [i, count + i, 2 * count + i]
+        there = (
+            [i + 1, count + i + 1, 2 * count + i + 1] if i < count - 1 else [2 * count, count, 0]
+        )
+        for a, b, c, d in zip(here, there, here[1:], there[1:], strict=False):
+            F += [[a, b, c], [b, d, c]]
+    half_way = np.repeat([0, 1], len(F) // 2)
+    films = [Patch("first", 1.0, pressure=0.0), Patch("second", 1.0, pressure=0.0)]
+    return Surface(X, F, half_way, films, fixed=[*range(count), *range(2 * count, 3 * count)])
+
+
+def test_a_moebius_band_keeps_a_curve_where_its_side_changes():
+    surface = moebius()
+    frame = structure(surface)
+    middle = np.flatnonzero(surface.free)
+    assert np.count_nonzero(frame.kind[middle] == CURVE) == 1
+    assert np.count_nonzero(frame.kind[middle] == SHEET) == len(middle) - 1
+    result = solve(surface)
+    assert result.converged
+    seam = middle[frame.kind[middle] == CURVE]
+    along = result.surface.vertices[frame.beside[np.isin(frame.curve, seam)]]
+    left = gradient(result.surface)[seam]
+    assert np.abs(np.cross(left, along[:, 1] - along[:, 0])).max() < 1e-10
+
+
+def test_a_vertex_that_sheets_share_without_an_edge_moves_in_all_directions():
+    """Along the sum of their normals alone it was at rest where each sheet still pulled it."""
+    surface = touching()
+    frame, space = frame_and_space(surface)
+    assert frame.kind[4] == POINT
+    assert space.dimension[4] == 3
+    result = solve(surface)
+    assert result.converged
+    assert np.abs(gradient(result.surface)[4]).max() < 1e-11
+    assert np.abs(gradient(surface)[4]).min() > 0.01
 
 
 def test_a_crest_at_rest_is_a_curve_whatever_meets_there():
