@@ -32,9 +32,11 @@ from .motion import MotionSpace, Structure, force_scale, motion_space
 from .quality import edge_lengths, triangle_quality
 from .rigid import rigid_modes, rigid_motions
 from .surface import Surface
+from .topology import SHEET
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
 NEUTRAL = 1e-2  # |λ| size²/α below which a mode counts as neutral
+SMALL = 1e3  # tolerances of its own forces that a patch may lack where stronger ones hide it
 ENDED_BADLY = ("DIVERGED", "DEGENERATE")
 COLLAPSED = 1e-3  # triangle quality below which a mesh counts as degenerate
 
@@ -180,8 +182,11 @@ def certify(
         system = _system(shown, frame, space)
     values, fields = _modes(system, modes)
     ratio, carried = load_ratio(shown), reactions(shown)
+    missing = space.project(forces)
+    own = _own_residuals(shown, frame, missing)
+    softest = _softest(shown, frame, values, fields)
     verdict, detail = _verdict(
-        surface, residual, tolerance, quality, system, values, ratio, status, below.pinchable
+        surface, residual, tolerance, quality, system, own, softest, ratio, status, below.pinchable
     )
     return Certificate(
         verdict=verdict,
@@ -197,7 +202,7 @@ def certify(
         quality=quality,
         walls_quality=walls_quality,
         patches=_patch_table(surface, shown),
-        junctions=junction_table(shown, space.project(forces)),
+        junctions=junction_table(shown, missing),
         boundaries=boundary_table(shown),
         load=load(shown),
         support=float((carried @ np.array(surface.plane.normal)).sum()),
@@ -224,7 +229,7 @@ def _modes(system: Stiffness | None, count: int) -> tuple[Floats, Floats]:
 
 def _verdict(
     surface: Surface, residual: float, tolerance: float, quality: float,
-    system: Stiffness | None, values: Floats, ratio: float, status: str, sliding: Bools,
+    system: Stiffness | None, own: Floats, softest: float, ratio: float, status: str, sliding: Bools,
 ) -> tuple[Verdict, str]:  # fmt: skip
     if not surface.tensions.any():
         return Verdict.NEUTRAL, "no patch has a tension: every shape is at rest"
@@ -252,13 +257,41 @@ def _verdict(
                 " fine mesh cannot come to rest, one as coarse as this may"
             )
         return Verdict.NOT_CONVERGED, why
+    if own.max() > SMALL * tolerance:
+        name = surface.patches[int(own.argmax())].name
+        why = (
+            f"patch {name!r} lacks {own.max():.1e} of its own forces, which are small beside those"
+            " of others; solve with a smaller tolerance"
+        )
+        return Verdict.NOT_CONVERGED, why
     if system.negative:
         return Verdict.SADDLE, f"index {system.negative}: {system.negative} ways down"
-    if len(values):
-        relative = values[0] * surface.size**2 / surface.tensions.max()
-        if abs(relative) < NEUTRAL:
-            return Verdict.NEUTRAL, f"softest mode {relative:.1e} in units of α/size²"
+    if abs(softest) < NEUTRAL:
+        return Verdict.NEUTRAL, f"softest mode {softest:.1e} in units of α/size²"
     return Verdict.STABLE, ""
+
+
+def _own_residuals(surface: Surface, frame: Structure, missing: Floats) -> Floats:
+    """(k,) of each patch: the forces missing inside over the norm of its own triangles' forces."""
+    F, patch, count = surface.faces, surface.patch_of_face, len(surface.patches)
+    sides = surface.vertices[F[:, [1, 2, 0]]] - surface.vertices[F]
+    forces = 0.25 * surface.tensions[patch] ** 2 * np.einsum("fij,fij->f", sides, sides)
+    scale = np.bincount(patch, forces, count)
+    owner = np.zeros(surface.n, dtype=np.int64)
+    owner[F] = patch[:, None]
+    left = np.einsum("ij,ij->i", missing, missing) * (frame.kind == SHEET)
+    return np.asarray(np.sqrt(np.bincount(owner, left, count) / np.where(scale > 0.0, scale, 1.0)))
+
+
+def _softest(surface: Surface, frame: Structure, values: Floats, fields: Floats) -> float:
+    """The lowest λ in units of α/size², α the tension of what its mode moves; infinite without one."""
+    if not len(values):
+        return np.inf
+    X, F = surface.vertices, frame.faces
+    area = np.linalg.norm(np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]), axis=1)
+    moved = area * np.einsum("fij,fij->f", fields[0][F], fields[0][F])
+    tension = float(surface.tensions[frame.patch_of_face] @ moved / moved.sum())
+    return float(values[0]) * surface.size**2 / tension
 
 
 def _pulled_off(unheld: Floats) -> str:

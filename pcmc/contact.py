@@ -1,10 +1,10 @@
 """Walls that pinch: where a junction comes down to Π the wall's height vanishes and it rests there.
 
 A wall of tension α_w and height z over a length s costs α_w |z| s: not differentiable at z = 0. The
-junction rests on Π where the upward pull of the sheets on it is at most α_w per length, and stands off
-where the forces balance. While it rests, the wall below has no area: its vertices coincide with the
-junction vertex above them (their *owner*), and its triangles are left out. So a pinched wall is seen from
-the positions alone, and a surface with one needs no extra state.
+junction rests on Π where the pull of the sheets on it, up or down, is at most α_w per length, and stands
+off, to the side it is pulled to, where the forces balance. While it rests, the wall below has no area: its
+vertices coincide with the junction vertex above them (their *owner*), and its triangles are left out. So a
+pinched wall is seen from the positions alone, and a surface with one needs no extra state.
 """
 
 from __future__ import annotations
@@ -223,11 +223,11 @@ def standing(surface: Surface, below: Walls | None = None, rests: Bools | None =
 
 
 def pull_and_capacity(surface: Surface, below: Walls, rests: Bools) -> tuple[Floats, Floats]:
-    """Upward pull (n,) on each resting vertex of a pinched surface and what the wall can take, force.
+    """Pull (n,) on each resting vertex of a pinched surface and what the wall can take, force.
 
-    The pull is the force of the sheets away from Π. Lifting the vertex by dz makes a wall of area
-    ½ ℓ dz under each crest edge there, ℓ its length along Π, so the capacity is ½ Σ α_w ℓ; the vertex
-    rests while pull ≤ capacity.
+    The pull is the force of the sheets away from Π, to the vertex's own side; negative to the other.
+    Lifting the vertex by dz to either side makes a wall of area ½ ℓ dz under each crest edge there, ℓ
+    its length along Π, so the capacity is ½ Σ α_w ℓ; the vertex rests while |pull| ≤ capacity.
     """
     force = -energy_and_gradient(surface, supports=False)[1]
     pull = np.where(rests, below.side * (force @ np.array(surface.plane.normal)), 0.0)
@@ -242,10 +242,11 @@ def pull_and_capacity(surface: Surface, below: Walls, rests: Bools) -> tuple[Flo
 def excess(surface: Surface, below: Walls, rests: Bools) -> Floats:
     """(n,) the pull on each resting vertex of a pinched surface beyond what its wall can take, force.
 
-    At rest there is none: a junction that is pulled harder stands off Π.
+    At rest there is none: a junction that is pulled harder stands off Π. Signed as the pull is.
     """
     pull, capacity = pull_and_capacity(surface, below, rests)
-    return np.where(pull > capacity * (1.0 + SLACK), pull - capacity, 0.0)
+    beyond = np.where(np.abs(pull) > capacity * (1.0 + SLACK), np.abs(pull) - capacity, 0.0)
+    return np.copysign(beyond, pull)
 
 
 def crest_spacing(surface: Surface, below: Walls) -> Floats:

@@ -203,6 +203,39 @@ def test_a_neutral_surface():
     assert "softest mode" in near.detail
 
 
+def beside_a_stiff_cap(soft: Surface, times: float) -> Surface:
+    """The cap and, three away, one at rest that is so many times as stiff."""
+    stiff = solve(spherical_cap(0.25, alpha=0.6 * times)).surface
+    patches = [Patch("soft", 0.6), Patch("stiff", 0.6 * times)]
+    return Surface(
+        np.concatenate([soft.vertices, stiff.vertices + np.array([3.0, 0.0, 0.0])]),
+        np.concatenate([soft.faces, soft.n + stiff.faces]),
+        np.repeat([0, 1], [soft.m, stiff.m]), patches,
+        fixed=np.concatenate([soft.fixed, stiff.fixed]),
+    )  # fmt: skip
+
+
+def test_a_mode_is_soft_beside_the_tension_of_what_it_moves():
+    """Not beside that of another part, or of a wall that is down: both used to make it neutral."""
+    cap = solve(spherical_cap(0.25))
+    found = certify(beside_a_stiff_cap(cap.surface, 1e6))
+    assert found.eigenvalues[0] == pytest.approx(cap.certificate.eigenvalues[0], rel=1e-9)
+    assert found.verdict is Verdict.STABLE
+    down = solve(two_squares(6, alpha_aux=3e3)).certificate
+    assert len(down.pinched) == 5
+    assert down.verdict is Verdict.STABLE
+
+
+def test_strong_forces_do_not_hide_what_a_weak_patch_lacks():
+    found = certify(beside_a_stiff_cap(spherical_cap(0.25), 1e8))
+    assert found.residual < 1e-8
+    assert found.curvature_error > 0.1
+    assert found.verdict is Verdict.NOT_CONVERGED
+    assert found.detail.startswith("patch 'soft' lacks 9.7e-02 of its own forces")
+    both = solve(beside_a_stiff_cap(spherical_cap(0.25), 1e8), tolerance=1e-18)
+    assert both.certificate.verdict is Verdict.STABLE
+
+
 def test_no_equilibrium_from_the_load_alone():
     found = certify(spherical_cap(0.25, alpha=0.45))
     assert found.load_ratio == pytest.approx(1.0 / 0.9, rel=0.03)

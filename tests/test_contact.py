@@ -282,8 +282,8 @@ def test_the_wall_stands_just_below_the_tension_that_keeps_it_down():
     assert complementary(below.surface)[0].sum() < 7
 
 
-@pytest.mark.parametrize("n", [6, 8, 10, 12])
-@pytest.mark.parametrize("alpha_aux", [2.2, 2.4, 2.5, 2.6, 2.7, 2.8])
+@pytest.mark.parametrize("n", [5, 6, 8, 10, 12])
+@pytest.mark.parametrize("alpha_aux", [2.2, 2.4, 2.5, 2.6, 2.7, 2.8, 3.0])
 def test_any_strength_of_wall_settles(n, alpha_aux):
     """Near the strength that keeps the junction down it stands off by less than 1/1000 of an edge."""
     result = solve(two_squares(n, alpha_aux=alpha_aux), target="stationary")
@@ -316,6 +316,18 @@ def test_below_the_plane_walls_pinch_and_stand_off_alike(how):
     lifted_down = solve(below.surface.retensioned({"wall": 1.0}))
     assert len(lifted_down.certificate.pinched) == 0
     assert lifted_down.energy == pytest.approx(lifted_up.energy, rel=1e-12)
+
+
+@pytest.mark.parametrize("target", ["minimum", "stationary"])
+def test_a_junction_that_is_pulled_through_the_plane_goes_there(target):
+    """It used to stay on Π, pulled down harder than its wall holds, and to count as converged."""
+    start = two_squares(6, alpha_aux=1.0)
+    result = solve(start.retensioned(pressures={"left": -1.0, "right": -1.0}), target=target)
+    assert result.converged
+    assert result.certificate.verdict is Verdict.STABLE
+    crest = walls(result.surface).can_rest
+    assert (result.surface.vertices[crest, 2] < -0.1).all()
+    assert result.energy == pytest.approx(solve(start).energy, rel=2e-3)
 
 
 @pytest.mark.parametrize("weak", [0.0, 0.1, 1.0])

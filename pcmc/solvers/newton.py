@@ -170,7 +170,7 @@ def _run(
             rounded = state.relative <= ROUNDED and (wait < 0 or since > PATIENCE)
             if state.relative <= options.tolerance or rounded:
                 if not _go_on(state, stepper, options):
-                    return Status.STALLED if state.overpulled().any() else Status.CONVERGED
+                    return Status.STALLED if state.overpull().any() else Status.CONVERGED
                 wait, since, lowest = 0, 0, state.relative
             elif wait < 0:
                 return _lost(state, start, Status.STALLED)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
@@ -167,16 +169,19 @@ class State:
         self.measure()
         return True
 
-    def overpulled(self) -> Bools:
-        """(n,) resting vertices that the sheets pull harder than the wall can hold."""
-        return excess(self.surface.moved(self.X), self.walls, self.rests) > 0.0
+    def overpull(self) -> Floats:
+        """(n,) the pull on resting vertices beyond what the wall can hold, force; see ``excess``."""
+        return excess(self.surface.moved(self.X), self.walls, self.rests)
 
     def release(self) -> bool:
-        """Lift the resting vertices that the sheets pull harder than the wall can hold."""
-        free = self.overpulled()
+        """Lift the resting vertices that the sheets pull harder than the wall can hold, to their side."""
+        beyond = self.overpull()
+        free = beyond != 0.0
         if self.releases <= 0 or not free.any():
             return False
         self.releases -= 1
+        side = np.where(beyond < 0.0, -self.walls.side, self.walls.side)
+        self.walls = replace(self.walls, side=side)
         self.full = lifted(self.result_surface(), self.walls, free, LIFT * self.caution)
         self.caution[free] *= CAUTION
         self._pinch(self.rests & ~free)
