@@ -61,6 +61,26 @@ def cap(rings: int, tension: float = 0.6, radius: float = 1.0) -> Surface:
     return Surface(X, faces, [0] * len(faces), [Patch("cap", tension)], fixed=rim)
 
 
+def tube(rows: int, around: int, profile, patch: Patch, **supports) -> Surface:
+    """A surface of revolution about z, normals outwards; ``profile(t)`` is (r, z) for t (rows + 1,)
+    from 0 to 1. Both ends are fixed if no supports are given; the first row is the first vertices.
+    """
+    row = np.arange(rows + 1)
+    r, z = profile(row / rows)
+    turn = 2.0 * np.pi * (np.arange(around) + 0.5 * (row % 2)[:, None]) / around
+    X = np.stack([r[:, None] * np.cos(turn), r[:, None] * np.sin(turn), z[:, None] + 0 * turn], -1)
+    a = np.arange(rows * around).reshape(rows, around)
+    b = np.roll(a, -1, axis=1)
+    c, d = a + around, b + around
+    even = (row[:-1] % 2 == 0)[:, None, None]
+    first = np.where(even, np.stack([a, b, c], -1), np.stack([a, b, d], -1))
+    second = np.where(even, np.stack([b, d, c], -1), np.stack([a, d, c], -1))
+    F = np.stack([first, second], axis=2).reshape(-1, 3)
+    n = (rows + 1) * around
+    supports = supports or {"fixed": [*range(around), *range(n - around, n)]}
+    return Surface(X.reshape(-1, 3), F, [0] * len(F), [patch], **supports)
+
+
 def three_patches(rings: int = 3, plane: Plane | None = None) -> Surface:
     """Fig. 4: three roofs over a hexagon on the plane, three walls that share a vertical line.
 
