@@ -134,6 +134,11 @@ def shaken(surface: Surface, amount: float = 0.05, seed: int = 0) -> Surface:
     return surface.moved(surface.vertices + moves)
 
 
+def generic() -> Surface:
+    """Fig. 4 on a tilted plane away from the origin, shaken: nothing vanishes by symmetry."""
+    return shaken(three_patches(3, Plane((1, 2, 3), (1, -2, 2))))
+
+
 def rotation(seed: int) -> np.ndarray:
     """A random rotation matrix (3,3)."""
     Q, R = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))

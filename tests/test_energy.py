@@ -1,16 +1,12 @@
 """The energy against its identities, its Taylor expansion and the paper's formulas."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from shapes import cap, hexagon, octahedron, pyramid, rotation, shaken, three_patches
+from shapes import cap, generic, octahedron, pyramid, shaken, three_patches
 
-from generators import two_caps, two_squares
-from pcmc import Patch, Plane, Surface, energy, gradient, hessian, kernels
+from pcmc import Plane, energy, gradient, hessian
 from pcmc.energy import (
     apply_supports,
     energy_and_gradient,
@@ -20,14 +16,6 @@ from pcmc.energy import (
     volume,
 )
 from pcmc.topology import POINT
-
-seeds = st.integers(0, 2**32 - 1)
-small = st.floats(-10.0, 10.0)
-
-
-def generic() -> Surface:
-    """Fig. 4 on a tilted plane away from the origin, shaken: nothing vanishes by symmetry."""
-    return shaken(three_patches(3, Plane((1, 2, 3), (1, -2, 2))))
 
 
 def forms(surface, **keywords):
@@ -233,102 +221,6 @@ def test_gradient_is_the_papers_formula(case):
         )
 
 
-# ---- rigid motions, scaling, labels -------------------------------------------------------------
-
-
-@settings(max_examples=25, deadline=None, derandomize=True)
-@given(seeds, st.tuples(small, small, small))
-def test_rigid_motions_turn_the_gradient(seed, shift):
-    surface = shaken(three_patches(3))
-    R, shift = rotation(seed), np.array(shift)
-    plane = Plane(shift + R @ surface.plane.point, R @ surface.plane.normal)
-    X = surface.vertices @ R.T + shift
-    # Rounding may lift sliding vertices off the turned plane by far less than the check allows.
-    other = Surface(
-        X, surface.faces, surface.patch_of_face, surface.patches,
-        surface.fixed, surface.on_plane, plane,
-    )  # fmt: skip
-    assert energy(other) == pytest.approx(energy(surface), rel=1e-12)
-    np.testing.assert_allclose(gradient(other), gradient(surface) @ R.T, atol=1e-11)
-
-
-@settings(max_examples=25, deadline=None, derandomize=True)
-@given(st.floats(1e-3, 1e3))
-def test_scaling_lengths_and_tensions(scale):
-    surface = shaken(three_patches(3))
-    tensions = {p.name: scale * p.tension for p in surface.patches}
-    other = surface.moved(scale * surface.vertices).retensioned(tensions)
-    assert energy(other) == pytest.approx(scale**3 * energy(surface), rel=1e-12)
-    np.testing.assert_allclose(gradient(other) / scale**2, gradient(surface), atol=1e-12)
-
-
-@settings(max_examples=25, deadline=None, derandomize=True)
-@given(seeds)
-def test_labels_do_not_matter(seed):
-    surface = shaken(three_patches(3))
-    rng = np.random.default_rng(seed)
-    vertex, face, patch = (rng.permutation(k) for k in (surface.n, surface.m, 6))
-    turned = (np.arange(3) + rng.integers(0, 3, (surface.m, 1))) % 3  # start at another corner
-    F = np.argsort(vertex)[surface.faces[face]]
-    other = Surface(
-        surface.vertices[vertex], np.take_along_axis(F, turned, axis=1),
-        np.argsort(patch)[surface.patch_of_face[face]], [surface.patches[k] for k in patch],
-        surface.fixed[vertex], surface.on_plane[vertex],
-    )  # fmt: skip
-    assert energy(other) == pytest.approx(energy(surface), rel=1e-13)
-    np.testing.assert_allclose(gradient(other), gradient(surface)[vertex], atol=1e-13)
-    np.testing.assert_allclose(patch_areas(other), patch_areas(surface)[patch], rtol=1e-13)
-
-
-def test_turning_a_patch_over_turns_its_pressure():
-    surface = shaken(pyramid())
-    under = Surface(
-        surface.vertices, surface.faces[:, ::-1], [0] * 4, [Patch("roof", 1.0, -1.0)], range(4)
-    )
-    assert energy(under) == pytest.approx(energy(surface), rel=1e-15)
-    np.testing.assert_allclose(gradient(under), gradient(surface), atol=1e-15)
-
-
-# ---- threads ------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def small_blocks(monkeypatch):
-    monkeypatch.setattr(kernels, "BLOCK", 10)
-
-
-def test_blocks_cover_every_triangle_once(small_blocks):
-    for count in (1, 9, 10, 25, 81, 1000):
-        for workers in (1, 2, 3, 8):
-            ranges = kernels.blocks(count, workers)
-            assert len(ranges) <= workers
-            assert ranges[0][0] == 0
-            assert ranges[-1][1] == count
-            assert all(a[1] == b[0] for a, b in pairwise(ranges))
-
-
-@pytest.mark.parametrize("workers", [1, 2, 3, 8])
-def test_threads_do_not_change_the_answer(small_blocks, workers):
-    surface = generic()
-    E, g = forms(surface, workers=1)
-    again = [forms(surface, workers=workers) for _ in range(3)]
-    for other, d in again:
-        assert other == pytest.approx(E, rel=1e-14)
-        np.testing.assert_allclose(d, g, atol=1e-14)
-        assert other == again[0][0]  # the same bytes every time
-        assert d.tobytes() == again[0][1].tobytes()
-
-
-def test_a_mesh_of_two_real_blocks():
-    points, faces = hexagon(110)  # 72 600 triangles
-    X = np.column_stack([points, 0.01 * (points**2).sum(axis=1)])
-    surface = Surface(X, faces, [0] * len(faces), [Patch("big", 1.0)], fixed=[0])
-    assert len(kernels.blocks(surface.m, 2)) == 2
-    one, two = (forms(surface, workers=w) for w in (1, 2))
-    assert two[0] == pytest.approx(one[0], rel=1e-12)
-    np.testing.assert_allclose(two[1], one[1], atol=1e-9 * np.abs(one[1]).max())
-
-
 # ---- supports and odd triangles -----------------------------------------------------------------
 
 
@@ -360,97 +252,3 @@ def test_second_order_of_the_sampled_cap():
     error = [energy(cap(rings)) - 1.5039191689 for rings in (8, 16, 32)]
     orders = np.log2(np.abs(np.array(error[:-1]) / error[1:]))
     assert orders == pytest.approx([2, 2], abs=0.15)
-
-
-# ---- unequal pressures --------------------------------------------------------------------------
-
-
-def rooms(wall: float) -> Surface:
-    """Two rooms of pressures 1.5 and 1 and the wall between, its normal from the first to the second."""
-    surface = two_squares(3, alpha_aux=1.0, height=1.0)
-    X = surface.vertices[surface.faces[surface.patch_of_face == surface.patch_index("wall")]]
-    assert np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0]).sum(axis=0)[0] > 0.0
-    rng = np.random.default_rng(5)
-    raised = surface.vertices + 0.05 * rng.standard_normal((surface.n, 3)) * surface.free[:, None]
-    return surface.moved(raised).retensioned(pressures={"left": 1.5, "right": 1.0, "wall": wall})
-
-
-def seen_from(surface: Surface, point) -> Surface:
-    return replace(surface, plane=Plane(point))
-
-
-def test_a_wall_that_carries_the_difference_makes_rooms():
-    """Then Σ p V is Σ over rooms of p times the room's volume, and no point of Π is special."""
-    surface = rooms(0.5)
-    here, there = surface, seen_from(surface, (7.0, -3.0, 0.0))
-    assert energy(there) == pytest.approx(energy(here), rel=1e-13)
-    np.testing.assert_allclose(gradient(there), gradient(here), atol=1e-13)
-    left, right, wall = patch_volumes(there)
-    assert left + wall == pytest.approx(patch_volumes(here)[0] + patch_volumes(here)[2], rel=1e-12)
-    tension = float(surface.tensions @ patch_areas(surface))
-    assert energy(there) == pytest.approx(tension - 1.5 * (left + wall) - (right - wall))
-
-
-def test_a_difference_no_wall_carries_acts_on_the_side_of_the_cones():
-    """At the junction alone, by p_1 - p_2 times a third of each triangle to the point of Π."""
-    points = np.array([[0.0, 0.0, 0.0], [7.0, -3.0, 0.0]])
-    surface = rooms(0.0)
-    before, after = (gradient(seen_from(surface, point)) for point in points)
-    moved = np.flatnonzero(np.abs(after - before).max(axis=1) > 1e-12)
-    seam = np.flatnonzero(surface.topology.on_junction & surface.free)
-    np.testing.assert_array_equal(moved, seam)
-    expected = np.zeros_like(before)
-    X, F = surface.vertices, surface.faces[surface.patch_of_face == surface.patch_index("left")]
-    for a, b in ((F[:, k - 1], F[:, k]) for k in range(3)):
-        along = surface.topology.on_junction[a] & surface.topology.on_junction[b]
-        side = 0.5 / 6.0 * np.cross(X[b] - X[a], points[1] - points[0])[along]
-        for end in (a[along], b[along]):
-            np.add.at(expected, end, side)
-    np.testing.assert_allclose((after - before)[seam], expected[seam], atol=1e-13)
-
-
-@pytest.mark.parametrize("wall", [0.0, 0.5])
-@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (7.0, -3.0, 0.0)])
-def test_taylor_slopes_under_unequal_pressures(wall, point):
-    surface = seen_from(rooms(wall), point)
-    X, rng = surface.vertices, np.random.default_rng(6)
-    d = apply_supports(surface, rng.standard_normal(X.shape))
-    E, slope = energy(surface), float((gradient(surface) * d).sum())
-    curve = float(d.ravel() @ (hessian(surface) @ d.ravel()))
-    steps = 1e-2 * 0.5 ** np.arange(4)
-    first = np.array([energy_at(surface, X + t * d) - E - t * slope for t in steps])
-    second = first - 0.5 * steps**2 * curve
-    np.testing.assert_allclose(np.diff(np.log2(np.abs(first))), -2.0, atol=0.1)
-    np.testing.assert_allclose(np.diff(np.log2(np.abs(second))), -3.0, atol=0.3)
-
-
-def test_far_from_the_plane_s_point_volumes_are_seen_from_near_by():
-    """Forces keep their digits, and energies and volumes differ by a constant at most."""
-    near = two_caps(1.2)
-    shift = np.array([5e5, 5e6, 0.0])
-    far = Surface(
-        near.vertices + shift, near.faces, near.patch_of_face, near.patches, fixed=near.fixed,
-        on_plane=near.on_plane,
-    )  # fmt: skip
-    assert np.linalg.norm(far.origin - far.vertices.mean(axis=0)) < near.size
-    assert far.origin[2] == 0.0
-    np.testing.assert_allclose(
-        gradient(far), gradient(near), atol=1e-8 * np.abs(gradient(near)).max()
-    )
-    assert volume(far) == pytest.approx(volume(near), rel=1e-8)
-    assert far.moved(far.vertices + np.array([1e3, 0, 0])).origin is far.origin
-
-
-def test_where_pressures_do_not_cancel_the_point_of_the_plane_stays():
-    """The force of what is left over depends on it."""
-    near = two_caps(1.2)
-    patches = [
-        Patch(p.name, p.tension, p.pressure * (1 + (k == 0))) for k, p in enumerate(near.patches)
-    ]
-    far = Surface(
-        near.vertices + np.array([5e5, 0, 0]), near.faces, near.patch_of_face, patches,
-        fixed=near.fixed, on_plane=near.on_plane,
-    )  # fmt: skip
-    assert far.uncancelled.any()
-    assert far.origin.tolist() == [0.0, 0.0, 0.0]
-    assert not near.uncancelled.any()
