@@ -26,6 +26,10 @@ class FileWarning(UserWarning):
     """A file was read or written, but not everything in it could be kept as it was."""
 
 
+class LostWarning(FileWarning):
+    """What the format of a file cannot carry was left out."""
+
+
 class PlanError(PcmcError):
     """The lines of a plan do not divide it into patches."""
 

@@ -11,7 +11,7 @@ import typer
 
 from .. import project as projects
 from ..errors import FileError, OptionError, unknown
-from ..io import FORMATS, read
+from ..io import FORMATS, read_bare
 from ..surface import Surface
 
 TOML = ".toml"
@@ -63,7 +63,7 @@ def whole(text: str | int) -> int:
 def surface_in(file: Path) -> Surface:
     """A surface from its file, or the one that a project starts from."""
     check_input(file)
-    return projects.build(file) if file.suffix.lower() == TOML else read(file)
+    return projects.build(file) if file.suffix.lower() == TOML else read_bare(file)
 
 
 def check_input(file: Path) -> None:

@@ -16,10 +16,11 @@ import numpy.typing as npt
 
 from ..arrays import Floats
 from ..contact import standing
-from ..errors import FileError, FileWarning, PcmcError, unknown
+from ..errors import FileError, FileWarning, LostWarning, PcmcError, unknown
 from ..files import whole
 from ..surface import Plane, Surface
 from .contents import Contents, merged, to_surface, without_unused
+from .suspect import suspicions
 
 FORMATS = {
     ".pcmc": "native",
@@ -35,6 +36,11 @@ FORMATS = {
     ".3dm": "rhino",
 }
 """Suffix and the module here that reads and writes it."""
+
+BARE = (
+    "it tells of no supports: its boundary is held, and tensions and pressures are 1 where none are"
+    " given"
+)
 
 
 def read(
@@ -60,7 +66,8 @@ def read(
     Warns
     -----
     FileWarning : once, saying what was changed (polygons cut into triangles, unused vertices left
-        out, ...).
+        out, ...), and what is probably not meant in a mesh from another program (a seam left open,
+        patches turned against each other, an axis up that is not z).
 
     Raises
     ------
@@ -68,13 +75,25 @@ def read(
         not of its suffix's format, or not a surface.
     MissingExtra : when the format needs a library that is not installed.
     """
+    return _read(path, load(path), (tensions, pressures, fixed, on_plane, plane), ())
+
+
+def read_bare(path: str | os.PathLike[str]) -> Surface:
+    """``read``, for who has not said what a file lacks: that it tells of no supports is warned of too."""
     contents = load(path)
+    return _read(path, contents, (), (BARE,) if contents.support is None else ())
+
+
+def _read(
+    path: str | os.PathLike[str], contents: Contents, given: tuple[Any, ...], notes: tuple[str, ...]
+) -> Surface:
     try:
-        surface = to_surface(contents, tensions, pressures, fixed, on_plane, plane)
+        surface = to_surface(contents, *given)
     except PcmcError as error:
         raise type(error)(f"{os.fspath(path)}: {error}") from None
-    if contents.notes:
-        warnings.warn(f"{os.fspath(path)}: {'; '.join(contents.notes)}", FileWarning, stacklevel=2)
+    notes = (*contents.notes, *suspicions(contents), *notes)
+    if notes:
+        warnings.warn(f"{os.fspath(path)}: {'; '.join(notes)}", FileWarning, stacklevel=3)
     return surface
 
 
@@ -126,7 +145,8 @@ def write(
 
     Warns
     -----
-    FileWarning : once, naming what the format cannot carry.
+    LostWarning : once, naming what the format cannot carry.
+    FileWarning : where coordinates are written relative to another origin (.stl).
     """
     path = Path(path)
     module = _module(path)
@@ -150,7 +170,7 @@ def write(
         surface = shown
     try:
         with whole(path) as temporary:
-            module.write(
+            moved = module.write(
                 temporary, surface, scalars=scalars, certificate=_values(certificate), walls=told
             )
     except OSError as error:
@@ -158,8 +178,11 @@ def write(
     except PcmcError as error:
         raise _located(path, error) from None
     if lost:
+        lost += getattr(module, "NEVER", ())
         text = f"{path}: a {path.suffix} file cannot carry {', '.join(lost)}; left out"
-        warnings.warn(text, FileWarning, stacklevel=2)
+        warnings.warn(text, LostWarning, stacklevel=2)
+    if moved:
+        warnings.warn(f"{path}: {moved}", FileWarning, stacklevel=2)
 
 
 def _located(path: Path, error: PcmcError) -> FileError:

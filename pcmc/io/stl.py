@@ -1,6 +1,8 @@
 """STL (.stl): written as text with one solid per patch, read in either form.
 
-Nothing but triangles and names: supports, tensions, pressures and scalars are lost.
+Nothing but triangles and names: supports, tensions, pressures and scalars are lost. Programs read the
+coordinates in single precision, seven digits. So a surface far from the origin, as in a survey's
+coordinates, is written about its middle; the format has no place to say where that is.
 """
 
 from __future__ import annotations
@@ -11,22 +13,26 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
-from ..surface import Surface
+from ..surface import FAR, Surface
 from .contents import Contents
 from .optional import library, reading
 from .scenes import from_meshes
 from .text import rows
 
 MERGE = APART = True
+NEVER = ("supports", "tensions", "pressures")
 FACET = (
     "facet normal %.6g %.6g %.6g\nouter loop\nvertex %.9g %.9g %.9g\nvertex %.9g %.9g %.9g\n"
     "vertex %.9g %.9g %.9g\nendloop\nendfacet\n"
 )
 
 
-def write(path: Path, surface: Surface, **_: Any) -> None:
-    """Coordinates to nine digits, which is all that readers of STL keep."""
-    P = surface.vertices[surface.faces]
+def write(path: Path, surface: Surface, **_: Any) -> str:
+    """Coordinates to nine digits, more than readers of STL keep; a sentence where they are moved."""
+    middle = np.round(surface.vertices.mean(axis=0))
+    moved = bool(np.linalg.norm(middle) > FAR * surface.size)
+    middle[np.abs(middle) <= surface.size] = 0.0  # heights stay what they are
+    P = surface.vertices[surface.faces] - (middle if moved else 0.0)
     normal = np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     lines = np.concatenate([normal, P.reshape(-1, 9)], axis=1)
@@ -35,6 +41,12 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
             chosen = lines[surface.patch_of_face == k]
             if len(chosen):
                 file.write(f"solid {patch.name}\n{rows(FACET, *chosen.T)}endsolid {patch.name}\n")
+    if not moved:
+        return ""
+    return (
+        f"its coordinates are relative to {[int(c) for c in middle]}, as a .stl file keeps seven digits;"
+        " move it back by that where it is read, or write a format that keeps all (.obj, .3dm)"
+    )
 
 
 def read(path: Path) -> Contents:

@@ -91,7 +91,9 @@ def read_data(path: Path) -> tuple[str, dict[str, Any]]:
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror or error})") from None
     except UnicodeDecodeError as error:
-        raise FileError(f"{path}: byte {error.start} is not text; is it a TOML file?") from None
+        raise FileError(
+            f"{path}: byte {error.start} is not text in UTF-8; save it as that"
+        ) from None
     except tomllib.TOMLDecodeError as error:
         raise FileError(f"{path}: not TOML: {error}{_quotes(text, str(error))}") from None
     check_keys(path, text, data)
@@ -124,7 +126,7 @@ def build(path: PathLike) -> Surface:
 def surface_of(project: Project) -> Surface:
     """The mesh of the project's plan."""
     if project.plan is None:
-        return io.read(project.path)
+        return io.read_bare(project.path)
     try:
         return project.plan.surface()
     except PcmcError as error:

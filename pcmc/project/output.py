@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from .. import io
 from ..arrays import Floats
 from ..certificate import Certificate
 from ..curvature import curvature_error, mean_curvature
-from ..errors import FileError, FileWarning, OptionError, PcmcError, unknown
+from ..errors import FileError, FileWarning, LostWarning, OptionError, PcmcError, unknown
 from ..files import together
 from ..interrupts import held
 from ..solvers.result import Result
@@ -73,12 +74,11 @@ def write_all(
     say, works = progress or silent, list(works)
     paths = [path for path, _ in works]
     check_outputs(paths)
-    with together(paths) as temporaries, warnings.catch_warnings():
-        warnings.simplefilter("ignore", FileWarning)  # what a format cannot carry is not asked for
+    with together(paths) as temporaries:
         for (path, write), temporary in zip(works, temporaries, strict=True):
             say(f"writing {path.name}")
             try:
-                with held():
+                with held(), _named(temporary, path):
                     write(temporary)
             except OSError as error:
                 raise FileError(f"{path}: cannot be written ({error.strerror or error})") from None
@@ -86,6 +86,18 @@ def write_all(
                 text = str(error).replace(f"{temporary}: ", "")
                 raise FileError(f"{path}: {text}") from None
     return paths
+
+
+@contextmanager
+def _named(temporary: Path, path: Path) -> Iterator[None]:
+    """Warnings with the file's own name, but for what its format cannot carry, which nobody asked for."""
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always", FileWarning)
+        yield
+    for warning in found:
+        if not issubclass(warning.category, LostWarning):
+            text = str(warning.message).replace(str(temporary), str(path))
+            warnings.warn(text, warning.category, stacklevel=4)
 
 
 def paint(surface: Surface, path: PathLike, view: Any, colour: str) -> None:
@@ -110,7 +122,7 @@ def check_picture(view: Any, colour: str) -> None:
     if isinstance(view, str):
         if view not in VIEWS:
             raise OptionError(unknown("view", view, VIEWS))
-    elif len(view) != 2 or not all(
+    elif not (isinstance(view, Sequence) and len(view) == 2) or not all(
         isinstance(angle, int | float) and math.isfinite(angle) for angle in view
     ):
         raise OptionError(f"view: expected a name or two angles in degrees, found {view!r}")
