@@ -150,7 +150,11 @@ def _direction(parameter: object) -> Direction:
 
 
 def _goals(stop: float | None, until: Mapping[str, float] | None) -> dict[str, float]:
+    if not isinstance(until, Mapping | None):
+        raise OptionError(f"until: expected a value by column, {{'height': 1.0}}, found {until!r}")
     goals = dict(until or {})
+    if stop is not None and "parameter" in goals:
+        raise OptionError("stop and until['parameter'] are the same goal; give one of them")
     for name, value in goals.items():
         if name not in GOALS:
             raise OptionError(unknown("column in until", name, GOALS))

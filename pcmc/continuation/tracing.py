@@ -88,7 +88,10 @@ class Tracer:
             )
         moves = space.pull(self.line.gradient(shape.surface, X)).any()
         if not (moves or shape.rests.any()):  # a wall that is gone may come back
-            raise OptionError("the parameter moves nothing: no vertex of what it names is free")
+            raise OptionError(
+                "the parameter moves nothing: no vertex of what it names is free, or a change of it"
+                " leaves every force as it is, as that of a flat patch's tension does"
+            )
         try:
             residual = shape.residual(X)
             if not residual <= AT_REST:

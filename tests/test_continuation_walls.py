@@ -1,0 +1,110 @@
+"""Branches of several patches: changes of index, walls that come down to the plane, new meshes."""
+
+import pytest
+from branches import tension_of_height
+
+from generators import four_fans, two_caps, two_squares
+from pcmc import Direction, certify, follow, solve
+from pcmc.contact import pull_and_capacity, standing
+from pcmc.continuation import Ending
+
+
+def test_walls_of_the_fans_lose_stability_in_two_directions_at_once():
+    walls = {f"wall {k}": 1.0 for k in range(1, 5)}
+    start = solve(four_fans(7, alpha_aux=1.5), target="stationary").surface
+    branch = follow(start, Direction(walls), 3.0)
+    assert branch.ending is Ending.REACHED
+    (event,) = branch.events.itertuples()
+    assert (event.kind, event.index_before, event.index_after) == ("index", 0, 2)
+    for shift, index in ((-2e-4, 0), (2e-4, 2)):
+        value = event.parameter * (1.0 + shift)
+        row = int((branch.points.parameter < value).sum()) - 1
+        near = branch.surfaces[row].retensioned(dict.fromkeys(walls, value))
+        assert certify(solve(near, target="stationary", care=0.0).surface).index == index
+
+
+def test_fold_of_two_caps_on_a_coarse_mesh():
+    start = solve(two_caps(1.2), target="stationary").surface
+    branch = follow(start, Direction({"large": -1.0, "small": -1.0}, relative=True), folds=1)
+    assert branch.ending is Ending.FOLDS
+    at = branch.folds.iloc[0]
+    assert at["tension large"] == pytest.approx(2.976, abs=0.01)
+    assert branch.points.residual.max() <= 1e-10
+    lower = start.retensioned(
+        {"large": at["tension large"] - 0.02, "small": at["tension small"] - 0.02}
+    )
+    assert not solve(lower).converged  # no minimum is left; a far saddle is
+
+
+@pytest.mark.slow
+def test_wall_that_comes_down_to_the_plane_on_the_way_changes_the_contact():
+    start = solve(two_squares(8, alpha_aux=1.8)).surface
+    branch = follow(start, "wall", 2.3)
+    assert branch.ending is Ending.REACHED
+    assert "contact" in set(branch.events.kind)
+    before, after = certify(start), certify(branch.last)
+    assert len(before.pinched) == 0 < len(after.pinched)
+    assert after.residual <= 1e-9
+
+
+def test_junction_that_rests_on_the_plane_is_lifted_when_its_wall_pulls_less():
+    start = solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
+    branch = follow(start, "wall", 2.51)
+    assert branch.ending is Ending.REACHED
+    assert set(branch.events.kind) == {"contact"}
+    before, after = certify(start), certify(branch.last)
+    assert len(before.pinched) == 5 > len(after.pinched) > 0
+    for surface in branch.surfaces.values():
+        assert certify(surface).residual <= 1e-9
+
+
+def test_junction_stands_off_as_soon_as_its_wall_pulls_less_than_the_sheets():
+    start = solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
+    found = standing(start)
+    pull, capacity = pull_and_capacity(found.surface, found.walls, found.rests)
+    least = 3.0 * float((pull[found.rests] / capacity[found.rests]).max())
+    for part, resting in ((1.001, 5), (0.995, 3)):
+        branch = follow(start, "wall", part * least)
+        assert branch.ending is Ending.REACHED
+        after = certify(branch.last)
+        assert len(after.pinched) == resting
+        assert after.residual <= 1e-9
+
+
+def test_ctrl_c_while_a_contact_is_solved_for_ends_the_branch(monkeypatch):
+    start = solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
+
+    def pressed(progress):
+        raise KeyboardInterrupt
+
+    def interrupted(surface, method, **options):
+        return solve(surface, method, pressed, **options)
+
+    monkeypatch.setattr("pcmc.continuation.tracing.solve", interrupted)
+    branch = follow(start, "wall", 2.51)
+    assert branch.ending is Ending.STOPPED
+    assert len(branch.points) > 0 == len(branch.events)
+
+
+@pytest.mark.slow
+def test_new_mesh_on_the_way_keeps_to_the_branch(small_cap):
+    pytest.importorskip("mmgpy")
+    branch = follow(small_cap, "cap", until={"height": 1.5}, step=-0.05, care=0.93, remesh=0.25)
+    assert branch.ending is Ending.REACHED
+    assert branch.last.m != small_cap.m
+    assert branch.points.residual.max() <= 1e-10
+    exact = tension_of_height(branch.points.height.to_numpy())
+    assert branch.points.parameter.to_numpy() == pytest.approx(exact, rel=0.05)
+
+
+@pytest.mark.slow
+def test_new_mesh_does_not_leap_over_a_goal(small_cap):
+    pytest.importorskip("mmgpy")
+    options = {"step": -0.05, "care": 0.93, "remesh": 0.25}
+    branch = follow(small_cap, "cap", until={"height": 0.8}, steps=2, **options)
+    before, after = branch.points.volume.iloc[-1], certify(branch.surfaces[2]).volume
+    assert after == pytest.approx(before)
+    goal = before + 0.03  # of the mesh made anew after that point it has 0.06 more
+    met = follow(small_cap, "cap", until={"volume": goal}, steps=4, **options)
+    assert met.ending is Ending.REACHED
+    assert met.points.volume.iloc[-1] == pytest.approx(goal, rel=1e-9)
