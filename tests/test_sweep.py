@@ -18,6 +18,7 @@ from tables import same
 from pcmc.errors import FileError, SweepError
 from pcmc.sweep import (
     Sweep,
+    engine,
     provenance,
     read_store,
     run,
@@ -183,6 +184,13 @@ def test_a_worker_that_cannot_load_the_case_stops_the_sweep(monkeypatch, tmp_pat
     monkeypatch.setattr("sys.ps0", 1, raising=False)
     with pytest.raises(SweepError, match=r"cannot load the case.*\n(.*\n)*.*not on this"):
         run(Sweep("here_only:case", {"n": [1, 2]}), workers=1)
+
+
+def test_a_worker_of_another_version_stops_the_sweep(monkeypatch, tmp_path):
+    monkeypatch.setattr(engine, "OWN_VERSION", "99.0")
+    with pytest.raises(SweepError, match=r"has pcmc .*, this is pcmc 99\.0; install the same"):
+        run(CHAOS, tmp_path / "s.jsonl", workers=1)
+    assert read_store(tmp_path / "s.jsonl") == []
 
 
 def test_an_executor_that_breaks_stops_the_sweep(tmp_path):

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import OptionError, SweepError
 from ..solvers import options as check
-from .executors import Submit, open_pool
+from .executors import OWN_VERSION, Submit, open_pool
 from .grid import Sweep
 from .store import FORCE_EVERY, Record, open_store
 from .table import table
@@ -207,7 +207,7 @@ def _next(finished: SimpleQueue[Any], idle: Callable[[], None]) -> Future[dict[s
 def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any]:
     """What a case came to; SweepError if the executor, not the case, failed."""
     try:
-        return future.result()
+        return _of_this_version(future.result())
     except SweepError:
         raise
     except (Exception, CancelledError) as error:
@@ -225,6 +225,18 @@ def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any]:
             f"the executor failed ({text}); the cases stored so far are safe: run the same sweep"
             " again to go on from there"
         ) from error
+
+
+def _of_this_version(outcome: dict[str, Any]) -> dict[str, Any]:
+    """The outcome; SweepError if another pcmc gave it, on a worker that came late or is not Dask's."""
+    about = outcome["provenance"]
+    found = about.get("pcmc", OWN_VERSION)  # a case that ended its process does not say
+    if found != OWN_VERSION:
+        raise SweepError(
+            f"a worker on {about['host']} has pcmc {found}, this is pcmc {OWN_VERSION}; install the"
+            " same version there and run the same sweep again to go on from the cases stored"
+        )
+    return outcome
 
 
 @contextmanager
