@@ -16,20 +16,25 @@ from .topology import Curve
 def load_ratio(surface: Surface) -> float:
     """Pressure along Π's normal over the most that tension at the boundary could carry.
 
-    Vertical balance of the whole: p |Ω| ≤ Σ α length(∂Ω) + Σ α_wall length(wall feet). Above 1 no
-    smooth surface with this boundary is at rest, whatever its shape. A mesh may be: its triangles
-    balance along the normals alone. A cap over the unit disc with edge length 0.2 comes to rest down
-    to α = 0.493, where the ratio is 1.014; a pyramid over a square with one free vertex down to
-    α = 1/3, at 1.5. The verdict draws on the ratio only above ``1 + coarseness``. 0 for a closed
-    surface.
+    Vertical balance of the whole: p |Ω| ≤ Σ α length(∂Ω) + Σ α_wall length(wall feet). Lines that are
+    fixed inside carry too, Σ α of all their sheets per length, and so do single fixed vertices with
+    the most that their triangles pull. Above 1 no smooth surface with this boundary is at rest,
+    whatever its shape. A mesh may be: its triangles balance along the normals alone. A cap over the
+    unit disc with edge length 0.2 comes to rest down to α = 0.493, where the ratio is 1.014; a pyramid
+    over a square with one free vertex down to α = 1/3, at 1.5. The verdict draws on the ratio only
+    above ``1 + coarseness``. 0 for a closed surface that nothing holds.
     """
-    topo = surface.topology
-    edge_patch = np.full(len(topo.edges), -1)
-    edge_patch[topo.edge_of_face] = surface.patch_of_face[:, None]
-    boundary = np.flatnonzero(topo.boundary_edge)
-    ends = surface.vertices[topo.edges[boundary]]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    capacity = float(surface.tensions[edge_patch[boundary]] @ length)
+    topo, X, F = surface.topology, surface.vertices, surface.faces
+    tension = surface.tensions[surface.patch_of_face]
+    sheets = np.bincount(topo.edge_of_face.ravel(), np.repeat(tension, 3), len(topo.edges))
+    inside = surface.fixed & ~topo.on_boundary
+    line = inside[topo.edges].all(axis=1)
+    carries = topo.boundary_edge | line
+    ends = X[topo.edges[carries]]
+    capacity = float(sheets[carries] @ np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+    inside[topo.edges[line]] = False
+    opposite = np.linalg.norm(X[F[:, [2, 0, 1]]] - X[F[:, [1, 2, 0]]], axis=2)
+    capacity += 0.5 * float(tension @ (opposite * inside[F]).sum(axis=1))
     return abs(load(surface)) / capacity if capacity > 0.0 else 0.0
 
 

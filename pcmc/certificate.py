@@ -48,7 +48,7 @@ class Verdict(Enum):
     NEUTRAL = "neutral: at rest, and some change of shape costs almost no energy"
     SADDLE = "saddle: at rest, but some change of shape lowers the energy"
     NOT_CONVERGED = "not converged: forces are left; solve further"
-    NO_EQUILIBRIUM = "no equilibrium: the tension cannot carry the pressure; raise the tensions"
+    NO_EQUILIBRIUM = "no equilibrium: tension and pressure cannot balance; change the tensions"
     DEGENERATE = "degenerate mesh: triangles have collapsed; remesh, or start from another shape"
 
 
@@ -239,7 +239,9 @@ def _verdict(
             return Verdict.NO_EQUILIBRIUM, too_strong
         # a solver that ended badly settles what a coarse mesh leaves open
         if ratio > 1.0 + (0.0 if status in ENDED_BADLY else coarseness(surface)):
-            times = f"{ratio:.2f}" if ratio < 1e4 else f"{ratio:.3g}"
+            times = (
+                f"{ratio:.3f}" if ratio < 1.1 else f"{ratio:.2f}" if ratio < 1e4 else f"{ratio:.3g}"
+            )
             why = f"the pressure is {times} times what the boundary's tension could carry"
             return Verdict.NO_EQUILIBRIUM, why
         if status == "DIVERGED":
@@ -265,7 +267,8 @@ def _verdict(
         )
         return Verdict.NOT_CONVERGED, why
     if system.negative:
-        return Verdict.SADDLE, f"index {system.negative}: {system.negative} ways down"
+        ways = "1 way" if system.negative == 1 else f"{system.negative} ways"
+        return Verdict.SADDLE, f"index {system.negative}: {ways} down"
     if abs(softest) < NEUTRAL:
         return Verdict.NEUTRAL, f"softest mode {softest:.1e} in units of α/size²"
     return Verdict.STABLE, ""

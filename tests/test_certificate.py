@@ -253,6 +253,25 @@ def test_the_load_ratio_of_a_disc_is_its_radius_over_twice_the_tension(alpha):
     assert load_ratio(double_bubble(0.8)) == 0.0
 
 
+def test_what_is_fixed_inside_carries_too():
+    """A ring that holds a cap half way lets it stand below the tension of the hemisphere."""
+    cap = spherical_cap(0.1, alpha=0.45)
+    away = np.hypot(*cap.vertices.T[:2])
+    ring = np.abs(away - 0.5) < 0.03
+    held = Surface(cap.vertices, cap.faces, cap.patch_of_face, cap.patches, fixed=cap.fixed | ring)
+    assert load_ratio(cap) == pytest.approx(1.0 / 0.9, rel=3e-3)
+    both_sides = 2.0 * away[ring].mean()
+    assert load_ratio(held) == pytest.approx(1.0 / 0.9 / (1.0 + both_sides), rel=5e-3)
+    assert certify(held).verdict is Verdict.NOT_CONVERGED
+    assert solve(held).certificate.verdict is Verdict.STABLE
+    column = Surface(
+        cap.vertices, cap.faces, cap.patch_of_face, cap.patches, fixed=cap.fixed | (away == 0)
+    )
+    star = np.linalg.norm(cap.vertices[1] - cap.vertices[2])
+    carried = 0.45 * (2.0 * np.pi + 0.5 * 6.0 * star)
+    assert load_ratio(column) == pytest.approx(np.pi / carried, rel=4e-3)
+
+
 def test_a_load_just_above_what_tension_carries_is_no_proof_on_a_coarse_mesh():
     """The smooth cap ends at α = 1/2; that of edge length 0.2 is still there a little below."""
     surface = spherical_cap(0.2, alpha=0.495)
