@@ -15,12 +15,12 @@ from ..factor import Factor, Factoriser, factoriser
 from ..kernels import area_vectors
 from ..modes import Stiffness, full_matrix, lumped_mass
 from ..motion import MotionSpace, force_scale, motion_space
-from ..quality import redistribution, triangle_quality
+from ..quality import triangle_quality
+from ..spreading import spread
 from ..surface import Surface
 from ..topology import SHEET
 from .direction import Line, weighted_gradient
 
-SWEEPS = 20  # of redistribution at most
 CLEAR = 1.02  # ratio of qualities that counts as better
 
 
@@ -36,7 +36,7 @@ class Shape:
 
     def __init__(self, surface: Surface, backend: str | None = None) -> None:
         self.full = surface
-        found = standing(surface)
+        self._found = found = standing(surface)
         self.surface, self.below, self.rests = found.surface, found.walls, found.rests
         self.frame, self.judged = found.frame, found.judged
         self.pressed: Floats = (~surface.walls).astype(float)
@@ -154,19 +154,8 @@ class Shape:
 
         The best of the sweeps; None where none is clearly better.
         """
-        least = worst = self.quality(X)
-        best, frame = None, self.frame
-        for _ in range(SWEEPS):
-            move = redistribution(self.surface, X, frame.kind, frame.curve, frame.beside)
-            move[self.rests] = 0.0
-            space = self.space(X)
-            X = self.swept(X + move - space.project(move), space)
-            quality = self.quality(X)
-            if quality > max(worst, CLEAR * least):
-                best, worst = X, quality
-            if quality >= aim:
-                break
-        return best
+        best, worst = spread(self._found, X, aim, slide=False)
+        return best if worst > CLEAR * self.quality(X) else None
 
 
 def _normals(X: Floats, F: Ints) -> Floats:

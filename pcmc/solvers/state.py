@@ -20,7 +20,8 @@ from ..contact import (
 )
 from ..energy import energy_and_gradient, energy_at
 from ..motion import MotionSpace, force_scale, motion_space
-from ..quality import compare, redistribution, worst_quality
+from ..quality import compare, worst_quality
+from ..spreading import spread
 from ..surface import Surface
 
 LOW = 5e-3  # height, in spacings along the crest, at which a sinking junction is set to rest
@@ -37,6 +38,7 @@ class State:
     Attributes
     ----------
     full, surface : all of the mesh as it last was; the part of it that stands (see ``contact``).
+    standing : that part with its walls, and what lies on what.
     size : of the mesh at the start.
     X : (n,3) where the standing surface is now.
     rests : (n,) junction vertices at rest on Π.
@@ -59,7 +61,7 @@ class State:
         self._pinch(resting(surface, self.walls))
 
     def _pinch(self, rests: Bools) -> None:
-        found = standing(self.full, self.walls, rests)
+        self.standing = found = standing(self.full, self.walls, rests)
         self.rests, self.surface, self.frame = rests, found.surface, found.frame
         self.judged: Ints = found.judged
         self.X: Floats = self.surface.vertices.copy()
@@ -143,24 +145,13 @@ class State:
 
     def care(self) -> bool:
         """Spread the vertices along the shape while triangles are poor; True if they moved."""
-        start = worst = self.worst
-        if self.cares <= 0 or worst >= self._care_from:
+        start = self.worst
+        if self.cares <= 0 or start >= self._care_from:
             return False
         if not 1e-7 <= self.relative < self._care_below:
             return False
         self.cares -= 1
-        frame = self.frame
-        best, X = self.X, self.X
-        for _ in range(20):
-            move = redistribution(self.surface, X, frame.kind, frame.curve, frame.beside)
-            move[self.rests] = self.surface.plane.along(move[self.rests])
-            space = motion_space(self.surface, frame, X)
-            X = hung(self.surface, self.walls, X + move - space.project(move), space)
-            quality = worst_quality(X, self.judged)
-            if quality > worst:
-                best, worst = X, quality
-            if quality >= self.care_bound:
-                break
+        best, worst = spread(self.standing, self.X, self.care_bound, slide=True)
         if worst <= 1.02 * start:
             self._care_from = POOR * self.care_bound
             self._care_below = 0.1 * self.relative
