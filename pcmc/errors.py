@@ -34,6 +34,10 @@ class PlanError(PcmcError):
     """The lines of a plan do not divide it into patches."""
 
 
+class PlanWarning(UserWarning):
+    """A plan can be meshed, but its roof will hardly come to rest."""
+
+
 class SweepError(PcmcError):
     """The executor, scheduler or workers of a sweep failed; the cases stored before are safe."""
 

@@ -171,7 +171,7 @@ def test_files_that_are_none(tmp_path):
     with pytest.raises(FileError, match="cannot be read"):
         load(tmp_path / "none.toml")
     (tmp_path / "p.toml").write_bytes(b"\xff\xfe")
-    with pytest.raises(FileError, match="byte 0 is not text"):
+    with pytest.raises(FileError, match="byte 0 is not text in UTF-8; save it as that"):
         load(tmp_path / "p.toml")
     (tmp_path / "p.toml").write_text("", encoding="utf-8")
     with pytest.raises(FileError, match=r"needs a \[plan\]"):
@@ -353,6 +353,8 @@ def test_a_project_is_read_with_the_mark_of_windows_editors(small):
 def test_a_bad_view_is_refused_before_any_work(small):
     for view, message in (
         ('"diagnal"', "did you mean 'diagonal'"), ("[30]", "two angles"), ("[nan, 30]", "two angles"),
+        ("3", "view: expected a name or two angles in degrees, found 3"),
+        ("3", "view: expected a name or two angles in degrees, found 3"),
     ):  # fmt: skip
         text = small.read_text(encoding="utf-8")
         changed(small, "files =", f"view = {view}\nfiles =")

@@ -2,7 +2,8 @@
 
 from .curves import Curve, arc, bezier, circle, curve, join, polyline
 from .labelled import surface_from_labels
-from .roof import Area, Divider, Hole, Plan, plan_from
+from .parts import Area, Divider, Hole
+from .roof import Plan, plan_from
 from .walls import add_walls
 
 __all__ = [

@@ -339,9 +339,12 @@ def _end(path: Curve, end: int) -> Floats:
 
 def _points(points: Any, what: str, least: int, exactly: bool = False) -> Floats:
     try:
-        P = np.array(points, dtype=float)
+        P = np.array(points)
+        if P.dtype.kind not in "iuf":  # numpy would take the text "8" for a number
+            raise ValueError
     except (TypeError, ValueError):
         raise OptionError(f"{what}: expected points [x, y] or [x, y, z], all alike") from None
+    P = P.astype(float)
     if P.ndim != 2 or P.shape[1] not in (2, 3):
         raise OptionError(f"{what}: expected points [x, y] or [x, y, z], found shape {P.shape}")
     if len(P) < least or (exactly and len(P) != least):

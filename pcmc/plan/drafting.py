@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..errors import PlanError, SurfaceError
+from ..errors import PlanError, PlanWarning, SurfaceError
 from ..polish import polished
 from ..surface import Patch, Surface
 from .arrangement import Arrangement, arrange, hole_points
 from .curves import Curve, to_local, to_space
 from .lift import dome, spanned
 from .lines import SNAP, Drawn, Kind, Line
+from .parts import EDGES, Area
 from .planar import PlanarMesh, locate, signed_areas, triangulate
-from .roof import EDGES, Area, Plan
 from .walls import Added, WallTop, stand
+
+if TYPE_CHECKING:
+    from .roof import Plan  # which asks for this module when a surface is wanted
 
 MOST = 5_000_000  # triangles
 STEEPEST = 10.0  # initial rise over the plan's size
@@ -39,6 +44,7 @@ def surface(plan: Plan) -> Surface:
         raise PlanError("nothing holds the roof; fix an edge or give supports")
     if (fixed | sliding).all():
         raise PlanError("every vertex of the mesh is held; use a smaller edge_length")
+    _warn_of_free_edges(drawn, lines, fixed | sliding)
     base, height = _heights(plan, drawn, mesh, fixed | sliding)
     patches, patch_of_face = _patches(plan, mesh)
     raised = np.column_stack([mesh.points, height])
@@ -143,6 +149,21 @@ def _supports(
                 masks["fixed"][vertex] = True
     masks["fixed"][drawn.spots] = True
     return masks["fixed"], masks["sliding"] & ~masks["fixed"]
+
+
+def _warn_of_free_edges(drawn: Arrangement, lines: Sequence[Line], held: Bools) -> None:
+    """No shape is at rest where a patch ends with nothing to pull against; the mesh alone may hold it."""
+    for line in (line for line in lines if line.bounds):
+        chains = [c.vertices for c in drawn.chains if lines[c.line] is line]
+        free = list(dict.fromkeys(v for chain in chains for v in chain if not held[v]))
+        if free:
+            place = drawn.points[free[0]].round(4).tolist()
+            text = (
+                f"nothing holds {line.name} at {place} ({len(free)} such vertices): the tension has"
+                " nothing to pull against there, and the roof will hardly come to rest; hold the edge,"
+                " along a curve in space if it is to be above the plane"
+            )
+            warnings.warn(text, PlanWarning, stacklevel=4)
 
 
 def _heights(

@@ -16,7 +16,7 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import OptionError, SurfaceError, unknown
 from ..surface import Patch, Plane, Surface
 from ..topology import topology
-from .roof import EDGES
+from .parts import EDGES
 from .walls import add_walls
 
 

@@ -12,81 +12,7 @@ import numpy as np
 from ..errors import MissingExtra, OptionError, unknown
 from ..surface import Plane, Surface
 from .curves import Curve, curve
-
-EDGES = ("fixed", "sliding", "free")
-BOTTOMS = ("sliding", "held", "sloped")
-
-
-@dataclass(frozen=True, eq=False)
-class Divider:
-    """A line between patches, with the wall that stands under it.
-
-    Only its course in plan counts: the height is the surface's.
-
-    Attributes
-    ----------
-    curve : a Curve or its plain data; each end on the outline, a hole or another divider. What is
-        drawn beyond the outline or across a hole is left out.
-    wall : tension of the wall, force/length, ≥ 0; None for no wall. Between areas of different
-        pressures the difference acts on it, so that the shape is that of rooms under those pressures.
-    name : of the wall's patch; by default "wall 1", "wall 2", … in order. Where the difference of
-        pressure changes along the divider, each part is a patch of its own: "wall 1-1", "wall 1-2".
-    bottom : "sliding" on Π; "held" on Π in all directions; or "sloped": held in all directions on
-        the surface that the boundary curves span (for boundaries that leave Π). A sliding wall
-        that ends on a straight edge tends to slip along it to where it is shorter; hold it, or end
-        it in re-entrant corners.
-    """
-
-    curve: Any
-    wall: float | None = 1.0
-    name: str = ""
-    bottom: str = "sliding"
-
-
-@dataclass(frozen=True, eq=False)
-class Hole:
-    """An opening in the plan.
-
-    Attributes
-    ----------
-    curve : a closed Curve or its plain data.
-    edge : "fixed", "sliding" on Π, or "free".
-    name : used in messages.
-    """
-
-    curve: Any
-    edge: str = "fixed"
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class Area:
-    """A patch of the plan.
-
-    Attributes
-    ----------
-    name : of the patch.
-    tension, pressure : α, force/length, and p, force/area.
-    at : a point (x, y) inside it, or several points if several parts are to be one patch. If no
-        area of a plan has one, they are given to its parts from left to right (by centroid).
-    """
-
-    name: str
-    tension: float
-    pressure: float = 1.0
-    at: Any = None
-
-    def __post_init__(self) -> None:
-        if self.at is None:
-            return
-        try:
-            points = np.atleast_2d(np.asarray(self.at, dtype=float))
-        except (TypeError, ValueError):
-            points = np.empty(0)
-        if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
-            raise OptionError(
-                f"patch {self.name!r}: at must be a point [x, y] or a list of such, found {self.at!r}"
-            )
+from .parts import BOTTOMS, EDGES, Area, Divider, Hole
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,13 +28,15 @@ class Plan:
     patches : Area for each part that the dividers cut the plan into, or a mapping from names to
         ``{"tension": …, "pressure": …, "at": …}``; without any, ``tension`` is every part's.
     edge_length : of the triangles, length.
-    edge : what holds the outline: "fixed", "sliding" on Π, or "free".
+    edge : what holds the outline: "fixed"; "sliding" on Π, which the roof then meets at a right angle;
+        or "free" but for ``supports``. At a free edge the tension has nothing to pull against: for a
+        roof on a few points draw the edges between them as curves in space (arches), and hold those.
     supports : points (2,) or (3,) and curves along which vertices are fixed. A curve on the outline
         or a hole holds that part of it; one inside a patch is held where it is drawn.
     plane : Π.
     rise : height of the initial surface above what the boundary spans, length; by default 0.3 of
         the radius of the largest circle clear of supports.
-    tension : α of the patches, if ``patches`` is empty.
+    tension : α of all patches, in place of ``patches``.
 
     Raises
     ------
@@ -116,6 +44,8 @@ class Plan:
         When ``surface`` is called without the library shapely.
     PlanError
         When ``surface`` is called: the lines do not divide the plan as they should; names the line.
+    PlanWarning
+        When ``surface`` is called: an edge is free.
     OptionError
         For a value that an attribute may not have.
 
@@ -154,6 +84,10 @@ class Plan:
             _positive(self.rise, "rise")
         if not self.patches and self.tension is None:
             raise OptionError("a plan needs patches with tensions, or one tension= for all")
+        if self.patches and self.tension is not None:
+            raise OptionError(
+                "a plan has patches, each with its tension, or one tension= for all; leave one of them out"
+            )
         _unique(
             [w.name for w in self.dividers if w.wall is not None] + [a.name for a in self.patches]
         )
