@@ -103,7 +103,8 @@ def starts(target: Floats, sound: Floats) -> list[list[float]]:
 
     First the nearest that shares the larger patch's tension, then the nearest that shares the smaller
     one's, then the others, no two with the same patches; nearest in ratio, where a wall stronger than
-    both patches together counts as their sum: it lies on Π either way.
+    both patches together counts as their sum: it lies on Π either way. Of those equally near, the one
+    whose wall is nearest.
     """
 
     def ratios(triples: Floats) -> Floats:
@@ -111,7 +112,8 @@ def starts(target: Floats, sound: Floats) -> list[list[float]]:
         return np.log(np.stack([wall, triples[..., 1], triples[..., 2]], axis=-1))
 
     apart = np.linalg.norm(ratios(sound) - ratios(target), axis=-1).round(9)
-    ordered = sound[np.argsort(apart, kind="stable")]
+    walls = np.abs(np.log(sound[:, 0] / target[0])).round(9)
+    ordered = sound[np.lexsort((walls, apart))]
     shared = [ordered[ordered[:, k] == target[k]][:1] for k in (1, 2)]
     chosen: dict[tuple[float, float], list[float]] = {}
     for triple in np.concatenate([*shared, ordered]).tolist():

@@ -52,7 +52,7 @@ from .folder import Folder
 from .panels import category_panels
 from .study import Study
 
-TRIES = 8  # equilibria from which a branch is sought
+TRIES = 12  # equilibria from which a branch is sought
 WEAK = 4.0  # tension of a patch up to which its equilibria are weakened further
 THIN = 0.05  # triangle quality of an equilibrium that leans on its mesh
 FOLD_LENGTHS = (EDGE_LENGTH, 0.6, 0.3)  # of the meshes on which the patches' folds are sought
@@ -79,7 +79,7 @@ CATEGORIES = {
 
 def data(folder: Folder, short: bool) -> None:
     """``records``: the geometric solver's answers; then why there is none, or how good it is."""
-    sweep = geometric_sweep(TENSIONS[::3] if short else TENSIONS)
+    sweep = geometric_sweep(TENSIONS[::4] if short else TENSIONS)
     found = run_sweep(folder, "records", sweep)
     found = found.rename(columns={"alpha_aux": "alpha_wall"})
     records = found[[*AXES, "status", *NUMBERS]].rename(columns=NUMBERS)
@@ -267,17 +267,17 @@ def figure(folder: Folder) -> None:
             "the flow diverges": ("x", marks),
             "not found at half the edge length": (".", dots),
         },
-        xlabel=large, ylabel=small,
+        xlabel=large, ylabel=small, columns=5,
     )  # fmt: skip
     heatmap(
         tensions, tensions, quality, folder.figure("quality"), limits=(0.0, 0.9), xlabel=large,
-        ylabel=small, label="worst triangle quality at the equilibrium; grey: none found",
+        ylabel=small, columns=5, label="worst triangle quality at the equilibrium; grey: none found",
     )  # fmt: skip
 
 
 STUDY = Study(
     "alpha_grid_geometric",
-    "the same 512 cases by the geometric solver, and why the flow diverges: × explained",
+    "the same 1000 cases by the geometric solver, and why the flow diverges: × explained",
     data,
     table,
     figure,
@@ -287,6 +287,6 @@ STUDY = Study(
         "tries": TRIES,
         "steps": STEPS,
     },
-    seconds=300,
+    seconds=520,
     paper=False,
 )

@@ -16,7 +16,7 @@ from .alpha_grid import ITERATIONS, TENSIONS, flow_sweep
 from .alpha_grid_geometric import geometric_sweep
 from .timing import Row, median
 
-FEW, SHORT = TENSIONS[::3], 10  # tensions and iterations of the quick form
+FEW, SHORT = TENSIONS[::4], 10  # tensions and iterations of the quick form
 REPEATS = 5  # of the flow's sweeps, which take seconds; the geometric solver's are run once
 RATIO = 1.7
 

@@ -110,8 +110,9 @@ def category_panels(
         axes.set_title(title, fontsize=TEXT, color=INK, pad=3.0)
         axes.tick_params(labelsize=SMALL, width=0.5, length=2.0, pad=1.5, colors=INK)
         last, first = k + columns >= len(tables), column == 0
-        axes.set_xticks(range(len(x)), [f"{v:g}" if last else "" for v in x])
-        axes.set_yticks(range(len(y)), [f"{v:g}" if first else "" for v in y])
+        for axis, values, shown in ((axes.xaxis, x, last), (axes.yaxis, y, first)):
+            places = range(0, len(values), math.ceil(len(values) / 8))
+            axis.set_ticks(places, [f"{values[i]:g}" if shown else "" for i in places])
         axes.set_xlabel(xlabel if last else "", fontsize=SMALL, labelpad=1.5)
         axes.set_ylabel(ylabel if first else "", fontsize=SMALL, labelpad=1.5)
         for spine in axes.spines.values():

@@ -15,6 +15,7 @@ from pcmc.motion import motion_space, structure
 from pcmc.sweep import Sweep
 from studies import benchmark, benchmark_explore, benchmark_solver, benchmark_sweep, evolver
 from studies.__main__ import main
+from studies.alpha_grid import TENSIONS
 from studies.benchmark_solver import Step
 from studies.timing import Row, median, median_seconds
 
@@ -96,7 +97,9 @@ def test_sweeps_are_timed_whole_and_in_turn(monkeypatch):
 
     monkeypatch.setattr(benchmark_sweep, "sweep_seconds", seconds)
     rows = benchmark_sweep.sweeps(False)
-    flow, geometric = ([(case, 512, k) for k in (1, 2)] for case in ("flow_case", "solve_case"))
+    size = len(TENSIONS) ** 3
+    assert size >= 512
+    flow, geometric = ([(case, size, k) for k in (1, 2)] for case in ("flow_case", "solve_case"))
     assert asked == flow * benchmark_sweep.REPEATS + geometric + [("flow_case", 1, 1)]
     assert [row.asked for row in rows] == ["", "≤ 60", "≥ 1.7", "", "≤ 300", "≥ 1.7", ""]
     assert [row.value for row in rows if "over" in row.what] == [pytest.approx(1.9)] * 2
