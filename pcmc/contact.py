@@ -68,17 +68,18 @@ def walls(surface: Surface) -> Walls:
     """The walls of a surface that can pinch, and how each vertex hangs from the crest."""
     n = surface.n
     height = surface.plane.height(surface.vertices)
-    outer = np.zeros(n, dtype=bool)
-    outer[surface.faces[~surface.walls[surface.patch_of_face]]] = True
+    topo, roof = surface.topology, ~surface.walls[surface.patch_of_face]
+    of_roof, outer = np.zeros(len(topo.edges), dtype=bool), np.zeros(n, dtype=bool)
+    of_roof[topo.edge_of_face[roof]] = True
+    outer[surface.faces[roof]] = True
     pinchable = np.zeros(len(surface.patches), dtype=bool)
     hanging, edges, tension = [], [np.empty((0, 2), dtype=np.int64)], [np.empty(0)]
     for index, patch in enumerate(surface.patches):
         if not patch.auxiliary:
             continue
-        faces = surface.faces[surface.patch_of_face == index]
-        members = np.unique(faces)
-        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        crest = np.unique(sides[outer[sides].all(axis=1)], axis=0)
+        found = np.unique(topo.edge_of_face[surface.patch_of_face == index])
+        sides, crest = topo.edges[found], topo.edges[found[of_roof[found]]]
+        members = np.unique(sides)
         if not surface.on_plane[members].any() or not len(crest):
             continue
         pinchable[index] = True
@@ -86,9 +87,8 @@ def walls(surface: Surface) -> Walls:
         hanging.append((below, *_hang(surface, below, crest, sides)))
         edges.append(crest)
         tension.append(np.full(len(crest), patch.tension))
-    crest = np.concatenate(edges)
     above = np.zeros(n, dtype=bool)
-    above[crest] = True
+    above[np.concatenate(edges)] = True
     low = lying(height, surface.vertices)
     below, ends, along, share, lean = _joined(hanging)
     return Walls(
@@ -99,7 +99,7 @@ def walls(surface: Surface) -> Walls:
         lean=lean,
         can_rest=above & ~surface.fixed & ~surface.on_plane,
         anchored=above & surface.fixed & low,
-        edges=crest,
+        edges=np.concatenate(edges),
         tension=np.concatenate(tension),
         side=np.where(np.where(low, _pushed(surface), height) < 0.0, -1.0, 1.0),
         pinchable=pinchable,

@@ -109,6 +109,22 @@ def test_the_rows_of_a_wall_follow_its_crest():
     np.testing.assert_array_equal(moved[others], X[others])
 
 
+def test_the_crest_is_where_a_roof_is_too():
+    """A wall's triangle may reach from one vertex of the junction to the next but one."""
+    line = [[0, -2, 0], [0, -1, 1], [0, 0, 2], [0, 1, 1], [0, 2, 0]]
+    X = np.array([*line, [-2, 0, 0], [2, 0, 0], [0, -1, 0], [0, 1, 0]], dtype=float)
+    left, right = ([[i, i + 1, 5] for i in range(4)], [[i + 1, i, 6] for i in range(4)])
+    wall = [[1, 3, 2], [7, 8, 3], [7, 3, 1], [0, 7, 1], [8, 4, 3]]
+    patches = [Patch("left", 2.0), Patch("right", 2.0), Patch("wall", 1.0, pressure=0.0)]
+    surface = Surface(
+        X, [*left, *right, *wall], [0] * 4 + [1] * 4 + [2] * 5, patches, fixed=[0, 4, 5, 6],
+        on_plane=[7, 8],
+    )  # fmt: skip
+    below = walls(surface)
+    assert below.edges.tolist() == [[0, 1], [1, 2], [2, 3], [3, 4]]
+    assert np.flatnonzero(below.can_rest).tolist() == [1, 2, 3]
+
+
 def test_with_a_motion_space_only_what_lies_along_the_wall():
     surface = shaken(two_squares(6), 0.02)
     below = walls(surface)
