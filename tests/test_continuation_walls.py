@@ -47,6 +47,31 @@ def test_wall_that_comes_down_to_the_plane_on_the_way_changes_the_contact():
     assert after.residual <= 1e-9
 
 
+@pytest.mark.parametrize("largest", [0.15, 0.04])
+def test_wall_comes_down_at_the_same_tensions_whatever_the_steps(largest):
+    start = solve(two_squares(4, alpha_aux=1.0)).surface
+    branch = follow(start, "wall", 3.0, largest=largest)
+    assert branch.ending is Ending.REACHED
+    assert branch.events.kind.tolist() == ["contact"] * 2
+    pinched = {row: len(certify(surface).pinched) for row, surface in branch.surfaces.items()}
+    assert list(dict.fromkeys(pinched.values())) == [0, 1, 3]  # each contact changes what rests
+    direct = solve(two_squares(4, alpha_aux=3.0), target="stationary").surface
+    height = max(direct.vertices[:, 2])
+    assert branch.points.height.iloc[-1] == pytest.approx(
+        height, rel=1e-2
+    )  # triangles lie otherwise
+    assert branch.points.quality.iloc[-1] > 0.8
+
+
+@pytest.mark.parametrize("control", ["volume", "height"])
+def test_wall_comes_down_under_every_control(control):
+    start = solve(two_squares(4, alpha_aux=2.2)).surface
+    branch = follow(start, "wall", 2.49, control=control)
+    assert branch.ending is Ending.REACHED
+    assert set(branch.events.kind) == {"contact"}
+    assert len(certify(branch.last).pinched) == 1
+
+
 def test_junction_that_rests_on_the_plane_is_lifted_when_its_wall_pulls_less():
     start = solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
     branch = follow(start, "wall", 2.51)

@@ -51,7 +51,7 @@ class Collapsed(Lost):
 
 
 class Touched(Lost):
-    """A wall's contact with Π changes: at the positions X and the parameter λ."""
+    """A wall's contact with Π may change: near the positions X, at about the parameter λ."""
 
     def __init__(self, X: Floats, value: float) -> None:
         super().__init__("the contact of a wall with the plane changes")
@@ -177,7 +177,7 @@ def correct(
     Lost : Newton's method does not converge there, or the mesh collapses.
     Touched : a junction comes down to Π on the way.
     """
-    last, slow = np.inf, 0
+    last, slow, start = np.inf, 0, (X, value)
     _check(line, value)
     for iteration in range(ITERATIONS + 1):
         surface = line.applied(shape.surface, value)
@@ -202,7 +202,7 @@ def correct(
         if shape.quality(X) < COLLAPSED:
             raise Collapsed("triangles collapse")
         if shape.down(X).any():
-            raise Touched(X, value)
+            raise Touched(*start)  # below Π the walls' forces mislead Newton's method
     raise Lost(f"Newton's method does not converge (residual {residual:.1e})")
 
 

@@ -262,10 +262,10 @@ class Tracer:
         """The events on a stretch, in their order."""
         here, there, length = stretch.here, stretch.there, stretch.length
         if not stretch.same_mesh:
-            return [
-                self.event("contact", there, length, here.index, there.index),
-                *self.unlocated(here, there, length),
-            ]
+            events = self.unlocated(here, there, length)
+            if (here.shape.rests != there.shape.rests).any():
+                events.insert(0, self.event("contact", there, length, here.index, there.index))
+            return events
         if length <= 2.0 * EXACT:
             return self.unlocated(here, there, length)
         found = []
