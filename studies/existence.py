@@ -4,9 +4,11 @@
   folds at the hemisphere, and the caps higher than that are saddles.
 - Example 2 over the plane of its two tensions: rays from the paper's (4, 3), each followed to the fold
   where the equilibrium ends, or to where the crest has run so far along an outline that triangles
-  collapse. A fold is an end of the branch. A collapse decides nothing: it depends on the mesh, whose
-  corners hold the crest less and less as it is refined, and on the finer one it comes before folds that
-  the coarser one reaches.
+  collapse. A fold is an end of the branch on the mesh as it was carried there. Started past it, the
+  geometric solver spreads the triangles otherwise, and still finds equilibria up to 0.05 of tension
+  farther; and the index changes behind the fold, on the finer mesh far behind or not at all. A collapse
+  decides nothing: it depends on the mesh, whose corners hold the crest less and less as it is refined,
+  and on the finer one it comes before folds that the coarser one reaches.
 - Example 3 as its walls pull harder: the tension at which the cross lets go of the middle. ``stability``
   seeks the same on meshes that start anew at each tension; their vertices lie otherwise along the shape,
   and its tensions are up to a fifth away on the same number of rings, below or above. Both fall with the
@@ -39,7 +41,7 @@ DRAWN = (45, 100, 230, 290)
 ENDS = {"folds": "fold", "degenerate": "mesh collapses", "lost": "lost", "reached": "goes on"}
 MARKERS = {"folds": "o", "degenerate": "s", "lost": "X", "reached": "^"}
 MEANINGS = {  # what an end says
-    "folds": "fold: no equilibrium beyond, on this branch",
+    "folds": "fold: the branch of this mesh turns back",
     "degenerate": "the mesh collapses beside a corner: undecided",
     "lost": "the branch was lost: undecided",
     "reached": "goes on: as far as it was followed",

@@ -99,6 +99,14 @@ def follow(
     fold and behind it, is met the first time. Of two folds within one step neither is seen; shorten
     ``largest``.
 
+    Where a smooth branch folds, an eigenvalue passes 0. That of a mesh does so near the fold, the cap's
+    within 1e-6 of its tension, but farther off where a junction ends at a corner that the mesh alone
+    holds, and there perhaps not at all: that triangles slide along after the junction moves the fold, and
+    not the eigenvalues.
+
+    A change of contact with Π is solved for at one λ and not located within its step; a branch that
+    folds just there is lost.
+
     Examples
     --------
     A pyramid of tension α over a square: E = 4 α √(1 + h²) - 4h/3 is stationary where
