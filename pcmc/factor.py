@@ -31,7 +31,8 @@ from .assemble import Pattern
 from .errors import MissingExtra, OptionError, unknown
 
 BACKENDS = ("pardiso", "superlu")
-ZERO = 1e-13  # of the largest entry: a pivot below is zero to rounding, as MKL sees it
+ZERO = 1e-13  # of the largest entry: a pivot below is zero to rounding
+TINY = float(np.finfo(float).tiny)
 ALONE = 10_000  # rows; up to here MKL's threads wait for each other longer than they work
 
 
@@ -189,7 +190,9 @@ class _Pardiso:
 
     def factor(self, data: Floats) -> Factor:
         _finite(data)
-        matrix = self._kept.matrix(data)
+        # what MKL holds a pivot against does not depend on the units of the matrix
+        unit = 0.5 ** math.frexp(np.abs(data).max(initial=TINY))[1]
+        matrix = self._kept.matrix(unit * data)
         nothing = np.zeros((self._kept.size, 1), order="F")
         try:
             if not self._analysed:
@@ -203,7 +206,7 @@ class _Pardiso:
         iparm = self._solver.iparm
         if iparm[13]:  # MKL replaces such a pivot and goes on
             raise SingularMatrix(f"{iparm[13]} pivots are zero to rounding")
-        return _PardisoFactor(self, matrix, int(iparm[22]))
+        return _PardisoFactor(self, matrix, unit, int(iparm[22]))
 
     def run(self, phase: int, matrix: csr_array, right: Floats) -> Floats:
         with self._lock, self._threads():
@@ -244,7 +247,8 @@ def _release(solver: Any, kept: Pattern) -> None:
 class _PardisoFactor:
     owner: _Pardiso
     matrix: csr_array
+    unit: float
     negative: int
 
     def solve(self, right: Floats) -> Floats:
-        return self.owner.run(33, self.matrix, np.asfortranarray(right))
+        return self.owner.run(33, self.matrix, np.asfortranarray(self.unit * right))

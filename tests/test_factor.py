@@ -112,6 +112,24 @@ def test_a_singular_matrix_is_refused(backend, A):
 
 
 @every_backend
+@pytest.mark.parametrize("unit", [1e-20, 1e-8, 1.0, 1e8, 1e20])
+def test_what_counts_as_zero_does_not_depend_on_units(backend, unit):
+    A = np.diag([4.0, 3.0, 2.0, 5.0]) + 0.5 * (np.eye(4, k=1) + np.eye(4, k=-1))
+    A[3] = A[:, 3] = 0.0
+    for small, negative in ((1e-11, 0), (-1e-11, 1)):
+        A[3, 3] = small
+        kept, data = upper(A)
+        found = factoriser(kept, backend).factor(unit * data)
+        assert found.negative == negative
+        right = A @ [1.0, 2.0, 3.0, 4.0]
+        np.testing.assert_allclose(found.solve(unit * right), [1.0, 2.0, 3.0, 4.0], rtol=1e-12)
+    A[3, 3] = 1e-15
+    kept, data = upper(A)
+    with pytest.raises(SingularMatrix, match="zero to rounding"):
+        assert factoriser(kept, backend).factor(unit * data).negative == 0
+
+
+@every_backend
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])
 def test_numbers_that_are_not_finite_are_refused(backend, wrong):
     kept, data = upper(np.eye(3))
