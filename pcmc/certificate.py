@@ -345,11 +345,11 @@ def _patch_table(surface: Surface, standing: Surface) -> pd.DataFrame:
         faces = standing.patch_of_face == index
         inside = np.zeros(surface.n, dtype=bool)
         inside[standing.faces[faces]] = True
-        inside &= standing.topology.interior
+        inside &= np.isfinite(mean)
         row: dict[str, Any] = {
             "patch": patch.name, "tension": patch.tension, "pressure": patch.pressure,
             "target": patch.target_curvature, "area": float(areas[index]),
-            "mean_H": float(np.nanmean(mean[inside])) if inside.any() else np.nan,
+            "mean_H": float(mean[inside].mean()) if inside.any() else np.nan,
         }  # fmt: skip
         for method, error in errors.items():
             found = error[inside & np.isfinite(error)]

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from . import kernels
-from .arrays import Floats
+from .arrays import Bools, Floats
 from .errors import OptionError, unknown
 from .surface import Surface
 
@@ -20,7 +20,8 @@ METHODS: tuple[Method, ...] = ("cotangent", "variational")
 
 
 def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
-    """H (n,), 1/length; NaN on junctions and boundaries, where no single sheet has a curvature.
+    """H (n,), 1/length; NaN on junctions and boundaries, and at vertices where sheets touch: no single
+    sheet has a curvature there.
 
     With ∇A the area gradient (15a) and ∇V = ⅓ Σ A_T ν_T the volume gradient of the vertex:
 
@@ -46,16 +47,16 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
             H = np.copysign(np.linalg.norm(area_gradient, axis=1), along) / (2.0 * star_area / 3.0)
         else:
             H = 1.5 * along / np.einsum("ij,ij->i", area_vector, area_vector)
-    H[~surface.topology.interior] = np.nan
+    H[~_within_one_sheet(surface)] = np.nan
     return H
 
 
 def target_curvature(surface: Surface) -> Floats:
-    """H̄ = p / (2 α) (n,) of the sheet each vertex lies in; NaN on junctions and boundaries."""
+    """H̄ = p / (2 α) (n,) of the sheet each vertex lies in; NaN where ``mean_curvature`` is."""
     patch = np.zeros(surface.n, dtype=np.int64)
     patch[surface.faces] = surface.patch_of_face[:, None]
     target = np.array([p.target_curvature for p in surface.patches])[patch]
-    target[~surface.topology.interior] = np.nan
+    target[~_within_one_sheet(surface)] = np.nan
     return target
 
 
@@ -67,6 +68,14 @@ def curvature_error(surface: Surface, method: Method = "cotangent") -> Floats:
     """
     H, target = mean_curvature(surface, method), target_curvature(surface)
     return np.divide(H - target, target, out=np.full(surface.n, np.nan), where=target != 0.0)
+
+
+def _within_one_sheet(surface: Surface) -> Bools:
+    """(n,) vertices off boundaries and junctions, and where sheets do not just touch."""
+    topo = surface.topology
+    return topo.interior & (
+        kernels.fans(surface.faces, topo.edge_of_face, topo.edges, surface.n) == 1
+    )
 
 
 def _star(surface: Surface) -> tuple[Floats, Floats, Floats]:

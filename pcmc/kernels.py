@@ -150,6 +150,29 @@ def area_vectors(X, F):
     return vector, area
 
 
+@compiled
+def fans(F: Ints, edge_of_face: Ints, edges: Ints, n: int) -> Ints:
+    """(n,) how many parts the triangles around each vertex fall into that share no edge there."""
+    parent = np.arange(2 * len(edges))  # node 2 e + s is the end edges[e, s] of edge e
+    for f in range(len(F)):
+        for c in range(3):
+            one, two = edge_of_face[f, c - 1], edge_of_face[f, c - 2]
+            a = 2 * one + (edges[one, 1] == F[f, c])
+            b = 2 * two + (edges[two, 1] == F[f, c])
+            while parent[a] != a:
+                parent[a] = parent[parent[a]]
+                a = parent[a]
+            while parent[b] != b:
+                parent[b] = parent[parent[b]]
+                b = parent[b]
+            parent[max(a, b)] = min(a, b)
+    count = np.zeros(n, dtype=np.int64)
+    for k in range(len(parent)):
+        if parent[k] == k:
+            count[edges[k // 2, k % 2]] += 1
+    return count
+
+
 def threads() -> int:
     """Threads used on large meshes: the processors this process may run on, at most eight.
 

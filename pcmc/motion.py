@@ -127,7 +127,7 @@ def structure(surface: Surface, crest: Ints | None = None, level: Bools | None =
         links = np.concatenate([links[~np.isin(links[:, 0], crest[:, 0])], crest])
     curve, beside = curve_neighbours(links, surface.n)
     kind = vertex_kind(links[:, 0], surface.n)
-    shared = _fans(faces, topo.edge_of_face, topo.edges, surface.n) > 1
+    shared = kernels.fans(faces, topo.edge_of_face, topo.edges, surface.n) > 1
     if crest is not None:
         shared[crest[:, 0]] = False
     kind[shared] = POINT
@@ -237,29 +237,6 @@ def _within_plane(
         basis[chosen[single], 0] = across[single] / length[single, None]
         basis[chosen[~single], 0], basis[chosen[~single], 1] = first[0], second[0]
         dimension[chosen] = np.where(single, 1, 2)
-
-
-@kernels.compiled
-def _fans(F: Ints, edge_of_face: Ints, edges: Ints, n: int) -> Ints:
-    """(n,) how many parts the triangles around each vertex fall into that share no edge there."""
-    parent = np.arange(2 * len(edges))  # node 2 e + s is the end edges[e, s] of edge e
-    for f in range(len(F)):
-        for c in range(3):
-            one, two = edge_of_face[f, c - 1], edge_of_face[f, c - 2]
-            a = 2 * one + (edges[one, 1] == F[f, c])
-            b = 2 * two + (edges[two, 1] == F[f, c])
-            while parent[a] != a:
-                parent[a] = parent[parent[a]]
-                a = parent[a]
-            while parent[b] != b:
-                parent[b] = parent[parent[b]]
-                b = parent[b]
-            parent[max(a, b)] = min(a, b)
-    count = np.zeros(n, dtype=np.int64)
-    for k in range(len(parent)):
-        if parent[k] == k:
-            count[edges[k // 2, k % 2]] += 1
-    return count
 
 
 @kernels.compiled

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from motion_cases import touching
 from shapes import cap, octahedron, pyramid, rotation, shaken, three_patches
 
 from pcmc import (
@@ -12,6 +13,7 @@ from pcmc import (
     curvature_error,
     gradient,
     mean_curvature,
+    solve,
     target_curvature,
 )
 from pcmc.errors import OptionError
@@ -81,6 +83,16 @@ def test_no_curvature_on_junctions_and_boundaries(method):
     for values in (mean_curvature(surface, method), target_curvature(surface)):
         assert np.isnan(values[~inside]).all()
         assert np.isfinite(values[inside]).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_curvature_where_sheets_touch(method):
+    """There are two; their mean used to count as a large error of a surface at rest."""
+    result = solve(touching())
+    assert np.isnan(mean_curvature(result.surface, method)).all()
+    assert np.isnan(target_curvature(result.surface)).all()
+    assert result.certificate.curvature_error == 0.0
+    assert result.certificate.patches["mean_H"].isna().all()
 
 
 def test_targets_and_errors_by_patch():
