@@ -27,8 +27,10 @@ class Branch:
 
     Attributes
     ----------
-    points : a row a point: arclength, parameter, the tensions and pressures that vary, energy,
-        volume, height, index, lowest_eigenvalue, residual, quality, slope (dλ/ds), iterations.
+    points : a row a point: arclength s (a number), parameter λ, the tensions and pressures that vary
+        (``tension NAME``, ``pressure NAME``), energy (force·length), volume (length³), height over Π
+        (length), index, lowest_eigenvalue (force/length³), residual (relative), quality of the worst
+        triangle, slope dλ/ds, iterations of Newton's method.
     events : a row an event: kind ("fold", "index" or "contact"), parameter, energy, volume, height,
         arclength, and the index before and after it.
     surfaces : by the row of ``points``.
