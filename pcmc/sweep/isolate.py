@@ -8,7 +8,7 @@ which may not have children by ``multiprocessing``. A child started as a script 
 
 Children are kept between the cases of one sweep, so that a case is imported and compiled once. They
 belong to a *team*, a name that one sweep draws for itself. A child whose parent dies, however
-suddenly, reads the end of its input and leaves.
+suddenly, leaves within a second, in the middle of a case too (on Windows, at the case's end).
 """
 
 from __future__ import annotations
