@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, cast
@@ -282,10 +282,16 @@ class Surface:
         self,
         tensions: Mapping[str, float] | None = None,
         pressures: Mapping[str, float] | None = None,
+        walls: Iterable[str] = (),
     ) -> Surface:
-        """The same surface with other tensions or pressures, given by patch name."""
+        """The same surface with other tensions or pressures, given by patch name.
+
+        ``walls`` names patches that are walls whatever their pressure.
+        """
         patches = list(self.patches)
-        changes: dict[int, dict[str, Any]] = {}
+        changes: dict[int, dict[str, Any]] = {
+            self.patch_index(name): {"wall": True} for name in walls
+        }
         for key, given in (("tension", tensions), ("pressure", pressures)):
             for name, value in (given or {}).items():
                 changes.setdefault(self.patch_index(name), {})[key] = value

@@ -9,6 +9,7 @@ import pcmc
 from generators import spherical_cap
 from pcmc.design.quantities import measure
 from pcmc.plan import plan_from
+from pcmc.rooms import pressed
 
 TIGHT = {"tolerance": 1e-13, "care": 0.0}
 
@@ -41,7 +42,7 @@ def cap(**arguments):
 def changed(surface, parameter, value):
     given = {parameter.patch: value}
     tension = parameter.kind == "tension"
-    return surface.retensioned(given if tension else None, None if tension else given)
+    return pressed(surface, given if tension else None, None if tension else given)
 
 
 def difference(surface, targets, parameter, step, **options):

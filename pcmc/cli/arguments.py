@@ -12,6 +12,7 @@ import typer
 from .. import project as projects
 from ..errors import FileError, OptionError, unknown
 from ..io import FORMATS, read_bare
+from ..rooms import pressed
 from ..surface import Surface
 
 TOML = ".toml"
@@ -30,7 +31,7 @@ Pressures = Annotated[
     typer.Option(
         "--pressure",
         metavar="NAME=VALUE",
-        help="Pressure on a patch; VALUE alone: on all under pressure.",
+        help="Pressure on a patch; VALUE alone: on all under pressure. Walls follow.",
     ),
 ]
 ViewName = Annotated[
@@ -75,9 +76,11 @@ def check_input(file: Path) -> None:
 
 def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str] | None) -> Surface:
     loaded = [patch.name for patch in surface.patches if not patch.auxiliary]
-    return surface.retensioned(
-        _by_name(loaded, tension, "--tension"), _by_name(loaded, pressure, "--pressure")
+    tensions, pressures = (
+        _by_name(loaded, tension, "--tension"),
+        _by_name(loaded, pressure, "--pressure"),
     )
+    return pressed(surface, tensions, pressures)
 
 
 def _by_name(names: list[str], given: list[str] | None, option: str) -> dict[str, float]:

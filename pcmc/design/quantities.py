@@ -98,7 +98,8 @@ class Parameter:
     Parameters
     ----------
     patch : name of the patch.
-    kind : ``"tension"`` or ``"pressure"``.
+    kind : ``"tension"`` or ``"pressure"``. With the pressure of a room that of its walls changes, which
+        is the difference between the rooms, unless it is a parameter itself.
     low, high : bounds; by default a twentieth of the present value and twenty times it.
 
     >>> Parameter("wall", low=0.0, high=3.0).label

@@ -22,6 +22,7 @@ from scipy.optimize import lsq_linear
 from ..arrays import Bools, Floats
 from ..balance import coarseness, load_ratio
 from ..errors import SurfaceError
+from ..rooms import pressed
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
@@ -173,7 +174,7 @@ class Search:
         chosen: dict[str, dict[str, float]] = {"tension": {}, "pressure": {}}
         for parameter, value in zip(self.parameters, self.turned(x).tolist(), strict=True):
             chosen[parameter.kind][parameter.patch] = value
-        return surface.retensioned(chosen["tension"], chosen["pressure"])
+        return pressed(surface, chosen["tension"], chosen["pressure"])
 
     def tried(self, x: Floats, result: Result) -> Tried:
         """What a solve has given."""

@@ -29,6 +29,7 @@ from ..errors import OptionError, SurfaceError
 from ..factor import Factor, SingularMatrix, factoriser
 from ..linearise import Linearisation, linearise
 from ..motion import MotionSpace, force_scale, motion_space
+from ..rooms import following
 from ..surface import Surface
 from .quantities import Measure, Parameter, Target, measure
 
@@ -131,8 +132,18 @@ def slopes(
     for k, parameter in enumerate(parameters):
         explicit = found.tension if parameter.kind == "tension" else found.pressure
         if explicit is not None:
-            slope[k] += explicit[surface.patch_index(parameter.patch)]
+            slope[k] += explicit @ _shares(surface, parameter, parameters)
     return slope
+
+
+def _shares(surface: Surface, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
+    """(k,) how the patches' tensions or pressures change with a parameter: walls follow their rooms'."""
+    one = np.zeros(len(surface.patches))
+    one[surface.patch_index(parameter.patch)] = 1.0
+    if parameter.kind == "tension":
+        return one
+    named = {surface.patch_index(p.patch) for p in parameters if p.kind == "pressure"}
+    return one + following(surface, one, named)
 
 
 def _answers(surface: Surface, parameters: Sequence[Parameter]) -> tuple[Surface, Floats]:
@@ -140,7 +151,7 @@ def _answers(surface: Surface, parameters: Sequence[Parameter]) -> tuple[Surface
     for parameter in parameters:
         surface.patch_index(parameter.patch)
     at_rest = _AtRest.of(surface)
-    return at_rest.found.surface, np.stack([at_rest.answer(p) for p in parameters])
+    return at_rest.found.surface, np.stack([at_rest.answer(p, parameters) for p in parameters])
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,9 +191,9 @@ class _AtRest:
         linear = linearise(shown, frame, space, X, gradient)
         return cls(found, follows, space, linear, factor)
 
-    def answer(self, parameter: Parameter) -> Floats:
-        """dX/dλ (n,3)."""
-        right = -self.space.pull(self._force(parameter))
+    def answer(self, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
+        """dX/dλ (n,3) for one of the parameters."""
+        right = -self.space.pull(self._force(parameter, parameters))
         if not np.any(right):
             return np.zeros_like(self.found.surface.vertices)
         size = self.space.size
@@ -196,11 +207,10 @@ class _AtRest:
             raise SurfaceError(AT_FOLD)
         return self._moved(s)
 
-    def _force(self, parameter: Parameter) -> Floats:
+    def _force(self, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
         """∂(∇E)/∂λ (n,3)."""
         shown = self.found.surface
-        one, zero = np.zeros((2, len(shown.patches)))
-        one[shown.patch_index(parameter.patch)] = 1.0
+        one, zero = _shares(shown, parameter, parameters), np.zeros(len(shown.patches))
         tension, pressure = (one, zero) if parameter.kind == "tension" else (zero, one)
         return kernels.measure(
             shown.vertices, shown.faces, shown.patch_of_face, shown.origin, tension, pressure,

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..certificate import Certificate, Verdict, certify
+from ..rooms import pressed
 from ..solvers import solve
 from ..solvers.result import Progress, Result
 from ..surface import Patch, Surface
@@ -191,7 +192,7 @@ class Draft:
     def _wanted(self, values: Values) -> Surface:
         """The surface shown, with the values asked for."""
         given = {key: dict(values.get(key) or {}) for key in ("tensions", "pressures")}
-        wanted = self.surface.retensioned(given["tensions"], given["pressures"])
+        wanted = pressed(self.surface, given["tensions"], given["pressures"])
         self._asked = wanted.patches
         return wanted
 
@@ -280,13 +281,13 @@ def reach(
 def between(start: Surface, end: Surface, part: float) -> Surface:
     """``start`` with its tensions and pressures moved a part of the way to those of ``end``."""
     if part >= 1.0:
-        return start.retensioned(
-            {p.name: p.tension for p in end.patches}, {p.name: p.pressure for p in end.patches}
-        )
-    tensions = (1.0 - part) * start.tensions + part * end.tensions
-    pressures = (1.0 - part) * start.pressures + part * end.pressures
+        tensions, pressures = end.tensions, end.pressures  # to the last digit
+    else:
+        tensions = (1.0 - part) * start.tensions + part * end.tensions
+        pressures = (1.0 - part) * start.pressures + part * end.pressures
     names = [p.name for p in start.patches]
     return start.retensioned(
         dict(zip(names, tensions.tolist(), strict=True)),
         dict(zip(names, pressures.tolist(), strict=True)),
+        [p.name for p in end.patches if p.wall],
     )

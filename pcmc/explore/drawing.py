@@ -55,7 +55,7 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
 def _walls_alone(surface: Surface) -> Bools:
     """(e,) edges all of whose triangles belong to walls."""
     alone = np.ones(len(surface.topology.edges), dtype=bool)
-    roof = surface.pressures[surface.patch_of_face] != 0.0
+    roof = ~surface.walls[surface.patch_of_face]
     alone[surface.topology.edge_of_face[roof]] = False
     return alone
 

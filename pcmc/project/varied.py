@@ -11,6 +11,7 @@ from typing import Any
 
 from .. import io
 from ..errors import OptionError, PcmcError, unknown
+from ..rooms import pressed
 from ..surface import Surface
 from .file import PathLike, Project, project_of, read_data, surface_of
 
@@ -137,6 +138,6 @@ def _retensioned(path: Path, surface: Surface, values: Mapping[str, float]) -> S
             raise OptionError(f"{path}: {unknown('number', name, keys)}")
         given[what][patch] = values[name]
     try:
-        return surface.retensioned(given["tension"], given["pressure"])
+        return pressed(surface, given["tension"], given["pressure"])
     except PcmcError as error:
         raise OptionError(f"{path}: {error}") from None
