@@ -107,6 +107,25 @@ def test_a_case_that_waits_for_one_that_kills_runs_on_another_child(tmp_path):
     assert output == "this is case 12\n"  # of its own output only
 
 
+def test_a_case_that_kills_while_the_answer_before_it_is_read_is_run_once(tmp_path, monkeypatch):
+    class Late(local.Child):
+        answers = 0
+
+        def receive(self, *arguments):
+            outcome = super().receive(*arguments)
+            Late.answers += 1
+            if Late.answers == 12:  # of case 11; case 12 ends the process
+                os.waitid(os.P_PID, self.process.pid, os.WEXITED | os.WNOWAIT)
+            return outcome
+
+    monkeypatch.setattr(local, "Child", Late)
+    monkeypatch.setattr(local, "BRIEF", 60.0)
+    sweep = Sweep(sweep_cases.mortal, {"n": range(15)}, {"fatal": 12, "folder": str(tmp_path)})
+    found = run(sweep, workers=1)
+    assert [int(line) for line in (tmp_path / "begun").read_text().split()] == list(range(15))
+    assert found.status.tolist() == ["killed" if n == 12 else "finished" for n in range(15)]
+
+
 @pytest.mark.parametrize(("brief", "most"), [(60.0, 2), (0.0, 1)])
 def test_only_short_cases_wait_in_a_childs_pipe(brief, most, monkeypatch):
     given = [0]

@@ -110,6 +110,11 @@ class Child:
         """Whether the process can take another case."""
         return self.process.poll() is None
 
+    @property
+    def ended(self) -> bool:
+        """Whether ``receive`` has met its end; ``alive`` looks whether it has come since."""
+        return self.process.returncode is not None
+
     def kill(self) -> None:
         """End the process and what it started, whatever they do and even if it has ended itself."""
         if os.name == "posix":

@@ -104,7 +104,8 @@ class LocalPool:
                 given.append(ahead)
             outcome = child.receive(self._time_limit)
             given.popleft().future.set_result(outcome)
-            if not child.alive:
+            # one that has answered may die of the next case before it is looked at: ``receive`` says so
+            if child.ended or not (given or child.alive):
                 break
             brief = outcome["wall_time"] < BRIEF
             task = None if given else self._take()
