@@ -99,8 +99,11 @@ def _sentence(
     says: str, what: str, ours: float, against: str, other: float, holds: Any, correction: str
 ) -> dict[str, Any]:
     """A sentence beside two numbers; where the relation fails, what is true instead."""
-    true = bool(holds(ours, other))
+    if math.isnan(ours) or math.isnan(other):
+        verdict = "no such cases"
+    else:
+        verdict = "confirmed" if holds(ours, other) else "corrected"
     return {
         "paper": says, "measured": what, "value": ours, "against": against, "other": other,
-        "verdict": "confirmed" if true else "corrected", "instead": "" if true else correction,
+        "verdict": verdict, "instead": correction if verdict == "corrected" else "",
     }  # fmt: skip

@@ -205,6 +205,8 @@ def test_sentences_follow_from_the_cases():
     turned = sentences(pd.DataFrame(listed))
     assert [turned.verdict[k] for k in (1, 3, 6)] == ["corrected"] * 3
     assert turned.instead[3]
+    few = sentences(pd.DataFrame(listed[:1])).set_index("paper").verdict
+    assert few[turned.paper[2]] == "no such cases"
 
 
 @pytest.mark.slow
