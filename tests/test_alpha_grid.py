@@ -222,6 +222,7 @@ def test_grid_by_the_geometric_solver_end_to_end(tmp_path, monkeypatch):
     folder = Folder(tmp_path / study.name)
     assert len(folder.read_table("explained")) == 8
     assert folder.read_table("measured").set_index("key").value[f"{study.name}.crosses"] > 0
-    assert folder.read_table("sentences").verdict.isin(["confirmed", "corrected"]).all()
+    verdicts = set(folder.read_table("sentences").verdict)  # 8 cases do not have all kinds
+    assert verdicts == {"confirmed", "no such cases"}
     assert folder.figure("existence").stat().st_size <= 150_000
     assert not (folder.path / "build").exists()
