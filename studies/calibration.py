@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-import numpy as np
 import pandas as pd
 
 from generators.calibration import EDGES_2, EDGES_4, RINGS_3, candidates
@@ -43,11 +42,10 @@ def figure(folder: Folder) -> None:
             str(family): (rows.triangles.to_numpy(), rows.ratio.to_numpy())
             for family, rows in mine.groupby("family")
         }
-        ends = np.array([mine.triangles.min(), mine.triangles.max()])
-        curves["printed"] = (ends, np.ones(2))
         lines(
             curves, folder.figure(str(example)), x="triangles", y="initial ‖∇E‖² / printed",
-            xscale="log", yscale="log", markers=True,
+            title=f"Example {str(example).removeprefix('example')}: the initial shape's ‖∇E‖²",
+            levels={"printed": 1.0}, xscale="log", yscale="log", markers=True,
         )  # fmt: skip
 
 

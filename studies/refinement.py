@@ -7,9 +7,8 @@ That one is Example 2 as printed. At its corners the crest turns with the edge l
 one mesh can follow it, and it is meshed anew each time; from an edge length of 0.19 (10 208 triangles) on
 the triangles at a corner collapse, and the last that converges has 9 219. A smaller patch of tension
 √11 = 3.317 instead of 3 would make it two spheres that join in balance along the whole crest, corners too
-(``joined_caps``). Near that the corners hold longer: at 3.2, ``example2_near``, on all meshes here; at 3.1
-up to 64 000 triangles and not 256 000. There too the crest turns, so energies converge with order 2 and
-positions do not.
+(``joined_caps``). Near that the corners hold longer: at 3.2, ``example2_near``, on all meshes here. There
+too the crest turns, so energies converge with order 2 and positions do not.
 """
 
 from __future__ import annotations

@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 
 from generators import four_fans, three_patches, two_caps, two_squares
+from generators.two_caps import LARGE, SMALL
 from pcmc import Certificate, Surface, certify, solve
 from pcmc.arrays import Floats
 
@@ -65,7 +66,9 @@ FAMILIES = (
 CORNER_LENGTHS = (0.8, 0.6, 0.4, 0.3, 0.2)
 CREST = 6  # edges of the crest, counted from the corner
 # Of Example 2's outlines, circles of radius 6 and 4 with their middles 8 apart, at their upper corner.
-OUTLINES = {"large": ((-5.0, 0.0), 6.0), "small": ((3.0, 0.0), 4.0)}
+OUTLINES = {
+    name: ((ball.x, 0.0), ball.floor_radius) for name, ball in (("large", LARGE), ("small", SMALL))
+}
 CORNER = (0.25, 6.0 * math.sin(math.acos(5.25 / 6.0)))
 
 
@@ -187,7 +190,10 @@ def table(folder: Folder) -> dict[str, float]:
 
 
 def critical_wall(walls: Floats, lowest: Floats) -> float:
-    """Where the lowest eigenvalue passes from positive to negative, linear in between; 0 or ∞ if not.
+    """The least tension at which the lowest eigenvalue turns negative, linear in between.
+
+    0 where it is negative at the weakest wall already, ∞ where it is negative at none. On a strong wall
+    that rests on Π it may be positive again.
 
     >>> critical_wall(np.array([1.0, 2.0, 3.0]), np.array([3.0, 1.0, -1.0]))
     2.5
@@ -261,7 +267,7 @@ def figure(folder: Folder) -> None:
     lines(
         curves, folder.figure("critical"), x="edge length / length of a wall", xscale="log",
         y="tension of the walls / tension of the roofs", markers=True,
-        title="Above its curve a shape is a saddle: finer meshes hold weaker walls only",
+        title="Where a shape turns into a saddle: finer meshes hold weaker walls only",
     )  # fmt: skip
     _draw_crest(folder)
 
