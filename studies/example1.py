@@ -31,6 +31,12 @@ T0, T0_HISTORIES, ITERATIONS = 0.005, 0.05, 300
 WALLS = (0.0, 1.0, 2.0, 3.0)  # Fig. 7b to 7e
 COARSE, FINE = 4, 8
 STANDS = 0.05  # a wall lower than this, over an initial height of 1, is not seen
+LAST = 100  # iterations over which the wall's bouncing is measured
+STANDING = {  # momentum, diagonals of the runs that follow the wall of α 3
+    "with momentum": (True, "symmetric"),
+    "without": (False, "symmetric"),
+    "with momentum, diagonals the other way": (True, "parallel"),
+}
 VARIANTS = {  # Fig. 10: the lines and their names
     "proposed": (True, True),
     "no-line-search": (True, False),
@@ -72,21 +78,27 @@ def data(folder: Folder, short: bool) -> None:
 
 
 def _standing(iterations: int) -> pd.DataFrame:
-    """The height of the wall of α 3 after each iteration, with and without momentum."""
-    start = two_squares(COARSE, alpha_aux=WALLS[-1])
-    junction = start.topology.on_junction
+    """The height of the wall of α 3 after each iteration, a run for each of ``STANDING``."""
     tables = []
-    for momentum in (True, False):
-        heights = [start.vertices[junction, 2].max()]
-
-        def note(progress: Progress, heights: list[float] = heights) -> None:
-            heights.append(progress.surface().vertices[junction, 2].max())
-
-        options: dict[str, Any] = {**PAPER, "t0": T0, "tolerance": None, "momentum": momentum}
-        solve(start, "nesterov", note, iterations=iterations, **options)
-        columns = {"momentum": momentum, "iteration": range(len(heights)), "height": heights}
+    for run, (momentum, diagonals) in STANDING.items():
+        start = two_squares(COARSE, alpha_aux=WALLS[-1], diagonals=diagonals)
+        heights = _heights(start, momentum, iterations)
+        columns = {"run": run, "iteration": range(len(heights)), "height": heights}
         tables.append(pd.DataFrame(columns))
     return pd.concat(tables, ignore_index=True)
+
+
+def _heights(start: Surface, momentum: bool, iterations: int) -> list[float]:
+    """The junction's height at the start and after each iteration."""
+    junction = start.topology.on_junction
+    heights = [start.vertices[junction, 2].max()]
+
+    def note(progress: Progress) -> None:
+        heights.append(progress.surface().vertices[junction, 2].max())
+
+    options: dict[str, Any] = {**PAPER, "t0": T0, "tolerance": None, "momentum": momentum}
+    solve(start, "nesterov", note, iterations=iterations, **options)
+    return heights
 
 
 def table(folder: Folder) -> dict[str, float]:
@@ -102,19 +114,29 @@ def table(folder: Folder) -> dict[str, float]:
     fig10 = _fig10(folder.read_table("histories"))
     folder.write_table("fig10", fig10)
     records = folder.read_table("records").set_index("case")
-    standing = folder.read_table("standing")
-    tall = standing[standing.height > STANDS].groupby("momentum").iteration.max()
-    until = {"stands_until": tall[True], "stands_until_without_momentum": tall[False]}
     return (
-        until
-        | _given(start)
+        _standing_numbers(folder.read_table("standing"))
+        | _given(start, records)
         | _shape_numbers(junction.set_index("case"), records)
         | _numbers10(fig10)
     )
 
 
-def _given(start: Surface) -> dict[str, float]:
-    """What the paper tells of the initial shape, taken from ours."""
+def _standing_numbers(standing: pd.DataFrame) -> dict[str, float]:
+    """Until which iteration the wall of α 3 stands, and how low it gets in the last ones."""
+    tall = (standing.height > STANDS).groupby(standing.run).cummin()
+    until = standing[tall].groupby("run").iteration.max()
+    symmetric, still, parallel = STANDING
+    least = standing[standing.run == parallel].height.iloc[-LAST:].min()
+    return {
+        "stands_until": until[symmetric],
+        "stands_until_without_momentum": until[still],
+        "least_height_3_parallel": least,
+    }
+
+
+def _given(start: Surface, records: pd.DataFrame) -> dict[str, float]:
+    """What the paper tells of the initial shape and of its runs, taken from ours."""
     roof = start.patch_faces([0])
     X = start.vertices[np.unique(start.faces[roof])]
     across = np.unique(X[:, 0].round(9))
@@ -125,8 +147,10 @@ def _given(start: Surface) -> dict[str, float]:
         "squares": len(across) - 1,
         "square": float(np.diff(across).max()),
         "height": float(start.vertices[junction_top(start), 2]),
-        "t0": T0,
-    }
+        **{key: records[key][_main(2.0)] for key in (*PAPER, "t0", "iterations")},
+        **{f"{key}_histories": records[key]["fig10-proposed-printed"]
+           for key in ("t0", "alpha_aux", "iterations")},
+    }  # fmt: skip
 
 
 def _junction(surface: Surface) -> dict[str, float]:
@@ -213,11 +237,10 @@ def figure(folder: Folder) -> None:
     draw_elevations(shapes, folder.figure("fig07"), top=1.2)
     standing = folder.read_table("standing")
     heights = {
-        "with momentum" if momentum else "without": (mine.iteration, mine.height)
-        for momentum, mine in standing.groupby("momentum", sort=False)
+        str(run): (mine.iteration, mine.height) for run, mine in standing.groupby("run", sort=False)
     }
     lines(heights, folder.figure("fig07-wall"), x="iteration", y="height of the wall",
-          title="Example 1, wall of α 3: its middle sinks to the ground")  # fmt: skip
+          title="Example 1, wall of α 3: its middle sinks to the ground and bounces")  # fmt: skip
     pair = [end, folder.read_mesh(_main(2.0, FINE))["final"]]
     panel(
         pair, folder.figure("fig09"), views="plan", titles=["(a) coarse mesh", "(b) fine mesh"],

@@ -103,16 +103,16 @@ class Finding:
     def reason(self, instead: float = math.nan) -> str:
         """The claim without its example, and what we find, in words that stand alone."""
         digits = 4 if self.claim.kind == "sentence" else 5
-        ours, printed = f"{self.ours:.4g}", f"{self.paper:.{digits}g}"
+        ours, told = f"{self.ours:.4g}", f"{self.paper:.{digits}g}"
         if self.claim.fails:
-            return self.claim.fails.format(ours=ours, paper=printed, instead=f"{instead:.4g}")
+            return self.claim.fails.format(ours=ours, paper=told, instead=f"{instead:.4g}")
         says = self.claim.says.partition(": ")[2] or self.claim.says
         if self.claim.kind == "sentence":
-            return f"{says}: ours {ours}, to hold it must be {self.claim.relation} {printed}"
+            return f"{says}: ours {ours}, to hold it must be {self.claim.relation} {told}"
         if self.claim.relation != "=":
-            return f"{says}: ours {ours}, printed {self.claim.relation} {printed}"
+            return f"{says}: ours {ours}, printed {self.claim.relation} {told}"
         share = f" ({self.difference / self.paper:+.1%})" if self.paper else ""
-        return f"{says}: ours {ours}, printed {printed}{share}"
+        return f"{says}: ours {ours}, printed {told}{share}"
 
 
 @cache
@@ -143,6 +143,18 @@ def paper(path: Path = PAPER) -> tuple[list[Claim], list[Figure]]:
     return claims, figures
 
 
+def printed(ours: str) -> float:
+    """The number that the paper prints where we measure ``ours``; FileError if it prints none.
+
+    >>> printed("example4.best_iteration")
+    225.0
+    """
+    for claim in paper()[0]:
+        if claim.ours == ours and not isinstance(claim.paper, str):
+            return float(claim.paper)
+    raise FileError(f"{PAPER} prints no number for {ours}")
+
+
 def judge(claim: Claim, measured: Mapping[str, float]) -> Finding:
     """Put a claim beside the measured numbers.
 
@@ -150,8 +162,8 @@ def judge(claim: Claim, measured: Mapping[str, float]) -> Finding:
     >>> [judge(claim, {"study.x": x}).verdict for x in (2.4, 2.9, 4.0)]
     ['reproduced', 'near', 'differs']
     """
-    printed = claim.paper
-    value = measured.get(printed, math.nan) if isinstance(printed, str) else float(printed)
+    told = claim.paper
+    value = measured.get(told, math.nan) if isinstance(told, str) else float(told)
     ours = measured.get(claim.ours, math.nan)
     if math.isnan(ours) or math.isnan(value):
         verdict = MISSING

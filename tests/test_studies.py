@@ -17,8 +17,10 @@ import pytest
 from rich.console import Console
 
 from generators import two_caps, two_squares
+from generators.calibration import PRINTED
 from pcmc.energy import energy_and_gradient
 from pcmc.errors import FileError, OptionError
+from studies import example1
 from studies.__main__ import main
 from studies.benchmark import numpy_energy_and_gradient
 from studies.flow import turn
@@ -34,6 +36,7 @@ from studies.paper import (
     judge,
     label,
     paper,
+    printed,
     read_measured,
 )
 from studies.readme import with_block
@@ -170,6 +173,12 @@ def test_every_figure_of_the_examples_rests_on_claims_of_a_study_that_exists():
     for claim in claims:
         for key in (claim.ours, claim.paper):
             assert not isinstance(key, str) or key.split(".")[0] in STUDIES
+
+
+def test_numbers_printed_for_initial_shapes_are_the_same_wherever_they_stand():
+    assert {name: printed(f"{name}.initial_gradient_squared") for name in PRINTED} == PRINTED
+    with pytest.raises(FileError, match=r"prints no number for example1\.turn_2"):
+        printed("example1.turn_2")
 
 
 def test_paper_file_with_a_wrong_relation_or_key_is_refused(tmp_path):
@@ -355,6 +364,19 @@ def test_turn_between_two_flat_sheets_is_their_angle():
     assert turn(surface.moved(X), middle, ("left", "right")) == pytest.approx(40.0)
     X[roof, 2] = 1.0 - np.abs(X[roof, 0]) * math.tan(math.radians(20.0))
     assert turn(surface.moved(X), middle, ("left", "right")) == pytest.approx(-40.0)
+
+
+def test_a_wall_stands_until_it_first_comes_down_however_it_bounces():
+    heights = {run: [1.0, 0.5, 0.04, 0.3, 0.2] for run in example1.STANDING}
+    *_, other = heights
+    heights[other] = [1.0, 0.9, 0.8, 0.7, 0.6]
+    tables = [
+        pd.DataFrame({"run": run, "iteration": range(5), "height": column})
+        for run, column in heights.items()
+    ]
+    assert example1._standing_numbers(pd.concat(tables, ignore_index=True)) == {
+        "stands_until": 1, "stands_until_without_momentum": 1, "least_height_3_parallel": 0.6,
+    }  # fmt: skip
 
 
 def test_every_vertex_that_can_move_is_in_one_group_and_the_shares_add_to_one():
