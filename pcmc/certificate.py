@@ -23,13 +23,14 @@ from .balance import (
     seen_from_point,
     unbalanced,
 )
+from .collapse import where_collapsed
 from .contact import Walls, excess, standing
 from .curvature import METHODS, curvature_error, mean_curvature
 from .energy import energy_and_gradient, patch_areas, volume
 from .factor import SingularMatrix
 from .modes import Stiffness, lowest, stiffness
 from .motion import MotionSpace, Structure, force_scale, motion_space
-from .quality import edge_lengths, triangle_quality
+from .quality import triangle_quality
 from .rigid import rigid_modes, rigid_motions
 from .surface import Surface
 from .topology import SHEET
@@ -250,7 +251,7 @@ def _verdict(
         if status == "VANISHED":
             return Verdict.NO_EQUILIBRIUM, "nothing holds the surface, and it shrinks to nothing"
     if status == "DEGENERATE" or quality <= COLLAPSED:
-        return Verdict.DEGENERATE, _where_collapsed(surface, sliding)
+        return Verdict.DEGENERATE, where_collapsed(surface, sliding)
     if residual > tolerance or system is None:
         why = f"relative residual {residual:.1e}, asked {tolerance:.0e}"
         if ratio > 1.0:
@@ -306,27 +307,6 @@ def _pulled_off(unheld: Floats) -> str:
         f"at {len(found)} pinched vertices, the first {found[0]}, the sheets pull harder than the"
         " wall can: it stands off there once solved"
     )
-
-
-def _where_collapsed(surface: Surface, sliding: Bools) -> str:
-    """Names the worst triangle outside the patches that may pinch, and what pressed on it."""
-    X, topo = surface.vertices, surface.topology
-    quality = triangle_quality(X, surface.faces)
-    outer = np.where(sliding[surface.patch_of_face], np.inf, quality)
-    face = int(outer.argmin())
-    corners = X[surface.faces[face]]
-    name = surface.patches[surface.patch_of_face[face]].name
-    place = corners.mean(axis=0).round(4).tolist()
-    said = f"worst is face {face} of patch {name!r} near {place}, quality {outer[face]:.1e}"
-    reach = 1.5 * float(np.median(edge_lengths(surface)))
-    near = np.linalg.norm(X - corners.mean(axis=0), axis=1) <= reach
-    slips = (near & surface.fixed).any() and (near & topo.on_junction & ~surface.fixed).any()
-    if slips and (near & surface.on_plane).any():
-        said += (
-            "; the junction there slips along a support, which does not hold its end: hold the bottom"
-            " of its wall"
-        )
-    return said
 
 
 def _quality(standing: Surface, below: Walls) -> tuple[float, float]:

@@ -12,21 +12,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import cKDTree
 
 from .arrays import Bools, Floats, Ints
 from .check import lying
 from .energy import energy_and_gradient
+from .hanging import crest_places, hang, joined, places
 from .motion import MotionSpace, Structure, structure
 from .surface import Surface
 from .topology import topology
 
-SNAP = 1e-3  # of a crest edge: a vertex this near to hanging straight below a crest vertex does
-FLAT = 1e-9  # height of the crest, relative to the size, below which it tells no rows apart
 SLACK = 1e-9  # of the capacity: an excess below is rounding
-LEAN = 4.0  # crest heights that a wall vertex may stand off from straight below the crest
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,13 +79,13 @@ def walls(surface: Surface) -> Walls:
             continue
         pinchable[index] = True
         below = members[~outer[members]]
-        hanging.append((below, *_hang(surface, below, crest, sides)))
+        hanging.append((below, *hang(surface, below, crest, sides)))
         edges.append(crest)
         tension.append(np.full(len(crest), patch.tension))
     above = np.zeros(n, dtype=bool)
     above[np.concatenate(edges)] = True
     low = lying(height, surface.vertices)
-    below, ends, along, share, lean = _joined(hanging)
+    below, ends, along, share, lean = joined(hanging)
     return Walls(
         hanging=below,
         ends=ends,
@@ -113,7 +108,7 @@ def hung(surface: Surface, below: Walls, X: Floats, space: MotionSpace | None = 
     """
     if not len(below.hanging):
         return X
-    place = _place(surface, X, below.ends, below.along, below.share, below.lean)
+    place = places(surface, X, below.ends, below.along, below.share, below.lean)
     change = np.zeros_like(X)
     change[below.hanging] = place - X[below.hanging]
     if space is not None:
@@ -136,7 +131,7 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
     if not rests.any():
         return middle
     crest, drop = X.copy(), np.zeros_like(X)
-    crest[below.hanging] = _above(X, below.ends, below.along)
+    crest[below.hanging] = crest_places(X, below.ends, below.along)
     drop[below.hanging] = (below.share - 1.0)[:, None] * np.array(surface.plane.normal) + below.lean
     down = rests.copy()
     down[below.hanging] = (rests | below.anchored)[below.ends].all(axis=1)
@@ -273,99 +268,18 @@ def lifted(surface: Surface, below: Walls, free: Bools, fraction: float | Floats
 
 
 def settled(surface: Surface, below: Walls, rests: Bools, X: Floats) -> Floats:
-    """X (n,3) with the vertices of vanished walls brought to their place on the resting junction."""
+    """X (n,3) with the vertices of vanished walls brought to their place on the resting junction.
+
+    One of which a triangle still stands, as its lower corner, slides on Π and stays where it is.
+    """
+    stands = np.zeros(surface.n, dtype=bool)
+    stands[pinched(surface, below, rests).faces] = True
     i, j = below.ends.T
-    gone = (rests | below.anchored)[below.ends].all(axis=1)
+    gone = (rests | below.anchored)[below.ends].all(axis=1) & ~stands[below.hanging]
     along = below.along[gone, None]
     X = X.copy()
     X[below.hanging[gone]] = (1.0 - along) * X[i[gone]] + along * X[j[gone]]
     return X[_merged(surface.n, below, rests)]
-
-
-def _above(X: Floats, ends: Ints, along: Floats) -> Floats:
-    """(w,3) the places on the crest that wall vertices hang from."""
-    return (1.0 - along[:, None]) * X[ends[:, 0]] + along[:, None] * X[ends[:, 1]]
-
-
-def _place(
-    surface: Surface, X: Floats, ends: Ints, along: Floats, share: Floats, lean: Floats
-) -> Floats:
-    """(w,3) where wall vertices hang with the crest at X (n,3)."""
-    above = _above(X, ends, along)
-    height = surface.plane.height(above)[:, None]
-    return above + height * ((share[:, None] - 1.0) * np.array(surface.plane.normal) + lean)
-
-
-def _hang(
-    surface: Surface, below: Ints, crest: Ints, sides: Ints
-) -> tuple[Ints, Floats, Floats, Floats]:
-    """Crest edge ends (w,2), λ, ρ and what wall vertices stand off, by nearness seen along Π's normal.
-
-    ``sides`` are the wall's edges. Where the crest lies on Π its height tells nothing, and ρ is that of
-    the vertex's row: steps along edges from the foot, over those from foot to crest.
-    """
-    X, height = surface.vertices, surface.plane.height(surface.vertices)
-    flat = X - height[:, None] * np.array(surface.plane.normal)
-    ends, along = _nearest(flat, below, crest)
-    above = (1.0 - along) * height[ends[:, 0]] + along * height[ends[:, 1]]
-    stands = np.abs(above) > FLAT * surface.size
-    share = np.clip(np.divide(height[below], above, out=np.zeros(len(below)), where=stands), 0, 1)
-    if not stands.all():
-        share = np.where(stands, share, _rows(surface, below, sides))
-    share[surface.on_plane[below]] = 0.0
-    straight = _place(surface, X, ends, along, share, np.zeros((len(below), 3)))
-    lean = np.zeros((len(below), 3))
-    np.divide(X[below] - straight, above[:, None], out=lean, where=stands[:, None])
-    lean[np.linalg.norm(lean, axis=1) > LEAN] = 0.0
-    return ends, along, share, lean
-
-
-def _nearest(flat: Floats, below: Ints, crest: Ints) -> tuple[Ints, Floats]:
-    """The crest edge (w,2) nearest to each wall vertex, seen along Π's normal, and λ there."""
-    start, side = flat[crest[:, 0]], flat[crest[:, 1]] - flat[crest[:, 0]]
-    length = np.einsum("ij,ij->i", side, side)
-    near = cKDTree(start + 0.5 * side).query(flat[below], k=min(4, len(crest)))[1]
-    near = near.reshape(len(below), -1)
-    along = np.einsum("wkj,wkj->wk", flat[below][:, None] - start[near], side[near])
-    along = np.clip(along / np.where(length > 0.0, length, 1.0)[near], 0.0, 1.0)
-    foot = start[near] + along[:, :, None] * side[near]
-    best = np.linalg.norm(flat[below][:, None] - foot, axis=2).argmin(axis=1)
-    row = np.arange(len(below))
-    along = along[row, best]
-    along = np.where(along < SNAP, 0.0, np.where(along > 1.0 - SNAP, 1.0, along))
-    return crest[near[row, best]], along
-
-
-def _rows(surface: Surface, below: Ints, sides: Ints) -> Floats:
-    """ρ (w,) by edges (k,2) of the wall: steps to the foot, over those to the foot and to the crest."""
-    inner = np.zeros(surface.n, dtype=bool)
-    inner[below] = True
-    crest = np.unique(sides[~(inner | surface.fixed)[sides]])
-    foot = below[surface.on_plane[below]]
-    # no way leads through a corner, which is foot and crest at once
-    links = sides[(inner | np.isin(np.arange(surface.n), crest))[sides].all(axis=1)]
-    graph = coo_array((np.ones(len(links)), links.T), shape=(surface.n, surface.n)).tocsr()
-    steps = [
-        dijkstra(graph, directed=False, indices=of, unweighted=True, min_only=True)[below]
-        for of in (foot, crest)
-    ]
-    reached = np.isfinite(steps[0]) & np.isfinite(steps[1])
-    total = np.where(reached, steps[0] + steps[1], 1.0)
-    return np.where(reached, steps[0] / total, 0.5)
-
-
-def _joined(
-    parts: list[tuple[Ints, Ints, Floats, Floats, Floats]],
-) -> tuple[Ints, Ints, Floats, Floats, Floats]:
-    """One list of hanging vertices; one that two walls share hangs from the first."""
-    if not parts:
-        none = np.empty(0, dtype=int)
-        return none, np.empty((0, 2), dtype=int), np.empty(0), np.empty(0), np.empty((0, 3))
-    vertex, ends, along, share, lean = (
-        np.concatenate(column) for column in zip(*parts, strict=True)
-    )
-    first = np.unique(vertex, return_index=True)[1]
-    return vertex[first], ends[first], along[first], share[first], lean[first]
 
 
 def _merged(n: int, below: Walls, rests: Bools) -> Ints:

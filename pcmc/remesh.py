@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .arrays import Bools, Floats, Ints
+from .contact import lifted, resting, walls
 from .errors import MissingExtra, OptionError, SurfaceError
 from .polish import angles, polished
 from .quality import edge_lengths
@@ -23,6 +24,7 @@ PASSES = 3  # of MMG at most, each on the result of the one before; a patch take
 GOOD_ANGLE = 25.0  # degrees; no further pass is made when all angles reach it
 LEAST_ANGLE = 20.0  # degrees; a patch that stays below it ...
 WORSE = 0.8  # ... and below this share of its old smallest angle keeps its old triangles, cut
+RAISED = 0.25  # of its spacing: what a resting junction is lifted by, so that its wall has area
 BLUNT, OBTUSE = 25.0, 100.0  # degrees; for the upper two angles of one that fills a corner well
 
 
@@ -39,8 +41,9 @@ def remesh(
     Patches, tensions, the plane and all names stay. Boundaries, junctions and seams stay where they
     are to rounding: their vertices are kept, and new ones are put on the straight edges between
     them, with the same support as their edge. (So along curves the mesh gets finer, never coarser.)
-    Vertices held inside a patch stay. Everywhere else MMG puts new vertices on a smooth
-    approximation of the surface: solve again afterwards.
+    Vertices held inside a patch stay. A junction that rests on the plane is lifted off it by a quarter
+    of its edges, for its wall to have triangles; solving brings it down again. Everywhere else MMG
+    puts new vertices on a smooth approximation of the surface: solve again afterwards.
 
     Parameters
     ----------
@@ -70,6 +73,7 @@ def remesh(
     """
     check_lengths(edge_length, near_curves, growth, chord)
     _check_count(surface, edge_length)
+    surface = _raised(surface)
     old = _cut_curves(surface, edge_length if near_curves is None else near_curves)
     candidates = []
     mesh = old
@@ -81,6 +85,12 @@ def remesh(
         if angles(mesh.X, mesh.F).min() >= GOOD_ANGLE:
             break
     return _assembled(surface, old, candidates)
+
+
+def _raised(surface: Surface) -> Surface:
+    """The surface with the walls standing again that had vanished below a junction at rest."""
+    below = walls(surface)
+    return lifted(surface, below, resting(surface, below), RAISED)
 
 
 @dataclass(frozen=True, eq=False)

@@ -188,6 +188,23 @@ def test_pinching_turns_with_the_plane():
         np.testing.assert_allclose(one, two, atol=1e-12)
 
 
+def test_a_foot_that_still_carries_a_triangle_stays_where_it_slid():
+    surface, below, rests, _ = pressed()
+    crest = crest_of(surface, below)
+    under = surface.vertices[crest[1]] * [1.0, 1.0, 0.0]
+    gap = np.linalg.norm(surface.vertices - under, axis=1)
+    foot = np.flatnonzero((gap < 1e-9) & surface.on_plane)
+    X = surface.vertices.copy()
+    X[foot] += 0.01 * (X[crest[0]] - X[crest[1]]) * [1.0, 1.0, 0.0]
+    surface = surface.moved(X)
+    below = walls(surface)
+    standing = pinched(surface, below, rests)
+    assert len(foot) == 1
+    assert np.isin(foot, standing.faces).all()
+    moved = settled(surface, below, rests, standing.vertices)
+    np.testing.assert_array_equal(moved[foot], X[foot])
+
+
 def test_curves_and_neighbours_of_the_resting_part():
     full, below, rests, _ = pressed(count=2)
     crest = crest_of(full, below)

@@ -94,6 +94,16 @@ def test_walls_that_share_a_line_and_slide():
     assert minimum_angle(fine) > 20.0
 
 
+def test_a_wall_that_has_vanished_below_a_resting_junction():
+    rested = solve(generators.two_squares(alpha_aux=3.0))
+    assert len(rested.certificate.pinched) == 3
+    again = solve(remesh(rested.surface, 1.0))
+    assert again.converged
+    assert len(again.certificate.pinched) == 3
+    assert again.surface.m > 2 * rested.surface.m
+    np.testing.assert_allclose(again.energy, rested.energy, rtol=0.02)
+
+
 def test_a_thin_wall_keeps_its_triangles_where_they_are_better():
     start = generators.two_caps(1.2)
     before = patch_angles(start)

@@ -218,7 +218,7 @@ def _go_on(state: State, stepper: Stepper, options: NewtonOptions) -> bool:
     """At rest: whether a saddle is left or a resting junction lifted, so that it is not the end."""
     if options.target == "minimum" and stepper.leave_saddle():
         return True
-    if state.release():
+    if state.rests.any() and (state.release() or state.seen_anew()):
         stepper.kind = "release"
         return True
     return False

@@ -164,6 +164,21 @@ class State:
         """(n,) the pull on resting vertices beyond what the wall can hold, force; see ``excess``."""
         return excess(self.surface.moved(self.X), self.walls, self.rests)
 
+    def seen_anew(self) -> bool:
+        """Whether what stands, seen from the positions reached, is other than what was solved for.
+
+        A foot that has come below its crest is one with it from then on.
+        """
+        full = self.result_surface()
+        anew = replace(walls(full), side=self.walls.side)
+        same = np.array_equal(standing(full, anew, self.rests).surface.faces, self.surface.faces)
+        if same or self.releases <= 0:
+            return False
+        self.releases -= 1
+        self.full, self.walls = full, anew
+        self._pinch(self.rests)
+        return True
+
     def release(self) -> bool:
         """Lift the resting vertices that the sheets pull harder than the wall can hold, to their side."""
         beyond = self.overpull()

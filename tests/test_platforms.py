@@ -1,0 +1,67 @@
+"""Roofs along curved platforms, remeshed: what comes to rest does, and what collapses is told why."""
+
+import numpy as np
+import pytest
+
+from pcmc import Verdict, solve
+from pcmc.plan import Divider, Plan
+from pcmc.plan.curves import arc, join, polyline
+from pcmc.quality import triangle_quality
+from pcmc.remesh import remesh
+
+
+def at(radius, degrees):
+    angle = np.radians(degrees)
+    return [float(radius * np.cos(angle)), float(radius * np.sin(angle))]
+
+
+def platform(radius, width, opening, walls, *, alpha, wall, h, turn=0.0, bottom="sliding"):
+    """A strip between two arcs, walls across it at angles from its start, each turned further out."""
+    end, outer = opening / 2.0, radius + width
+    outline = join(
+        arc(at(outer, -end), at(outer, 0.0), at(outer, end)),
+        polyline([at(outer, end), at(radius, end)]),
+        arc(at(radius, end), at(radius, 0.0), at(radius, -end)),
+        polyline([at(radius, -end), at(outer, -end)]),
+    )
+    across = [
+        Divider([at(radius - 1, w - end), at(outer + 1, w - end + turn)], wall=wall, bottom=bottom)
+        for w in walls
+    ]
+    return Plan(outline, across, edge_length=h, tension=alpha).surface()
+
+
+def test_a_remeshed_roof_is_at_rest_as_it_is_seen():
+    """A foot comes to stand right below a resting crest vertex, from where it had hung apart."""
+    coarse = solve(platform(15, 6, 100, (50,), alpha=3.6, wall=2.88, h=2.0, turn=8.0))
+    assert coarse.certificate.verdict is Verdict.STABLE
+    fine = solve(remesh(coarse.surface, 0.8))
+    assert fine.converged
+    assert len(fine.certificate.pinched)
+    assert fine.certificate.residual < 1e-9
+    assert fine.certificate.verdict is Verdict.STABLE
+
+
+def test_a_roof_at_rest_keeps_its_shape_when_remeshed():
+    start = platform(30, 8, 60, (20, 40), alpha=6.0, wall=2.0, h=1.6)
+    coarse, fine = solve(start), solve(remesh(start, 0.8))
+    assert fine.certificate.verdict is coarse.certificate.verdict is Verdict.STABLE
+    again = solve(remesh(coarse.surface, 0.8))
+    assert again.energy == pytest.approx(fine.energy, rel=2e-3)
+    assert again.certificate.verdict is Verdict.STABLE
+
+
+@pytest.mark.parametrize("kind", ["comes down", "slips"])
+def test_a_collapse_is_told_with_its_cause(kind):
+    if kind == "comes down":
+        start = platform(20, 5, 60, (31,), alpha=4.0, wall=3.2, h=2.0, bottom="held")
+        said = "comes down on the held bottom of its wall"
+    else:  # seen away from the corners, where the mesh has no fixed vertex
+        start = platform(15, 5, 60, (23, 43), alpha=3.0, wall=2.4, h=2.5, turn=8.0)
+        said = "slips along a support"
+    assert solve(start).certificate.verdict is Verdict.STABLE
+    fine = remesh(start, 0.8)
+    assert triangle_quality(fine.vertices, fine.faces).min() > 0.3
+    found = solve(fine).certificate
+    assert found.verdict is Verdict.DEGENERATE
+    assert said in found.detail
