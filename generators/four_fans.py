@@ -21,8 +21,8 @@ def four_fans(
 
     The rim is fixed and the walls' feet slide on Π. The paper tells neither its mesh nor the height
     of its initial fans. Soap films over 13 rings of the lattice have ‖∇E‖² = 7949, 0.7 % from the
-    printed 7893.633, and the paper's flow comes below 0.005 there, as printed; "rings" at 14 come
-    to 7892, and the flow stays above 0.03 (`generators.calibration`).
+    printed 7893.633, and the paper's flow comes below 0.005 there, as printed, before it rises again;
+    "rings" at 14 come to 7892, and the flow stays above 0.03 (`generators.calibration`).
 
     Parameters
     ----------

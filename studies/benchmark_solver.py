@@ -22,7 +22,7 @@ from pcmc.factor import Factoriser, available, factoriser
 from pcmc.motion import Structure, motion_space, structure
 
 from . import evolver
-from .timing import Row, median, median_seconds
+from .timing import Row, median, median_seconds, peak_bytes
 
 QUARTER_MILLION, MILLION = 245, 492  # squares a side, for 260 000 and 1 050 000 triangles
 DESIGN, QUICK = 15, 32  # for 1 000 and 4 400
@@ -137,21 +137,7 @@ def _solve_and_weigh(squares: int) -> tuple[int, float, float]:
     start = time.perf_counter()
     surface = example(squares)
     assert solve(surface, target="stationary", tolerance=AT_REST).converged
-    return surface.m, time.perf_counter() - start, _peak_bytes()
-
-
-def _peak_bytes() -> float:
-    """Largest resident size of this process so far."""
-    try:  # ru_maxrss of a child starts at its parent's size, this does not
-        with open("/proc/self/status") as status:
-            line = next(line for line in status if line.startswith("VmHWM"))
-        return 1024.0 * float(line.split()[1])
-    except OSError:
-        import resource
-        import sys
-
-        unit = 1.0 if sys.platform == "darwin" else 1024.0
-        return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return surface.m, time.perf_counter() - start, peak_bytes()
 
 
 def redesign(quick: bool) -> list[Row]:

@@ -43,6 +43,7 @@ from .flow import errors
 from .folder import Folder
 from .orders import Order, limit_order, slope
 from .study import Study
+from .timing import peak_bytes
 
 Circle = tuple[float, float, float]  # x, y and radius of an arc of the outline, on Π
 
@@ -185,7 +186,7 @@ def run_family(name: str, levels: int) -> list[dict[str, Any]]:
             "position": float("nan"),
             "moved": _moved(before, here) if before is not None and not family.lengths else np.nan,
             "seconds": seconds,
-            "peak_megabytes": peak_megabytes(),
+            "peak_megabytes": peak_bytes() / 1e6,
         }
         if family.exact is not None:
             row["position"] = float(np.sqrt((family.exact().distance(here) ** 2).mean()))
@@ -216,18 +217,6 @@ def _moved(coarse: Surface, fine: Surface) -> float:
     normal = normal[inside] / np.linalg.norm(normal[inside], axis=1)[:, None]
     step = fine.vertices[: coarse.n][inside] - X[inside]
     return float(np.sqrt((np.einsum("ij,ij->i", step, normal) ** 2).mean()))
-
-
-def peak_megabytes() -> float:
-    """The most memory this process has had so far; NaN where the system does not tell."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return float("nan")
-    import sys
-
-    unit = 1.0 if sys.platform == "darwin" else 1024.0
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
 
 
 def table(folder: Folder) -> dict[str, float]:

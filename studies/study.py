@@ -56,13 +56,17 @@ def perform(
 ) -> None:
     """Run the steps of a study in ``results / study.name`` and write its provenance.
 
-    ``announce`` is told each step before it starts. The measured numbers of an earlier run are
-    taken away first, so that a study that fails leaves none behind.
+    ``announce`` is told each step before it starts. The measured numbers of an earlier run are taken
+    away first, and before new data its meshes too, so that a study that fails, or no longer makes one,
+    leaves none behind.
     """
     folder = Folder(results / study.name)
     seconds = {}
     if "data" in steps or "table" in steps:
         (folder.path / "measured.csv").unlink(missing_ok=True)
+    if "data" in steps:
+        for mesh in folder.path.glob("*.npz"):
+            mesh.unlink()
     for step in (s for s in STEPS if s in steps):
         announce(step)
         start = time.perf_counter()

@@ -1,7 +1,9 @@
-"""Times as medians of repeats, and the rows in which they are reported."""
+"""Times as medians of repeats, the peak of memory, and the rows in which they are reported."""
 
 from __future__ import annotations
 
+import math
+import sys
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -54,3 +56,19 @@ def median_seconds(call: Callable[[], object], repeats: int) -> float:
         call()
         times.append(time.perf_counter() - start)
     return median(times)
+
+
+def peak_bytes() -> float:
+    """The largest resident size of this process so far; NaN where the system does not tell."""
+    try:  # ru_maxrss of a child starts at its parent's size, this does not
+        with open("/proc/self/status") as status:
+            line = next(line for line in status if line.startswith("VmHWM"))
+        return 1024.0 * float(line.split()[1])
+    except OSError:
+        pass
+    try:
+        import resource
+    except ImportError:  # Windows
+        return math.nan
+    unit = 1.0 if sys.platform == "darwin" else 1024.0
+    return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

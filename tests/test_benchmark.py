@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,7 +18,9 @@ from studies import benchmark, benchmark_explore, benchmark_solver, benchmark_sw
 from studies.__main__ import main
 from studies.alpha_grid import TENSIONS
 from studies.benchmark_solver import Step
-from studies.timing import Row, median, median_seconds
+from studies.timing import Row, median, median_seconds, peak_bytes
+
+HOME = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture
@@ -133,4 +136,13 @@ def test_rows_know_what_is_asked(monkeypatch):
 
 
 def test_memory_of_this_process_is_known():
-    assert 1e7 < benchmark_solver._peak_bytes() < 1e12
+    assert 1e7 < peak_bytes() < 1e12
+
+
+def test_memory_of_a_child_does_not_hold_its_parents():
+    held = np.ones(25_000_000)  # 200 MB
+    code = "from studies.timing import peak_bytes; print(peak_bytes())"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=HOME
+    )
+    assert not float(done.stdout) > 0.75 * held.nbytes  # NaN where the system does not tell

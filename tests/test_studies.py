@@ -247,6 +247,16 @@ def test_a_study_that_fails_leaves_no_numbers_of_an_earlier_run(tmp_path):
     assert read_measured(tmp_path) == {}
 
 
+def test_new_data_takes_the_meshes_of_an_earlier_run_away(tmp_path):
+    perform(_study(), tmp_path)
+    stale = tmp_path / "tiny" / "stale.npz"
+    stale.touch()
+    perform(_study(), tmp_path, steps=["figure"])
+    assert stale.exists()
+    perform(_study(), tmp_path, steps=["data", "table"])
+    assert not stale.exists()
+
+
 def test_table_alone_uses_the_records_that_are_there(tmp_path):
     perform(_study(), tmp_path, short=True)
     perform(_study(fail="data"), tmp_path, steps=["table"])
