@@ -12,6 +12,8 @@ from .arrays import Bools, Floats, Ints
 from .surface import Surface
 from .topology import Curve
 
+ROUNDING = 1e-12  # of the size: a coordinate below is 0
+
 
 def load_ratio(surface: Surface) -> float:
     """Pressure along Π's normal over the most that tension at the boundary could carry.
@@ -160,7 +162,7 @@ def reactions(surface: Surface) -> Floats:
 
 
 def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
-    """Per junction curve: the forces left per length, and Σ α n of the triangles along it."""
+    """Per junction curve: where it is, the forces left per length, and Σ α n of the triangles along it."""
     topo = surface.topology
     imbalance = np.linalg.norm(conormal_sum(surface), axis=1)
     number = {tuple(edge): i for i, edge in enumerate(topo.edges[_seams(topo)].tolist())}
@@ -173,6 +175,7 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
         rows.append({
             "junction": " | ".join(surface.patches[i].name for i in curve.sheets),
             "length": total,
+            **_middle(surface, curve),
             "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max()) / _mean(lengths),
             "sum_alpha_n_mean": float(imbalance[edges] @ lengths) / total if total else 0.0,
             "sum_alpha_n_max": float(imbalance[edges].max()),
@@ -181,7 +184,7 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
 
 
 def boundary_table(surface: Surface) -> pd.DataFrame:
-    """Per held boundary curve: its length, the force on it, and the largest force per length."""
+    """Per held boundary curve: where it is, the force on it, and the largest force per length."""
     forces = reactions(surface)
     held = surface.fixed | surface.on_plane
     loops = surface.topology.boundary_loops
@@ -200,6 +203,7 @@ def boundary_table(surface: Surface) -> pd.DataFrame:
         rows.append({
             "boundary": " | ".join(surface.patches[i].name for i in curve.sheets),
             "length": float(_segments(surface, curve)[1].sum()),
+            **_middle(surface, curve),
             "reaction_x": float(total[0]), "reaction_y": float(total[1]),
             "reaction_z": float(total[2]),
             "per_length_max": float(per_length[curve.vertices].max()),
@@ -212,6 +216,20 @@ def _segments(surface: Surface, curve: Curve) -> tuple[Ints, Floats]:
     pairs = np.stack([order[:-1], order[1:]], axis=1)
     ends = surface.vertices[pairs]
     return pairs, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+
+def _middle(surface: Surface, curve: Curve) -> dict[str, float]:
+    """The point half way along a curve, or the centre of a closed one: curves of one name apart."""
+    pairs, lengths = _segments(surface, curve)
+    ends = surface.vertices[pairs]
+    if curve.closed:
+        place = lengths @ ends.mean(axis=1) / (lengths.sum() or 1.0)
+    else:
+        along = np.concatenate([[0.0], np.cumsum(lengths)])
+        points = surface.vertices[curve.vertices]
+        place = np.array([np.interp(0.5 * along[-1], along, column) for column in points.T])
+    place = np.where(np.abs(place) <= ROUNDING * surface.size, 0.0, place)
+    return {f"middle_{axis}": float(value) for axis, value in zip("xyz", place, strict=True)}
 
 
 def _seams(topo: Any) -> Bools:

@@ -70,9 +70,10 @@ class Certificate:
     curvature_error : largest |H - H̄|/H̄ by the variational definition.
     quality : smallest triangle quality outside pinched walls; ``walls_quality`` in walls that slide.
     patches : a row a patch: target, area, tension, errors by both definitions, quality.
-    junctions : a row a junction curve: length, forces left and Σ α n, force/length.
-    boundaries : a row a held boundary curve: length, reaction, largest reaction per length. A corner
-        gives each of its curves an equal part of its reaction; per length it counts whole.
+    junctions : a row a junction curve: length, its middle (the centre of a closed one), forces left and
+        Σ α n, force/length.
+    boundaries : a row a held boundary curve: length, middle, reaction, largest reaction per length. A
+        corner gives each of its curves an equal part of its reaction; per length it counts whole.
     load, support : forces along Π's normal, of the pressure and of all supports; they add up to 0
         but for what the mesh leaves along the sheets.
     reactions : (n,3) force that each support exerts on the surface.

@@ -20,6 +20,7 @@ from pcmc import (
 from pcmc.balance import coarseness, conormal_sum, load_ratio
 from pcmc.certificate import Verdict
 from pcmc.energy import patch_areas, volume
+from pcmc.plan import Divider, Plan
 from pcmc.quality import triangle_quality
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
@@ -341,6 +342,26 @@ def test_reactions_are_where_supports_are(squares):
     total = found.boundaries[["reaction_x", "reaction_y", "reaction_z"]].sum()
     np.testing.assert_allclose(total, found.reactions.sum(axis=0), atol=1e-12)
     np.testing.assert_allclose(total[:2], 0.0, atol=1e-9)
+
+
+def test_curves_of_one_name_are_told_apart_by_their_middles():
+    """Three bays: the middle one has a boundary on either side."""
+    walls = [Divider([[x, 0], [x, 4]]) for x in (4, 8)]
+    outline = [[0, 0], [12, 0], [12, 4], [0, 4]]
+    found = certify(Plan(outline, walls, edge_length=1.0, tension=3.0).surface())
+    middles = ["middle_x", "middle_y", "middle_z"]
+    bay = found.boundaries[found.boundaries["boundary"] == "patch 2"]
+    assert sorted(map(tuple, bay[middles].round(9).to_numpy())) == [(6, 0, 0), (6, 4, 0)]
+    assert found.junctions["middle_x"].round(9).tolist() == [4, 8]
+    assert found.junctions["middle_y"].round(9).tolist() == [2, 2]
+    assert (found.junctions["middle_z"] > 0.3).all()
+    assert "middle_x" in str(found)
+
+
+def test_the_middle_of_a_closed_curve_is_its_centre():
+    corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) @ np.diag([3.0, 1.0]) + [5.0, 7.0]
+    row = certify(Plan(corners, edge_length=1.0, tension=3.0).surface()).boundaries.iloc[0]
+    assert row[["middle_x", "middle_y", "middle_z"]].tolist() == pytest.approx([5, 7, 0])
 
 
 def test_supports_carry_the_whole_load_and_the_tension_of_the_rim():
