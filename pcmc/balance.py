@@ -9,6 +9,7 @@ import pandas as pd
 
 from . import kernels
 from .arrays import Bools, Floats, Ints
+from .contact import standing
 from .surface import Surface
 from .topology import Curve
 
@@ -161,6 +162,26 @@ def reactions(surface: Surface) -> Floats:
     return out
 
 
+def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floats:
+    """(n,3) the reactions over the length of held boundary at each vertex; NaN where there is none.
+
+    Half of each boundary edge that is held belongs to either end. ``forces`` (n,3) are by default the
+    surface's own, of what stands of it.
+
+    >>> from pcmc import Patch
+    >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
+    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+    >>> (3 * reactions_per_length(square)).round(9)[1].tolist()  # tension -1, 1; a third of p A = 2
+    [-1.5, 1.5, -1.0]
+    """
+    if forces is None:
+        forces = reactions(standing(surface).surface)
+    share = held_lengths(surface)
+    result = np.full((surface.n, 3), np.nan)
+    result[share > 0.0] = forces[share > 0.0] / share[share > 0.0, None]
+    return result
+
+
 def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
     """Per junction curve: where it is, the forces left per length, and Σ α n of the triangles along it."""
     topo = surface.topology
@@ -193,8 +214,7 @@ def boundary_table(surface: Surface) -> pd.DataFrame:
     for curve in loops:
         count[curve.vertices] += 1.0
     parts = forces / np.maximum(count, 1.0)[:, None]
-    share = held_lengths(surface)
-    per_length = np.linalg.norm(forces, axis=1) / np.where(share > 0.0, share, np.inf)
+    per_length = np.linalg.norm(np.nan_to_num(reactions_per_length(surface, forces)), axis=1)
     rows = []
     for curve in loops:
         if not held[curve.vertices].any():

@@ -108,7 +108,12 @@ def test_remesh_solves_again(solved, capsys):
 def test_convert_and_plot(solved, capsys):
     assert cli.main(["convert", "roof.pcmc", "roof.ply"]) == 0
     assert pcmc.read("roof.ply").m == pcmc.read("roof.pcmc").m
-    for more in (["--colour", "error"], ["--view", "30,20", "--color", "curvature"], []):
+    for more in (
+        ["--colour", "error"],
+        ["--view", "30,20", "--color", "curvature"],
+        ["--colour", "reactions"],
+        [],
+    ):
         (solved / "p.png").unlink(missing_ok=True)
         assert cli.main(["plot", "roof.pcmc", "p.png", *more]) == 0
         assert (solved / "p.png").read_bytes().startswith(b"\x89PNG")

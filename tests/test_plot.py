@@ -13,10 +13,12 @@ import pcmc
 from generators import two_squares
 from pcmc import plot
 from pcmc.errors import FileError, MissingExtra, OptionError
+from pcmc.explore.drawing import fields
 from pcmc.palette import WALLS, patch_colors, rgb
-from pcmc.plot import raster
+from pcmc.plot import raster, supports
 from pcmc.plot.figure import CURVES, finish, new
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
+from pcmc.project import paint
 
 RENDERERS = [
     pytest.param("matplotlib"),
@@ -226,6 +228,28 @@ def test_vectors_point_and_are_thinned():
     assert plot.vectors(many, pcmc.gradient(many), most=50).shape[1] == 900
 
 
+def test_reactions_are_those_of_the_certificate_per_length(monkeypatch, tmp_path):
+    """Half of each boundary edge to either end; the same numbers as the page for exploring has."""
+    surface = two_squares(6)
+    found, drawn = pcmc.certify(surface), []
+    arrows = supports.vectors
+    monkeypatch.setattr(
+        supports, "vectors", lambda s, field, *more, **how: drawn.append(field) or arrows(s, field)
+    )
+    paint(surface, tmp_path / "a.png", "diagonal", "reactions")
+    np.testing.assert_allclose(
+        drawn[0], np.nan_to_num(fields(surface, found, np.zeros(3))["reactions"]), atol=1e-12
+    )
+    most = np.linalg.norm(drawn[0], axis=1).max()
+    assert most == pytest.approx(found.boundaries["per_length_max"].max(), rel=1e-12)
+
+
+def test_reactions_are_arrows(tmp_path):
+    paint(two_squares(6), tmp_path / "r.png", "elevation", "reactions")
+    image = np.asarray(Image.open(tmp_path / "r.png").convert("RGB"))
+    assert near(image, rgb("#B2182B")).sum() > 500
+
+
 def test_curves(tmp_path):
     steps = np.arange(50)
     frame = pd.DataFrame({"evaluation": 2 * steps, "energy": -1.0 + 0.9**steps})
@@ -300,6 +324,9 @@ BAD = {
     "at least one surface": lambda s: plot.panel([]),
     "titles: expected 2": lambda s: plot.panel([s, s], titles=["one"]),
     "views: expected 2": lambda s: plot.panel([s, s], views=["plan"]),
+    "no boundary of the surface is held": lambda s: plot.reactions(
+        pcmc.Surface(s.vertices, s.faces, s.patch_of_face, s.patches, fixed=[0])
+    ),
     r"field: expected finite numbers of shape \(10, 3\)": lambda s: plot.vectors(s, np.zeros(10)),
     "history 'a': unknown column 'enrgy'; did you mean 'energy'": lambda s: plot.histories(
         {"a": pd.DataFrame({"energy": [1.0]})}, y="enrgy"

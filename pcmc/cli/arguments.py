@@ -41,7 +41,10 @@ ViewName = Annotated[
     ),
 ]
 Colour = Annotated[
-    str, typer.Option("--colour", "--color", metavar="NAME", help="patches, curvature or error.")
+    str,
+    typer.Option(
+        "--colour", "--color", metavar="NAME", help="patches, curvature, error or reactions."
+    ),
 ]
 
 

@@ -66,7 +66,7 @@ def plot(
     view: ViewName = "diagonal",
     colour: Colour = "patches",
 ) -> int:
-    """Draw a surface, coloured by patches, mean curvature or its relative error.
+    """Draw a surface, coloured by patches, mean curvature or its relative error; or its reactions.
 
     \b
     Example:

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Bools, Floats
+from ..balance import reactions_per_length
 from ..certificate import Certificate
 from ..curvature import curvature_error, mean_curvature
 from ..energy import patch_areas
@@ -77,22 +78,6 @@ def fields(surface: Surface, found: Certificate, origin: Floats) -> Arrays:
     if len(found.modes):
         arrays["mode"] = found.modes[0] / (np.abs(found.modes[0]).max() or 1.0)
     return arrays
-
-
-def reactions_per_length(surface: Surface, reactions: Floats) -> Floats:
-    """(n,3) force per length along the boundary; NaN where no boundary is held.
-
-    Half of each boundary edge belongs to either end.
-    """
-    topo = surface.topology
-    edges = topo.edges[topo.boundary_edge]
-    ends = surface.vertices[edges]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    share = np.bincount(edges.ravel(), np.repeat(0.5 * length, 2), surface.n)
-    held = (surface.fixed | surface.on_plane) & (share > 0.0)
-    result = np.full((surface.n, 3), np.nan)
-    result[held] = reactions[held] / share[held, None]
-    return result
 
 
 def findings(surface: Surface, found: Certificate) -> dict[str, Any]:

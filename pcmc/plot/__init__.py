@@ -6,5 +6,16 @@ Every function writes a PNG when given a path, and returns the picture as an (h,
 from .curves import convergence, heatmap, histories, lines
 from .diagrams import diagram
 from .pictures import draw, panel, vectors
+from .supports import reactions
 
-__all__ = ["convergence", "diagram", "draw", "heatmap", "histories", "lines", "panel", "vectors"]
+__all__ = [
+    "convergence",
+    "diagram",
+    "draw",
+    "heatmap",
+    "histories",
+    "lines",
+    "panel",
+    "reactions",
+    "vectors",
+]

@@ -24,7 +24,7 @@ from ..surface import Surface
 
 PathLike = str | os.PathLike[str]
 Say = Callable[[str], object]
-COLOURS = ("patches", "curvature", "error")
+COLOURS = ("patches", "curvature", "error", "reactions")
 
 
 def silent(words: str) -> None:
@@ -101,14 +101,20 @@ def _named(temporary: Path, path: Path) -> Iterator[None]:
 
 
 def paint(surface: Surface, path: PathLike, view: Any, colour: str) -> None:
-    """A picture with the patches, the mean curvature (1/length) or its relative error as colours."""
-    from ..plot import draw  # needs the extra plot, which a project without picture does not
+    """A picture with the patches, the mean curvature (1/length) or its relative error as colours, or
+    with the reactions of the supports as arrows."""
+    from ..plot import (
+        draw,
+        reactions,
+    )  # needs the extra plot, which a project without picture does not
 
     check_picture(view, colour)
     if colour == "curvature":
         draw(surface, path, view=view, scalars=mean_curvature(surface), label="mean curvature")
     elif colour == "error":
         draw(surface, path, view=view, scalars=curvature_error(surface), label="curvature error")
+    elif colour == "reactions":
+        reactions(surface, path, view=view)
     else:
         draw(surface, path, view=view, legend=True)
 
