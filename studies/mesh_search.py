@@ -172,8 +172,8 @@ def table(folder: Folder) -> dict[str, float]:
         found[f"meshes_{example}"] = float(len(mine))
         found[f"meets_{example}"] = float((mine.gradient_squared < target).sum())
         found[f"least_{example}"] = float(mine.gradient_squared.min())
-        nearest = (mine.initial_over_printed - 1.0).abs().idxmin()
-        found[f"least_from_nearest_start_{example}"] = mine.least_gradient_squared[nearest]
+        nearest = int(np.abs(mine.initial_over_printed.to_numpy() - 1.0).argmin())
+        found[f"least_from_nearest_start_{example}"] = mine.least_gradient_squared.iloc[nearest]
     far = order[(order.example != "example1") & ~order.meets]
     found["share_near_corners_where_missed"] = float((far[shares[0]] + far[shares[1]]).median())
     return found
