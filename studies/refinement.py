@@ -34,6 +34,7 @@ from generators import (
     two_squares,
 )
 from generators.exact import Exact, Sphere
+from generators.two_caps import LARGE, SMALL
 from pcmc import Surface, solve
 from pcmc.arrays import Floats
 from pcmc.refine import refine
@@ -135,7 +136,7 @@ FAMILIES = (
     Family("example1", "Example 1", _squares, 7),
     Family("example2", "Example 2", two_caps, 7, lengths=(1.2, 0.8, 0.6, 0.4, 0.3, 0.2, 0.19)),
     Family("example2_near", "Example 2, α small 3.2", _near, 6,
-           [(-5.0, 0.0, 6.0), (3.0, 0.0, 4.0)]),
+           [(ball.x, 0.0, ball.floor_radius) for ball in (LARGE, SMALL)]),
     Family("example3", "Example 3", _fans, 6, [(0.0, 0.0, 20.0)]),
     Family("example4", "Example 4", _hall, 6),
 )  # fmt: skip

@@ -193,14 +193,12 @@ def table(folder: Folder) -> dict[str, float]:
 
 def figure(folder: Folder) -> None:
     """Residual against evaluations and against time, a row of panels for each example."""
-    frames = {"evaluations": folder.read_table("histories")}
-    frames["time"] = folder.read_table("histories")
-    frames["time"]["seconds"] = folder.read_table("history_times").seconds
-    for name, (column, label) in {
-        "evaluations": ("evaluation", "evaluations of E and ∇E"),
-        "time": ("seconds", "processor time, s"),
-    }.items():
-        frame = frames[name]
+    seconds = folder.read_table("history_times").seconds
+    frame = folder.read_table("histories").assign(seconds=seconds)
+    for name, column, label in (
+        ("evaluations", "evaluation", "evaluations of E and ∇E"),
+        ("time", "seconds", "processor time, s"),
+    ):
         panels = {
             f"{example.title}, {mine.triangles.iloc[0]} triangles": _curves(mine, column)
             for example in EXAMPLES

@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 
 from generators import four_fans, three_patches, two_caps, two_squares
+from generators.sphere_pair import meeting
 from generators.two_caps import LARGE, SMALL
 from pcmc import Certificate, Surface, certify, solve
 from pcmc.arrays import Floats
@@ -65,11 +66,11 @@ FAMILIES = (
 )  # fmt: skip
 CORNER_LENGTHS = (0.8, 0.6, 0.4, 0.3, 0.2)
 CREST = 6  # edges of the crest, counted from the corner
-# Of Example 2's outlines, circles of radius 6 and 4 with their middles 8 apart, at their upper corner.
+# Example 2's outlines, circles of radius 6 and 4, by middle and radius; and their upper corner.
 OUTLINES = {
     name: ((ball.x, 0.0), ball.floor_radius) for name, ball in (("large", LARGE), ("small", SMALL))
 }
-CORNER = (0.25, 6.0 * math.sin(math.acos(5.25 / 6.0)))
+CORNER = meeting(LARGE, SMALL).points(1)[-1, :2]
 
 
 def data(folder: Folder, short: bool) -> None:
@@ -159,7 +160,7 @@ def _crest(edge_length: float) -> pd.DataFrame:
 def tangent(patch: str) -> Floats:
     """(2,) direction in which a patch's outline leaves the upper corner."""
     centre, radius = OUTLINES[patch]
-    x, y = (np.array(CORNER) - centre) / radius
+    x, y = (CORNER - centre) / radius
     return np.array([-y, x]) if patch == "large" else np.array([y, -x])
 
 
@@ -214,7 +215,8 @@ def _corner(folder: Folder) -> dict[str, float]:
     """The balanced cone beside what the crest's first edge does as the mesh is refined."""
     crest = folder.read_table("crest")
     first = crest[crest.edge == 1]
-    balanced = cone((4.0, 3.0, 4.0), opening())
+    large, small, wall = two_caps(CORNER_LENGTHS[0]).tensions.tolist()
+    balanced = cone((large, small, wall), opening())
     assert balanced is not None
     found = {
         "opening": math.degrees(opening()),

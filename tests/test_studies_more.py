@@ -141,7 +141,7 @@ def test_corner_of_example_2():
     assert math.degrees(stability.opening()) == pytest.approx(284.478, abs=1e-3)
     for patch in stability.OUTLINES:
         centre, radius = stability.OUTLINES[patch]
-        out = np.array(stability.CORNER) - centre
+        out = stability.CORNER - centre
         assert np.linalg.norm(out) == pytest.approx(radius)
         assert out @ stability.tangent(patch) == pytest.approx(0.0, abs=1e-12)
 
