@@ -13,6 +13,7 @@ from .contact import standing
 from .surface import Surface
 from .topology import Curve
 
+HARDLY = 0.99  # of the sum of the others: the largest tension at which two sheets meet at some 20°
 ROUNDING = 1e-12  # of the size: a coordinate below is 0
 
 
@@ -72,26 +73,46 @@ def coarseness(surface: Surface) -> float:
     return float((length.mean() * length.sum() / (2.0 * plan)) ** 2)
 
 
-def unbalanced(standing: Surface, pinchable: Bools) -> str:
+def unbalanced(surface: Surface, pinchable: Bools) -> str:
     """Names a junction whose tensions cannot balance whatever the angles; empty if there is none.
 
     Σ α n = 0 (7) needs the largest tension to be at most the sum of the others. Where a junction is
     held all along, its support takes the difference; a wall that slides on Π and is stronger than its
-    sheets brings its junction down to rest there.
+    sheets brings its junction down to rest there. ``pinchable`` (k,) tells which patches are such walls.
     """
-    held = standing.fixed | standing.on_plane
-    for curve in standing.topology.junctions:
-        strongest = max(curve.sheets, key=lambda patch: standing.tensions[patch])
-        tensions = sorted(standing.tensions[list(curve.sheets)])
-        if pinchable[strongest]:
+    names, strongest, others = _strained(surface, pinchable, 1.0 + 1e-9)
+    if not names:
+        return ""
+    return f"the tensions at the junction {names} cannot balance: {strongest} > {others}"
+
+
+def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
+    """Names a junction whose tensions balance only if its sheets lie nearly on each other, or cannot.
+
+    At the limit, 5 = 4.5 + 0.5, two of three lie on each other, which no mesh can follow. Arguments as
+    of ``unbalanced``.
+    """
+    names, strongest, others = _strained(surface, pinchable, HARDLY)
+    if not names:
+        return ""
+    return (
+        f"the tensions at the junction {names} could balance only with its sheets nearly on each other:"
+        f" {strongest} against {others}"
+    )
+
+
+def _strained(surface: Surface, pinchable: Bools, share: float) -> tuple[str, str, str]:
+    """A junction whose largest tension is over ``share`` of the sum of the others: names and tensions."""
+    held = surface.fixed | surface.on_plane
+    for curve in surface.topology.junctions:
+        strongest = max(curve.sheets, key=lambda patch: surface.tensions[patch])
+        tensions = sorted(surface.tensions[list(curve.sheets)])
+        if pinchable[strongest] or held[curve.vertices].all():
             continue
-        if tensions[-1] > sum(tensions[:-1]) * (1.0 + 1e-9) and not held[curve.vertices].all():
-            names = " | ".join(standing.patches[i].name for i in curve.sheets)
-            others = " + ".join(f"{tension:g}" for tension in tensions[:-1])
-            return (
-                f"the tensions at the junction {names} cannot balance: {tensions[-1]:g} > {others}"
-            )
-    return ""
+        if tensions[-1] > share * sum(tensions[:-1]):
+            names = " | ".join(surface.patches[i].name for i in curve.sheets)
+            return names, f"{tensions[-1]:g}", " + ".join(f"{t:g}" for t in tensions[:-1])
+    return "", "", ""
 
 
 def seen_from_point(surface: Surface) -> str:

@@ -16,6 +16,7 @@ from .arrays import Bools, Floats, Ints
 from .balance import (
     boundary_table,
     coarseness,
+    hardly_balanced,
     junction_table,
     load,
     load_ratio,
@@ -235,6 +236,7 @@ def _verdict(
 ) -> tuple[Verdict, str]:  # fmt: skip
     if not surface.tensions.any():
         return Verdict.NEUTRAL, "no patch has a tension: every shape is at rest"
+    strained = hardly_balanced(surface, sliding) if residual > tolerance else ""
     if residual > tolerance:
         too_strong = unbalanced(surface, sliding)
         if too_strong:
@@ -252,9 +254,13 @@ def _verdict(
         if status == "VANISHED":
             return Verdict.NO_EQUILIBRIUM, "nothing holds the surface, and it shrinks to nothing"
     if status == "DEGENERATE" or quality <= COLLAPSED:
-        return Verdict.DEGENERATE, where_collapsed(surface, sliding)
+        return Verdict.DEGENERATE, "; ".join(
+            filter(None, (strained, where_collapsed(surface, sliding)))
+        )
     if residual > tolerance or system is None:
         why = f"relative residual {residual:.1e}, asked {tolerance:.0e}"
+        if strained:
+            why += f"; {strained}"
         if ratio > 1.0:
             why += (
                 f"; the pressure is {ratio:.3f} times what the boundary's tension could carry: a"

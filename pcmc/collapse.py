@@ -36,7 +36,7 @@ def where_collapsed(surface: Surface, sliding: Bools) -> str:
             "; the junction there comes down on the held bottom of its wall, which leaves the wall no"
             " height: a weaker wall stands, and one whose bottom slides may rest on the plane"
         )
-    if _slips(surface, place, REACH * edge):
+    if _slips(surface, sliding, place, REACH * edge):
         said += (
             "; the junction there slips along a support, which does not hold its end: hold the bottom"
             " of its wall"
@@ -57,7 +57,7 @@ def _height(surface: Surface, patch: int) -> float:
     return float(np.min(cKDTree(X[bottom]).query(X[top])[0]))
 
 
-def _slips(surface: Surface, place: Floats, reach: float) -> bool:
+def _slips(surface: Surface, sliding: Bools, place: Floats, reach: float) -> bool:
     """Whether near a place a junction slides on a support next to its fixed end, or lies along it."""
     X, topo = surface.vertices, surface.topology
     near = np.linalg.norm(X - place, axis=1) <= reach
@@ -68,7 +68,7 @@ def _slips(surface: Surface, place: Floats, reach: float) -> bool:
         return True
     held = topo.edges[topo.boundary_edge & surface.fixed[topo.edges].all(axis=1)]
     for curve in topo.junctions:
-        if near[curve.vertices].any() and not curve.closed:
+        if near[curve.vertices].any() and sliding[list(curve.sheets)].any() and not curve.closed:
             for end, beside in (curve.vertices[:2], curve.vertices[:-3:-1]):
                 if surface.fixed[end] and _along(X, held, int(end), int(beside)):
                     return True

@@ -38,6 +38,10 @@ class PlanWarning(UserWarning):
     """A plan can be meshed, but its roof will hardly come to rest."""
 
 
+class BalanceWarning(UserWarning):
+    """The tensions at a junction cannot balance, whatever its shape."""
+
+
 class SweepError(PcmcError):
     """The executor, scheduler or workers of a sweep failed; the cases stored before are safe."""
 

@@ -16,8 +16,10 @@ import pandas as pd
 import pytest
 
 import pcmc
+from generators import two_squares
 from pcmc import cli
 from pcmc.io import load
+from pcmc.project import running
 from tests.test_project import SMALL
 
 HOME = Path(__file__).resolve().parent.parent
@@ -117,6 +119,21 @@ def test_convert_and_plot(solved, capsys):
         (solved / "p.png").unlink(missing_ok=True)
         assert cli.main(["plot", "roof.pcmc", "p.png", *more]) == 0
         assert (solved / "p.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_tensions_that_cannot_balance_are_told_before_solving(folder, capsys, monkeypatch):
+    pcmc.write("two.pcmc", two_squares(4, alpha_aux=1.0))
+    said = []
+    settle = running.settle
+    monkeypatch.setattr(
+        running, "settle", lambda *given: said.append(capsys.readouterr().err) or settle(*given)
+    )
+    assert cli.main(["solve", "two.pcmc", "--tension", "left=4"]) == 1
+    assert "note: the tensions at the junction left | right | wall cannot balance: 4 > " in said[0]
+    assert "unless the junction rests on the plane; solving all the same" in said[0]
+    assert "no equilibrium" in capsys.readouterr().out
+    assert cli.main(["solve", "two.pcmc", "--tension", "wall=9"]) == 0  # the wall comes down
+    assert said[1] == ""
 
 
 def test_sweep(folder, capsys):

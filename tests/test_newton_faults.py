@@ -330,6 +330,17 @@ def test_tensions_that_cannot_balance_are_named(backend, target, right, wall):
 
 
 @TARGETS
+@pytest.mark.parametrize("right", [3.0, 3.02])
+def test_tensions_at_the_limit_of_balance_are_named(backend, target, right):
+    """Where 4 = 3 + 1, the weaker patch and the wall would have to lie on each other."""
+    surface = two_squares(4, alpha_aux=1.0).retensioned({"left": 4.0, "right": right})
+    found = solve(surface, target=target, backend=backend).certificate
+    assert found.verdict in (Verdict.DEGENERATE, Verdict.NOT_CONVERGED)
+    assert "junction left | right | wall could balance only with its sheets nearly" in found.detail
+    assert f"4 against 1 + {right:g}" in found.detail
+
+
+@TARGETS
 def test_a_wall_that_outweighs_its_sheets_comes_down(backend, target):
     """No angle balances 9 against 4 and 4, but Π takes the rest."""
     surface = two_squares(4, alpha_aux=9.0).retensioned({"left": 4.0, "right": 4.0})

@@ -9,7 +9,14 @@ from collections.abc import Callable, Sequence
 from types import ModuleType
 from typing import Any
 
-from ..errors import FileWarning, FreeSurfaceWarning, MissingExtra, PcmcError, PlanWarning
+from ..errors import (
+    BalanceWarning,
+    FileWarning,
+    FreeSurfaceWarning,
+    MissingExtra,
+    PcmcError,
+    PlanWarning,
+)
 from ..interrupts import endings
 from .codes import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
@@ -33,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for kind in (FileWarning, FreeSurfaceWarning, PlanWarning):
+        for kind in (BalanceWarning, FileWarning, FreeSurfaceWarning, PlanWarning):
             warnings.simplefilter("always", kind)
         warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")
         _any_letter(sys.stdout)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..balance import unbalanced
 from ..certificate import Certificate
-from ..errors import OptionError, PcmcError
+from ..contact import walls
+from ..errors import BalanceWarning, OptionError, PcmcError
 from ..files import folder as made
 from ..remesh import remesh
 from ..solvers import solve
@@ -69,6 +72,10 @@ def run(
     Raises
     ------
     FileError, PlanError, OptionError : in one line, with the file; nothing is written then.
+
+    Warns
+    -----
+    BalanceWarning : before solving, where the tensions at a junction cannot balance.
     """
     project = load(path)
     return carry_out(
@@ -87,7 +94,9 @@ def carry_out(
     check_outputs(outputs, project.folder)
     say("reading" if project.plan is None else "meshing the plan")
     start = surface_of(project)
-    outcome = settle(project, start if changed is None else changed(start), say)
+    start = start if changed is None else changed(start)
+    _check_balance(start)
+    outcome = settle(project, start, say)
     if not outputs or not (outcome.good or anyway):
         return outcome
     with made(project.folder or Path()):
@@ -96,6 +105,15 @@ def carry_out(
             view=project.view, colour=project.colour, progress=say,
         )  # fmt: skip
     return replace(outcome, files=written)
+
+
+def _check_balance(surface: Surface) -> None:
+    """Say before a long search what the tensions alone tell; it is made all the same."""
+    pinchable = walls(surface).pinchable
+    found = unbalanced(surface, pinchable)
+    if found:
+        unless = ", unless the junction rests on the plane" if pinchable.any() else ""
+        warnings.warn(f"{found}{unless}; solving all the same", BalanceWarning, stacklevel=3)
 
 
 def settle(project: Project, surface: Surface, progress: Say | None = None) -> Outcome:
