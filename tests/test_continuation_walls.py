@@ -1,5 +1,6 @@
 """Branches of several patches: changes of index, walls that come down to the plane, new meshes."""
 
+import numpy as np
 import pytest
 from branches import tension_of_height
 
@@ -7,6 +8,8 @@ from generators import four_fans, two_caps, two_squares
 from pcmc import Direction, certify, follow, solve
 from pcmc.contact import pull_and_capacity, standing
 from pcmc.continuation import Ending
+from pcmc.plan import Divider, Plan
+from pcmc.rooms import pressed
 
 
 def test_walls_of_the_fans_lose_stability_in_two_directions_at_once():
@@ -133,3 +136,36 @@ def test_new_mesh_does_not_leap_over_a_goal(small_cap):
     met = follow(small_cap, "cap", until={"volume": goal}, steps=4, **options)
     assert met.ending is Ending.REACHED
     assert met.points.volume.iloc[-1] == pytest.approx(goal, rel=1e-9)
+
+
+def two_rooms(x, y):
+    """Two rooms with a wall between, the plan's corner at (x, y)."""
+    outline = [[x, y], [x + 8, y], [x + 8, y + 4], [x, y + 4]]
+    wall = Divider([[x + 4, y], [x + 4, y + 4]], wall=1.5, bottom="held")
+    rooms = {"west": {"tension": 4.0}, "east": {"tension": 4.0}}
+    return solve(Plan(outline, [wall], edge_length=1.0, patches=rooms).surface()).surface
+
+
+def test_a_branch_in_one_rooms_pressure_does_not_depend_on_where_the_plan_is_drawn():
+    direction = Direction(pressures={"west": 1.0})
+    here, there = (follow(two_rooms(*at), direction, 1.3) for at in ((0, 0), (40, 7)))
+    assert here.ending is there.ending is Ending.REACHED
+    for name in ("height", "volume", "energy", "lowest_eigenvalue"):
+        np.testing.assert_allclose(here.points[name], there.points[name], rtol=1e-8)
+    end = here.points.iloc[-1]
+    assert end["pressure wall 1"] == pytest.approx(0.3, rel=1e-12)
+    assert here.last.walls.tolist() == [False, False, True]
+    assert certify(here.last).detail == ""
+    direct = solve(pressed(two_rooms(0, 0), None, {"west": 1.3}))
+    assert direct.energy == pytest.approx(end["energy"], rel=1e-4)
+    named = Direction(pressures={"west": 1.0, "wall 1": 0.5}, relative=True)
+    assert named.line(two_rooms(0, 0)).pressure_rates.tolist() == [1.0, 0.0, 0.5]
+
+
+def test_a_wall_that_follows_its_rooms_stays_a_wall():
+    start = two_squares(4)
+    line = Direction(pressures={"left": 1.0}).line(start)
+    changed = line.applied(start, 1.25)
+    assert abs(changed.pressures[2]) == 0.25
+    assert changed.walls.tolist() == start.walls.tolist() == [False, False, True]
+    assert not changed.uncancelled.any()

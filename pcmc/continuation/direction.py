@@ -18,6 +18,7 @@ from .. import kernels
 from ..arrays import Floats
 from ..energy import apply_supports
 from ..errors import OptionError
+from ..rooms import following
 from ..surface import Surface
 
 EQUAL = 1e-9  # relative difference up to which two tensions give the same λ
@@ -30,7 +31,8 @@ class Direction:
     Parameters
     ----------
     tensions : weight w_i by patch name.
-    pressures : weight u_i by patch name.
+    pressures : weight u_i by patch name. Walls that are not named follow the rooms that they stand
+        between, as in ``pcmc.rooms.pressed``.
     relative : False: what is named is λ times its weight, α_i = w_i λ, so that ``{"roof": 1.0}`` is
         the tension of "roof" itself. True: counted from where the surface starts, α_i = α_i(start)
         + w_i λ with λ = 0 there.
@@ -78,6 +80,7 @@ class Direction:
         w = _rates(surface, self.tensions)
         u = _rates(surface, self.pressures)
         value = 0.0 if self.relative else _common_value(surface, w, u)
+        u = u + following(surface, u, {surface.patch_index(name) for name in self.pressures})
         line = Line(value, surface.tensions - w * value, surface.pressures - u * value, w, u)
         if not (surface.tensions[w != 0.0] > 0.0).all():
             name = surface.patches[int(np.argmax((w != 0.0) & (surface.tensions <= 0.0)))].name
@@ -122,9 +125,11 @@ class Line:
     def applied(self, surface: Surface, value: float) -> Surface:
         """The surface with its tensions and pressures at λ."""
         names = [p.name for p in surface.patches]
+        walls = [n for i, n in enumerate(names) if surface.walls[i] and self.pressure_rates[i]]
         return surface.retensioned(
             {n: self.tensions[i] + w * value for i, n in enumerate(names) if (w := self.tension_rates[i])},
             {n: self.pressures[i] + u * value for i, n in enumerate(names) if (u := self.pressure_rates[i])},
+            walls,
         )  # fmt: skip
 
     def columns(self, surface: Surface, value: float) -> dict[str, float]:
