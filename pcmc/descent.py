@@ -123,12 +123,16 @@ class Carrier:
         self._led = (frame.kind != SHEET) | surface.fixed
         self._weight = np.where(self._led[used], PIN * data[diagonal], 0.0)
         data[diagonal] += self._weight
+        # to a diagonal of ones: beside held vertices of thin triangles no pivot then looks like zero
+        self._scale = 1.0 / np.sqrt(data[diagonal])
+        data *= np.repeat(self._scale, np.diff(kept.indptr)) * self._scale[kept.indices]
         self._factor = factoriser(kept, backend).factor(data)
 
     def carry(self, space: MotionSpace, motion: Floats) -> Floats:
         """The motion (n,3) with the sheets' vertices carried along."""
         lead = np.where(self._led[:, None], motion, 0.0)[self._used]
         follow = np.zeros_like(motion)
-        follow[self._used] = self._factor.solve(self._weight[:, None] * lead)
+        pull = (self._scale * self._weight)[:, None] * lead
+        follow[self._used] = self._scale[:, None] * self._factor.solve(pull)
         follow[self._led] = 0.0
         return motion + follow - space.project(follow)

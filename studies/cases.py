@@ -30,17 +30,25 @@ def run_sweep(
 
     Raises
     ------
-    SweepError : the run was stopped (Ctrl-C), and is not complete.
+    SweepError : the run was stopped (Ctrl-C), and is not complete; or a case raised, was killed or
+        timed out: a table would have holes. The study's next run tries it again.
     """
     store = folder.path / "build" / f"{name}-{sweep.fingerprint[:8]}.jsonl"
     store.parent.mkdir(parents=True, exist_ok=True)
-    table = run(sweep, store, workers=workers, time_limit=limit)
+    table = run(sweep, store, workers=workers, time_limit=limit, retry_failed=True)
     if len(table) < len(sweep):
         raise SweepError(
             f"{name}: {len(table)} of {len(sweep)} cases are done and kept in {store}; run the"
             " study again to go on from there"
         )
-    times = provenance(read_store(store))[["wall_time"]].round(3)
+    records = read_store(store)
+    if failed := [record for record in records if record.failed]:
+        first = failed[0]
+        raise SweepError(
+            f"{name}: {len(failed)} of {len(sweep)} cases failed; case {first.case} {first.status}:"
+            f" {first.message}; the output of all is kept in {store}"
+        )
+    times = provenance(records)[["wall_time"]].round(3)
     folder.write_table(f"{name}_times", times.reset_index())
     for path in (store, *scratch):
         path.unlink()

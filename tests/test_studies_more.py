@@ -62,6 +62,15 @@ def test_an_incomplete_sweep_is_an_error_that_says_how_to_go_on(tmp_path, monkey
         run_sweep(Folder(tmp_path), "halves", HALVES)
 
 
+def test_a_case_that_fails_stops_a_study_and_is_tried_again_by_the_next(tmp_path):
+    broken = sweep.Sweep("pcmc.sweep.examples:ratio", {"over": [1, 2]}, {"under": 0})
+    for lines in (3, 5):  # a header, and two records a run
+        with pytest.raises(SweepError, match=r"2 of 2 cases failed; case 0 raised: ZeroDivision"):
+            run_sweep(Folder(tmp_path), "halves", broken, workers=1)
+        (store,) = (tmp_path / "build").iterdir()
+        assert len(store.read_text().splitlines()) == lines
+
+
 # -------------------------------------------------------------------------------------- orders
 
 

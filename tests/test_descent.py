@@ -1,0 +1,27 @@
+"""Sheets carried along with their curves, and the way down that is smooth."""
+
+import numpy as np
+import pytest
+from shapes import disc
+
+from pcmc import Patch, Surface
+from pcmc.descent import Carrier
+from pcmc.factor import available
+from pcmc.motion import motion_space, structure
+
+
+@pytest.mark.parametrize("backend", available())
+@pytest.mark.parametrize("gap", [1e-2, 1e-7])
+def test_sheets_are_carried_along_rigidly_however_thin_a_triangle_beside_the_boundary(backend, gap):
+    flat, F = disc(4)
+    X = np.column_stack([flat, np.zeros(len(flat))])
+    rim = np.linalg.norm(X, axis=1) > 0.99
+    inside = int(np.flatnonzero(~rim)[np.linalg.norm(X[~rim] - X[rim][0], axis=1).argmin()])
+    X[inside] = X[rim][0] + gap * (X[inside] - X[rim][0])
+    film = Surface(X, F, np.zeros(len(F), int), [Patch("film", 1.0)], fixed=rim)
+    frame = structure(film)
+    shift = np.array([0.3, -0.2, 0.0])
+    carried = Carrier(film, frame, X, backend).carry(
+        motion_space(film, frame, X), np.where(rim[:, None], shift, 0.0)
+    )
+    np.testing.assert_allclose(carried, np.broadcast_to(shift, X.shape), atol=1e-5)
