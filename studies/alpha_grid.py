@@ -65,10 +65,14 @@ def table(folder: Folder) -> dict[str, float]:
         "wall_small": wall <= 2.0,
         "wall_large": wall >= 8.0,
     }
+    classes |= {
+        f"{name}_at_4": classes[name] & (wall == 4.0) for name in ("equal", "slightly_smaller")
+    }
     found = {name: float(records.converged[mask].mean()) for name, mask in classes.items()}
     low = (records.alpha_large <= 2.0) | (records.alpha_small <= 2.0)
     return found | {
         "cases": len(records),
+        "iterations": records.iterations_taken.max(),
         "converged": float(records.converged.sum()),
         "failed_low": float(records.failed[low].mean()),
         "failed_high": float(records.failed[~low].mean()),
