@@ -235,7 +235,11 @@ def table(folder: Folder) -> dict[str, float]:
     claim = _claim(records)
     folder.write_table("fig09", claim)
     ok = records[records.status == "converged"]
-    found = {f"order_{r['quantity']}_{r['family']}": float(r["order"]) for r in rows}
+    found = {
+        f"{what}_{r['quantity']}_{r['family']}": float(r[what])
+        for r in rows
+        for what in ("order", "standard_error")
+    }
     return found | {
         **claim.filter(like="fig9_").iloc[0].to_dict(),
         "largest_variational_error": float(ok.largest_error_variational.max()),
