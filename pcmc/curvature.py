@@ -72,10 +72,7 @@ def curvature_error(surface: Surface, method: Method = "cotangent") -> Floats:
 
 def _within_one_sheet(surface: Surface) -> Bools:
     """(n,) vertices off boundaries and junctions, and where sheets do not just touch."""
-    topo = surface.topology
-    return topo.interior & (
-        kernels.fans(surface.faces, topo.edge_of_face, topo.edges, surface.n) == 1
-    )
+    return surface.topology.interior & (surface.topology.fans == 1)
 
 
 def _star(surface: Surface) -> tuple[Floats, Floats, Floats]:

@@ -127,7 +127,7 @@ def structure(surface: Surface, crest: Ints | None = None, level: Bools | None =
         links = np.concatenate([links[~np.isin(links[:, 0], crest[:, 0])], crest])
     curve, beside = curve_neighbours(links, surface.n)
     kind = vertex_kind(links[:, 0], surface.n)
-    shared = kernels.fans(faces, topo.edge_of_face, topo.edges, surface.n) > 1
+    shared = topo.fans > 1
     if crest is not None:
         shared[crest[:, 0]] = False
     kind[shared] = POINT

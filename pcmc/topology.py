@@ -68,6 +68,17 @@ class Topology:
         return (self.valence == 2) & (total != 0.0)
 
     @cached_property
+    def fans(self) -> Ints:
+        """(n,) int: how many parts the triangles around each vertex fall into that share no edge there.
+
+        1 within a sheet and along curves, 2 where two sheets just touch, 0 for a vertex of no triangle.
+        """
+        from .kernels import fans  # numba, at run time: many surfaces never ask
+
+        count: Ints = fans(self.faces, self.edge_of_face, self.edges, self.vertex_count)
+        return count
+
+    @cached_property
     def boundary_edge(self) -> Bools:
         """(e,) bool: edges of a single triangle."""
         return self.valence == 1

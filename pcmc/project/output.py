@@ -103,10 +103,8 @@ def _named(temporary: Path, path: Path) -> Iterator[None]:
 def paint(surface: Surface, path: PathLike, view: Any, colour: str) -> None:
     """A picture with the patches, the mean curvature (1/length) or its relative error as colours, or
     with the reactions of the supports as arrows."""
-    from ..plot import (
-        draw,
-        reactions,
-    )  # needs the extra plot, which a project without picture does not
+    # needs the extra plot, which a project without picture does not
+    from ..plot import draw, reactions
 
     check_picture(view, colour)
     if colour == "curvature":
