@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pcmc.arrays import Floats
+from pcmc.base.arrays import Floats
 
 _FINE = 2001  # samples that measure a curve's length: relative error below 1e-6
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from pcmc import Patch, Surface
-from pcmc.arrays import Floats, Ints
+from pcmc.base.arrays import Floats, Ints
 
 from .bezier import chain
 from .building import Builder

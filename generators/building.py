@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from pcmc import Patch, Surface
-from pcmc.arrays import Floats, Ints
-from pcmc.errors import FreeSurfaceWarning
+from pcmc.base.arrays import Floats, Ints
+from pcmc.base.errors import FreeSurfaceWarning
 
 from .strips import numbered, strips
 

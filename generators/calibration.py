@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from pcmc import Surface, gradient
-from pcmc.errors import OptionError, unknown
+from pcmc.base.errors import OptionError, unknown
 
 from .bezier_hall import bezier_hall
 from .four_fans import four_fans

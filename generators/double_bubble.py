@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Patch, Surface
-from pcmc.arrays import Floats, Ints
-from pcmc.errors import OptionError
+from pcmc.base.arrays import Floats, Ints
+from pcmc.base.errors import OptionError
 
 from .building import Builder
 from .exact import Exact, Sphere, UprightPlane

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import splu
 
-from pcmc.arrays import Bools, Floats, Ints
+from pcmc.base.arrays import Bools, Floats, Ints
 
 ITERATIONS = 100
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcmc import Surface
-from pcmc.arrays import Floats
+from pcmc.base.arrays import Floats
 
 
 @dataclass(frozen=True)

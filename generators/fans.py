@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Patch, Surface
-from pcmc.arrays import Floats, Ints
-from pcmc.errors import OptionError, unknown
+from pcmc.base.arrays import Floats, Ints
+from pcmc.base.errors import OptionError, unknown
 
 from .building import Builder
 from .drape import soap_film

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcmc import Patch, Surface
-from pcmc.errors import OptionError
+from pcmc.base.errors import OptionError
 
 from .exact import Exact, Sphere, UprightPlane
 from .options import positive

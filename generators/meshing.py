@@ -13,8 +13,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.spatial import Delaunay, cKDTree
 
-from pcmc.arrays import Bools, Floats, Ints
-from pcmc.errors import OptionError
+from pcmc.base.arrays import Bools, Floats, Ints
+from pcmc.base.errors import OptionError
 
 CLEARANCE = 0.65  # of the spacing: where the lattice ends before an outline
 SWEEPS, PUSHES = 4, 5  # triangulations, and steps on each; more gain nothing

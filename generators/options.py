@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 
-from pcmc.errors import OptionError
+from pcmc.base.errors import OptionError
 
 
 def positive(value: float, name: str) -> float:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcmc.arrays import Floats, Ints
+from pcmc.base.arrays import Floats, Ints
 
 from .strips import numbered, strips
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Patch, Surface
-from pcmc.arrays import Floats, Ints
+from pcmc.base.arrays import Floats, Ints
 
 from .building import Builder
 from .exact import Exact, Sphere

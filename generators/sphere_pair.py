@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcmc.arrays import Floats, Ints
-from pcmc.errors import OptionError
+from pcmc.base.arrays import Floats, Ints
+from pcmc.base.errors import OptionError
 
 from .building import Builder
 from .meshing import fill

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Patch, Surface
-from pcmc.errors import OptionError
+from pcmc.base.errors import OptionError
 
 from .building import Builder
 from .exact import Exact, Sphere

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pcmc.arrays import Bools, Ints
+from pcmc.base.arrays import Bools, Ints
 
 
 def strips(line_vertices: Ints, segments: Ints, mirrored: Bools | None = None) -> Ints:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pcmc import Patch, Surface
-from pcmc.errors import OptionError, unknown
+from pcmc.base.errors import OptionError, unknown
 
 from .options import positive
 from .sphere_pair import Ball, build_pair

@@ -5,8 +5,9 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from . import explore
-from .curvature import curvature_error, mean_curvature, target_curvature
-from .energy import energy, gradient, hessian
+from .base import errors
+from .energy.curvature import curvature_error, mean_curvature, target_curvature
+from .energy.functional import energy, gradient, hessian
 from .solvers import solve
 from .surface import Patch, Plane, Surface
 
@@ -29,6 +30,7 @@ __all__ = [
     "certify",
     "curvature_error",
     "energy",
+    "errors",
     "explore",
     "follow",
     "gradient",

@@ -9,7 +9,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from pcmc.errors import MissingExtra, PcmcError
+from pcmc.base.errors import MissingExtra, PcmcError
 
 from .registry import STUDIES, chosen, of_the_paper
 from .study import STEPS, Study

@@ -13,10 +13,10 @@ import pandas as pd
 
 from generators import two_caps
 from pcmc import Surface, certify, solve
-from pcmc.arrays import Bools, Floats
+from pcmc.base.arrays import Bools, Floats
+from pcmc.base.errors import SurfaceError
 from pcmc.continuation import Branch, Direction, Ending, follow
-from pcmc.errors import SurfaceError
-from pcmc.refine import refine
+from pcmc.meshing.refinement import refine
 from pcmc.solvers.result import Progress, Result
 
 PATCHES = ("wall", "large", "small")

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pcmc.arrays import Bools, Floats
+from pcmc.base.arrays import Bools, Floats
 from pcmc.sweep import Sweep, solve_case
 
 from .alpha_grid import AXES, CONVERGED, EDGE_LENGTH, FAILED, TENSIONS, flow_grid

@@ -20,8 +20,8 @@ from rich.table import Table
 
 from generators import two_squares
 from pcmc import Surface
-from pcmc.arrays import Floats
-from pcmc.energy import energy_and_gradient
+from pcmc.base.arrays import Floats
+from pcmc.energy.functional import energy_and_gradient
 
 from .benchmark_explore import EXPLORE
 from .benchmark_solver import SOLVER

@@ -15,11 +15,11 @@ import numpy as np
 
 from generators import two_squares
 from pcmc import Surface, certify, solve
-from pcmc.arrays import Floats
-from pcmc.assemble import Pattern, assemble, pattern
-from pcmc.energy import energy_and_gradient
-from pcmc.factor import Factoriser, available, factoriser
-from pcmc.motion import Structure, motion_space, structure
+from pcmc.base.arrays import Floats
+from pcmc.energy.functional import energy_and_gradient
+from pcmc.energy.motion_space import Structure, motion_space, structure
+from pcmc.energy.projected_hessian import Pattern, assemble, pattern
+from pcmc.stability.factorisation import Factoriser, available, factoriser
 
 from . import evolver
 from .timing import Row, median, median_seconds, peak_bytes

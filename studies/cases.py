@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from pcmc.errors import SweepError
+from pcmc.base.errors import SweepError
 from pcmc.sweep import Sweep, provenance, read_store, run
 
 from .folder import Folder

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from pcmc.arrays import Floats
+from pcmc.base.arrays import Floats
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from pcmc import Surface
-from pcmc.arrays import Floats, Ints
-from pcmc.palette import patch_colors
+from pcmc.base.arrays import Floats, Ints
+from pcmc.surface.colours import patch_colors
 
 PIXELS = 78.0  # a unit of length
 LEFT, GAP, RIGHT, TITLE, FOOT = 70.0, 60.0, 20.0, 40.0, 60.0  # pixels around the axes

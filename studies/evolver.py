@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 import pcmc
-from pcmc.arrays import Floats
-from pcmc.energy import apply_supports
+from pcmc.base.arrays import Floats
+from pcmc.energy.functional import apply_supports
 
 PROGRAM = "evolver"
 

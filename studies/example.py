@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from pcmc import Surface, curvature_error
-from pcmc.arrays import Floats
-from pcmc.curvature import METHODS
+from pcmc.base.arrays import Floats
+from pcmc.energy.curvature import METHODS
 
 from .flow import errors, external_area
 from .folder import Folder

@@ -9,19 +9,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pcmc import (
-    Surface,
-    curvature_error,
-    gradient,
-    kernels,
-    mean_curvature,
-    solve,
-    target_curvature,
-)
-from pcmc.arrays import Floats, Ints
-from pcmc.curvature import METHODS
-from pcmc.energy import patch_areas
-from pcmc.quality import minimum_angle, triangle_quality
+from pcmc import Surface, curvature_error, gradient, mean_curvature, solve, target_curvature
+from pcmc.base.arrays import Floats, Ints
+from pcmc.energy import kernels
+from pcmc.energy.curvature import METHODS
+from pcmc.energy.functional import patch_areas
+from pcmc.meshing.quality import minimum_angle, triangle_quality
 from pcmc.solvers.result import Progress
 
 from .flow_case import PAPER

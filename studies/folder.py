@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 
 from pcmc import Patch, Plane, Surface
-from pcmc.errors import FileError
-from pcmc.files import whole
+from pcmc.base.errors import FileError
+from pcmc.base.files import whole
 
 FLOATS = "%.10g"  # enough to compare with what is printed, few enough to read
 

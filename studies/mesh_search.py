@@ -15,8 +15,8 @@ import pandas as pd
 
 from generators import bezier_hall, four_fans, two_caps, two_squares
 from pcmc import Surface, gradient, solve
-from pcmc.arrays import Bools
-from pcmc.quality import triangle_quality
+from pcmc.base.arrays import Bools
+from pcmc.meshing.quality import triangle_quality
 from pcmc.solvers.result import Result
 
 from .flow import Case, Watch, describe, ending, measured_vertices, settings

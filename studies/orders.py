@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import curve_fit
 from scipy.stats import linregress
 
-from pcmc.arrays import Floats
+from pcmc.base.arrays import Floats
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from typing import Any
 
 import pandas as pd
 
-from pcmc.errors import FileError
+from pcmc.base.errors import FileError
 
 PAPER = Path(__file__).with_name("paper.toml")
 HOLDS, NEAR, DIFFERS, MISSING = "reproduced", "near", "differs", "not measured"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from pcmc.errors import FileError
+from pcmc.base.errors import FileError
 
 from .folder import Folder, write_bytes
 from .report import FIGURES, HEADS, comparison_cells, figure_cells, given_sentence

@@ -36,8 +36,8 @@ from generators import (
 from generators.exact import Exact, Sphere
 from generators.two_caps import LARGE, SMALL
 from pcmc import Surface, solve
-from pcmc.arrays import Floats
-from pcmc.refine import refine
+from pcmc.base.arrays import Floats
+from pcmc.meshing.refinement import refine
 from pcmc.solvers.result import Result
 
 from .flow import errors

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from pcmc.errors import OptionError, unknown
+from pcmc.base.errors import OptionError, unknown
 
 from . import (
     alpha_grid,

@@ -22,7 +22,7 @@ from generators import four_fans, three_patches, two_caps, two_squares
 from generators.sphere_pair import meeting
 from generators.two_caps import LARGE, SMALL
 from pcmc import Certificate, Surface, certify, solve
-from pcmc.arrays import Floats
+from pcmc.base.arrays import Floats
 
 from .cone import cone
 from .folder import Folder

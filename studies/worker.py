@@ -10,7 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from pcmc.errors import MissingExtra, PcmcError
+from pcmc.base.errors import MissingExtra, PcmcError
 
 from .registry import chosen
 from .study import STEPS, perform

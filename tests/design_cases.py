@@ -9,7 +9,7 @@ import pcmc
 from generators import spherical_cap
 from pcmc.design.quantities import measure
 from pcmc.plan import plan_from
-from pcmc.rooms import pressed
+from pcmc.surface.wall_pressures import pressed
 
 TIGHT = {"tolerance": 1e-13, "care": 0.0}
 

@@ -5,10 +5,10 @@ import pytest
 from motion_cases import SURFACES, seam
 
 from pcmc import hessian
-from pcmc.assemble import assemble, pattern
-from pcmc.motion import motion_space, structure
+from pcmc.energy.motion_space import motion_space, structure
+from pcmc.energy.projected_hessian import assemble, pattern
 
-pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
 
 def ready(surface, crest=None):

@@ -12,7 +12,7 @@ import pytest
 
 from generators import two_squares
 from pcmc import hessian
-from pcmc.motion import motion_space, structure
+from pcmc.energy.motion_space import motion_space, structure
 from pcmc.sweep import Sweep
 from studies import benchmark, benchmark_explore, benchmark_solver, benchmark_sweep, evolver
 from studies.__main__ import main

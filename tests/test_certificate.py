@@ -7,23 +7,14 @@ from shapes import pyramid, shaken, three_patches
 from starts import double_bubble, four_fans, joined_caps, sphere, spherical_cap, two_squares
 
 from generators import spherical_cap_exact
-from pcmc import (
-    Patch,
-    Surface,
-    certify,
-    curvature_error,
-    energy,
-    gradient,
-    mean_curvature,
-    solve,
-)
-from pcmc.balance import coarseness, conormal_sum, load_ratio
-from pcmc.certificate import Verdict
-from pcmc.energy import patch_areas, volume
+from pcmc import Patch, Surface, certify, curvature_error, energy, gradient, mean_curvature, solve
+from pcmc.certificate.balance import coarseness, conormal_sum, load_ratio
+from pcmc.certificate.certificate import Verdict
+from pcmc.energy.functional import patch_areas, volume
+from pcmc.meshing.quality import triangle_quality
 from pcmc.plan import Divider, Plan
-from pcmc.quality import triangle_quality
 
-pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
 
 @pytest.fixture(scope="module")

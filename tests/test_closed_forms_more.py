@@ -13,9 +13,9 @@ from shapes import disc, tube
 
 from generators import spherical_cap
 from pcmc import Patch, Surface, Verdict, certify, solve
-from pcmc.energy import volume
+from pcmc.energy.functional import volume
 
-pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
 AROUND = (12, 24, 48)
 

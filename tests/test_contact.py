@@ -6,7 +6,7 @@ from shapes import rotation, shaken
 from starts import double_bubble, four_fans, two_caps, two_squares
 
 from pcmc import Patch, Plane, Surface, Verdict, certify, energy, solve
-from pcmc.contact import (
+from pcmc.contact.pinching import (
     beside,
     crest_spacing,
     hung,
@@ -18,11 +18,11 @@ from pcmc.contact import (
     settled,
     walls,
 )
-from pcmc.motion import motion_space, structure
-from pcmc.quality import triangle_quality
+from pcmc.energy.motion_space import motion_space, structure
+from pcmc.meshing.quality import triangle_quality
 from pcmc.solvers.state import State
 
-pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
 
 def crest_of(surface, below):

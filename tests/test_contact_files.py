@@ -12,8 +12,8 @@ from starts import stationary, two_squares
 
 import pcmc
 from pcmc import Plane, Surface, certify
-from pcmc.contact import resting, walls
-from pcmc.errors import FileError, FileWarning, SurfaceError
+from pcmc.base.errors import FileError, FileWarning, SurfaceError
+from pcmc.contact.pinching import resting, walls
 from pcmc.io import load
 from pcmc.io.flat import KEY
 

@@ -7,13 +7,13 @@ import pytest
 from starts import bezier_hall, stationary, two_caps, two_squares
 
 from pcmc import Surface, certify, solve
-from pcmc.contact import hung, pinched, resting, walls
-from pcmc.errors import SurfaceError
-from pcmc.factor import SingularMatrix, available
-from pcmc.quality import triangle_quality
-from pcmc.refine import refine
+from pcmc.base.errors import SurfaceError
+from pcmc.contact.pinching import hung, pinched, resting, walls
+from pcmc.meshing.quality import triangle_quality
+from pcmc.meshing.refinement import refine
 from pcmc.solvers.state import State
 from pcmc.solvers.steps import Stepper
+from pcmc.stability.factorisation import SingularMatrix, available
 
 
 def flat(n=8):
@@ -67,10 +67,10 @@ def test_a_step_without_a_matrix_is_a_step_that_failed(kind, monkeypatch):
     stepper = Stepper(state, minimum=False, backend=None)
     X = state.X.copy()
     if kind == "descent":
-        monkeypatch.setattr("pcmc.descent.Smoother.refresh", singular)
+        monkeypatch.setattr("pcmc.solvers.smoother.Smoother.refresh", singular)
         assert not stepper.descend()
     else:
-        monkeypatch.setattr("pcmc.descent.Carrier.__init__", singular)
+        monkeypatch.setattr("pcmc.solvers.smoother.Carrier.__init__", singular)
         motion = np.ones_like(X)
         np.testing.assert_array_equal(stepper._carried(motion), motion)
     np.testing.assert_array_equal(state.X, X)

@@ -8,8 +8,8 @@ from tables import same
 
 from generators import spherical_cap, two_caps
 from pcmc import Direction, Parameter, certify, follow, solve
+from pcmc.base.errors import OptionError
 from pcmc.continuation import Ending
-from pcmc.errors import OptionError
 from pcmc.plot import diagram
 
 

@@ -7,12 +7,12 @@ from shapes import octahedron, pyramid
 
 from generators import two_caps, two_squares
 from pcmc import Direction, Parameter, follow, solve
+from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.continuation import Ending, FollowOptions
 from pcmc.continuation.between import GOALS, root
 from pcmc.continuation.point import Lost, at_parameter, correct
 from pcmc.continuation.shape import Shape
 from pcmc.continuation.tracing import Tracer
-from pcmc.errors import MissingExtra, OptionError, SurfaceError
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,10 @@ from branches import tension_of_height
 
 from generators import four_fans, two_caps, two_squares
 from pcmc import Direction, certify, follow, solve
-from pcmc.contact import pull_and_capacity, standing
+from pcmc.contact.pinching import pull_and_capacity, standing
 from pcmc.continuation import Ending
 from pcmc.plan import Divider, Plan
-from pcmc.rooms import pressed
+from pcmc.surface.wall_pressures import pressed
 
 
 def test_walls_of_the_fans_lose_stability_in_two_directions_at_once():

@@ -7,16 +7,8 @@ from hypothesis import strategies as st
 from motion_cases import touching
 from shapes import cap, octahedron, pyramid, rotation, shaken, three_patches
 
-from pcmc import (
-    Patch,
-    Surface,
-    curvature_error,
-    gradient,
-    mean_curvature,
-    solve,
-    target_curvature,
-)
-from pcmc.errors import OptionError
+from pcmc import Patch, Surface, curvature_error, gradient, mean_curvature, solve, target_curvature
+from pcmc.base.errors import OptionError
 
 METHODS = ["cotangent", "variational"]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pcmc import Plane
-from pcmc.errors import OptionError
+from pcmc.base.errors import OptionError
 from pcmc.plan.curves import arc, bezier, circle, curve, frame, join, polyline, to_local, to_space
 
 

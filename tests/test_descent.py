@@ -5,9 +5,9 @@ import pytest
 from shapes import disc
 
 from pcmc import Patch, Surface
-from pcmc.descent import Carrier
-from pcmc.factor import available
-from pcmc.motion import motion_space, structure
+from pcmc.energy.motion_space import motion_space, structure
+from pcmc.solvers.smoother import Carrier
+from pcmc.stability.factorisation import available
 
 
 @pytest.mark.parametrize("backend", available())

@@ -10,9 +10,9 @@ from shapes import pyramid
 import pcmc
 from generators import double_bubble, spherical_cap, two_caps, two_squares
 from pcmc import Parameter, Patch, Target, sensitivities
+from pcmc.base.errors import SurfaceError
 from pcmc.design.quantities import QUANTITIES, measure
-from pcmc.energy import apply_supports
-from pcmc.errors import SurfaceError
+from pcmc.energy.functional import apply_supports
 
 
 @pytest.fixture

@@ -9,10 +9,10 @@ from shapes import pyramid
 import pcmc
 from generators import double_bubble, joined_caps
 from pcmc import Parameter, Target, meet, sensitivities
+from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.design import Reach
 from pcmc.design.quantities import measure
 from pcmc.design.sensitivity import as_parameters
-from pcmc.errors import OptionError, SurfaceError
 
 # Bad requests
 

@@ -7,7 +7,7 @@ import pytest
 from shapes import cap, generic, octahedron, pyramid, shaken, three_patches
 
 from pcmc import Plane, energy, gradient, hessian
-from pcmc.energy import (
+from pcmc.energy.functional import (
     apply_supports,
     energy_and_gradient,
     energy_at,
@@ -15,7 +15,7 @@ from pcmc.energy import (
     patch_volumes,
     volume,
 )
-from pcmc.topology import POINT
+from pcmc.surface.topology import POINT
 
 
 def forms(surface, **keywords):

@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import generic, hexagon, pyramid, rotation, shaken, three_patches
 
-from pcmc import Patch, Plane, Surface, energy, gradient, kernels
-from pcmc.energy import energy_and_gradient, patch_areas
+from pcmc import Patch, Plane, Surface, energy, gradient
+from pcmc.base import compiled
+from pcmc.energy.functional import energy_and_gradient, patch_areas
 
 seeds = st.integers(0, 2**32 - 1)
 small = st.floats(-10.0, 10.0)
@@ -81,13 +82,13 @@ def test_turning_a_patch_over_turns_its_pressure():
 
 @pytest.fixture
 def small_blocks(monkeypatch):
-    monkeypatch.setattr(kernels, "BLOCK", 10)
+    monkeypatch.setattr(compiled, "BLOCK", 10)
 
 
 def test_blocks_cover_every_triangle_once(small_blocks):
     for count in (1, 9, 10, 25, 81, 1000):
         for workers in (1, 2, 3, 8):
-            ranges = kernels.blocks(count, workers)
+            ranges = compiled.blocks(count, workers)
             assert len(ranges) <= workers
             assert ranges[0][0] == 0
             assert ranges[-1][1] == count
@@ -110,7 +111,7 @@ def test_a_mesh_of_two_real_blocks():
     points, faces = hexagon(110)  # 72 600 triangles
     X = np.column_stack([points, 0.01 * (points**2).sum(axis=1)])
     surface = Surface(X, faces, [0] * len(faces), [Patch("big", 1.0)], fixed=[0])
-    assert len(kernels.blocks(surface.m, 2)) == 2
+    assert len(compiled.blocks(surface.m, 2)) == 2
     one, two = (forms(surface, workers=w) for w in (1, 2))
     assert two[0] == pytest.approx(one[0], rel=1e-12)
     np.testing.assert_allclose(two[1], one[1], atol=1e-9 * np.abs(one[1]).max())

@@ -12,7 +12,7 @@ import pytest
 import pcmc
 from generators import bezier_hall, spherical_cap
 from pcmc import explore
-from pcmc.errors import OptionError, SurfaceError
+from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.explore import server
 from pcmc.explore.packing import pack, unpack
 

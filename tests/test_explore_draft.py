@@ -10,10 +10,10 @@ from browsing import until
 
 import pcmc
 from generators import bezier_hall, four_fans, spherical_cap
-from pcmc.certificate import Verdict
-from pcmc.errors import OptionError, SurfaceError
+from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.certificate.certificate import Verdict
 from pcmc.explore.draft import Draft, begin, between, reach
-from pcmc.rooms import pressed
+from pcmc.surface.wall_pressures import pressed
 
 CAP = spherical_cap(edge_length=0.25)
 HALL = bezier_hall(edge_length=10.0)

@@ -7,11 +7,11 @@ import pytest
 from motion_cases import SURFACES
 from scipy.sparse import csr_array
 
-from pcmc import factor
-from pcmc.assemble import Pattern, assemble, pattern
-from pcmc.errors import MissingExtra, OptionError
-from pcmc.factor import SingularMatrix, available, factoriser
-from pcmc.motion import motion_space, structure
+from pcmc.base.errors import MissingExtra, OptionError
+from pcmc.energy.motion_space import motion_space, structure
+from pcmc.energy.projected_hessian import Pattern, assemble, pattern
+from pcmc.stability import factorisation as factor
+from pcmc.stability.factorisation import SingularMatrix, available, factoriser
 
 BACKENDS = [
     pytest.param(name, marks=pytest.mark.skipif(name not in available(), reason="not installed"))

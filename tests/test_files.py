@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from pcmc.files import folder, together
+from pcmc.base.files import folder, together
 
 NAMES = ("a.obj", "b.3dm", "c.glb")
 

@@ -11,9 +11,9 @@ import generators
 from generators import calibration
 from generators.calibration import PRINTED
 from pcmc import energy, gradient
-from pcmc.energy import patch_areas, volume
-from pcmc.errors import OptionError
-from pcmc.quality import edge_lengths
+from pcmc.base.errors import OptionError
+from pcmc.energy.functional import patch_areas, volume
+from pcmc.meshing.quality import edge_lengths
 
 # Smallest angle, degrees: of the patches under pressure, and of the walls. A wall's follow from the
 # height that it is given over its columns, down to the tip of a right triangle of 8 by 20.

@@ -11,7 +11,7 @@ from generators.drape import membrane, soap_film
 from generators.meshing import fill
 from generators.sphere_pair import Ball, meeting
 from generators.strips import strips
-from pcmc.errors import OptionError
+from pcmc.base.errors import OptionError
 
 
 def circle(radius, spacing, centre=(0.0, 0.0)):

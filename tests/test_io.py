@@ -8,7 +8,14 @@ from scipy.spatial import cKDTree
 from tents import tent
 
 import pcmc
-from pcmc.errors import FileError, FileWarning, MissingExtra, OptionError, PcmcError, SurfaceError
+from pcmc.base.errors import (
+    FileError,
+    FileWarning,
+    MissingExtra,
+    OptionError,
+    PcmcError,
+    SurfaceError,
+)
 from pcmc.io import FORMATS, load
 
 SINGLE = (".stl", ".glb", ".gltf")  # in single precision

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import pcmc
-from pcmc.errors import FileError, FileWarning
+from pcmc.base.errors import FileError, FileWarning
 
 CUBE = """// A quarter of a cube's surface, by hand
 PARAMETER side = 2*sqrt(4)/2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import pcmc
-from pcmc.errors import FileError, FileWarning, FreeSurfaceWarning
+from pcmc.base.errors import FileError, FileWarning, FreeSurfaceWarning
 from pcmc.io import load
 from pcmc.io.polygons import triangulate
 
@@ -189,7 +189,7 @@ OBJ = {
 }
 
 
-@pytest.mark.filterwarnings("ignore::pcmc.errors.FileWarning")
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FileWarning")
 @pytest.mark.parametrize("case", OBJ)
 def test_obj_dialects(tmp_path, case):
     text, names, faces = OBJ[case]

@@ -7,7 +7,7 @@ import pytest
 
 import pcmc
 from pcmc import cli, project
-from pcmc.errors import FileWarning
+from pcmc.base.errors import FileWarning
 from tests.tents import tent
 
 SIDE = 4  # quads of each square

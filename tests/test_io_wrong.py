@@ -5,7 +5,7 @@ import re
 import pytest
 
 import pcmc
-from pcmc.errors import FileError, PcmcError, SurfaceError
+from pcmc.base.errors import FileError, PcmcError, SurfaceError
 from tests.test_io_foreign import PLY, X, expected
 
 meshio = pytest.importorskip("meshio")

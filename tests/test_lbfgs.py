@@ -9,8 +9,8 @@ import pytest
 from shapes import cap, pyramid, shaken, three_patches
 
 from pcmc import Plane, energy, gradient, solve
-from pcmc.energy import energy_and_gradient, energy_at
-from pcmc.errors import OptionError
+from pcmc.base.errors import OptionError
+from pcmc.energy.functional import energy_and_gradient, energy_at
 from pcmc.solvers.evaluate import Evaluator
 from pcmc.solvers.lbfgs import Coordinates, LbfgsOptions, lbfgs
 from pcmc.solvers.result import Status

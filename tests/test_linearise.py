@@ -7,13 +7,13 @@ from shapes import octahedron, rotation, shaken
 from starts import two_squares
 
 from pcmc import Plane, Surface, solve
-from pcmc.contact import standing
-from pcmc.energy import energy_and_gradient
-from pcmc.linearise import linearise
-from pcmc.motion import motion_space, structure
-from pcmc.topology import SHEET
+from pcmc.contact.pinching import standing
+from pcmc.energy.functional import energy_and_gradient
+from pcmc.energy.jacobian import linearise
+from pcmc.energy.motion_space import motion_space, structure
+from pcmc.surface.topology import SHEET
 
-pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
 
 def equator() -> Surface:

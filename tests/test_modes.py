@@ -8,13 +8,13 @@ from shapes import disc, pyramid, rotation, shaken, three_patches
 from starts import double_bubble, sphere, two_squares
 
 from pcmc import Patch, Surface, hessian
-from pcmc.assemble import Pattern
-from pcmc.factor import factoriser
-from pcmc.modes import lowest, negatives_without, stiffness
-from pcmc.motion import motion_space, structure
-from pcmc.rigid import rigid_modes, rigid_motions
+from pcmc.energy.motion_space import motion_space, structure
+from pcmc.energy.projected_hessian import Pattern
+from pcmc.energy.rigid_motions import rigid_modes, rigid_motions
+from pcmc.stability.factorisation import factoriser
+from pcmc.stability.modes import lowest, negatives_without, stiffness
 
-pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
 LARGER = ("three patches", "three patches, tilted", "wall without tension", "bubbles")
 

@@ -7,12 +7,12 @@ from shapes import disc, pyramid, rotation, shaken, three_patches
 
 from generators import two_squares
 from pcmc import Patch, Plane, Surface, energy, gradient, solve
-from pcmc.contact import resting_crest, standing
-from pcmc.energy import energy_and_gradient
-from pcmc.motion import force_scale, motion_space, structure
-from pcmc.topology import CURVE, POINT, SHEET
+from pcmc.contact.pinching import resting_crest, standing
+from pcmc.energy.functional import energy_and_gradient
+from pcmc.energy.motion_space import force_scale, motion_space, structure
+from pcmc.surface.topology import CURVE, POINT, SHEET
 
-pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
 
 def frame_and_space(surface: Surface):

@@ -7,8 +7,8 @@ import pytest
 from shapes import cap, octahedron, pyramid, shaken, three_patches
 
 from pcmc import Plane, energy, gradient, solve
-from pcmc.energy import energy_and_gradient
-from pcmc.errors import OptionError
+from pcmc.base.errors import OptionError
+from pcmc.energy.functional import energy_and_gradient
 from pcmc.solvers.nesterov import NesterovOptions, nesterov
 from pcmc.solvers.result import Status
 

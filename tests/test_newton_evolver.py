@@ -22,7 +22,7 @@ from studies import evolver
 
 pytestmark = [
     pytest.mark.skipif(not evolver.available(), reason="evolver is not installed"),
-    pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning"),
+    pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning"),
 ]
 slow = pytest.mark.slow
 WEAK = {"alpha_left": 4.0, "alpha_right": 4.0, "alpha_aux": 1.0, "depth": 5.0}

@@ -8,15 +8,15 @@ from shapes import pyramid
 from starts import four_fans, sphere, spherical_cap, two_caps, two_squares
 
 from pcmc import Patch, Surface, certify, energy, solve
-from pcmc.certificate import Verdict
-from pcmc.errors import MissingExtra, OptionError, SurfaceError
-from pcmc.factor import available
-from pcmc.quality import triangle_quality
+from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
+from pcmc.certificate.certificate import Verdict
+from pcmc.meshing.quality import triangle_quality
 from pcmc.solvers.newton import NewtonOptions
 from pcmc.solvers.result import Status
+from pcmc.stability.factorisation import available
 
 pytestmark = [
-    pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning"),
+    pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning"),
     pytest.mark.parametrize("backend", available()),
 ]
 TARGETS = pytest.mark.parametrize("target", ["minimum", "stationary"])

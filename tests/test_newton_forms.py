@@ -6,13 +6,13 @@ from starts import double_bubble, joined_caps, sphere, spherical_cap
 
 from generators import double_bubble_exact, joined_caps_exact, sphere_exact, spherical_cap_exact
 from pcmc import certify, energy, solve
-from pcmc.certificate import Verdict
-from pcmc.energy import volume
-from pcmc.refine import refine
-from pcmc.rigid import rigid_motions
+from pcmc.certificate.certificate import Verdict
+from pcmc.energy.functional import volume
+from pcmc.energy.rigid_motions import rigid_motions
+from pcmc.meshing.refinement import refine
 from pcmc.solvers.result import Status
 
-pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 slow = pytest.mark.slow
 
 

@@ -22,7 +22,7 @@ from starts import (
 
 from pcmc import Patch, Plane, Surface, mean_curvature, solve
 
-pytestmark = pytest.mark.filterwarnings("ignore::pcmc.errors.FreeSurfaceWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
 SURFACES = {
     "two squares": partial(two_squares, 6, alpha_aux=1.0),

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from pcmc import Plane, Surface, Verdict, solve
-from pcmc.energy import patch_areas
-from pcmc.errors import PlanWarning
+from pcmc.base.errors import PlanWarning
+from pcmc.energy.functional import patch_areas
+from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.plan import Area, Divider, Hole, Plan, plan_from
 from pcmc.plan.curves import arc, bezier, circle, join, polyline, to_local
 from pcmc.plan.lift import dome, spanned
 from pcmc.plan.planar import triangulate
-from pcmc.quality import edge_lengths, minimum_angle
-from pcmc.topology import POINT
+from pcmc.surface.topology import POINT
 
 BOX = [[0, 0], [20, 0], [20, 12], [0, 12]]
 

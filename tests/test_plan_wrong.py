@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from pcmc.errors import MissingExtra, OptionError, PlanError, SurfaceError
+from pcmc.base.errors import MissingExtra, OptionError, PlanError, SurfaceError
 from pcmc.plan import Area, Plan, plan_from
 from pcmc.plan.curves import arc, circle, curve, join, polyline
 from tests.test_plan import BOX, vertices_of

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pcmc.errors import OptionError, SurfaceError
+from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.plan.planar import locate, signed_areas, triangulate
 
 

@@ -12,13 +12,13 @@ from tents import tent
 import pcmc
 from generators import two_squares
 from pcmc import plot
-from pcmc.errors import FileError, MissingExtra, OptionError
+from pcmc.base.errors import FileError, MissingExtra, OptionError
 from pcmc.explore.drawing import fields
-from pcmc.palette import WALLS, patch_colors, rgb
 from pcmc.plot import raster, supports
 from pcmc.plot.figure import CURVES, finish, new
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
 from pcmc.project import paint
+from pcmc.surface.colours import WALLS, patch_colors, rgb
 
 RENDERERS = [
     pytest.param("matplotlib"),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pcmc
-from pcmc.errors import FileError, OptionError
+from pcmc.base.errors import FileError, OptionError
 from pcmc.project import build, check_names, check_outputs, load, run
 
 ROOF = Path(__file__).resolve().parent.parent / "notebooks" / "roof.toml"
@@ -154,7 +154,7 @@ def test_values_of_the_wrong_kind(tmp_path, line, message):
     if not line.startswith(("patches", "dividers = [")):
         rest.append("patches = {roof = {tension = 2.0}}")
     path.write_text("\n".join(["[plan]", "edge = 'fixed'", line, *rest]), encoding="utf-8")
-    with pytest.raises(pcmc.errors.PcmcError, match=message) as caught:
+    with pytest.raises(pcmc.base.errors.PcmcError, match=message) as caught:
         build(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
@@ -180,7 +180,7 @@ def test_files_that_are_none(tmp_path):
 
 def test_a_crossing_outline_names_the_file(small):
     changed(small, "[4, 3], [0, 3]", "[0, 3], [4, 3]")
-    with pytest.raises(pcmc.errors.PlanError, match=r"small\.toml: "):
+    with pytest.raises(pcmc.base.errors.PlanError, match=r"small\.toml: "):
         build(small)
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from pcmc import Patch, Plane, Surface
-from pcmc.energy import patch_areas, patch_volumes
-from pcmc.errors import OptionError, SurfaceError
-from pcmc.refine import held_midpoints, prolongation, refine
+from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.energy.functional import patch_areas, patch_volumes
+from pcmc.meshing.refinement import held_midpoints, prolongation, refine
 
 
 def tent(plane: Plane | None = None) -> Surface:

@@ -8,12 +8,12 @@ from scipy.spatial import cKDTree
 
 import generators
 from pcmc import Patch, Surface, solve
-from pcmc.energy import patch_areas
-from pcmc.errors import MissingExtra, OptionError
+from pcmc.base.errors import MissingExtra, OptionError
+from pcmc.energy.functional import patch_areas
+from pcmc.meshing.quality import edge_lengths, minimum_angle
+from pcmc.meshing.refinement import refine
+from pcmc.meshing.remeshing import _by_mmg, _cut_curves, _patch_angles, remesh
 from pcmc.plan import Plan
-from pcmc.quality import edge_lengths, minimum_angle
-from pcmc.refine import refine
-from pcmc.remesh import _by_mmg, _cut_curves, _patch_angles, remesh
 
 
 def patch_angles(surface: Surface) -> dict[str, float]:

@@ -6,11 +6,11 @@ import pytest
 import pcmc
 from generators import double_bubble, two_squares
 from pcmc import Parameter, Target, cli, meet
-from pcmc.contact import standing
+from pcmc.contact.pinching import standing
 from pcmc.design import sensitivities
 from pcmc.design.quantities import measure
 from pcmc.plan import Area, Divider, Plan
-from pcmc.rooms import following, pressed
+from pcmc.surface.wall_pressures import following, pressed
 
 HALL = """
 [plan]

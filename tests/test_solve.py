@@ -4,7 +4,7 @@ import pytest
 from shapes import pyramid
 
 from pcmc import solve
-from pcmc.errors import OptionError, SurfaceError
+from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.solvers import METHODS
 from pcmc.solvers.result import Status
 

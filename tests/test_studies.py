@@ -18,8 +18,8 @@ from rich.console import Console
 
 from generators import two_caps, two_squares
 from generators.calibration import PRINTED
-from pcmc.energy import energy_and_gradient
-from pcmc.errors import FileError, OptionError
+from pcmc.base.errors import FileError, OptionError
+from pcmc.energy.functional import energy_and_gradient
 from studies import example1
 from studies.__main__ import main
 from studies.benchmark import numpy_energy_and_gradient

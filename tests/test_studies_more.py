@@ -10,9 +10,9 @@ import pytest
 
 from generators import four_fans, two_squares
 from pcmc import sweep
-from pcmc.errors import OptionError, SweepError
-from pcmc.quality import triangle_quality
-from pcmc.refine import refine
+from pcmc.base.errors import OptionError, SweepError
+from pcmc.meshing.quality import triangle_quality
+from pcmc.meshing.refinement import refine
 from studies import cases, refinement, solvers, stability
 from studies.cases import run_sweep
 from studies.cone import cone

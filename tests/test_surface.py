@@ -6,7 +6,7 @@ from shapes import octahedron, pyramid, three_patches
 from starts import two_squares
 
 from pcmc import Patch, Plane, Surface
-from pcmc.errors import FreeSurfaceWarning, OptionError, PcmcError, SurfaceError
+from pcmc.base.errors import FreeSurfaceWarning, OptionError, PcmcError, SurfaceError
 
 SQUARE = {
     "vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1]],

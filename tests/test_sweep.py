@@ -15,16 +15,8 @@ import sweep_cases
 from rich.console import Console
 from tables import same
 
-from pcmc.errors import FileError, SweepError
-from pcmc.sweep import (
-    Sweep,
-    engine,
-    provenance,
-    read_store,
-    run,
-    table,
-    write_table,
-)
+from pcmc.base.errors import FileError, SweepError
+from pcmc.sweep import Sweep, engine, provenance, read_store, run, table, write_table
 from pcmc.sweep.bar import bar
 
 CHAOS = Sweep(

@@ -12,7 +12,7 @@ import time
 import pytest
 from tables import same
 
-from pcmc.errors import OptionError, SweepError
+from pcmc.base.errors import OptionError, SweepError
 from pcmc.sweep import Sweep, executors, read_store, run, table
 
 pytestmark = pytest.mark.slow

@@ -7,8 +7,8 @@ import pytest
 import sweep_cases
 from tables import same
 
-from pcmc.errors import OptionError
-from pcmc.kernels import threads
+from pcmc.base.compiled import threads
+from pcmc.base.errors import OptionError
 from pcmc.sweep import Sweep, child, isolate, local, provenance, read_store, run
 
 CHAOS = Sweep("sweep_cases:chaos", {"rate": [3.6, 3.8, 4.0], "seed": [0.1, 0.2, 0.3]})

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import sweep_cases
 
-from pcmc.errors import OptionError
+from pcmc.base.errors import OptionError
 from pcmc.sweep import Sweep, run
 
 CHAOS = Sweep("sweep_cases:chaos", {"rate": [3.7, 3.9]}, {"seed": 0.1})

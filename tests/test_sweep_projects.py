@@ -10,7 +10,7 @@ from tables import same
 import pcmc
 from generators import two_squares
 from pcmc import cli
-from pcmc.errors import FileError, OptionError, PcmcError
+from pcmc.base.errors import FileError, OptionError, PcmcError
 from pcmc.project import digest, run, varied
 from pcmc.sweep import read_store
 from pcmc.sweep import run as run_sweep

@@ -7,7 +7,7 @@ import pytest
 
 import pcmc
 from generators import two_squares
-from pcmc.errors import OptionError
+from pcmc.base.errors import OptionError
 from pcmc.sweep import Sweep, run, solve_case
 
 

@@ -14,7 +14,7 @@ from contextlib import suppress
 import pytest
 from tables import same
 
-from pcmc.errors import FileError, FileWarning
+from pcmc.base.errors import FileError, FileWarning
 from pcmc.sweep import Sweep, read_store, run, table
 from pcmc.sweep import store as store_module
 from pcmc.sweep.store import open_store

@@ -8,7 +8,7 @@ import pytest
 from shapes import cap, hexagon, octahedron, pyramid, three_patches
 
 from pcmc import Patch, Surface
-from pcmc.topology import CURVE, POINT, SHEET, curve_neighbours
+from pcmc.surface.topology import CURVE, POINT, SHEET, curve_neighbours
 
 
 def edges_by_hand(surface):

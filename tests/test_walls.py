@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from pcmc import Plane, Surface
-from pcmc.energy import patch_areas
-from pcmc.errors import OptionError, SurfaceError
+from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.energy.functional import patch_areas
+from pcmc.meshing.quality import minimum_angle
 from pcmc.plan import Divider, Plan, add_walls, surface_from_labels
-from pcmc.quality import minimum_angle
 
 BOX = [[0, 0], [8, 0], [8, 6], [0, 6]]
 

@@ -10,10 +10,10 @@ from typing import Annotated, Any
 import typer
 
 from .. import project as projects
-from ..errors import FileError, OptionError, unknown
+from ..base.errors import FileError, OptionError, unknown
 from ..io import FORMATS, read_bare
-from ..rooms import pressed
 from ..surface import Surface
+from ..surface.wall_pressures import pressed
 
 TOML = ".toml"
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from types import ModuleType
 from typing import Any
 
-from ..errors import (
+from ..base.errors import (
     BalanceWarning,
     FileWarning,
     FreeSurfaceWarning,
@@ -17,7 +17,7 @@ from ..errors import (
     PcmcError,
     PlanWarning,
 )
-from ..interrupts import endings
+from ..base.interrupts import endings
 from .codes import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
 NARROW = ("strict", "surrogateescape")  # the second in the locale C

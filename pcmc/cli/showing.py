@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from .. import project as projects
-from ..errors import FileError, OptionError, unknown
-from ..interrupts import held
+from ..base.errors import FileError, OptionError, unknown
+from ..base.interrupts import held
 from ..io import load, write
 from ..surface import Surface
 from .arguments import (

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .. import project as projects
-from ..certificate import certify
+from ..certificate.certificate import certify
 from ..io import write
-from ..remesh import remesh
+from ..meshing.remeshing import remesh
 from .arguments import (
     TOML,
     Input,

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..errors import FileError, MissingExtra, OptionError
+from ..base.errors import FileError, MissingExtra, OptionError
 from ..io import FORMATS
 from .arguments import TOML, number, values_of, whole
 from .codes import INTERRUPTED, NOT_CERTIFIED, OK

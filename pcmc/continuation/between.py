@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..energy import energy_and_gradient, energy_at
+from ..energy.functional import energy_and_gradient, energy_at
 from .direction import Line
 from .point import Solution, Station, examine
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import pandas as pd
 
+from ..base import validate
+from ..base.errors import MissingExtra, OptionError, SurfaceError, unknown
 from ..design import Parameter
-from ..errors import MissingExtra, OptionError, SurfaceError, unknown
-from ..solvers import options as check
 from ..solvers.result import Callback
 from ..surface import Surface
 from .between import GOALS
@@ -126,7 +126,7 @@ def follow(
         raise SurfaceError(f"follow: expected a Surface, found {type(surface).__name__}")
     if callback is not None and not callable(callback):
         raise OptionError(f"callback: expected a function of a Progress, found {callback!r}")
-    chosen = check.build(FollowOptions, "follow", options)
+    chosen = validate.build(FollowOptions, "follow", options)
     if chosen.remesh is not None and find_spec("mmgpy") is None:
         raise MissingExtra("mmgpy", "remesh")
     parameter = _direction(parameter)
@@ -168,7 +168,7 @@ def _goals(stop: float | None, until: Mapping[str, float] | None) -> dict[str, f
     for name, value in goals.items():
         if name not in GOALS:
             raise OptionError(unknown("column in until", name, GOALS))
-        check.number(f"until[{name!r}]", value)
+        validate.number(f"until[{name!r}]", value)
     if stop is not None:
-        goals["parameter"] = check.number("stop", stop)
+        goals["parameter"] = validate.number("stop", stop)
     return goals

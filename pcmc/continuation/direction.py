@@ -14,12 +14,12 @@ from numbers import Real
 
 import numpy as np
 
-from .. import kernels
-from ..arrays import Floats
-from ..energy import apply_supports
-from ..errors import OptionError
-from ..rooms import following
+from ..base.arrays import Floats
+from ..base.errors import OptionError
+from ..energy import kernels
+from ..energy.functional import apply_supports
 from ..surface import Surface
+from ..surface.wall_pressures import following
 
 EQUAL = 1e-9  # relative difference up to which two tensions give the same λ
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from ..errors import OptionError
-from ..solvers import options as check
+from ..base import validate
+from ..base.errors import OptionError
 
 CONTROLS = ("arclength", "parameter", "volume", "height")
 
@@ -58,16 +58,16 @@ class FollowOptions:
     backend: str | None = None
 
     def __post_init__(self) -> None:
-        check.choice("control", self.control, CONTROLS)
-        if check.number("step", self.step) == 0.0:
+        validate.choice("control", self.control, CONTROLS)
+        if validate.number("step", self.step) == 0.0:
             raise OptionError("step: expected a number that is not 0; its sign is the first dλ's")
-        check.number("smallest", self.smallest, above=0.0)
-        check.number("largest", self.largest, least=self.smallest)
-        check.whole("steps", self.steps)
-        check.number("tolerance", self.tolerance, above=0.0)
+        validate.number("smallest", self.smallest, above=0.0)
+        validate.number("largest", self.largest, least=self.smallest)
+        validate.integer("steps", self.steps)
+        validate.number("tolerance", self.tolerance, above=0.0)
         if self.folds is not None:
-            check.whole("folds", self.folds, least=1)
-        check.number("care", self.care, least=0.0, below=1.0)
+            validate.integer("folds", self.folds, least=1)
+        validate.number("care", self.care, least=0.0, below=1.0)
         if self.remesh is not None:
-            check.number("remesh", self.remesh, above=0.0)
-        check.whole("keep", self.keep, least=1)
+            validate.number("remesh", self.remesh, above=0.0)
+        validate.integer("keep", self.keep, least=1)

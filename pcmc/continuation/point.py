@@ -26,12 +26,12 @@ from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator, gmres
 from scipy.spatial import cKDTree
 
-from ..arrays import Floats
-from ..energy import energy_and_gradient, energy_at
-from ..factor import Factor, SingularMatrix
-from ..linearise import Linearisation, linearise
-from ..modes import Stiffness, lowest
-from ..motion import MotionSpace, force_scale
+from ..base.arrays import Floats
+from ..energy.functional import energy_and_gradient, energy_at
+from ..energy.jacobian import Linearisation, linearise
+from ..energy.motion_space import MotionSpace, force_scale
+from ..stability.factorisation import Factor, SingularMatrix
+from ..stability.modes import Stiffness, lowest
 from ..surface import Surface
 from .direction import Line
 from .shape import Shape

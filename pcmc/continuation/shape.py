@@ -6,19 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
-from ..assemble import Pattern, assemble, pattern
-from ..contact import excess, hung, settled, standing, walls
-from ..descent import Carrier
-from ..energy import energy_and_gradient, patch_volumes
-from ..factor import Factor, Factoriser, factoriser
-from ..kernels import area_vectors
-from ..modes import Stiffness, full_matrix, lumped_mass
-from ..motion import MotionSpace, force_scale, motion_space
-from ..quality import triangle_quality
-from ..spreading import spread
+from ..base.arrays import Bools, Floats, Ints
+from ..contact.pinching import excess, hung, settled, standing, walls
+from ..energy.functional import energy_and_gradient, patch_volumes
+from ..energy.motion_space import MotionSpace, force_scale, motion_space
+from ..energy.projected_hessian import Pattern, assemble, pattern
+from ..meshing.quality import triangle_quality
+from ..meshing.redistribution import spread
+from ..solvers.smoother import Carrier
+from ..stability.factorisation import Factor, Factoriser, factoriser
+from ..stability.modes import Stiffness, full_matrix, lumped_mass
 from ..surface import Surface
-from ..topology import SHEET
+from ..surface.geometry import area_vectors
+from ..surface.topology import SHEET
 from .direction import Line, weighted_gradient
 
 CLEAR = 1.02  # ratio of qualities that counts as better

@@ -12,10 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..arrays import Floats
-from ..errors import OptionError, SurfaceError
-from ..remesh import remesh
-from ..rigid import rigid_modes, rigid_motions
+from ..base.arrays import Floats
+from ..base.errors import OptionError, SurfaceError
+from ..energy.rigid_motions import rigid_modes, rigid_motions
+from ..meshing.remeshing import remesh
 from ..solvers import solve
 from ..solvers.result import Callback, Progress, Status
 from ..surface import Surface

@@ -7,9 +7,9 @@ from typing import Any
 
 import pandas as pd
 
-from ..certificate import TOLERANCE
-from ..errors import OptionError, SurfaceError
-from ..solvers import options as check
+from ..base import validate
+from ..base.errors import OptionError, SurfaceError
+from ..certificate.certificate import TOLERANCE
 from ..surface import Surface
 from .outcome import Design
 from .quantities import Parameter, Target, measure
@@ -72,8 +72,8 @@ def meet(
         measure(surface, target)
     if callback is not None and not callable(callback):
         raise OptionError(f"callback: expected a function of a row, found {callback!r}")
-    check.number("tolerance", tolerance, above=0.0)
-    check.whole("solves", solves, least=1)
+    validate.number("tolerance", tolerance, above=0.0)
+    validate.integer("solves", solves, least=1)
     if options.get("tolerance", 0.0) > TOLERANCE:
         raise OptionError(f"meet: the solver's tolerance must be at most {TOLERANCE:g}")
     return Search(surface, aims, parameters, tolerance, solves, callback, options).run()

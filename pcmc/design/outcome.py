@@ -8,7 +8,7 @@ from enum import Enum
 
 import pandas as pd
 
-from ..certificate import Certificate
+from ..certificate.certificate import Certificate
 from ..solvers.result import Result
 from ..surface import Surface
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import kernels
-from ..arrays import Bools, Floats, Ints
-from ..balance import held_lengths, reactions
-from ..errors import OptionError, unknown
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import OptionError, unknown
+from ..certificate.balance import held_lengths, reactions
+from ..energy import kernels
 from ..plan.curves import frame
 from ..surface import Surface
 
@@ -46,7 +46,7 @@ class Target:
     >>> Target("apx", "north")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    pcmc.errors.OptionError: unknown quantity 'apx'; did you mean 'apex'? Known: apex, height, ...
+    pcmc.base.errors.OptionError: unknown quantity 'apx'; did you mean 'apex'? Known: apex, height, ...
     """
 
     quantity: str

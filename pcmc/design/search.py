@@ -19,13 +19,13 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import lsq_linear
 
-from ..arrays import Bools, Floats
-from ..balance import coarseness, load_ratio
-from ..errors import SurfaceError
-from ..rooms import pressed
+from ..base.arrays import Bools, Floats
+from ..base.errors import SurfaceError
+from ..certificate.balance import coarseness, load_ratio
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
+from ..surface.wall_pressures import pressed
 from .outcome import Design, Reach
 from .quantities import Parameter, Target, measure
 from .sensitivity import sensitivities

@@ -19,18 +19,18 @@ import numpy as np
 import pandas as pd
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from .. import kernels
-from ..arrays import Floats
-from ..assemble import assemble, pattern
-from ..certificate import TOLERANCE
-from ..contact import Standing, excess, hung, standing
-from ..energy import energy_and_gradient
-from ..errors import OptionError, SurfaceError
-from ..factor import Factor, SingularMatrix, factoriser
-from ..linearise import Linearisation, linearise
-from ..motion import MotionSpace, force_scale, motion_space
-from ..rooms import following
+from ..base.arrays import Floats
+from ..base.errors import OptionError, SurfaceError
+from ..certificate.certificate import TOLERANCE
+from ..contact.pinching import Standing, excess, hung, standing
+from ..energy import kernels
+from ..energy.functional import energy_and_gradient
+from ..energy.jacobian import Linearisation, linearise
+from ..energy.motion_space import MotionSpace, force_scale, motion_space
+from ..energy.projected_hessian import assemble, pattern
+from ..stability.factorisation import Factor, SingularMatrix, factoriser
 from ..surface import Surface
+from ..surface.wall_pressures import following
 from .quantities import Measure, Parameter, Target, measure
 
 ACCURACY = 1e-9  # relative, to which J s = b is solved

@@ -13,11 +13,11 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
-from ..certificate import Certificate, Verdict, certify
-from ..rooms import pressed
+from ..certificate.certificate import Certificate, Verdict, certify
 from ..solvers import solve
 from ..solvers.result import Progress, Result
 from ..surface import Patch, Surface
+from ..surface.wall_pressures import pressed
 
 AT_REST = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.SADDLE)
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves

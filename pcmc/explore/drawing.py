@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Bools, Floats
-from ..balance import reactions_per_length
-from ..certificate import Certificate
-from ..curvature import curvature_error, mean_curvature
-from ..energy import patch_areas
-from ..palette import patch_colors
+from ..base.arrays import Bools, Floats
+from ..certificate.balance import reactions_per_length
+from ..certificate.certificate import Certificate
+from ..energy.curvature import curvature_error, mean_curvature
+from ..energy.functional import patch_areas
 from ..surface import Surface
+from ..surface.colours import patch_colors
 
 Arrays = dict[str, npt.NDArray[Any]]
 

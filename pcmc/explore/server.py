@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from ..certificate import Certificate
-from ..errors import MissingExtra, OptionError, PcmcError, SurfaceError
+from ..base.errors import MissingExtra, OptionError, PcmcError, SurfaceError
+from ..certificate.certificate import Certificate
 from ..io import FORMATS, write
 from ..project.output import fields as written_fields
 from ..surface import Patch, Surface

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats
-from ..contact import standing
-from ..errors import FileError, FileWarning, LostWarning, PcmcError, unknown
-from ..files import whole
+from ..base.arrays import Floats
+from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknown
+from ..base.files import whole
+from ..contact.pinching import standing
 from ..surface import Plane, Surface
 from .contents import Contents, merged, to_surface, without_unused
 from .suspect import suspicions

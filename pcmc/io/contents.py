@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import check
-from ..arrays import Bools, Floats, Ints
-from ..errors import FileError, OptionError, unknown
-from ..surface import Patch, Plane, Surface
-from ..topology import topology
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import FileError, OptionError, unknown
+from ..surface import Patch, Plane, Surface, checks
+from ..surface.topology import topology
 
 FREE, SLIDING, FIXED = 0, 1, 2
 ROUNDING = 1e-6  # of the size: what a format may round by
@@ -80,7 +79,7 @@ def merged(contents: Contents) -> Contents:
         return contents
     from .merge import coincident  # scipy.spatial is slow to import, and rarely needed
 
-    keep, place = coincident(check.positions(contents.vertices))
+    keep, place = coincident(checks.positions(contents.vertices))
     if len(keep) == len(contents.vertices):
         return contents
     support = None
@@ -113,9 +112,9 @@ def to_surface(
     elif fixed is None:
         held = np.asarray(support == FIXED)
     else:
-        held = check.mask(fixed, n, "fixed")
+        held = checks.mask(fixed, n, "fixed")
     if on_plane is not None:
-        sliding = check.mask(on_plane, n, "on_plane")
+        sliding = checks.mask(on_plane, n, "on_plane")
     else:
         sliding = np.zeros(n, dtype=bool) if support is None else support == SLIDING
     if fixed is None and support is None:

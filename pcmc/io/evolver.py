@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..arrays import Floats, Ints
-from ..errors import FileError
+from ..base.arrays import Floats, Ints
+from ..base.errors import FileError
 from ..surface import Patch, Plane, Surface
 from .contents import FIXED, FREE, SLIDING, Contents, support_of
 from .expressions import constant, linear

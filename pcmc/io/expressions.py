@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats
-from ..errors import FileError
+from ..base.arrays import Floats
+from ..base.errors import FileError
 
 Fail = Callable[[str], FileError]
 

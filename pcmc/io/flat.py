@@ -14,8 +14,8 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import Bools, Floats, Ints
-from ..errors import FileError
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import FileError
 from ..surface import Patch, Surface
 from .contents import ROUNDING, Contents, support_of, without_unused
 

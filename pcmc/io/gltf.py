@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats
-from ..errors import FileError
-from ..palette import patch_colors
-from ..surface import FAR, Surface
+from ..base.arrays import Floats
+from ..base.errors import FileError
+from ..surface import Surface
+from ..surface.colours import patch_colors
+from ..surface.surface import FAR
 from .contents import Contents, described, description, support_of
 from .flat import KEY
 from .optional import library, reading

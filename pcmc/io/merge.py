@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..arrays import Floats, Ints
+from ..base.arrays import Floats, Ints
 
 TOLERANCE = 1e-7  # of the size; single precision keeps this much
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..arrays import Floats
-from ..errors import FileError
+from ..base.arrays import Floats
+from ..base.errors import FileError
 from ..surface import Surface
 from .contents import Contents, described, description, support_of
 from .optional import reading

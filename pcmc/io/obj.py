@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..errors import FileError
+from ..base.arrays import Floats, Ints
+from ..base.errors import FileError
 from ..surface import Surface
 from .contents import FIXED, FREE, SLIDING, Contents, described, description, support_of
 from .polygons import triangulate

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
-from ..errors import FileError, MissingExtra, PcmcError
+from ..base.errors import FileError, MissingExtra, PcmcError
 
 
 def library(name: str, extra: str = "files") -> Any:

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..errors import FileError
+from ..base.arrays import Floats, Ints
+from ..base.errors import FileError
 from ..surface import Surface
 from .cells import from_polygons
 from .contents import Contents, described, description, support_of

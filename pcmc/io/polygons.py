@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats, Ints
-from ..errors import FileError
-from ..quality import triangle_quality
+from ..base.arrays import Floats, Ints
+from ..base.errors import FileError
+from ..meshing.quality import triangle_quality
 
 
 def triangulate(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tuple[str, ...]]:

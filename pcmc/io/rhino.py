@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import Floats, Ints
-from ..errors import FileError
-from ..palette import patch_colors
+from ..base.arrays import Floats, Ints
+from ..base.errors import FileError
 from ..surface import Surface
+from ..surface.colours import patch_colors
 from . import flat
 from .contents import (
     FIXED,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileError
+from ..base.errors import FileError
 from .contents import Contents, Description
 
 

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileError
-from ..surface import FAR, Surface
+from ..base.errors import FileError
+from ..surface import Surface
+from ..surface.surface import FAR
 from .contents import Contents
 from .optional import library, reading
 from .scenes import from_meshes

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import Floats, Ints
+from ..base.arrays import Floats, Ints
 from .contents import Contents
 
 GAP = 0.05  # of the boundary edges beside it: nearer vertices are one that was drawn twice

@@ -12,8 +12,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..arrays import Bools, Floats, Ints
-from ..errors import PlanError
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import PlanError
 from .curves import Curve
 from .lines import (
     SNAP,

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats
-from ..errors import OptionError, unknown
+from ..base.arrays import Floats
+from ..base.errors import OptionError, unknown
 from ..surface import Plane
 
 CORNER = math.radians(10.0)  # a path that turns by more at a joint has a corner there

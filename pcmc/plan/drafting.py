@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
-from ..errors import PlanError, PlanWarning, SurfaceError
-from ..polish import polished
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import PlanError, PlanWarning, SurfaceError
+from ..meshing.angles import polished
 from ..surface import Patch, Surface
 from .arrangement import Arrangement, arrange, hole_points
 from .curves import Curve, to_local, to_space

@@ -11,11 +11,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .. import check
-from ..arrays import Bools, Floats, Ints
-from ..errors import OptionError, SurfaceError, unknown
-from ..surface import Patch, Plane, Surface
-from ..topology import topology
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import OptionError, SurfaceError, unknown
+from ..surface import Patch, Plane, Surface, checks
+from ..surface.topology import topology
 from .parts import EDGES
 from .walls import add_walls
 
@@ -65,8 +64,8 @@ def surface_from_labels(
     if boundary not in EDGES:
         raise OptionError(unknown("boundary", boundary, EDGES))
     plane = Plane() if plane is None else plane
-    X = check.positions(vertices)
-    F: Ints = check.face_array(faces, len(X)).astype(np.int64)
+    X = checks.positions(vertices)
+    F: Ints = checks.face_array(faces, len(X)).astype(np.int64)
     X, F = _welded(X, F, weld)
     names, patch = _names(labels, len(F))
     F = _oriented(X, F, patch, plane)

@@ -7,7 +7,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
-from ..arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from .planar import signed_areas
 
 RISE = 0.3  # of the clear radius: a shallow dome

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..arrays import Floats
-from ..errors import PlanError
+from ..base.arrays import Floats
+from ..base.errors import PlanError
 from .curves import Curve
 from .planar import cross
 

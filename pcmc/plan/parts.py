@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import OptionError
+from ..base.errors import OptionError
 
 EDGES = ("fixed", "sliding", "free")
 BOTTOMS = ("sliding", "held", "sloped")

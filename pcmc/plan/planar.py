@@ -10,9 +10,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
-from ..arrays import Bools, Floats, Ints
-from ..errors import OptionError, SurfaceError
-from ..polish import angles, polished
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import OptionError, SurfaceError
+from ..meshing.angles import angles, polished
 
 CLEARANCE = 0.62  # of the edge length: nearer to a segment, a free point would crowd it
 GOOD_ANGLE = 30.0  # degrees; where it is not reached, points are added and moved

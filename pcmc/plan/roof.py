@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import MissingExtra, OptionError, unknown
+from ..base.errors import MissingExtra, OptionError, unknown
 from ..surface import Plane, Surface
 from .curves import Curve, curve
 from .parts import BOTTOMS, EDGES, Area, Divider, Hole

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
-from ..errors import OptionError, SurfaceError, unknown
-from ..quality import edge_lengths
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import OptionError, SurfaceError, unknown
+from ..meshing.quality import edge_lengths
 from ..surface import Patch, Plane, Surface
-from ..topology import Curve
+from ..surface.topology import Curve
 from .curves import to_local, to_space
 from .planar import triangulate
 

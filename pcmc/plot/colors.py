@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats
-from ..errors import MissingExtra, OptionError, unknown
+from ..base.arrays import Floats
+from ..base.errors import MissingExtra, OptionError, unknown
 from .figure import INK, SMALL
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats
-from ..errors import OptionError, unknown
+from ..base.arrays import Floats
+from ..base.errors import OptionError, unknown
 from .figure import CURVES, INK, SMALL, TEXT, Image, apart, finish, new, style
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..arrays import Floats
-from ..errors import OptionError, unknown
+from ..base.arrays import Floats
+from ..base.errors import OptionError, unknown
 from .curves import _axes, _key
 from .figure import CURVES, Image, finish
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import FileError, MissingExtra
-from ..files import whole
+from ..base.errors import FileError, MissingExtra
+from ..base.files import whole
 
 DPI = 200.0
 TEXT, SMALL = 7.0, 6.0  # points

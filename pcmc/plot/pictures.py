@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Bools, Floats
-from ..errors import OptionError
-from ..palette import patch_colors
+from ..base.arrays import Bools, Floats
+from ..base.errors import OptionError
 from ..surface import Surface
+from ..surface.colours import patch_colors
 from .colors import color_scale
 from .figure import DPI, INK, SMALL, TEXT, Image, finish, new
 from .raster import paint

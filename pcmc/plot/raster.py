@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats
-from ..errors import MissingExtra, OptionError, unknown
+from ..base.arrays import Floats
+from ..base.errors import MissingExtra, OptionError, unknown
 from .scene import Scene
 
 RENDERERS = ("auto", "pyvista", "matplotlib")

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
-from ..errors import OptionError, unknown
-from ..palette import patch_colors, rgb
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import OptionError, unknown
 from ..surface import Surface
+from ..surface.colours import patch_colors, rgb
 
 NO_VALUE = "#D9D9D9"
 FIXED_DOT, SLIDING_DOT = "#C8102E", "#1F4FBF"

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..balance import reactions_per_length
-from ..errors import OptionError
+from ..base.errors import OptionError
+from ..certificate.balance import reactions_per_length
 from ..surface import Surface
 from .figure import Image
 from .pictures import Path, vectors

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import io
-from ..errors import FileError, OptionError, PcmcError
+from ..base.errors import FileError, OptionError, PcmcError
 from ..plan import Plan, plan_from
 from ..surface import Surface
 from .keys import check_keys, entries, options_of, tables

@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError, OptionError, unknown
+from ..base.errors import FileError, OptionError, unknown
 from ..plan import Area, Divider, Hole, Plan
 from ..solvers import METHODS
 from ..surface import Plane

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from .. import io
-from ..arrays import Floats
-from ..certificate import Certificate
-from ..curvature import curvature_error, mean_curvature
-from ..errors import FileError, FileWarning, LostWarning, OptionError, PcmcError, unknown
-from ..files import together
-from ..interrupts import held
+from ..base.arrays import Floats
+from ..base.errors import FileError, FileWarning, LostWarning, OptionError, PcmcError, unknown
+from ..base.files import together
+from ..base.interrupts import held
+from ..certificate.certificate import Certificate
+from ..energy.curvature import curvature_error, mean_curvature
 from ..solvers.result import Result
 from ..surface import Surface
 

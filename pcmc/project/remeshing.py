@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ..errors import OptionError, unknown
-from ..remesh import check_lengths
+from ..base.errors import OptionError, unknown
+from ..meshing.remeshing import check_lengths
 
 WHEN = ("before", "after")
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..balance import unbalanced
-from ..certificate import Certificate
-from ..contact import walls
-from ..errors import BalanceWarning, OptionError, PcmcError
-from ..files import folder as made
-from ..remesh import remesh
+from ..base.errors import BalanceWarning, OptionError, PcmcError
+from ..base.files import folder as made
+from ..certificate.balance import unbalanced
+from ..certificate.certificate import Certificate
+from ..contact.pinching import walls
+from ..meshing.remeshing import remesh
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from .. import io
-from ..errors import OptionError, PcmcError, unknown
-from ..rooms import pressed
+from ..base.errors import OptionError, PcmcError, unknown
 from ..surface import Surface
+from ..surface.wall_pressures import pressed
 from .file import PathLike, Project, project_of, read_data, surface_of
 
 WHAT = ("tension", "pressure")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from ..errors import OptionError, SurfaceError, unknown
+from ..base.errors import OptionError, SurfaceError, unknown
+from ..base.validate import build
 from ..surface import Surface
-from .options import build
 
 if TYPE_CHECKING:
     from .result import Callback, Result
@@ -54,7 +54,7 @@ def solve(
     >>> solve(pyramid, "nestrov")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    pcmc.errors.OptionError: unknown method 'nestrov'; did you mean 'nesterov'? Known: newton, ...
+    pcmc.base.errors.OptionError: unknown method 'nestrov'; did you mean 'nesterov'? Known: newton, ...
     """
     if not isinstance(surface, Surface):
         raise SurfaceError(f"solve: expected a Surface, found {type(surface).__name__}")

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import kernels
-from ..arrays import Bools, Floats
+from ..base.arrays import Bools, Floats
+from ..base.compiled import blocks, compiled, threads
+from ..energy import kernels
 from ..surface import Surface
 
 
@@ -44,7 +45,7 @@ class Evaluator:
         self._mesh = surface.faces, surface.patch_of_face, surface.origin
         self._weights = surface.tensions, surface.pressures
         self._supports = surface.fixed, surface.on_plane, np.array(surface.plane.normal)
-        self._single = len(kernels.blocks(surface.m, kernels.threads())) == 1
+        self._single = len(blocks(surface.m, threads())) == 1
 
     def __call__(self, X: Floats) -> Point:
         """E, ∇E and ‖∇E‖² with the vertices at X (n,3); not finite rather than an error."""
@@ -61,7 +62,7 @@ class Evaluator:
             return Point(X, float(tension @ area - pressure @ volume), G, squared)
 
 
-@kernels.compiled
+@compiled
 def _hold(G: Floats, fixed: Bools, sliding: Bools, normal: Floats) -> float:
     """Take from G (n,3) what the supports carry, Eq. (19), in place; return its squared sum."""
     squared = 0.0
@@ -76,7 +77,7 @@ def _hold(G: Floats, fixed: Bools, sliding: Bools, normal: Floats) -> float:
     return squared
 
 
-@kernels.compiled
+@compiled
 def extent(X: Floats) -> float:
     """Diagonal of the bounding box of X (n,3), length."""
     total = 0.0

@@ -10,9 +10,9 @@ from typing import Any
 import nlopt
 import numpy as np
 
-from ..arrays import Floats
+from ..base import validate
+from ..base.arrays import Floats
 from ..surface import Surface
-from . import options as check
 from .evaluate import Evaluator, Point, extent
 from .result import Callback, Progress, Result, Status
 
@@ -40,10 +40,10 @@ class LbfgsOptions:
 
     def __post_init__(self) -> None:
         if self.tolerance is not None:
-            check.number("tolerance", self.tolerance, least=0.0)
-        check.whole("evaluations", self.evaluations, least=1)
-        check.whole("memory", self.memory)
-        check.number("inflation", self.inflation, above=1.0)
+            validate.number("tolerance", self.tolerance, least=0.0)
+        validate.integer("evaluations", self.evaluations, least=1)
+        validate.integer("memory", self.memory)
+        validate.number("inflation", self.inflation, above=1.0)
 
 
 class Coordinates:

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats
+from ..base import validate
+from ..base.arrays import Floats
 from ..surface import Surface
-from . import options as check
 from .evaluate import Evaluator, Point, extent
 from .result import Callback, Progress, Result, Status
 
@@ -50,18 +50,18 @@ class NesterovOptions:
     inflation: float = 10.0
 
     def __post_init__(self) -> None:
-        check.number("t0", self.t0, above=0.0)
-        check.number("gamma", self.gamma, least=0.0, below=1.0)
-        check.number("xi", self.xi, least=0.0)
-        check.number("tau", self.tau, above=0.0, below=1.0)
-        check.whole("floor_power", self.floor_power)
-        check.flag("momentum", self.momentum)
-        check.flag("line_search", self.line_search)
-        check.choice("armijo", self.armijo, ("printed", "sufficient"))
+        validate.number("t0", self.t0, above=0.0)
+        validate.number("gamma", self.gamma, least=0.0, below=1.0)
+        validate.number("xi", self.xi, least=0.0)
+        validate.number("tau", self.tau, above=0.0, below=1.0)
+        validate.integer("floor_power", self.floor_power)
+        validate.flag("momentum", self.momentum)
+        validate.flag("line_search", self.line_search)
+        validate.choice("armijo", self.armijo, ("printed", "sufficient"))
         if self.tolerance is not None:
-            check.number("tolerance", self.tolerance, least=0.0)
-        check.whole("iterations", self.iterations)
-        check.number("inflation", self.inflation, above=1.0)
+            validate.number("tolerance", self.tolerance, least=0.0)
+        validate.integer("iterations", self.iterations)
+        validate.number("inflation", self.inflation, above=1.0)
 
 
 class Move(NamedTuple):

@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from ..certificate import certify
-from ..errors import SurfaceError
-from ..quality import worst_quality
-from ..refine import refine
+from ..base import validate
+from ..base.errors import SurfaceError
+from ..certificate.certificate import certify
+from ..meshing.quality import worst_quality
+from ..meshing.refinement import refine
 from ..surface import Surface
-from . import options as check
 from .result import Callback, Progress, Result, Status
 from .state import State
 from .steps import Stepper
@@ -62,12 +62,12 @@ class NewtonOptions:
     backend: str | None = None
 
     def __post_init__(self) -> None:
-        check.number("tolerance", self.tolerance, above=0.0)
-        check.whole("iterations", self.iterations)
-        check.choice("target", self.target, TARGETS)
-        check.whole("levels", self.levels)
-        check.number("care", self.care, least=0.0, below=1.0)
-        check.number("inflation", self.inflation, above=1.0)
+        validate.number("tolerance", self.tolerance, above=0.0)
+        validate.integer("iterations", self.iterations)
+        validate.choice("target", self.target, TARGETS)
+        validate.integer("levels", self.levels)
+        validate.number("care", self.care, least=0.0, below=1.0)
+        validate.number("inflation", self.inflation, above=1.0)
 
 
 @dataclass

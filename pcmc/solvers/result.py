@@ -13,7 +13,7 @@ from ..surface import Surface
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..certificate import Certificate
+    from ..certificate.certificate import Certificate
 
 
 class Status(Enum):
@@ -80,7 +80,9 @@ class Result:
     @cached_property
     def certificate(self) -> Certificate:
         """What the surface reached is: residual, curvature error, stability, verdict."""
-        from ..certificate import certify  # here, as pandas below: both take long to import
+        from ..certificate.certificate import (
+            certify,  # here, as pandas below: both take long to import
+        )
 
         return certify(self.surface, status=self.status.name)
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
-from ..contact import (
+from ..base.arrays import Bools, Floats, Ints
+from ..contact.pinching import (
     Walls,
     crest_spacing,
     excess,
@@ -18,10 +18,10 @@ from ..contact import (
     standing,
     walls,
 )
-from ..energy import energy_and_gradient, energy_at
-from ..motion import MotionSpace, force_scale, motion_space
-from ..quality import compare, worst_quality
-from ..spreading import spread
+from ..energy.functional import energy_and_gradient, energy_at
+from ..energy.motion_space import MotionSpace, force_scale, motion_space
+from ..meshing.quality import compare, worst_quality
+from ..meshing.redistribution import spread
 from ..surface import Surface
 
 LOW = 5e-3  # height, in spacings along the crest, at which a sinking junction is set to rest

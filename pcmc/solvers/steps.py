@@ -8,16 +8,16 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from ..arrays import Floats
-from ..assemble import Pattern, assemble, pattern
-from ..descent import Carrier, Smoother
-from ..factor import Factor, Factoriser, SingularMatrix, factoriser
-from ..kernels import area_vectors
-from ..linearise import linearise
-from ..modes import SOFT, full_matrix, lowest, negatives_without, stiffness
-from ..motion import MotionSpace
-from ..quality import edge_lengths
-from ..rigid import rigid_modes, rigid_motions
+from ..base.arrays import Floats
+from ..energy.jacobian import linearise
+from ..energy.motion_space import MotionSpace
+from ..energy.projected_hessian import Pattern, assemble, pattern
+from ..energy.rigid_motions import rigid_modes, rigid_motions
+from ..meshing.quality import edge_lengths
+from ..stability.factorisation import Factor, Factoriser, SingularMatrix, factoriser
+from ..stability.modes import SOFT, full_matrix, lowest, negatives_without, stiffness
+from ..surface.geometry import area_vectors
+from .smoother import Carrier, Smoother
 from .state import State
 
 SHIFTS = (0.0, 0.25, 1.0, 4.0)  # of the stiffness, tried in turn until the matrix is positive

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from ..errors import MissingExtra
+from ..base.errors import MissingExtra
 from .engine import Progress
 
 if TYPE_CHECKING:

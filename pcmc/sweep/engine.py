@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
-from ..errors import OptionError, SweepError
-from ..solvers import options as check
+from ..base import validate
+from ..base.errors import OptionError, SweepError
 from .executors import OWN_VERSION, Submit, open_pool
 from .grid import Sweep
 from .store import FORCE_EVERY, Record, open_store
@@ -148,9 +148,9 @@ def _check_options(
     if on_record is not None and not callable(on_record):
         raise OptionError(f"on_record: expected a function of a Progress, found {on_record!r:.80}")
     if workers is not None:
-        check.whole("workers", workers, least=1)
+        validate.integer("workers", workers, least=1)
     if time_limit is not None:
-        check.number(
+        validate.number(
             "time_limit (seconds; None for no limit)", time_limit, above=0.0, below=LONGEST
         )
 

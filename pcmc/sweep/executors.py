@@ -10,7 +10,7 @@ from concurrent.futures import Executor, Future
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from ..errors import MissingExtra, OptionError, SweepError
+from ..base.errors import MissingExtra, OptionError, SweepError
 from .child import version
 from .isolate import retire, run_case
 from .local import LocalPool

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import OptionError, unknown
+from ..base.errors import OptionError, unknown
 from .child import WORDS, resolve, scalar
 
 
@@ -42,7 +42,7 @@ class Sweep:
     --------
     >>> sweep = Sweep("math:ldexp", grid={})
     Traceback (most recent call last):
-    pcmc.errors.OptionError: the grid is empty; give at least one parameter a list of values
+    pcmc.base.errors.OptionError: the grid is empty; give at least one parameter a list of values
     >>> sweep = Sweep("fractions:Fraction", {"numerator": [1, 2], "denominator": [3, 5]})
     >>> len(sweep), list(sweep)[1]
     (4, {'numerator': 1, 'denominator': 5})

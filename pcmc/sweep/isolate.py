@@ -27,7 +27,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Any
 
-from ..errors import SweepError
+from ..base.errors import SweepError
 from . import child as child_script
 
 GRACE = 2.0  # seconds a child may overrun its time limit before it is killed from outside

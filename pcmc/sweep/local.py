@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any, NamedTuple
 
-from ..errors import SweepError
+from ..base.errors import SweepError
 from .isolate import Child
 
 BRIEF = 0.1  # seconds; after a case that took longer the next is given when it has ended

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import project as projects
-from ..errors import FileError, OptionError, unknown
+from ..base.errors import FileError, OptionError, unknown
 from ..solvers import METHODS
 from .grid import Sweep
 from .solving import row

@@ -8,8 +8,8 @@ from dataclasses import fields
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from ..energy import gradient
-from ..errors import OptionError, unknown
+from ..base.errors import OptionError, unknown
+from ..energy.functional import gradient
 from ..solvers import METHODS, solve
 from ..solvers.result import Result
 from .child import resolve

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 from warnings import warn
 
-from ..errors import FileError, FileWarning
+from ..base.errors import FileError, FileWarning
 from .child import version
 from .grid import Sweep
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import FileError, MissingExtra
-from ..files import whole
+from ..base.errors import FileError, MissingExtra
+from ..base.files import whole
 from .store import Record
 
 if TYPE_CHECKING:

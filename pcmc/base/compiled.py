@@ -1,0 +1,65 @@
+"""Compiling loops over arrays, and running them on several threads."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import numba
+import numpy as np
+
+from .errors import OptionError
+
+BLOCK = 32_768  # below this many triangles a second thread costs more than it gains
+
+compiled = numba.njit(cache=True, nogil=True, error_model="numpy")
+
+
+def threads() -> int:
+    """Threads used on large meshes: the processors this process may run on, at most eight.
+
+    The environment variable PCMC_THREADS sets another number, as sweeps do for their workers.
+
+    Raises
+    ------
+    OptionError : PCMC_THREADS is not a whole number ≥ 1.
+    """
+    wish = os.environ.get("PCMC_THREADS", "")
+    if wish:
+        if not wish.isdecimal() or int(wish) < 1:
+            raise OptionError(f"PCMC_THREADS: expected a whole number ≥ 1, found {wish!r}")
+        return int(wish)
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return max(1, min(8, usable or 1))
+
+
+def blocks(count: int, workers: int) -> list[tuple[int, int]]:
+    """Cut ``count`` triangles into equal ranges, one a worker, each of at least BLOCK triangles.
+
+    >>> blocks(100_000, 2)
+    [(0, 50000), (50000, 100000)]
+    >>> blocks(1000, 2)
+    [(0, 1000)]
+    """
+    parts = max(1, min(workers, count // BLOCK))
+    edges = np.linspace(0, count, parts + 1).astype(int)
+    return [(int(a), int(b)) for a, b in pairwise(edges)]
+
+
+def run_blocks(work: Callable[[int, int, int], None], count: int, workers: int | None) -> int:
+    """Call ``work(part, first, last)`` for each block, on threads if there are several; return how many.
+
+    The first block is done by the caller: its processor is awake, and the others' threads go elsewhere.
+    """
+    first, *others = blocks(count, workers or threads())
+    if not others:
+        work(0, *first)
+        return 1
+    with ThreadPoolExecutor(len(others)) as pool:
+        waiting = [pool.submit(work, part, *block) for part, block in enumerate(others, start=1)]
+        work(0, *first)
+        for each in waiting:
+            each.result()
+    return 1 + len(others)

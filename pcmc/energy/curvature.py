@@ -1,0 +1,85 @@
+"""Mean curvature at the vertices by two definitions, its target, and the error between them.
+
+Positive where the patch bulges towards its positive side (the paper's (2) has the opposite sign in the
+formulas, and positive printed values).
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from ..base.arrays import Bools, Floats
+from ..base.errors import OptionError, unknown
+from ..surface import Surface
+from ..surface.geometry import area_vectors
+from . import kernels
+
+Method = Literal["cotangent", "variational"]
+METHODS: tuple[Method, ...] = ("cotangent", "variational")
+
+
+def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
+    """H (n,), 1/length; NaN on junctions and boundaries, and at vertices where sheets touch: no single
+    sheet has a curvature there.
+
+    With ∇A the area gradient (15a) and ∇V = ⅓ Σ A_T ν_T the volume gradient of the vertex:
+
+    - ``"cotangent"``: |∇A| / (2 A_b) with A_b = ⅓ Σ A_T, the Laplace-Beltrami value of Meyer et al.
+      (2002) with the barycentric area, as in the paper's Figs. 8-24. At an exactly stationary vertex
+      it is H̄ |Σ A_T ν_T| / Σ A_T ≤ H̄: it sees that the star is not flat.
+    - ``"variational"``: ⟨∇A, ∇V⟩ / (2 ⟨∇V, ∇V⟩), exactly H̄ at a stationary vertex.
+
+    >>> from pcmc import Patch, Surface
+    >>> pyramid = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]],
+    ...     [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4, [Patch("roof", 1.0)], fixed=range(4))
+    >>> mean_curvature(pyramid).round(6).tolist()
+    [nan, nan, nan, nan, 0.75]
+    >>> mean_curvature(pyramid, "variational").round(6).tolist()
+    [nan, nan, nan, nan, 1.06066]
+    """
+    if method not in METHODS:
+        raise OptionError(unknown("mean curvature method", method, METHODS))
+    area_gradient, area_vector, star_area = _star(surface)
+    along = np.einsum("ij,ij->i", area_gradient, area_vector)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if method == "cotangent":
+            H = np.copysign(np.linalg.norm(area_gradient, axis=1), along) / (2.0 * star_area / 3.0)
+        else:
+            H = 1.5 * along / np.einsum("ij,ij->i", area_vector, area_vector)
+    H[~_within_one_sheet(surface)] = np.nan
+    return H
+
+
+def target_curvature(surface: Surface) -> Floats:
+    """H̄ = p / (2 α) (n,) of the sheet each vertex lies in; NaN where ``mean_curvature`` is."""
+    patch = np.zeros(surface.n, dtype=np.int64)
+    patch[surface.faces] = surface.patch_of_face[:, None]
+    target = np.array([p.target_curvature for p in surface.patches])[patch]
+    target[~_within_one_sheet(surface)] = np.nan
+    return target
+
+
+def curvature_error(surface: Surface, method: Method = "cotangent") -> Floats:
+    """(H - H̄) / H̄ (n,) at the interior vertices of patches under pressure, NaN elsewhere.
+
+    Relative, with sign: 0.01 is one percent too curved. Walls, whose target is zero, have no
+    relative error; ``mean_curvature`` itself is their error.
+    """
+    H, target = mean_curvature(surface, method), target_curvature(surface)
+    return np.divide(H - target, target, out=np.full(surface.n, np.nan), where=target != 0.0)
+
+
+def _within_one_sheet(surface: Surface) -> Bools:
+    """(n,) vertices off boundaries and junctions, and where sheets do not just touch."""
+    return surface.topology.interior & (surface.topology.fans == 1)
+
+
+def _star(surface: Surface) -> tuple[Floats, Floats, Floats]:
+    """Σ over each vertex's star: area gradient (n,3), area vector Σ A_T ν_T (n,3), area (n,)."""
+    X, F = surface.vertices, surface.faces
+    ones, zeros = np.ones(len(surface.patches)), np.zeros(len(surface.patches))
+    gradient = kernels.measure(X, F, surface.patch_of_face, np.zeros(3), ones, zeros)[2]
+    vector, area = area_vectors(X, F)
+    return gradient, vector, area

@@ -1,0 +1,137 @@
+"""The energy of a Surface, its gradient with the supports applied, and its Hessian.
+
+    E = Σ α_i A_i - Σ p_i V_i                     (11), (20); the paper's pressures are 1 and 0
+    A_i = Σ_T ½ |(q_j - p) × (q_{j+1} - p)|        (9a), (10a)
+    V_i = (1/6) Σ_T ⟨p, q_j × q_{j+1}⟩             (10b), positions seen from the point of Π
+
+V_i is the volume of the cone from the point of Π (or, far from it, ``Surface.origin``) to patch i. At a
+junction the sides of the cones meet. Where the pressures there, each counted along its patch's normal,
+cancel (equal patches and a wall of pressure 0; or patches of pressures p_1 and p_2 and a wall of
+p_1 - p_2, its normal pointing from room 1 to room 2), so do the sides: Σ p V is the pressures of the
+rooms times their volumes, wherever on Π the point is. Where they do not (p_1 ≠ p_2 and a wall of
+pressure 0, as (11) admits), the difference acts on the side of the cones, the triangles between junction
+and point, as it would on a wall there; E, and the shape at rest, then depend on the point.
+
+Units: E force·length, ∇E force, with tension in force/length and pressure in force/length².
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..surface import Surface
+from . import kernels
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+
+def energy(surface: Surface) -> float:
+    """E = Σ α A - Σ p V, Eq. (20), force·length.
+
+    >>> from pcmc import Patch, Surface
+    >>> tent = Surface([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]],
+    ...                [[0, 1, 2], [1, 3, 2], [3, 0, 2]], [0, 0, 0], [Patch("tent", 2.0)], fixed=[0, 1, 3])
+    >>> round(energy(tent), 12) == round(2 * (3**0.5 / 2 + 1) - 1 / 6, 12)
+    True
+    """
+    return energy_at(surface, surface.vertices)
+
+
+def energy_at(surface: Surface, X: Floats) -> float:
+    """E of the surface with its vertices at X (n,3)."""
+    areas, volumes = kernels.areas_and_volumes(
+        X, surface.faces, surface.patch_of_face, surface.origin, len(surface.patches)
+    )
+    return float(surface.tensions @ areas - surface.pressures @ volumes)
+
+
+def energy_and_gradient(
+    surface: Surface, X: Floats | None = None, *, supports: bool = True, workers: int | None = None
+) -> tuple[float, Floats]:
+    """E and ∇E (n,3) in one pass over the triangles, at X or where the surface stands.
+
+    ``supports=False`` leaves the forces at held vertices in: what the supports must carry.
+    """
+    areas, volumes, gradient = kernels.measure(
+        surface.vertices if X is None else X, surface.faces, surface.patch_of_face,
+        surface.origin, surface.tensions, surface.pressures, workers,
+    )  # fmt: skip
+    if supports:
+        apply_supports(surface, gradient)
+    return float(surface.tensions @ areas - surface.pressures @ volumes), gradient
+
+
+def gradient(surface: Surface) -> Floats:
+    """∇E (n,3), force; its squared sum is the paper's ‖∇E‖².
+
+    The seven cases of Sec. 2.3 are one sum over the triangles around a vertex, Σ α ∇A - p ∇V with
+    ∇A = ½ Σ ν × (q_{j+1} - q_j) (15a), (17a) and ∇V = (1/6) Σ q_j × q_{j+1}; the paper prints the
+    negative of the latter in (15b), (17b). What the cases add is the support: sliding vertices keep
+    the part along Π (19), fixed ones are zero.
+
+    >>> from pcmc import Patch, Surface
+    >>> pyramid = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]],
+    ...     [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4, [Patch("roof", 1.0)], fixed=range(4))
+    >>> gradient(pyramid)[4].round(6).tolist()
+    [0.0, 0.0, 1.495094]
+    """
+    return energy_and_gradient(surface)[1]
+
+
+def apply_supports(surface: Surface, vectors: Floats) -> Floats:
+    """Zero vectors (n,3) at fixed vertices and their part normal to Π at sliding ones, in place."""
+    vectors[surface.fixed] = 0.0
+    sliding = surface.on_plane
+    vectors[sliding] = surface.plane.along(vectors[sliding])
+    return vectors
+
+
+def hessian(surface: Surface) -> csr_array:
+    """∂²E/∂X², sparse symmetric (3n,3n), supports not applied; unknown 3v + d is coordinate d of v.
+
+    >>> from pcmc import Patch, Surface
+    >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("t", 1.0)], fixed=[0])
+    >>> H = hessian(flat.retensioned(pressures={"t": 0.0}))  # A is homogeneous of degree 2: H X = ∇A
+    >>> (H @ flat.vertices.ravel()).reshape(3, 3).round(12).tolist()
+    [[-0.5, -0.5, 0.0], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]
+    """
+    from scipy.sparse import coo_array, csr_array
+
+    blocks = np.empty((surface.m, 3, 3, 3, 3))
+    kernels.hessian_blocks(
+        surface.vertices, surface.faces, surface.patch_of_face, surface.origin,
+        surface.tensions, surface.pressures, blocks,
+    )  # fmt: skip
+    unknowns = 3 * surface.faces[:, :, None] + np.arange(3)
+    rows = np.broadcast_to(unknowns[:, :, None, :, None], blocks.shape)
+    columns = np.broadcast_to(unknowns[:, None, :, None, :], blocks.shape)
+    size = 3 * surface.n
+    return csr_array(
+        coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size))
+    )
+
+
+def patch_areas(surface: Surface) -> Floats:
+    """(k,) area A_i of each patch, length²."""
+    return _areas_and_volumes(surface)[0]
+
+
+def patch_volumes(surface: Surface) -> Floats:
+    """(k,) signed volume V_i of each patch's cone to ``surface.origin``, length³ (10b)."""
+    return _areas_and_volumes(surface)[1]
+
+
+def volume(surface: Surface) -> float:
+    """The volume under the roof: Σ V_i over the patches that are no walls, length³."""
+    return float(patch_volumes(surface)[~surface.walls].sum())
+
+
+def _areas_and_volumes(surface: Surface) -> tuple[Floats, Floats]:
+    return kernels.areas_and_volumes(
+        surface.vertices, surface.faces, surface.patch_of_face, surface.origin,
+        len(surface.patches),
+    )  # fmt: skip

@@ -1,0 +1,283 @@
+"""The motion space: at each vertex the directions in which moving it changes the shape.
+
+- inside a sheet: the unit vertex normal (the normalised vector area);
+- on a curve where sheets meet or end: the plane perpendicular to the curve;
+- at a point where such curves meet, or which sheets share that have no edge in common there: all
+  three directions;
+- always within what the support allows: nothing where fixed, along Π where sliding.
+
+The remaining directions only slide vertices along the shape and belong to mesh quality. Faces without
+tension and pressure exert no force: they are left out, and a vertex of such faces alone has no motion.
+A P-CMC surface is Bᵀ∇E = 0, with B the basis of this space.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..base.arrays import Bools, Floats, Ints
+from ..base.compiled import compiled
+from ..surface import Surface
+from ..surface.geometry import area_vectors
+from ..surface.topology import (
+    CURVE,
+    POINT,
+    SHEET,
+    Topology,
+    components,
+    curve_neighbours,
+    topology,
+    vertex_kind,
+)
+
+PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What stays the same while the vertices move: the pulling faces and what each vertex lies on.
+
+    Attributes
+    ----------
+    active : (m,) bool, faces with a tension or a pressure.
+    faces, patch_of_face : the active faces alone; those without pressure turned over where that gives
+        a sheet one side.
+    kind : (n,) SHEET, CURVE or POINT: how many edges end there at which active sheets meet, end, or
+        change tension, pressure or side.
+    curve, beside : (c,) vertices on a curve, and their neighbours along it (c,2).
+    idle : (n,) vertices of no active face.
+    level : (n,) curve vertices beside one that rests on Π: their tangent is taken along Π.
+    """
+
+    active: Bools
+    faces: Ints
+    patch_of_face: Ints
+    topology: Topology
+    kind: Ints
+    curve: Ints
+    beside: Ints
+    idle: Bools
+    level: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class MotionSpace:
+    """Orthonormal basis of the motion space at each vertex.
+
+    Attributes
+    ----------
+    basis : (n,3,3) float; basis[v, c] for c < dimension[v] are unit vectors, the rest zero.
+    dimension : (n,) int, 0 to 3.
+    """
+
+    basis: Floats
+    dimension: Ints
+
+    @cached_property
+    def start(self) -> Ints:
+        """(n+1,) first unknown of each vertex; the last entry is their number."""
+        return np.concatenate([[0], np.cumsum(self.dimension)]).astype(np.int64)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self.start[-1])
+
+    def pull(self, vectors: Floats) -> Floats:
+        """Bᵀ v (size,): the components of vectors (n,3) along the basis."""
+        return _pull(self.basis, self.dimension, self.start, vectors)
+
+    def push(self, components: Floats) -> Floats:
+        """B s (n,3): the vectors that have these components (size,)."""
+        return _push(self.basis, self.dimension, self.start, components)
+
+    def project(self, vectors: Floats) -> Floats:
+        """B Bᵀ v (n,3): the part of the vectors that changes the shape."""
+        return self.push(self.pull(vectors))
+
+
+def structure(surface: Surface, crest: Ints | None = None, level: Bools | None = None) -> Structure:
+    """The pulling faces of a surface and what its vertices lie on.
+
+    ``crest`` (k,2) leads from each junction vertex that rests on Π to its neighbours on the junction:
+    that is its curve, sharp or not, and whatever else ends there, as a standing wall does beside.
+    ``level`` (n,) marks curve vertices whose tangent is taken along Π: beside a resting vertex the
+    curve has a corner and no tangent of its own.
+
+    Two sheets of equal tension and pressure that meet with no pulling wall between them are one
+    smooth sheet: their common curve can slide along it freely and carries no motion of its own.
+    Without pressure they are so whichever way their faces run; a Möbius band keeps a curve across.
+    """
+    pulls = (surface.tensions != 0.0) | (surface.pressures != 0.0)
+    active = pulls[surface.patch_of_face]
+    faces = np.ascontiguousarray(surface.faces[active])
+    patch = np.ascontiguousarray(surface.patch_of_face[active])
+    kinds = np.unique(np.stack([surface.tensions, surface.pressures]), axis=1, return_inverse=True)
+    alike = np.asarray(kinds[1]).ravel()[patch].astype(np.int32)
+    topo = topology(faces, alike, surface.n)
+    if (topo.one_way_edge & ~topo.seam_edge).any():
+        turned = _against_the_others(topo) & (surface.pressures[patch] == 0.0)
+        faces[turned] = faces[turned][:, ::-1]
+        topo = topology(faces, alike, surface.n)
+    edges = topo.edges[topo.curve_edge | topo.one_way_edge]
+    links = np.concatenate([edges, edges[:, ::-1]])
+    if crest is not None and len(crest):
+        links = np.concatenate([links[~np.isin(links[:, 0], crest[:, 0])], crest])
+    curve, beside = curve_neighbours(links, surface.n)
+    kind = vertex_kind(links[:, 0], surface.n)
+    shared = topo.fans > 1
+    if crest is not None:
+        shared[crest[:, 0]] = False
+    kind[shared] = POINT
+    curve, beside = curve[~shared[curve]], beside[~shared[curve]]
+    idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
+    return Structure(
+        active=active,
+        faces=faces,
+        patch_of_face=patch,
+        topology=topo,
+        kind=kind,
+        curve=curve,
+        beside=beside,
+        idle=idle,
+        level=np.zeros(surface.n, dtype=bool) if level is None else level,
+    )
+
+
+def motion_space(surface: Surface, frame: Structure, X: Floats) -> MotionSpace:
+    """Basis of the motion space of the surface with its vertices at X (n,3)."""
+    n = surface.n
+    basis = np.zeros((n, 3, 3))
+    dimension = np.zeros(n, dtype=np.int64)
+    moving = ~(surface.fixed | frame.idle)
+
+    sheet = moving & (frame.kind == SHEET)
+    _along_normals(area_vectors(X, frame.faces)[0], sheet, basis, dimension)
+
+    curve = np.flatnonzero(moving & (frame.kind == CURVE))
+    tangent = np.zeros((n, 3))
+    chord = curve_chords(surface, frame, X)
+    length = np.linalg.norm(chord, axis=1)
+    tangent[frame.curve] = chord / np.where(length > 0.0, length, 1.0)[:, None]
+    straight = np.einsum("ij,ij->i", tangent[curve], tangent[curve]) > 0.5
+    ring = curve[straight]
+    basis[ring, 0], basis[ring, 1] = perpendicular(tangent[ring])
+    dimension[ring] = 2
+
+    ends = np.flatnonzero(moving & (frame.kind == POINT))
+    point = np.concatenate([ends, curve[~straight]])
+    basis[point] = np.eye(3)
+    dimension[point] = 3
+
+    sliding = np.flatnonzero(moving & surface.on_plane)
+    if len(sliding):
+        _within_plane(np.array(surface.plane.normal), tangent, sliding, basis, dimension)
+    return MotionSpace(basis, dimension)
+
+
+def curve_chords(surface: Surface, frame: Structure, X: Floats) -> Floats:
+    """(c,3) from the vertex before to the one after each curve vertex: along its tangent."""
+    chord = X[frame.beside[:, 1]] - X[frame.beside[:, 0]]
+    level = frame.level[frame.curve]
+    chord[level] = surface.plane.along(chord[level])
+    return np.asarray(chord)
+
+
+def force_scale(surface: Surface, frame: Structure, X: Floats) -> float:
+    """The norm of the single triangles' tension forces ½ α |e|, which cancel at rest, force."""
+    square = _square_of_forces(X, frame.faces, surface.tensions[frame.patch_of_face])
+    return float(np.sqrt(square)) or 1.0
+
+
+def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors (k,3) that complete each unit direction (k,3) to a right-handed frame."""
+    axis = np.eye(3)[np.abs(directions).argmin(axis=1)]
+    first = np.cross(directions, axis)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return first, np.cross(directions, first)
+
+
+def _against_the_others(topo: Topology) -> Bools:
+    """(m,) faces to turn over so that each sheet has one side; none of a sheet that has only one."""
+    flat = topo.edge_of_face.ravel()
+    smooth = (topo.valence == 2) & ~topo.seam_edge
+    hit = np.flatnonzero(smooth[flat])
+    one, other = (hit[np.argsort(flat[hit], kind="stable")] // 3).reshape(-1, 2).T
+    # every face twice, as it is and turned over: what hangs together runs the same way
+    m = len(topo.faces)
+    across = topo.one_way_edge[smooth] * m
+    second = np.append(other + across, other + m - across)
+    label = components(np.stack([np.append(one, one + m), second], axis=1), 2 * m)
+    return np.asarray(label[:m] > label[m:])
+
+
+def _within_plane(
+    normal: Floats, tangent: Floats, sliding: Ints, basis: Floats, dimension: Ints
+) -> None:
+    """Cut the basis at sliding vertices down to directions along Π, in place."""
+    first, second = perpendicular(normal[None])
+    for size in (1, 2, 3):
+        chosen = sliding[dimension[sliding] == size]
+        if not len(chosen):
+            continue
+        old = basis[chosen].copy()
+        basis[chosen] = 0.0
+        if size == 1:
+            along = old[:, 0] - (old[:, 0] @ normal)[:, None] * normal
+            length = np.linalg.norm(along, axis=1)
+            keep = length > PARALLEL
+            basis[chosen[keep], 0] = along[keep] / length[keep, None]
+            dimension[chosen] = keep
+            continue
+        across = np.cross(normal, tangent[chosen])
+        length = np.linalg.norm(across, axis=1)
+        single = (length > PARALLEL) & (size == 2)
+        basis[chosen[single], 0] = across[single] / length[single, None]
+        basis[chosen[~single], 0], basis[chosen[~single], 1] = first[0], second[0]
+        dimension[chosen] = np.where(single, 1, 2)
+
+
+@compiled
+def _along_normals(vector: Floats, chosen: Bools, basis: Floats, dimension: Ints) -> None:
+    for v in range(len(vector)):
+        a, b, c = vector[v, 0], vector[v, 1], vector[v, 2]
+        length = np.sqrt(a * a + b * b + c * c)
+        if chosen[v] and length > 0.0:
+            basis[v, 0, 0], basis[v, 0, 1], basis[v, 0, 2] = a / length, b / length, c / length
+            dimension[v] = 1
+
+
+@compiled
+def _square_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
+    total = 0.0
+    for f in range(len(F)):
+        square = 0.0
+        for i in range(3):
+            for d in range(3):
+                square += (X[F[f, i], d] - X[F[f, i - 1], d]) ** 2
+        total += 0.25 * tension[f] ** 2 * square
+    return total
+
+
+@compiled
+def _pull(basis: Floats, dimension: Ints, start: Ints, vectors: Floats) -> Floats:
+    out = np.empty(start[-1])
+    for v in range(len(dimension)):
+        for c in range(dimension[v]):
+            b = basis[v, c]
+            out[start[v] + c] = b[0] * vectors[v, 0] + b[1] * vectors[v, 1] + b[2] * vectors[v, 2]
+    return out
+
+
+@compiled
+def _push(basis: Floats, dimension: Ints, start: Ints, components: Floats) -> Floats:
+    out = np.zeros((len(dimension), 3))
+    for v in range(len(dimension)):
+        for c in range(dimension[v]):
+            s = components[start[v] + c]
+            for d in range(3):
+                out[v, d] += s * basis[v, c, d]
+    return out

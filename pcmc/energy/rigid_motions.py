@@ -1,0 +1,58 @@
+"""The rigid motions that the supports leave free."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..surface import Surface
+from .motion_space import MotionSpace
+
+SEEN = 0.05  # part of a rigid motion in the motion space below which it only slides the surface
+
+
+def rigid_motions(surface: Surface) -> Floats:
+    """(k,2,3) translations and rotations about the centroid, k = 0 to 6, that no support resists.
+
+    Entry (i,0) is the translation, (i,1) the rotation vector, scaled so that the six are orthonormal
+    when lengths are measured in sizes of the surface.
+    """
+    X = surface.vertices
+    centre = X.mean(axis=0)
+    scale = surface.size
+    normal = np.array(surface.plane.normal)
+    rows = []
+    if surface.fixed.any():
+        arm = (X[surface.fixed] - centre) / scale
+        for axis in np.eye(3):
+            rows.append(_row(arm, axis))
+    if surface.on_plane.any():
+        rows.append(_row((X[surface.on_plane] - centre) / scale, normal))
+    if not rows:
+        free = np.eye(6)
+    else:
+        resisted = np.concatenate(rows)
+        _, s, vt = np.linalg.svd(resisted.T @ resisted)
+        free = vt[s <= 1e-10 * s[0]]
+    motions = free.reshape(-1, 2, 3).copy()
+    motions[:, 1] /= scale
+    return motions
+
+
+def rigid_modes(space: MotionSpace, motions: Floats, X: Floats) -> Floats:
+    """(N,k) orthonormal: the given rigid motions as they appear in the motion space at X.
+
+    Those that only slide the surface along itself, like a sphere's rotations, drop out.
+    """
+    if not len(motions):
+        return np.zeros((space.size, 0))
+    arm = X - X.mean(axis=0)
+    fields = [translation + np.cross(rotation, arm) for translation, rotation in motions]
+    parts = np.stack([space.pull(f) / np.linalg.norm(f) for f in fields], axis=1)
+    u, s, _ = np.linalg.svd(parts, full_matrices=False)
+    return u[:, s > SEEN]
+
+
+def _row(arm: Floats, axis: Floats) -> Floats:
+    """(k,6): velocity along ``axis`` of points at ``arm`` for unit translations and rotations."""
+    return np.concatenate([np.tile(axis, (len(arm), 1)), np.cross(arm, axis)], axis=1)

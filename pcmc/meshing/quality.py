@@ -1,0 +1,118 @@
+"""How good the triangles are: one number each, 1 for equilateral, 0 for degenerate."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from ..base.arrays import Floats, Ints
+from ..base.compiled import compiled
+from ..energy.functional import apply_supports
+from ..surface import Surface
+from ..surface.topology import SHEET
+
+SQRT3 = sqrt(3.0)
+
+
+def triangle_quality(X: Floats, F: Ints) -> Floats:
+    """q = 4√3 area / Σ edge² (m,), 1 for an equilateral triangle, 0 for a degenerate one.
+
+    >>> triangle_quality(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])).round(6)
+    array([0.866025])
+    """
+    sides = X[F[:, [1, 2, 0]]] - X[F]
+    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    return 4.0 * np.sqrt(3.0) * area / np.einsum("fij,fij->f", sides, sides)
+
+
+def worst_quality(X: Floats, F: Ints) -> float:
+    """The smallest triangle quality, 1 where there are no triangles."""
+    return float(_worst(X, F))
+
+
+def compare(X: Floats, Y: Floats, F: Ints) -> tuple[bool, float, float]:
+    """Whether a triangle turns over on the way from X to Y, and the worst quality at X and at Y."""
+    return bool(_turns(X, Y, F)), float(_worst(X, F)), float(_worst(Y, F))
+
+
+@compiled
+def _worst(X: Floats, F: Ints) -> float:
+    worst = 1.0
+    for f in range(len(F)):
+        i, j, k = F[f, 0], F[f, 1], F[f, 2]
+        ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
+        wx, wy, wz = X[k, 0] - X[i, 0], X[k, 1] - X[i, 1], X[k, 2] - X[i, 2]
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        uu, ww, uw = (
+            ux * ux + uy * uy + uz * uz,
+            wx * wx + wy * wy + wz * wz,
+            ux * wx + uy * wy + uz * wz,
+        )
+        squares = 2.0 * (uu + ww - uw)
+        twice = sqrt(nx * nx + ny * ny + nz * nz)
+        if twice * 2.0 * SQRT3 < worst * squares or squares == 0.0:
+            worst = twice * 2.0 * SQRT3 / squares if squares > 0.0 else 0.0
+    return worst
+
+
+@compiled
+def _turns(X: Floats, Y: Floats, F: Ints) -> bool:
+    for f in range(len(F)):
+        i, j, k = F[f, 0], F[f, 1], F[f, 2]
+        ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
+        wx, wy, wz = X[k, 0] - X[i, 0], X[k, 1] - X[i, 1], X[k, 2] - X[i, 2]
+        px, py, pz = Y[j, 0] - Y[i, 0], Y[j, 1] - Y[i, 1], Y[j, 2] - Y[i, 2]
+        qx, qy, qz = Y[k, 0] - Y[i, 0], Y[k, 1] - Y[i, 1], Y[k, 2] - Y[i, 2]
+        dot = (
+            (uy * wz - uz * wy) * (py * qz - pz * qy)
+            + (uz * wx - ux * wz) * (pz * qx - px * qz)
+            + (ux * wy - uy * wx) * (px * qy - py * qx)
+        )
+        if dot <= 0.0:
+            return True
+    return False
+
+
+def minimum_angle(surface: Surface) -> float:
+    """The smallest angle of any triangle, degrees."""
+    X, F = surface.vertices, surface.faces
+    a, b = X[F[:, [1, 2, 0]]] - X[F], X[F[:, [2, 0, 1]]] - X[F]
+    cosine = np.einsum("fij,fij->fi", a, b)
+    sine = np.linalg.norm(np.cross(a, b), axis=2)
+    return float(np.degrees(np.arctan2(sine, cosine)).min())
+
+
+def edge_lengths(surface: Surface) -> Floats:
+    """(e,) length of each edge, in the order of ``surface.topology.edges``."""
+    start, end = surface.topology.edges.T
+    return np.linalg.norm(surface.vertices[end] - surface.vertices[start], axis=1)
+
+
+def redistribution(
+    surface: Surface, X: Floats, kind: Ints, curve: Ints, beside: Ints, step: float = 0.5
+) -> Floats:
+    """Move (n,3) of each vertex towards a better-shaped star, before any projection.
+
+    Inside a sheet (``kind`` (n,)) towards the area-weighted mean of its triangles' centroids, at the
+    vertices ``curve`` (c,) towards the middle of their neighbours ``beside`` (c,2), elsewhere not at
+    all; fixed vertices stay and sliding ones keep to Π.
+    """
+    F = surface.faces
+    corners = X[F]
+    area = 0.5 * np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    centroid = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0
+    corner = F.T.ravel()
+    total = np.bincount(corner, np.tile(area, 3), len(X))[:, None]
+    weighted = _summed(corner, np.tile(area[:, None] * centroid, (3, 1)), len(X))
+    move = np.where(total > 0.0, weighted / np.where(total > 0.0, total, 1.0) - X, 0.0)
+    move[kind != SHEET] = 0.0
+    move[curve] = 0.5 * (X[beside[:, 0]] + X[beside[:, 1]]) - X[curve]
+    return apply_supports(surface, step * move)
+
+
+def _summed(place: Ints, values: Floats, n: int) -> Floats:
+    """(n,3) the sum of the values (k,3) at each place."""
+    return np.stack([np.bincount(place, column, n) for column in values.T], axis=1)

@@ -1,0 +1,38 @@
+"""Spreading vertices along the shape, so that its triangles get better and nothing else changes."""
+
+from __future__ import annotations
+
+from ..base.arrays import Floats
+from ..contact.pinching import Standing, hung
+from ..energy.motion_space import motion_space
+from .quality import redistribution, worst_quality
+
+SWEEPS = 20  # at most
+
+
+def spread(found: Standing, X: Floats, aim: float, *, slide: bool) -> tuple[Floats, float]:
+    """The best of a few sweeps of redistribution, (n,3), and the quality of its worst triangle.
+
+    Sweeps end where that is at least ``aim``. Each vertex moves towards the middle of its star, without
+    the part in the motion space, which would change the shape; walls follow their crest.
+
+    Parameters
+    ----------
+    found : what stands of the surface; triangles of walls that may pinch are not judged.
+    X : (n,3) where its vertices are.
+    slide : whether junction vertices at rest on Π may slide along their junction.
+    """
+    surface, frame, judged = found.surface, found.frame, found.judged
+    best, worst = X, worst_quality(X, judged)
+    for _ in range(SWEEPS):
+        move = redistribution(surface, X, frame.kind, frame.curve, frame.beside)
+        if not slide:
+            move[found.rests] = 0.0
+        space = motion_space(surface, frame, X)
+        X = hung(surface, found.walls, X + move - space.project(move), space)
+        quality = worst_quality(X, judged)
+        if quality > worst:
+            best, worst = X, quality
+        if quality >= aim:
+            break
+    return best, worst

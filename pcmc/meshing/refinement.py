@@ -1,0 +1,132 @@
+"""1→4 refinement: edges are cut at their midpoints; patches and supports stay."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import OptionError
+from ..contact.pinching import midpoints
+from ..surface import Surface
+
+Projection = Callable[[Floats], Floats]
+
+
+def refine(surface: Surface, levels: int = 1, project: Projection | None = None) -> Surface:
+    """The same surface with every triangle cut into four, ``levels`` times.
+
+    Vertex i keeps its number; the midpoint of edge e of ``surface.topology.edges`` becomes vertex
+    n + e. Face f becomes faces 4 f … 4 f + 3 (three at its corners, then the middle one), so a
+    per-face field is carried over by ``numpy.repeat(field, 4)`` and a per-vertex field by
+    ``prolongation(surface) @ field``.
+
+    A midpoint is held where both ends of its edge are held *and* the edge is part of that support:
+
+    - boundary edge, both ends fixed: fixed;
+    - boundary edge, one end sliding and the other sliding, or fixed and on Π: sliding;
+    - junction or seam edge, both ends fixed, not leading from boundary to boundary: fixed;
+    - edge inside a sheet, both ends fixed and off the boundary (a held line in a patch): fixed;
+    - every other edge, such as one across a sheet between two fixed boundary vertices: free.
+
+    A new vertex is the middle of its edge, but beside a junction that rests on Π the rows of the wall,
+    which coincide there, are taken apart.
+
+    Parameters
+    ----------
+    levels : how often, ≥ 0.
+    project : (k,3) → (k,3), applied to the new fixed vertices at each level: puts them on a curved
+        boundary that the edges only approximate.
+
+    Raises
+    ------
+    OptionError
+        If ``levels`` is not a whole number ≥ 0, or ``project`` returns another shape.
+    SurfaceError
+        If ``project`` degenerates a triangle.
+
+    Examples
+    --------
+    >>> from pcmc import Patch
+    >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
+    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+    >>> fine = refine(square)
+    >>> fine.n, fine.m, int(fine.fixed.sum())  # the diagonal's midpoint is free
+    (9, 8, 8)
+    """
+    if isinstance(levels, bool) or not isinstance(levels, int | np.integer) or levels < 0:
+        raise OptionError(f"refine: levels must be a whole number ≥ 0, found {levels!r}")
+    for _ in range(levels):
+        surface = _refine_once(surface, project)
+    return surface
+
+
+def prolongation(surface: Surface) -> csr_array:
+    """(n + e, n) sparse P: ``P @ field`` carries a vertex field to ``refine(surface)``.
+
+    Old vertices keep their value, midpoints take the average of their edge's ends.
+
+    >>> from pcmc import Patch
+    >>> one = Surface([[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)],
+    ...               fixed=range(3))
+    >>> (prolongation(one) @ [0.0, 1.0, 2.0]).tolist()
+    [0.0, 1.0, 2.0, 0.5, 1.0, 1.5]
+    """
+    n, edges = surface.n, surface.topology.edges
+    e = len(edges)
+    columns = np.concatenate([np.arange(n), edges.ravel()])
+    starts = np.concatenate([np.arange(n), n + 2 * np.arange(e + 1)])
+    weights = np.concatenate([np.ones(n), np.full(2 * e, 0.5)])
+    return csr_array((weights, columns, starts), shape=(n + e, n))
+
+
+def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
+    """(e,) masks of the edges whose midpoint is fixed, and of those whose midpoint slides on Π."""
+    topo, fixed, sliding = surface.topology, surface.fixed, surface.on_plane
+    start, end = topo.edges.T
+    boundary = topo.boundary_edge
+    crossing = topo.on_boundary[start] & topo.on_boundary[end]
+    inner = (topo.junction_edge | topo.seam_edge) & ~crossing
+    inside = ~(topo.on_boundary[start] | topo.on_boundary[end])
+    both_fixed = fixed[start] & fixed[end] & (boundary | inner | inside)
+    height = surface.plane.height(surface.vertices)
+    resting = sliding | (fixed & (np.abs(height) <= 1e-9 * surface.size))
+    slides = boundary & resting[start] & resting[end] & (sliding[start] | sliding[end])
+    return both_fixed, slides
+
+
+def _refine_once(surface: Surface, project: Projection | None) -> Surface:
+    edges = surface.topology.edges
+    X, middle = surface.vertices, midpoints(surface, edges)
+    held, slides = held_midpoints(surface)
+    if project is not None:
+        middle[held] = _projected(project, middle[held])
+    return Surface(
+        np.concatenate([X, middle]),
+        _children(surface.faces, surface.topology.edge_of_face, surface.n),
+        np.repeat(surface.patch_of_face, 4),
+        surface.patches,
+        np.concatenate([surface.fixed, held]),
+        np.concatenate([surface.on_plane, slides]),
+        surface.plane,
+    )
+
+
+def _children(F: Ints, edge_of_face: Ints, n: int) -> Ints:
+    """(4m,3): the triangles at the three corners, then the middle one; orientation is kept."""
+    a, b, c = F.T
+    bc, ca, ab = n + edge_of_face.T  # an edge's number is opposite its corner
+    corners = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1)
+    return corners.reshape(-1, 3)
+
+
+def _projected(project: Projection, points: Floats) -> Floats:
+    found = np.asarray(project(points.copy()), dtype=float)
+    if found.shape != points.shape:
+        raise OptionError(
+            f"refine: project must return shape {points.shape} for {len(points)} points, returned"
+            f" {found.shape}"
+        )
+    return found

@@ -1,0 +1,379 @@
+"""Remeshing, by MMG, that keeps patches, junction curves, boundaries and supports."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import MissingExtra, OptionError, SurfaceError
+from ..contact.pinching import lifted, resting, walls
+from ..surface import Surface
+from .angles import angles, polished
+from .quality import edge_lengths
+from .refinement import held_midpoints, refine
+
+CHORD = 0.1  # of the edge length
+MOST = 20_000_000  # triangles; more are taken for a slip in the edge length
+PASSES = 3  # of MMG at most, each on the result of the one before; a patch takes its best
+GOOD_ANGLE = 25.0  # degrees; no further pass is made when all angles reach it
+LEAST_ANGLE = 20.0  # degrees; a patch that stays below it ...
+WORSE = 0.8  # ... and below this share of its old smallest angle keeps its old triangles, cut
+RAISED = 0.25  # of its spacing: what a resting junction is lifted by, so that its wall has area
+BLUNT, OBTUSE = 25.0, 100.0  # degrees; for the upper two angles of one that fills a corner well
+
+
+def remesh(
+    surface: Surface,
+    edge_length: float,
+    *,
+    near_curves: float | None = None,
+    growth: float = 1.2,
+    chord: float | None = None,
+) -> Surface:
+    """The same surface with triangles near a wanted edge length.
+
+    Patches, tensions, the plane and all names stay. Boundaries, junctions and seams stay where they
+    are to rounding: their vertices are kept, and new ones are put on the straight edges between
+    them, with the same support as their edge. (So along curves the mesh gets finer, never coarser.)
+    Vertices held inside a patch stay. A junction that rests on the plane is lifted off it by a quarter
+    of its edges, for its wall to have triangles; solving brings it down again. Everywhere else MMG
+    puts new vertices on a smooth approximation of the surface: solve again afterwards.
+
+    Parameters
+    ----------
+    edge_length : of the triangles, length.
+    near_curves : edge length at junctions and boundaries, if it is to be shorter there; it grows
+        with the distance.
+    growth : ratio of the lengths of neighbouring edges where they grow, > 1.
+    chord : largest distance between the triangles and the smooth surface, length; where the surface
+        is strongly curved, edges get shorter to keep it. By default a tenth of ``edge_length``.
+
+    Raises
+    ------
+    MissingExtra
+        Without the library mmgpy.
+    OptionError
+        For lengths that are not positive, or that would make more than 20 million triangles.
+    SurfaceError
+        When MMG gives up, or does not keep a curve.
+
+    Examples
+    --------
+    >>> from pcmc.plan import Plan
+    >>> dome = Plan([[0, 0], [4, 0], [4, 3], [0, 3]], tension=2.0, edge_length=1.0).surface()
+    >>> fine = remesh(dome, 0.5)
+    >>> fine.m > 2 * dome.m, fine.patches == dome.patches
+    (True, True)
+    """
+    check_lengths(edge_length, near_curves, growth, chord)
+    _check_count(surface, edge_length)
+    surface = _raised(surface)
+    old = _cut_curves(surface, edge_length if near_curves is None else near_curves)
+    candidates = []
+    mesh = old
+    for _ in range(PASSES):
+        size = _sizes(mesh, edge_length, growth)
+        mesh = _by_mmg(mesh, size, growth, CHORD * edge_length if chord is None else chord)
+        mesh = replace(mesh, X=polished(mesh.X, mesh.F, mesh.source < 0, GOOD_ANGLE))
+        candidates.append(mesh)
+        if angles(mesh.X, mesh.F).min() >= GOOD_ANGLE:
+            break
+    return _assembled(surface, old, candidates)
+
+
+def _raised(surface: Surface) -> Surface:
+    """The surface with the walls standing again that had vanished below a junction at rest."""
+    below = walls(surface)
+    return lifted(surface, below, resting(surface, below), RAISED)
+
+
+@dataclass(frozen=True, eq=False)
+class _Mesh:
+    """Vertices, faces with a patch each, the edges (c,2) of curves, and supports.
+
+    ``source`` (n,) tells which vertex of the mesh before MMG each one is, or -1.
+    """
+
+    X: Floats
+    F: Ints
+    patch: Ints
+    curves: Ints
+    fixed: Bools
+    sliding: Bools
+    source: Ints
+
+
+def check_lengths(
+    edge_length: float,
+    near_curves: float | None = None,
+    growth: float = 1.2,
+    chord: float | None = None,
+) -> None:
+    """Refuse arguments of ``remesh`` that no surface could be remeshed with.
+
+    >>> check_lengths(0.5, growth=1)
+    Traceback (most recent call last):
+    pcmc.base.errors.OptionError: growth must be a finite number > 1, found 1
+    """
+    lengths = {"edge_length": edge_length, "near_curves": near_curves, "chord": chord}
+    for name, value in lengths.items():
+        if not (value is None and name != "edge_length") and not _above(0.0, value):
+            raise OptionError(f"{name} must be a finite number > 0, found {value!r}")
+    if not _above(1.0, growth):
+        raise OptionError(f"growth must be a finite number > 1, found {growth!r}")
+
+
+def _above(least: float, value: Any) -> bool:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and math.isfinite(value) and value > least
+
+
+def _check_count(surface: Surface, edge_length: float) -> None:
+    """Refuse a slip in the edge length before it fills the memory."""
+    sides = surface.vertices[surface.faces[:, 1:]] - surface.vertices[surface.faces[:, :1]]
+    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum()
+    count = area / (math.sqrt(3.0) / 4.0 * edge_length**2)
+    if count > MOST:
+        raise OptionError(
+            f"edge_length={edge_length:g} would make about {count:.2g} triangles; at most {MOST}"
+            " are allowed"
+        )
+
+
+def _curve_edges(surface: Surface) -> Bools:
+    """(e,) the edges that must stay: curves, and edges held inside a patch."""
+    fixed, sliding = held_midpoints(surface)
+    return surface.topology.curve_edge | fixed | sliding
+
+
+def _cut_curves(surface: Surface, length: float) -> _Mesh:
+    """The mesh with new vertices on its curves, at most about ``length`` apart."""
+    counts = _pieces(surface, length)
+    # 1→4 keeps the triangles' shape, cutting single edges does not
+    while len(counts) and np.median(counts) >= 2.0:
+        surface = _refined_round(surface)
+        counts = _pieces(surface, length)
+    topo, stay = surface.topology, _curve_edges(surface)
+    fixed_edge, sliding_edge = held_midpoints(surface)
+    mesh = _Mesh(
+        surface.vertices, surface.faces, surface.patch_of_face, topo.edges[stay],
+        surface.fixed, surface.on_plane, np.arange(surface.n),
+    )  # fmt: skip
+    support = np.stack([fixed_edge[stay], sliding_edge[stay]], axis=1)
+    while (counts > 1).any():
+        mesh, counts, support = _cut_once(mesh, counts, support)
+    return mesh
+
+
+def _refined_round(surface: Surface) -> Surface:
+    """1→4 with the new vertices off the curves on cubics that end square to the vertex normals.
+
+    With t the components of the edge b - a across the normals at its ends, the middle of the cubic is
+    (a + b)/2 + (t_a - t_b)/8.
+    """
+    chosen = np.flatnonzero(~_curve_edges(surface))
+    ends, normals = surface.topology.edges[chosen], _edge_normals(surface, chosen)
+    edge = (surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]])[:, None]
+    across = edge - (edge * normals).sum(axis=2, keepdims=True) * normals
+    rise = (across[:, 0] - across[:, 1]) / 8.0
+    most = 0.2 * np.linalg.norm(edge[:, 0], axis=1)
+    rise *= np.minimum(1.0, most / np.maximum(np.linalg.norm(rise, axis=1), 1e-300))[:, None]
+    fine = refine(surface)
+    X = fine.vertices.copy()
+    X[surface.n + chosen] += rise
+    return fine.moved(X)
+
+
+def _edge_normals(surface: Surface, chosen: Ints) -> Floats:
+    """(c,2,3) unit normals at the ends of edges inside sheets, of the edge's own sheet."""
+    X, F, topo = surface.vertices, surface.faces, surface.topology
+    vector = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]])
+    key, place = np.unique(
+        (surface.patch_of_face[:, None].astype(np.int64) * surface.n + F).ravel(),
+        return_inverse=True,
+    )
+    total = np.zeros((len(key), 3))
+    np.add.at(total, place, np.repeat(vector, 3, axis=0))
+    total /= np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
+    patch_of_edge = np.zeros(len(topo.edges), dtype=np.int64)
+    patch_of_edge[topo.edge_of_face] = surface.patch_of_face[:, None]
+    return total[np.searchsorted(key, patch_of_edge[chosen, None] * surface.n + topo.edges[chosen])]
+
+
+def _pieces(surface: Surface, length: float) -> Ints:
+    """(c,) into how many pieces each curve edge is to be cut."""
+    lengths = edge_lengths(surface)[_curve_edges(surface)]
+    return np.maximum(1, np.rint(lengths / length)).astype(np.int64)
+
+
+def _cut_once(mesh: _Mesh, counts: Ints, support: Bools) -> tuple[_Mesh, Ints, Bools]:
+    """Every curve edge that is to be cut, cut in two, with its triangles."""
+    cut = counts > 1
+    ends, pieces = mesh.curves[cut], counts[cut]
+    first = pieces // 2
+    share = (first / pieces)[:, None]
+    start, end = mesh.X[ends[:, 0]], mesh.X[ends[:, 1]]
+    number = len(mesh.X) + np.arange(len(ends))
+    F, patch = _cut_triangles(mesh.F, mesh.patch, ends, number, len(mesh.X))
+    curves = np.concatenate(
+        [mesh.curves[~cut], np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)]
+    )
+    new = _Mesh(
+        np.concatenate([mesh.X, start + share * (end - start)]), F, patch, curves,
+        np.concatenate([mesh.fixed, support[cut, 0]]),
+        np.concatenate([mesh.sliding, support[cut, 1]]),
+        np.arange(len(mesh.X) + len(ends)),
+    )  # fmt: skip
+    counts = np.concatenate([counts[~cut], first, pieces - first])
+    return new, counts, np.concatenate([support[~cut], support[cut], support[cut]])
+
+
+def _cut_triangles(F: Ints, patch: Ints, ends: Ints, number: Ints, n: int) -> tuple[Ints, Ints]:
+    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four."""
+    key = ends.min(axis=1).astype(np.int64) * n + ends.max(axis=1)
+    order = np.argsort(key)
+    side = F[:, [[1, 2], [2, 0], [0, 1]]].astype(np.int64)
+    wanted = side.min(axis=2) * n + side.max(axis=2)
+    place = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
+    middle = np.where(key[order][place] == wanted, number[order][place], -1)
+    count = (middle >= 0).sum(axis=1)
+    # turn each triangle so that its cut sides come first: opposite corners 0, then 0 and 1
+    turn = np.argmax(middle >= 0, axis=1)
+    turn = np.where((count == 2) & (middle[:, 0] >= 0) & (middle[:, 2] >= 0), 2, turn)
+    roll = (np.arange(3) + turn[:, None]) % 3
+    a, b, c = np.take_along_axis(F.astype(np.int64), roll, axis=1).T
+    p, q, r = np.take_along_axis(middle, roll, axis=1).T  # on the sides opposite a, b, c
+    templates = {
+        0: [(a, b, c)],
+        1: [(a, b, p), (a, p, c)],
+        2: [(c, q, p), (q, a, p), (a, b, p)],
+        3: [(a, r, q), (b, p, r), (c, q, p), (p, q, r)],
+    }
+    faces, owner = [], []
+    for cuts, corners in templates.items():
+        chosen = np.flatnonzero(count == cuts)
+        faces.append(np.stack([np.stack(t, axis=1)[chosen] for t in corners], 1).reshape(-1, 3))
+        owner.append(np.repeat(patch[chosen], len(corners)))
+    return np.concatenate(faces), np.concatenate(owner)
+
+
+def _sizes(mesh: _Mesh, edge_length: float, growth: float) -> Floats:
+    """(n,) the edge length wanted at each vertex: a curve's own next to it, growing away from it."""
+    size = np.full(len(mesh.X), float(edge_length))
+    if len(mesh.curves):
+        start, end = mesh.curves.T
+        length = np.linalg.norm(mesh.X[end] - mesh.X[start], axis=1)
+        spacing = np.zeros(len(mesh.X))
+        np.maximum.at(spacing, mesh.curves, length[:, None])
+        on_curve = np.flatnonzero(spacing)
+        distance, nearest = cKDTree(mesh.X[on_curve]).query(mesh.X)
+        size = np.minimum(size, spacing[on_curve][nearest] + (growth - 1.0) * distance)
+    return size
+
+
+def _by_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> _Mesh:
+    """The mesh after MMG, with the same curves."""
+    try:
+        from mmgpy import MmgMeshS
+    except ImportError:
+        raise MissingExtra("mmgpy", "remesh") from None
+    held = np.flatnonzero(mesh.fixed | mesh.sliding)
+    kept = np.unique(np.concatenate([mesh.curves.ravel(), held]))
+    reference = np.zeros(len(mesh.X), dtype=np.int64)
+    reference[kept] = 1 + np.arange(len(kept))
+    tool: Any = MmgMeshS()
+    tool.set_mesh_size(vertices=len(mesh.X), triangles=len(mesh.F), edges=len(mesh.curves))
+    tool.set_vertices(np.ascontiguousarray(mesh.X), reference)
+    tool.set_triangles(mesh.F.astype(np.int32), mesh.patch.astype(np.int64) + 1)
+    tool.set_edges(mesh.curves.astype(np.int32), np.ones(len(mesh.curves), dtype=np.int64))
+    tool.set_required_edges(np.arange(len(mesh.curves), dtype=np.int32))
+    tool.set_required_vertices(kept.astype(np.int32))
+    tool.set_required_triangles(_corners_to_keep(mesh).astype(np.int32))
+    tool["metric"] = size[:, None]
+    try:
+        tool.remesh(
+            hmin=0.3 * float(size.min()), hmax=1.3 * float(size.max()), hausd=chord, hgrad=growth,
+            angle=0, verbose=-1,
+        )  # fmt: skip
+    except RuntimeError as error:
+        raise SurfaceError(
+            f"the remesher gave up ({error}); repair degenerate triangles first, or choose another"
+            " edge length"
+        ) from None
+    X, reference = tool.get_vertices_with_refs()
+    F, patch = tool.get_triangles_with_refs()
+    place = np.append(-1, kept)[reference]
+    known = place >= 0
+    number = np.full(len(mesh.X), -1)
+    number[place[known]] = np.flatnonzero(known)
+    curves = number[mesh.curves]
+    _check_kept(mesh, curves, F, len(X))
+    return _Mesh(
+        X, F.astype(np.int64), patch - 1, curves,
+        known & mesh.fixed[place], known & mesh.sliding[place],
+        np.where(known, mesh.source[place], -1),
+    )  # fmt: skip
+
+
+def _corners_to_keep(mesh: _Mesh) -> Ints:
+    """Triangles between curves that are as good as their corner allows: MMG would split them."""
+    on_curve = np.zeros(len(mesh.X), dtype=bool)
+    on_curve[mesh.curves] = True
+    between = np.flatnonzero(on_curve[mesh.F].all(axis=1))
+    _, second, largest = np.sort(angles(mesh.X, mesh.F[between]), axis=1).T
+    return between[(second >= BLUNT) & (largest <= OBTUSE)]
+
+
+def _check_kept(before: _Mesh, curves: Ints, F: Ints, n: int) -> None:
+    """Every curve edge must still be an edge of triangles."""
+    side = F[:, [[1, 2], [2, 0], [0, 1]]].astype(np.int64)
+    found = side.min(axis=2) * n + side.max(axis=2)
+    lost = (curves < 0).any(axis=1)
+    lost |= ~np.isin(curves.min(axis=1) * n + curves.max(axis=1), found)
+    if lost.any():
+        raise SurfaceError(
+            f"the remesher lost {lost.sum()} edges of curves, the first at"
+            f" {before.X[before.curves[np.argmax(lost), 0]].tolist()}; choose a smaller edge length"
+        )
+
+
+def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Surface:
+    """A Surface of the best triangles for each patch: they fit, because the curves are the same.
+
+    Kept vertices are taken from ``old``: MMG scales the mesh, which changes the last digits.
+    """
+    meshes = [old, *candidates]
+    angle = np.array([_patch_angles(mesh, len(surface.patches)) for mesh in meshes])
+    best = 1 + np.argmax(np.minimum(angle[1:], GOOD_ANGLE), axis=0)
+    reached = angle[best, np.arange(len(best))]
+    best[(reached < LEAST_ANGLE) & (reached < WORSE * angle[0])] = 0
+    first = np.cumsum([0, *(len(mesh.X) for mesh in meshes)])
+    faces, patch = [], []
+    for number, mesh in enumerate(meshes):
+        chosen = best[mesh.patch] == number
+        vertex = np.where(mesh.source >= 0, mesh.source, first[number] + np.arange(len(mesh.X)))
+        faces.append(vertex[mesh.F[chosen]])
+        patch.append(mesh.patch[chosen])
+    used, inverse = np.unique(np.concatenate(faces), return_inverse=True)
+    return Surface(
+        np.concatenate([mesh.X for mesh in meshes])[used],
+        inverse.reshape(-1, 3),
+        np.concatenate(patch),
+        surface.patches,
+        np.concatenate([mesh.fixed for mesh in meshes])[used],
+        np.concatenate([mesh.sliding for mesh in meshes])[used],
+        surface.plane,
+    )
+
+
+def _patch_angles(mesh: _Mesh, count: int) -> Floats:
+    """(count,) the smallest angle in each patch, degrees."""
+    smallest = np.full(count, 180.0)
+    np.minimum.at(smallest, mesh.patch, angles(mesh.X, mesh.F).min(axis=1))
+    return smallest

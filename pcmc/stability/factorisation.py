@@ -1,0 +1,254 @@
+"""Sparse symmetric factorisation with inertia, behind one small interface.
+
+A matrix is given by the upper triangle of a fixed pattern (``assemble.Pattern``). The symbolic work is
+done once per pattern; ``factor`` then takes new values. Backends, fastest first: ``"pardiso"`` (MKL, extra
+``fast``) and ``"superlu"`` (scipy, everywhere).
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+import re
+import threading
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from scipy.sparse import csc_array, csr_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+from scipy.sparse.linalg import splu
+
+from ..base.arrays import Floats, Ints
+from ..base.errors import MissingExtra, OptionError, unknown
+from ..energy.projected_hessian import Pattern
+
+BACKENDS = ("pardiso", "superlu")
+ZERO = 1e-13  # of the largest entry: a pivot below is zero to rounding
+TINY = float(np.finfo(float).tiny)
+ALONE = 10_000  # rows; up to here MKL's threads wait for each other longer than they work
+
+
+class SingularMatrix(ArithmeticError):
+    """A pivot is zero: the matrix has no factorisation, or none that shows its inertia."""
+
+
+class Factor(Protocol):
+    """A factorised matrix."""
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues (Sylvester: negative pivots of D in L D Lᵀ)."""
+
+    def solve(self, right: Floats) -> Floats:
+        """A⁻¹ right, for one right-hand side (N,) or several (N,k)."""
+
+
+class Factoriser(Protocol):
+    """Factorises matrices of one pattern."""
+
+    def factor(self, data: Floats) -> Factor:
+        """Factorise the matrix with these upper-triangle values; a new factor replaces the last."""
+
+
+@cache
+def available() -> tuple[str, ...]:
+    """Backends that can be used here, fastest first."""
+    found = importlib.util.find_spec("pypardiso") is not None
+    return BACKENDS if found else ("superlu",)
+
+
+def factoriser(kept: Pattern, backend: str | None = None) -> Factoriser:
+    """A factoriser for the pattern: the fastest backend available, or the one named.
+
+    >>> import numpy as np
+    >>> from scipy.sparse import csr_array
+    >>> kept = Pattern(np.array([0, 2, 3]), np.array([0, 1, 1]), np.empty((0, 3)))
+    >>> factor = factoriser(kept, "superlu").factor(np.array([1.0, 2.0, 1.0]))
+    >>> factor.negative, factor.solve(np.array([3.0, 3.0])).round(12).tolist()
+    (1, [1.0, 1.0])
+    """
+    chosen = backend or available()[0]
+    if chosen not in BACKENDS:
+        raise OptionError(unknown("factorisation backend", chosen, BACKENDS))
+    if chosen not in available():
+        raise MissingExtra("pypardiso", "fast")
+    # MKL refuses a matrix without rows
+    return _Pardiso(kept) if chosen == "pardiso" and kept.size else _SuperLU(kept)
+
+
+def _finite(data: Floats) -> None:
+    if not np.isfinite(data).all():
+        raise SingularMatrix("the matrix has entries that are not finite")
+
+
+class _SuperLU:
+    """scipy's SuperLU, kept symmetric: no pivoting off the diagonal.
+
+    Its minimum-degree ordering takes several times as long as the factorisation where the numbers of
+    neighbours are far apart, as after refinement. So it is given the Cuthill-McKee order, and is
+    asked once; later matrices come in the order it found.
+    """
+
+    def __init__(self, kept: Pattern) -> None:
+        entry = np.arange(1, len(kept.indices) + 1)
+        upper = csr_array((entry, kept.indices, kept.indptr), shape=(kept.size, kept.size))
+        rows = np.repeat(np.arange(kept.size), np.diff(kept.indptr))
+        off = rows != kept.indices
+        lower = csr_array((entry[off], (kept.indices[off], rows[off])), shape=upper.shape)
+        self._full = csr_array(upper + lower)
+        self._ordering: Literal["MMD_AT_PLUS_A", "NATURAL"] = "MMD_AT_PLUS_A"
+        empty = np.empty(0, dtype=np.int32)
+        self._arrange(
+            reverse_cuthill_mckee(self._full, symmetric_mode=True) if kept.size else empty
+        )
+
+    def _arrange(self, order: Ints) -> None:
+        """Take rows and columns in this order from now on."""
+        arranged = csc_array(self._full[order][:, order])
+        arranged.sort_indices()
+        self._order = order
+        self._source: Ints = arranged.data - 1
+        self._indices, self._indptr = arranged.indices, arranged.indptr
+
+    def factor(self, data: Floats) -> Factor:
+        _finite(data)
+        matrix = csc_array((data[self._source], self._indices, self._indptr), self._full.shape)
+        try:
+            lu = splu(
+                matrix, permc_spec=self._ordering, diag_pivot_thresh=0.0, panel_size=4,
+                options={"SymmetricMode": True},
+            )  # fmt: skip
+        except RuntimeError as error:
+            raise SingularMatrix(str(error)) from None
+        found = _SuperLUFactor(matrix, lu, self._order)
+        if self._ordering != "NATURAL":
+            self._ordering = "NATURAL"
+            self._arrange(self._order[np.argsort(lu.perm_c)])
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class _SuperLUFactor:
+    matrix: csc_array
+    lu: Any
+    order: Ints
+
+    @property
+    def negative(self) -> int:
+        if not np.array_equal(self.lu.perm_r, self.lu.perm_c):
+            raise SingularMatrix("a zero pivot forced a row exchange, so the inertia is unknown")
+        pivots = self.lu.U.diagonal()
+        lost = int(
+            np.count_nonzero(np.abs(pivots) < ZERO * np.abs(self.matrix.data).max(initial=0.0))
+        )
+        if lost:
+            raise SingularMatrix(f"{lost} pivots are zero to rounding")
+        return int(np.count_nonzero(pivots < 0.0))
+
+    def solve(self, right: Floats) -> Floats:
+        right = right[self.order]
+        first = self.lu.solve(right)
+        out = np.empty_like(first)
+        out[self.order] = first + self.lu.solve(right - self.matrix @ first)
+        return out
+
+
+class _Pardiso:
+    """MKL PARDISO on the upper triangle: mtype -2, real symmetric indefinite."""
+
+    def __init__(self, kept: Pattern) -> None:
+        # pypardiso looks for MKL in the whole prefix, 0.2 s each time, unless it is told where
+        if known := _mkl():
+            os.environ.setdefault("PYPARDISO_MKL_RT", known)
+        import pypardiso
+
+        self._kept = kept
+        self._solver = pypardiso.PyPardisoSolver(mtype=-2)
+        os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
+        self._error = pypardiso.pardiso_wrapper.PyPardisoError
+        self._lock = threading.Lock()
+        for place, value in (
+            (1, 1),
+            (2, 2),
+            (8, 0),
+            (10, round(-math.log10(ZERO))),
+            (11, 0),
+            (13, 0),
+            (21, 1),
+            (24, 1),
+        ):
+            self._solver.set_iparm(place, value)
+        self._analysed = False
+
+    def factor(self, data: Floats) -> Factor:
+        _finite(data)
+        # what MKL holds a pivot against does not depend on the units of the matrix
+        unit = 0.5 ** math.frexp(np.abs(data).max(initial=TINY))[1]
+        matrix = self._kept.matrix(unit * data)
+        nothing = np.zeros((self._kept.size, 1), order="F")
+        try:
+            if not self._analysed:
+                self.run(11, matrix, nothing)
+                self._analysed = True
+                # MKL keeps the factor outside Python: free it with this object, not at exit.
+                weakref.finalize(self, _release, self._solver, self._kept).atexit = False
+            self.run(22, matrix, nothing)
+        except self._error as error:
+            raise SingularMatrix(str(error)) from None
+        iparm = self._solver.iparm
+        if iparm[13]:  # MKL replaces such a pivot and goes on
+            raise SingularMatrix(f"{iparm[13]} pivots are zero to rounding")
+        return _PardisoFactor(self, matrix, unit, int(iparm[22]))
+
+    def run(self, phase: int, matrix: csr_array, right: Floats) -> Floats:
+        with self._lock, self._threads():
+            self._solver.set_phase(phase)
+            return self._solver._call_pardiso(matrix, right)
+
+    @contextmanager
+    def _threads(self) -> Iterator[None]:
+        """A single one within the block where the matrix is small."""
+        if self._kept.size > ALONE:
+            yield
+            return
+        choose = self._solver.libmkl.MKL_Set_Num_Threads_Local
+        before = choose(1)
+        try:
+            yield
+        finally:
+            choose(before)
+
+
+@cache
+def _mkl() -> str:
+    """Where MKL's own list of files says that it is; empty without one."""
+    with suppress(metadata.PackageNotFoundError):
+        for file in metadata.files("mkl") or ():
+            if re.fullmatch(r"(lib)?mkl_rt[.\d]*\.(so[.\d]*|dll)", file.name):
+                path = Path(str(file.locate()))
+                return str(path.resolve()) if path.is_file() else ""
+    return ""
+
+
+def _release(solver: Any, kept: Pattern) -> None:
+    solver.set_phase(-1)
+    solver._call_pardiso(kept.matrix(np.zeros(len(kept.indices))), np.zeros((kept.size, 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class _PardisoFactor:
+    owner: _Pardiso
+    matrix: csr_array
+    unit: float
+    negative: int
+
+    def solve(self, right: Floats) -> Floats:
+        return self.owner.run(33, self.matrix, np.asfortranarray(self.unit * right))

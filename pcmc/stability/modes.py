@@ -1,0 +1,129 @@
+"""Morse index and lowest modes: which motions lower the energy of a surface at rest.
+
+The Hessian in the motion space is compared with the lumped area mass M (a third of the area around each
+vertex): λ of  Bᵀ(∂²E)B s = λ M s  is the second variation per unit normal displacement, force/length³. The
+number of negative λ is the Morse index; it is counted by inertia, without computing any of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array, triu
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+
+from ..base.arrays import Floats
+from ..energy.motion_space import MotionSpace, Structure
+from ..energy.projected_hessian import Pattern, assemble, pattern
+from ..surface import Surface
+from ..surface.geometry import area_vectors
+from .factorisation import Factor, SingularMatrix, factoriser
+
+SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
+
+
+@dataclass(frozen=True, eq=False)
+class Stiffness:
+    """Bᵀ(∂²E)B of a surface, factorised, with the rigid motions set apart.
+
+    Attributes
+    ----------
+    matrix : sparse symmetric (N,N).
+    mass : (N,) lumped area, length².
+    negative : negative eigenvalues, rigid motions not counted.
+    """
+
+    space: MotionSpace
+    matrix: csr_array
+    mass: Floats
+    factor: Factor
+    rigid: Floats
+    negative: int
+
+
+def full_matrix(kept: Pattern, data: Floats) -> csr_array:
+    """The symmetric matrix (N,N) of which the pattern holds the upper triangle."""
+    upper = kept.matrix(data)
+    return csr_array(upper + triu(upper, k=1).T)
+
+
+def lumped_mass(space: MotionSpace, frame: Structure, X: Floats) -> Floats:
+    """(N,) a third of the area of the active triangles around each unknown's vertex, length²."""
+    return np.repeat(area_vectors(X, frame.faces)[1] / 3.0, space.dimension)
+
+
+def negatives_without(factor: Factor, rigid: Floats) -> int:
+    """Negative eigenvalues on the complement of the columns of ``rigid`` (N,k).
+
+    Haynsworth: the bordered matrix [[H, Q], [Qᵀ, 0]] has the inertia of H restricted to the
+    complement plus (k, k), and that of H plus that of -QᵀH⁻¹Q.
+    """
+    k = rigid.shape[1]
+    if not k:
+        return factor.negative
+    small = rigid.T @ factor.solve(rigid)
+    positive = int((np.linalg.eigvalsh(0.5 * (small + small.T)) > 0.0).sum())
+    return factor.negative + positive - k
+
+
+def stiffness(
+    surface: Surface,
+    frame: Structure,
+    space: MotionSpace,
+    rigid: Floats,
+    backend: str | None = None,
+) -> Stiffness:
+    """Assemble and factorise Bᵀ(∂²E)B where the surface stands.
+
+    Motions that cost nothing at all, like a vertex's inside a flat part that rests on Π, get a
+    little of the stiffness BᵀLB: they are no way down.
+    """
+    X = surface.vertices
+    kept = pattern(frame, space)
+    solver = factoriser(kept, backend)
+    data = assemble(surface, frame, space, kept, X)
+    try:
+        factor = solver.factor(data)
+        negative = negatives_without(factor, rigid)
+    except SingularMatrix:
+        data = assemble(surface, frame, space, kept, X, 1.0, SOFT)
+        factor = solver.factor(data)
+        negative = negatives_without(factor, rigid)
+    mass = lumped_mass(space, frame, X)
+    return Stiffness(space, full_matrix(kept, data), mass, factor, rigid, negative)
+
+
+def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
+    """The ``count`` eigenvalues (k,) nearest zero, ascending, and their modes (k,n,3).
+
+    The negative ones are among those sought, so the first is the lowest of all. Modes have unit
+    mass: Σ M |v|² = 1. Rigid motions are left out.
+    """
+    size = len(system.mass)
+    k = min(max(count, system.negative + 2), size - 1)
+    root = np.sqrt(system.mass)
+    Q = system.rigid
+    bordered = system.factor.solve(Q) if Q.shape[1] else Q
+
+    def inverse(x: Floats) -> Floats:
+        y = system.factor.solve(root * x)
+        if Q.shape[1]:
+            y = y - bordered @ np.linalg.solve(Q.T @ bordered, Q.T @ y)
+        return root * y
+
+    scaled = diags_array(1.0 / root) @ system.matrix @ diags_array(1.0 / root)
+    operator = LinearOperator((size, size), inverse, dtype=float)
+    start = inverse(np.cos(np.arange(size) * 1.618))  # fixed, so that runs repeat
+    while True:
+        try:
+            vectors = eigsh(operator, k=k, which="LM", v0=start)[1]
+        except ArpackNoConvergence as partial:
+            vectors = np.asarray(partial.eigenvectors, dtype=float)
+        values = np.einsum("ik,ik->k", vectors, scaled @ vectors)
+        if np.count_nonzero(values < 0.0) >= system.negative or 2 * k >= size:
+            break
+        k *= 2  # a strongly negative one is farther from zero than some positive ones
+    order = np.argsort(values)[:count]
+    fields = [system.space.push(vectors[:, i] / root) for i in order]
+    return values[order], np.array(fields).reshape(len(order), len(system.space.dimension), 3)

@@ -1,0 +1,314 @@
+"""Patch, Plane and Surface: frozen values, checked once on the way in."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import FreeSurfaceWarning, OptionError, SurfaceError, unknown
+from . import checks
+from .topology import Topology, topology
+
+Vector = tuple[float, float, float]
+
+FAR = 30.0  # sizes from the point of Π: farther, volumes seen from it lose over three digits
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A part of the surface with one tension and one pressure.
+
+    Parameters
+    ----------
+    name : str, unique in its surface.
+    tension : α ≥ 0, force per length. At rest the patch has mean curvature pressure / (2 α).
+    pressure : p, force per area along the positive normal. It is a difference, that below the patch
+        less that above it. So a wall between two rooms of pressures p_1 and p_2 carries p_1 - p_2,
+        its normal pointing from room 1 to room 2; see ``pcmc.energy`` for what E means where it does
+        not.
+    wall : whether the patch stands between rooms and is no roof: its cone is no part of the volume,
+        and it may pinch. A patch without pressure is a wall in any case.
+
+    >>> Patch("roof", tension=2.0).target_curvature
+    0.25
+    """
+
+    name: str
+    tension: float
+    pressure: float = 1.0
+    wall: bool = field(default=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", str(self.name))
+        object.__setattr__(self, "wall", bool(self.wall))
+        for key in ("tension", "pressure"):
+            value = getattr(self, key)
+            try:
+                if isinstance(value, bool):
+                    raise TypeError
+                object.__setattr__(self, key, float(value))
+            except (TypeError, ValueError):
+                raise SurfaceError(
+                    f"patch {self.name!r}: {key} must be a number, found {value!r}"
+                ) from None
+        if not (math.isfinite(self.tension) and self.tension >= 0.0):
+            raise SurfaceError(
+                f"patch {self.name!r}: tension must be a finite number ≥ 0, found {self.tension};"
+                " 0 makes a wall that does not pull"
+            )
+        if not math.isfinite(self.pressure):
+            raise SurfaceError(
+                f"patch {self.name!r}: pressure must be finite, found {self.pressure}"
+            )
+        for key in ("tension", "pressure"):
+            if abs(getattr(self, key)) > checks.LARGEST:
+                raise SurfaceError(
+                    f"patch {self.name!r}: {key} must be at most {checks.LARGEST:g}, found"
+                    f" {getattr(self, key)}; use a larger unit of force"
+                )
+        if self.tension == 0.0 and self.pressure != 0.0:
+            raise SurfaceError(
+                f"patch {self.name!r}: a patch under pressure {self.pressure} needs a tension > 0;"
+                " only a wall between equal pressures (pressure=0) may have tension 0"
+            )
+
+    @property
+    def auxiliary(self) -> bool:
+        """Whether the patch is a wall: said to be one, or without pressure."""
+        return self.wall or self.pressure == 0.0
+
+    @property
+    def target_curvature(self) -> float:
+        """H̄ = p / (2 α), 1/length; NaN for a wall without tension, whose shape is arbitrary."""
+        return self.pressure / (2.0 * self.tension) if self.tension > 0.0 else math.nan
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The plane Π through ``point`` with unit ``normal`` (normalised on the way in).
+
+    Volumes are measured from its point, so with the boundary on Π the volume is the one enclosed
+    between surface and Π.
+
+    >>> Plane(normal=(0, 0, 2)).normal
+    (0.0, 0.0, 1.0)
+    """
+
+    point: Vector = (0.0, 0.0, 0.0)
+    normal: Vector = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        for key in ("point", "normal"):
+            vector = checks.finite_vector(getattr(self, key), f"Plane.{key}")
+            object.__setattr__(self, key, vector)
+        length = math.sqrt(sum(c * c for c in self.normal))
+        if length == 0.0:
+            raise SurfaceError("Plane.normal must not be the zero vector")
+        object.__setattr__(self, "normal", tuple(c / length for c in self.normal))
+
+    def height(self, points: npt.ArrayLike) -> Floats:
+        """(…) signed distance of points (…,3) from the plane, positive along the normal."""
+        return (np.asarray(points, dtype=float) - np.array(self.point)) @ np.array(self.normal)
+
+    def along(self, vectors: Floats) -> Floats:
+        """(…,3) the components of vectors (…,3) parallel to the plane: v - ⟨v, n⟩ n, Eq. (19)."""
+        normal = np.array(self.normal)
+        return vectors - (vectors @ normal)[..., None] * normal
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A triangle mesh of several patches, with its supports.
+
+    Parameters
+    ----------
+    vertices : (n,3) float, positions.
+    faces : (m,3) int, counter-clockwise seen from the side the pressure pushes towards.
+    patch_of_face : (m,) int, index into ``patches``.
+    patches : sequence of Patch, names unique.
+    fixed : index array or (n,) bool mask: vertices that do not move.
+    on_plane : index array or (n,) bool mask: vertices that slide on ``plane`` (fixed wins).
+    plane : Π.
+
+    Raises
+    ------
+    SurfaceError
+        Naming the first offending index, for arrays that are not such a mesh.
+
+    Examples
+    --------
+    >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
+    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+    >>> square.n, square.m, square.size
+    (4, 2, 1.4142135623730951)
+    """
+
+    vertices: Floats
+    faces: Ints
+    patch_of_face: Ints
+    patches: tuple[Patch, ...]
+    fixed: Bools = field(default=cast(Bools, ()))
+    on_plane: Bools = field(default=cast(Bools, ()))
+    plane: Plane = Plane()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.plane, Plane):
+            raise SurfaceError(f"plane: expected a Plane, found {self.plane!r}")
+        X = checks.positions(self.vertices)
+        checks.within_reach(X)
+        F = checks.face_array(self.faces, len(X))
+        patch = checks.patch_array(self.patch_of_face, len(F), self.patches)
+        fixed = checks.mask(self.fixed, len(X), "fixed")
+        sliding = checks.mask(self.on_plane, len(X), "on_plane") & ~fixed
+        for key, value in (
+            ("vertices", X), ("faces", F), ("patch_of_face", patch), ("fixed", fixed),
+            ("on_plane", sliding),
+        ):  # fmt: skip
+            value.setflags(write=False)
+            object.__setattr__(self, key, value)
+        object.__setattr__(self, "patches", tuple(self.patches))
+        height = self.plane.height(X)
+        checks.mesh(X, F, patch, self.topology, self.patches, fixed | sliding, height)
+        checks.on_plane(height, sliding, X, self.size)
+        if not (fixed.any() or sliding.any()):
+            warnings.warn(
+                "no vertex is fixed or on the plane: translations are free, so only closed"
+                " surfaces have an equilibrium; pass fixed= or on_plane= to hold it",
+                FreeSurfaceWarning,
+                stacklevel=3,
+            )
+
+    @property
+    def n(self) -> int:
+        """Number of vertices."""
+        return len(self.vertices)
+
+    @property
+    def m(self) -> int:
+        """Number of triangles."""
+        return len(self.faces)
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the bounding box, length: the scale of every relative tolerance."""
+        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+
+    @cached_property
+    def topology(self) -> Topology:
+        """Edges, curves and points, from the faces alone; shared by all moved copies."""
+        return topology(self.faces, self.patch_of_face, len(self.vertices))
+
+    @cached_property
+    def uncancelled(self) -> Floats:
+        """(e,) the pressures left over at each edge that may leave its support, force/area.
+
+        Each triangle's counts along its sense there. Where all are zero, no force depends on which
+        point of Π the volumes are seen from.
+        """
+        topo = self.topology
+        pressure = self.pressures[self.patch_of_face, None] * topo.sense
+        left = np.bincount(topo.edge_of_face.ravel(), pressure.ravel(), len(topo.edges))
+        held = (self.fixed | self.on_plane)[topo.edges].all(axis=1)
+        rounding = 1e-12 * np.abs(self.pressures).max(initial=0.0)
+        return np.where(held | (np.abs(left) <= rounding), 0.0, left)
+
+    @cached_property
+    def origin(self) -> Floats:
+        """(3,) the point that volumes are seen from: that of Π.
+
+        Drawn far from it, as in a survey's coordinates, a surface would lose its digits in volumes of
+        that size; there it is the point of Π below the middle of the surface, so that a volume over Π
+        is the same wherever it is drawn, or that middle, where it is as far above Π and nothing slides.
+        Forces are the same as long as the pressures cancel along all edges that nothing holds; where
+        they do not, the point of Π it remains.
+        """
+        point, middle = np.array(self.plane.point), self.vertices.mean(axis=0)
+        near = np.linalg.norm(middle - point) <= FAR * self.size
+        if near or self.uncancelled.any():
+            return point
+        height = float(self.plane.height(middle))
+        if self.on_plane.any() or abs(height) <= FAR * self.size:
+            middle = middle - height * np.array(self.plane.normal)
+        return np.asarray(middle)
+
+    @cached_property
+    def walls(self) -> Bools:
+        """(k,) bool: which patches are walls."""
+        return np.array([p.auxiliary for p in self.patches])
+
+    @cached_property
+    def tensions(self) -> Floats:
+        """(k,) tension α of each patch."""
+        return np.array([p.tension for p in self.patches])
+
+    @cached_property
+    def pressures(self) -> Floats:
+        """(k,) pressure p of each patch."""
+        return np.array([p.pressure for p in self.patches])
+
+    @property
+    def free(self) -> Bools:
+        """(n,) vertices that no support holds at all."""
+        return ~(self.fixed | self.on_plane)
+
+    def patch_index(self, name: str) -> int:
+        """Index of the patch called ``name``."""
+        names = [p.name for p in self.patches]
+        if name not in names:
+            raise OptionError(unknown("patch", name, names))
+        return names.index(name)
+
+    def moved(self, vertices: npt.ArrayLike) -> Surface:
+        """The same surface with its vertices elsewhere, (n,3); faces, supports, patches are shared.
+
+        Sliding vertices must stay on Π. Triangles may collapse: ``solve`` mends what it can.
+        """
+        X = checks.positions(vertices)
+        if X.shape != self.vertices.shape:
+            raise SurfaceError(f"vertices: expected shape {self.vertices.shape}, found {X.shape}")
+        checks.on_plane(self.plane.height(X), self.on_plane, X, self.size)
+        X.setflags(write=False)
+        return self._with(vertices=X)
+
+    def retensioned(
+        self,
+        tensions: Mapping[str, float] | None = None,
+        pressures: Mapping[str, float] | None = None,
+        walls: Iterable[str] = (),
+    ) -> Surface:
+        """The same surface with other tensions or pressures, given by patch name.
+
+        ``walls`` names patches that are walls whatever their pressure.
+        """
+        patches = list(self.patches)
+        changes: dict[int, dict[str, Any]] = {
+            self.patch_index(name): {"wall": True} for name in walls
+        }
+        for key, given in (("tension", tensions), ("pressure", pressures)):
+            for name, value in (given or {}).items():
+                changes.setdefault(self.patch_index(name), {})[key] = value
+        for index, both in changes.items():
+            patches[index] = replace(patches[index], **both)
+        return self._with(patches=tuple(patches))
+
+    def patch_faces(self, patches: Sequence[int]) -> Bools:
+        """(m,) mask of the triangles of the given patches."""
+        return np.isin(self.patch_of_face, patches)
+
+    def _with(self, **changes: object) -> Surface:
+        """A copy that skips the checks already made; the topology travels along."""
+        other = object.__new__(type(self))
+        names = ("vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane")
+        for name in (*names, "topology"):
+            other.__dict__[name] = changes.get(name, getattr(self, name))
+        if "patches" not in changes:  # seen from one point all along a solver's way
+            other.__dict__["origin"] = self.origin
+        return other

@@ -1,0 +1,289 @@
+"""What the faces alone say: edges, sheets around an edge, junction curves and points, boundary loops.
+
+A *junction* is an edge that three or more triangles share, a *seam* an edge between two triangles of
+different patches, a *boundary* edge belongs to one triangle only. All three are *curve* edges; a vertex
+on exactly two curve edges lies on a curve, one on a single or on three or more is a *point*.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.arrays import Bools, Ints
+from ..base.compiled import compiled
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array  # at run time where it is needed: many surfaces never ask
+
+SHEET, CURVE, POINT = 0, 1, 2
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A chain of curve edges between two points, or a closed loop.
+
+    Attributes
+    ----------
+    vertices : (k,) int array, in order along the curve (first is not repeated when closed).
+    closed : whether the last vertex is joined to the first.
+    sheets : names' indices of the patches that meet along the curve, ascending.
+    """
+
+    vertices: Ints
+    closed: bool
+    sheets: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Topology:
+    """Edges of a triangle mesh that may branch.
+
+    Attributes
+    ----------
+    edges : (e,2) int array, each row ascending, rows in lexicographic order.
+    edge_of_face : (m,3) int array; entry (f,k) is the edge opposite corner k of face f.
+    valence : (e,) int array, the number of triangles at each edge.
+    """
+
+    faces: Ints
+    patch_of_face: Ints
+    vertex_count: int
+    edges: Ints
+    edge_of_face: Ints
+    valence: Ints
+
+    @cached_property
+    def sense(self) -> Ints:
+        """(m,3) int: +1 where a face runs along the edge of ``edge_of_face`` as its row does, else -1."""
+        ascends = self.faces[:, [1, 2, 0]] < self.faces[:, [2, 0, 1]]
+        return np.where(ascends, np.int8(1), np.int8(-1))
+
+    @cached_property
+    def one_way_edge(self) -> Bools:
+        """(e,) bool: edges between two triangles that run along it the same way: the side changes."""
+        total = np.bincount(self.edge_of_face.ravel(), self.sense.ravel(), len(self.edges))
+        return (self.valence == 2) & (total != 0.0)
+
+    @cached_property
+    def fans(self) -> Ints:
+        """(n,) int: how many parts the triangles around each vertex fall into that share no edge there.
+
+        1 within a sheet and along curves, 2 where two sheets just touch, 0 for a vertex of no triangle.
+        """
+
+        count: Ints = fans(self.faces, self.edge_of_face, self.edges, self.vertex_count)
+        return count
+
+    @cached_property
+    def boundary_edge(self) -> Bools:
+        """(e,) bool: edges of a single triangle."""
+        return self.valence == 1
+
+    @cached_property
+    def junction_edge(self) -> Bools:
+        """(e,) bool: edges where three or more triangles meet."""
+        return self.valence >= 3
+
+    @cached_property
+    def seam_edge(self) -> Bools:
+        """(e,) bool: edges between two triangles of different patches, with no wall between them."""
+        low, high = self._patch_range
+        return (self.valence == 2) & (low != high)
+
+    @cached_property
+    def curve_edge(self) -> Bools:
+        """(e,) bool: boundary, junction and seam edges."""
+        return self.boundary_edge | self.junction_edge | self.seam_edge
+
+    @cached_property
+    def _patch_range(self) -> tuple[Ints, Ints]:
+        patches = np.repeat(self.patch_of_face, 3)
+        low = np.full(len(self.edges), np.iinfo(np.int32).max, dtype=np.int32)
+        high = np.full(len(self.edges), -1, dtype=np.int32)
+        np.minimum.at(low, self.edge_of_face.ravel(), patches)
+        np.maximum.at(high, self.edge_of_face.ravel(), patches)
+        return low, high
+
+    @cached_property
+    def vertex_kind(self) -> Ints:
+        """(n,) int: SHEET, CURVE or POINT."""
+        return vertex_kind(self.edges[self.curve_edge], self.vertex_count)
+
+    @cached_property
+    def on_boundary(self) -> Bools:
+        """(n,) bool: vertices of a boundary edge."""
+        return _touched(self.edges[self.boundary_edge], self.vertex_count)
+
+    @cached_property
+    def on_junction(self) -> Bools:
+        """(n,) bool: vertices of a junction or seam edge."""
+        return _touched(self.edges[self.junction_edge | self.seam_edge], self.vertex_count)
+
+    @cached_property
+    def interior(self) -> Bools:
+        """(n,) bool: vertices inside a single sheet, where a mean curvature is defined."""
+        return ~(self.on_boundary | self.on_junction)
+
+    @cached_property
+    def junctions(self) -> tuple[Curve, ...]:
+        """Junction curves and seams, cut at the points where they meet, end or touch a boundary."""
+        return self._curves(self.junction_edge | self.seam_edge, self.vertex_kind == POINT)
+
+    @cached_property
+    def boundary_loops(self) -> tuple[Curve, ...]:
+        """Boundary curves of each patch's outline, cut where more than two boundary edges meet."""
+        boundary = self.edges[self.boundary_edge]
+        return self._curves(self.boundary_edge, vertex_kind(boundary, self.vertex_count) == POINT)
+
+    @cached_property
+    def components(self) -> Ints:
+        """(n,) int: label of the connected part that each vertex belongs to."""
+        return components(self.edges, self.vertex_count)
+
+    def _curves(self, mask: Bools, stop: np.ndarray) -> tuple[Curve, ...]:
+        chosen = np.flatnonzero(mask)
+        pairs = self.edges[chosen]
+        split, original = _split_at(pairs, stop, self.vertex_count)
+        graph = _adjacency(split, len(original))
+        label = components(split, len(original))
+        sheets = self._sheets_of_edges(chosen)
+        curves = []
+        degree = np.bincount(split.ravel(), minlength=len(original))
+        for part, first_edge in zip(*np.unique(label[split[:, 0]], return_index=True), strict=True):
+            members = np.flatnonzero((label == part) & (degree > 0))
+            ends = members[degree[members] == 1]
+            closed = not len(ends)
+            order = _chain(graph, members[0] if closed else ends[0], closed)
+            curves.append(Curve(original[order], closed, sheets[first_edge]))
+        return tuple(curves)
+
+    def _sheets_of_edges(self, chosen: Ints) -> list[tuple[int, ...]]:
+        wanted = np.zeros(len(self.edges), dtype=bool)
+        wanted[chosen] = True
+        flat = self.edge_of_face.ravel()
+        hit = np.flatnonzero(wanted[flat])
+        order = np.argsort(flat[hit], kind="stable")
+        patch = self.patch_of_face[hit[order] // 3]
+        starts = np.cumsum(self.valence[chosen])[:-1]
+        return [tuple(sorted(map(int, part))) for part in np.split(patch, starts)]
+
+
+def topology(faces: Ints, patch_of_face: Ints, vertex_count: int) -> Topology:
+    """Edges of the faces and what lies on what.
+
+    >>> import numpy as np
+    >>> t = topology(np.array([[0, 1, 2], [0, 2, 3]]), np.array([0, 0]), 4)
+    >>> t.edges[~t.boundary_edge].tolist(), t.valence.tolist()
+    ([[0, 2]], [1, 2, 1, 1, 1])
+    """
+    corners = np.concatenate([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]]).astype(
+        np.int64
+    )
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    key, inverse, count = np.unique(
+        low * vertex_count + high, return_inverse=True, return_counts=True
+    )
+    edges = np.stack([key // vertex_count, key % vertex_count], axis=1).astype(np.int32)
+    edge_of_face = inverse.reshape(3, -1).T.astype(np.int32)
+    return Topology(
+        faces, patch_of_face, vertex_count, edges, np.ascontiguousarray(edge_of_face), count
+    )
+
+
+def vertex_kind(ends: Ints, vertex_count: int) -> Ints:
+    """(n,) int: SHEET, CURVE or POINT, from the ends of the curve edges alone."""
+    degree = np.bincount(ends.ravel(), minlength=vertex_count)
+    return np.where(degree == 0, SHEET, np.where(degree == 2, CURVE, POINT)).astype(np.int8)
+
+
+def components(edges: Ints, vertex_count: int) -> Ints:
+    """(n,) int: label of each vertex's connected part."""
+    from scipy.sparse.csgraph import connected_components
+
+    return connected_components(_adjacency(edges, vertex_count), directed=False)[1]
+
+
+def curve_neighbours(links: Ints, vertex_count: int) -> tuple[Ints, Ints]:
+    """The vertices (c,) that two of the links lead from, and where these lead to (c,2).
+
+    ``links`` (k,2) are curve edges, each twice: as seen from the one end and from the other.
+
+    >>> import numpy as np
+    >>> edges = np.array([[0, 1], [1, 4], [4, 2]])
+    >>> curve, beside = curve_neighbours(np.concatenate([edges, edges[:, ::-1]]), 5)
+    >>> curve.tolist(), beside.tolist()
+    ([1, 4], [[4, 0], [2, 1]])
+    """
+    here, there = links[np.argsort(links[:, 0], kind="stable")].T
+    curve = np.flatnonzero(vertex_kind(here, vertex_count) == CURVE)
+    first = np.searchsorted(here, curve)
+    return curve, np.stack([there[first], there[first + 1]], axis=1)
+
+
+def _touched(edges: Ints, vertex_count: int) -> Bools:
+    mask = np.zeros(vertex_count, dtype=bool)
+    mask[edges.ravel()] = True
+    return mask
+
+
+def _adjacency(edges: Ints, vertex_count: int) -> csr_array:
+    from scipy.sparse import coo_array, csr_array
+
+    rows, columns = edges[:, 0], edges[:, 1]
+    index = np.arange(1, len(edges) + 1)
+    half = coo_array((index, (rows, columns)), shape=(vertex_count, vertex_count))
+    return csr_array(half + half.T)
+
+
+def _split_at(pairs: Ints, stop: Bools, vertex_count: int) -> tuple[Ints, Ints]:
+    """Give each edge end at a stopping vertex a vertex of its own, so that chains end there."""
+    flat = pairs.astype(np.int64).ravel()
+    ends = np.flatnonzero(stop[flat])
+    original = np.concatenate([np.arange(vertex_count), flat[ends]])
+    flat[ends] = vertex_count + np.arange(len(ends))
+    return flat.reshape(-1, 2), original
+
+
+def _chain(graph: csr_array, start: int, closed: bool) -> Ints:
+    """Vertices of a path or a ring in order from ``start``."""
+    from scipy.sparse.csgraph import breadth_first_order
+
+    order, before = breadth_first_order(graph, start, directed=False)
+    if not closed or len(order) < 3:
+        return order
+    # A ring is reached from both sides: walk one side out and the other back.
+    step = np.zeros(graph.shape[0], dtype=np.int8)
+    branch = {int(order[1]): 0, int(order[2]): 1}
+    side = np.zeros(len(order), dtype=np.int8)
+    for place, vertex in enumerate(order[1:], start=1):
+        parent = int(before[vertex])
+        side[place] = branch[int(vertex)] if parent == start else step[parent]
+        step[vertex] = side[place]
+    return np.concatenate([order[:1], order[1:][side[1:] == 0], order[1:][side[1:] == 1][::-1]])
+
+
+@compiled
+def fans(F: Ints, edge_of_face: Ints, edges: Ints, n: int) -> Ints:
+    """(n,) how many parts the triangles around each vertex fall into that share no edge there."""
+    parent = np.arange(2 * len(edges))  # node 2 e + s is the end edges[e, s] of edge e
+    for f in range(len(F)):
+        for c in range(3):
+            one, two = edge_of_face[f, c - 1], edge_of_face[f, c - 2]
+            a = 2 * one + (edges[one, 1] == F[f, c])
+            b = 2 * two + (edges[two, 1] == F[f, c])
+            while parent[a] != a:
+                parent[a] = parent[parent[a]]
+                a = parent[a]
+            while parent[b] != b:
+                parent[b] = parent[parent[b]]
+                b = parent[b]
+            parent[max(a, b)] = min(a, b)
+    count = np.zeros(n, dtype=np.int64)
+    for k in range(len(parent)):
+        if parent[k] == k:
+            count[edges[k // 2, k % 2]] += 1
+    return count
