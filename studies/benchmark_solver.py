@@ -17,8 +17,8 @@ from generators import two_squares
 from pcmc import Surface, certify, solve
 from pcmc.base.arrays import Floats
 from pcmc.energy.functional import energy_and_gradient
-from pcmc.energy.motion_space import Structure, motion_space, structure
-from pcmc.energy.projected_hessian import Pattern, assemble, pattern
+from pcmc.energy.motion_space import VertexClasses, motion_space, vertex_classes
+from pcmc.energy.projected_hessian import Pattern, assemble, hessian_pattern
 from pcmc.stability.factorisation import Factoriser, available, factoriser
 
 from . import evolver
@@ -43,22 +43,22 @@ class Step:
 
     surface: Surface
     backend: str
-    frame: Structure = field(init=False)
-    kept: Pattern = field(init=False)
+    classes: VertexClasses = field(init=False)
+    pattern: Pattern = field(init=False)
     factoriser: Factoriser = field(init=False)
 
     def __post_init__(self) -> None:
-        self.frame = structure(self.surface)
-        space = motion_space(self.surface, self.frame, self.surface.vertices)
-        self.kept = pattern(self.frame, space)
-        self.factoriser = factoriser(self.kept, self.backend)
+        self.classes = vertex_classes(self.surface)
+        space = motion_space(self.surface, self.classes, self.surface.vertices)
+        self.pattern = hessian_pattern(self.classes, space)
+        self.factoriser = factoriser(self.pattern, self.backend)
 
     def __call__(self) -> Floats:
         X = self.surface.vertices
         _, gradient = energy_and_gradient(self.surface, X)
-        space = motion_space(self.surface, self.frame, X)
-        data = assemble(self.surface, self.frame, space, self.kept, X)
-        return space.push(-self.factoriser.factor(data).solve(space.pull(gradient)))
+        space = motion_space(self.surface, self.classes, X)
+        data = assemble(self.surface, self.classes, space, self.pattern, X)
+        return space.to_vectors(-self.factoriser.factor(data).solve(space.to_coordinates(gradient)))
 
 
 def newton_steps(quick: bool) -> list[Row]:

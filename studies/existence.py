@@ -127,7 +127,7 @@ def _walls(folder: Folder, rings: tuple[int, ...]) -> None:
     for number in rings:
         start = solve(four_fans(number, alpha_aux=WALLS[0]), target="stationary").surface
         names = [patch.name for patch in start.patches if patch.auxiliary]
-        branch = follow(start, Direction(dict.fromkeys(names, 1.0)), WALLS[1], care=0.3)
+        branch = follow(start, Direction(dict.fromkeys(names, 1.0)), WALLS[1], min_quality=0.3)
         points.append(branch.points.assign(rings=number, edge_length=20.0 / number))
         events.append(branch.events.assign(rings=number, edge_length=20.0 / number))
     folder.write_table("wall_points", pd.concat(points))

@@ -15,7 +15,7 @@ import pandas as pd
 
 from pcmc import Patch, Plane, Surface
 from pcmc.base.errors import FileError
-from pcmc.base.files import whole
+from pcmc.base.files import atomic_write
 
 FLOATS = "%.10g"  # enough to compare with what is printed, few enough to read
 
@@ -126,7 +126,7 @@ def mesh_hash(surface: Surface) -> str:
 def write_bytes(path: Path, data: bytes) -> None:
     """Write a file so that at every instant the old or the new one is there, whole."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with whole(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_bytes(data)
 
 

@@ -9,9 +9,9 @@ import pcmc
 from generators import spherical_cap
 from pcmc.design.quantities import measure
 from pcmc.plan import plan_from
-from pcmc.surface.wall_pressures import pressed
+from pcmc.surface.wall_pressures import with_pressures
 
-TIGHT = {"tolerance": 1e-13, "care": 0.0}
+TIGHT = {"tolerance": 1e-13, "min_quality": 0.0}
 
 ROOF = """
 edge_length = 2.0
@@ -42,7 +42,7 @@ def cap(**arguments):
 def changed(surface, parameter, value):
     given = {parameter.patch: value}
     tension = parameter.kind == "tension"
-    return pressed(surface, given if tension else None, None if tension else given)
+    return with_pressures(surface, given if tension else None, None if tension else given)
 
 
 def difference(surface, targets, parameter, step, **options):

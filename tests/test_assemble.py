@@ -5,25 +5,25 @@ import pytest
 from motion_cases import SURFACES, seam
 
 from pcmc import hessian
-from pcmc.energy.motion_space import motion_space, structure
-from pcmc.energy.projected_hessian import assemble, pattern
+from pcmc.energy.motion_space import motion_space, vertex_classes
+from pcmc.energy.projected_hessian import assemble, hessian_pattern
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
 
 def ready(surface, crest=None):
-    frame = structure(surface, crest)
-    space = motion_space(surface, frame, surface.vertices)
-    return frame, space, pattern(frame, space)
+    classes = vertex_classes(surface, crest)
+    space = motion_space(surface, classes, surface.vertices)
+    return classes, space, hessian_pattern(classes, space)
 
 
 def dense_basis(space):
     """B (3n,N)."""
-    return np.stack([space.push(column).ravel() for column in np.eye(space.size)], axis=1)
+    return np.stack([space.to_vectors(column).ravel() for column in np.eye(space.size)], axis=1)
 
 
-def symmetric(kept, data):
-    upper = kept.matrix(data).toarray()
+def symmetric(pattern, data):
+    upper = pattern.matrix(data).toarray()
     return upper + np.triu(upper, 1).T
 
 
@@ -50,28 +50,30 @@ def relative(found, expected):
 @pytest.mark.parametrize("name", SURFACES)
 def test_it_is_the_energys_hessian_between_the_bases(name):
     surface = SURFACES[name]()
-    frame, space, kept = ready(surface)
+    classes, space, pattern = ready(surface)
     B = dense_basis(space)
-    found = symmetric(kept, assemble(surface, frame, space, kept, surface.vertices))
+    found = symmetric(pattern, assemble(surface, classes, space, pattern, surface.vertices))
     assert relative(found, B.T @ hessian(surface).toarray() @ B) < 1e-13
 
 
 @pytest.mark.parametrize("name", SURFACES)
 def test_the_stiffness_is_the_weighted_cotangent_laplacian(name):
     surface = SURFACES[name]()
-    frame, space, kept = ready(surface)
+    classes, space, pattern = ready(surface)
     B = dense_basis(space)
     L = np.kron(dense_laplacian(surface), np.eye(3))
-    found = symmetric(kept, assemble(surface, frame, space, kept, surface.vertices, 0.0, 1.0))
+    found = symmetric(
+        pattern, assemble(surface, classes, space, pattern, surface.vertices, 0.0, 1.0)
+    )
     assert relative(found, B.T @ L @ B) < 1e-12
 
 
 def test_both_add_up():
     surface = SURFACES["three patches"]()
-    frame, space, kept = ready(surface)
+    classes, space, pattern = ready(surface)
 
     def data(hessian, stiffness):
-        return assemble(surface, frame, space, kept, surface.vertices, hessian, stiffness)
+        return assemble(surface, classes, space, pattern, surface.vertices, hessian, stiffness)
 
     np.testing.assert_allclose(
         data(2.0, 0.3), 2.0 * data(1.0, 0.0) + 0.3 * data(0.0, 1.0), atol=1e-12
@@ -81,33 +83,33 @@ def test_both_add_up():
 def test_other_places_than_the_surfaces_own():
     """The positions given count; the frames are those given, too."""
     surface = SURFACES["three patches"]()
-    frame, space, kept = ready(surface)
-    X = surface.vertices + space.push(0.01 * np.sin(np.arange(space.size)))
+    classes, space, pattern = ready(surface)
+    X = surface.vertices + space.to_vectors(0.01 * np.sin(np.arange(space.size)))
     B = dense_basis(space)
-    found = symmetric(kept, assemble(surface, frame, space, kept, X))
+    found = symmetric(pattern, assemble(surface, classes, space, pattern, X))
     assert relative(found, B.T @ hessian(surface.moved(X)).toarray() @ B) < 1e-13
 
 
 def test_with_a_crease():
     surface = seam()
-    frame, space, kept = ready(surface, np.array([[6, 7], [7, 6], [7, 8], [8, 7]]))
+    classes, space, pattern = ready(surface, np.array([[6, 7], [7, 6], [7, 8], [8, 7]]))
     assert space.dimension.max() == 3
     B = dense_basis(space)
-    found = symmetric(kept, assemble(surface, frame, space, kept, surface.vertices))
+    found = symmetric(pattern, assemble(surface, classes, space, pattern, surface.vertices))
     assert relative(found, B.T @ hessian(surface).toarray() @ B) < 1e-13
 
 
 @pytest.mark.parametrize("name", SURFACES)
 def test_the_pattern_is_the_upper_triangle_of_neighbours_in_order(name):
     surface = SURFACES[name]()
-    frame, space, kept = ready(surface)
-    assert kept.size == space.size
+    classes, space, pattern = ready(surface)
+    assert pattern.size == space.size
     vertex = np.repeat(np.arange(surface.n), space.dimension)
     near = np.eye(surface.n, dtype=bool)
-    for face in frame.faces:
+    for face in classes.faces:
         near[np.ix_(face, face)] = True
     expected = np.triu(near[np.ix_(vertex, vertex)])
-    for row in range(kept.size):
-        columns = kept.indices[kept.indptr[row] : kept.indptr[row + 1]]
+    for row in range(pattern.size):
+        columns = pattern.indices[pattern.indptr[row] : pattern.indptr[row + 1]]
         np.testing.assert_array_equal(columns, np.flatnonzero(expected[row]))
         assert columns[0] == row

@@ -12,7 +12,7 @@ import pytest
 
 from generators import two_squares
 from pcmc import hessian
-from pcmc.energy.motion_space import motion_space, structure
+from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.sweep import Sweep
 from studies import benchmark, benchmark_explore, benchmark_solver, benchmark_sweep, evolver
 from studies.__main__ import main
@@ -57,8 +57,8 @@ def test_the_quick_form_prints_and_writes(small, tmp_path, capsys):
 
 def test_a_step_is_newtons():
     surface = two_squares(4, alpha_aux=1.0)
-    space = motion_space(surface, structure(surface), surface.vertices)
-    B = np.stack([space.push(e).ravel() for e in np.eye(space.size)], axis=1)
+    space = motion_space(surface, vertex_classes(surface), surface.vertices)
+    B = np.stack([space.to_vectors(e).ravel() for e in np.eye(space.size)], axis=1)
     forces = benchmark_solver.energy_and_gradient(surface, surface.vertices)[1].ravel()
     expected = -B @ np.linalg.solve(B.T @ hessian(surface).toarray() @ B, B.T @ forces)
     for backend in benchmark_solver.available():

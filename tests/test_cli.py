@@ -330,7 +330,7 @@ def test_without_typer_the_extra_is_named(monkeypatch, capsys):
     monkeypatch.setattr(builtins, "__import__", without)
     assert cli.main(["--help"]) == 2
     err = capsys.readouterr().err
-    assert "pcmc[cli]" in err
+    assert "pcmc-surfaces[cli]" in err
     assert err.count("\n") == 1
 
 

@@ -9,16 +9,16 @@ from pcmc import Patch, Plane, Surface, Verdict, certify, energy, solve
 from pcmc.contact.pinching import (
     beside,
     crest_spacing,
-    hung,
+    find_walls,
     lifted,
     pinched,
+    place_wall_rows,
     pull_and_capacity,
     resting,
     resting_crest,
     settled,
-    walls,
 )
-from pcmc.energy.motion_space import motion_space, structure
+from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.meshing.quality import triangle_quality
 from pcmc.solvers.state import State
 
@@ -34,7 +34,7 @@ def crest_of(surface, below):
 def pressed(n=6, count=2, **arguments):
     """Two squares whose junction rests on Π at the first ``count`` vertices from one corner."""
     surface = two_squares(n, **arguments)
-    below = walls(surface)
+    below = find_walls(surface)
     rests = np.zeros(surface.n, dtype=bool)
     rests[crest_of(surface, below)[:count]] = True
     standing = pinched(surface, below, rests)
@@ -55,7 +55,7 @@ def elsewhere(surface, seed=0):
 
 def test_which_walls_can_pinch():
     surface = two_squares(6)
-    below = walls(surface)
+    below = find_walls(surface)
     assert below.pinchable.tolist() == [False, False, True]
     assert len(below.edges) == 6
     assert below.can_rest.sum() == 5
@@ -65,11 +65,11 @@ def test_which_walls_can_pinch():
     crest = np.unique(below.edges)
     np.testing.assert_array_equal(below.hanging, np.setdiff1d(wall, crest))
     assert set(below.tension) == {2.0}
-    assert walls(four_fans(4)).pinchable.sum() == 4
+    assert find_walls(four_fans(4)).pinchable.sum() == 4
 
 
 def test_a_wall_that_does_not_stand_on_the_plane_cannot():
-    below = walls(double_bubble(1.2))
+    below = find_walls(double_bubble(1.2))
     assert not below.pinchable.any()
     assert not below.can_rest.any()
     assert len(below.hanging) == len(below.edges) == 0
@@ -81,8 +81,10 @@ def test_a_wall_that_does_not_stand_on_the_plane_cannot():
 )  # fmt: skip
 def test_each_wall_vertex_hangs_where_it_is(make):
     surface = make()
-    below = walls(surface)
-    np.testing.assert_allclose(hung(surface, below, surface.vertices), surface.vertices, atol=1e-2)
+    below = find_walls(surface)
+    np.testing.assert_allclose(
+        place_wall_rows(surface, below, surface.vertices), surface.vertices, atol=1e-2
+    )
     i, j = below.ends.T
     assert ((below.along >= 0) & (below.along <= 1) & (below.share >= 0) & (below.share <= 1)).all()
     crest = np.unique(below.edges)
@@ -95,11 +97,11 @@ def test_each_wall_vertex_hangs_where_it_is(make):
 
 def test_the_rows_of_a_wall_follow_its_crest():
     surface = two_squares(6)
-    below = walls(surface)
+    below = find_walls(surface)
     X = surface.vertices.copy()
     crest = crest_of(surface, below)
     X[crest] = X[crest] * [1, 1, 1.7] + [0.3, 0.0, 0.0]
-    moved = hung(surface, below, X)
+    moved = place_wall_rows(surface, below, X)
     straight = (below.along == 0.0) | (below.along == 1.0)
     assert straight.all()
     owner = np.where(below.along == 0.0, below.ends[:, 0], below.ends[:, 1])
@@ -120,18 +122,18 @@ def test_the_crest_is_where_a_roof_is_too():
         X, [*left, *right, *wall], [0] * 4 + [1] * 4 + [2] * 5, patches, fixed=[0, 4, 5, 6],
         on_plane=[7, 8],
     )  # fmt: skip
-    below = walls(surface)
+    below = find_walls(surface)
     assert below.edges.tolist() == [[0, 1], [1, 2], [2, 3], [3, 4]]
     assert np.flatnonzero(below.can_rest).tolist() == [1, 2, 3]
 
 
 def test_with_a_motion_space_only_what_lies_along_the_wall():
     surface = shaken(two_squares(6), 0.02)
-    below = walls(surface)
-    space = motion_space(surface, structure(surface), surface.vertices)
+    below = find_walls(surface)
+    space = motion_space(surface, vertex_classes(surface), surface.vertices)
     X = surface.vertices.copy()
     X[below.can_rest] += [0.1, 0.0, 0.2]
-    change = hung(surface, below, X, space) - X
+    change = place_wall_rows(surface, below, X, space) - X
     np.testing.assert_allclose(space.project(change), 0.0, atol=1e-14)
     assert np.abs(change).max() > 0.05
 
@@ -139,11 +141,11 @@ def test_with_a_motion_space_only_what_lies_along_the_wall():
 def test_hanging_turns_with_the_plane():
     surface = two_squares(6)
     turned, place = elsewhere(surface)
-    here, there = walls(surface), walls(turned)
+    here, there = find_walls(surface), find_walls(turned)
     X = surface.vertices.copy()
     X[here.can_rest] += [0.3, 0.0, 0.5]
-    expected = place(hung(surface, here, X))
-    np.testing.assert_allclose(hung(turned, there, place(X)), expected, atol=1e-12)
+    expected = place(place_wall_rows(surface, here, X))
+    np.testing.assert_allclose(place_wall_rows(turned, there, place(X)), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("count", [1, 3, 5])
@@ -166,7 +168,7 @@ def test_what_is_left_when_a_junction_rests(count):
 
 def test_without_a_resting_vertex_nothing_changes():
     surface = two_squares(4)
-    below = walls(surface)
+    below = find_walls(surface)
     assert not resting(surface, below).any()
     assert pinched(surface, below, resting(surface, below)) is surface
 
@@ -174,7 +176,7 @@ def test_without_a_resting_vertex_nothing_changes():
 def test_pinching_turns_with_the_plane():
     full, below, rests, standing = pressed()
     turned, place = elsewhere(two_squares(6))
-    there = walls(turned)
+    there = find_walls(turned)
     turned = turned.moved(place(full.vertices))
     np.testing.assert_array_equal(resting(turned, there), rests)
     other = pinched(turned, there, rests)
@@ -197,7 +199,7 @@ def test_a_foot_that_still_carries_a_triangle_stays_where_it_slid():
     X = surface.vertices.copy()
     X[foot] += 0.01 * (X[crest[0]] - X[crest[1]]) * [1.0, 1.0, 0.0]
     surface = surface.moved(X)
-    below = walls(surface)
+    below = find_walls(surface)
     standing = pinched(surface, below, rests)
     assert len(foot) == 1
     assert np.isin(foot, standing.faces).all()
@@ -256,7 +258,7 @@ def test_a_lifted_wall_is_back():
 
 @pytest.mark.parametrize(("alpha_aux", "lifts"), [(0.5, 3), (50.0, 0)])
 def test_a_junction_put_down_comes_up_where_the_wall_cannot_hold_it(alpha_aux, lifts):
-    state = State(two_squares(6, alpha_aux=alpha_aux), care=0.45)
+    state = State(two_squares(6, alpha_aux=alpha_aux), min_quality=0.45)
     crest = crest_of(state.full, state.walls)[:3]
     drop = np.zeros_like(state.X)
     drop[crest, 2] = -state.X[crest, 2]
@@ -277,7 +279,7 @@ def test_a_junction_put_down_comes_up_where_the_wall_cannot_hold_it(alpha_aux, l
 
 def complementary(surface):
     """Whether the pull on each resting vertex is one that its wall can take."""
-    below = walls(surface)
+    below = find_walls(surface)
     rests = resting(surface, below)
     pull, capacity = pull_and_capacity(pinched(surface, below, rests), below, rests)
     return rests, pull, capacity
@@ -295,7 +297,7 @@ def test_a_converged_contact_is_one(n, alpha_aux, count):
     np.testing.assert_array_equal(found.pinched, np.flatnonzero(rests))
     assert found.curvature_error < 1e-9
     heights = result.surface.plane.height(result.surface.vertices)
-    assert (heights[walls(result.surface).can_rest & ~rests] > 0.0).all()
+    assert (heights[find_walls(result.surface).can_rest & ~rests] > 0.0).all()
 
 
 def test_the_wall_stands_just_below_the_tension_that_keeps_it_down():
@@ -325,7 +327,7 @@ def test_any_strength_of_wall_settles(n, alpha_aux):
     rests, pull, capacity = complementary(result.surface)
     assert (pull <= capacity * (1 + 1e-9)).all()
     heights = result.surface.plane.height(result.surface.vertices)
-    assert (heights[walls(result.surface).can_rest & ~rests] > 0.0).all()
+    assert (heights[find_walls(result.surface).can_rest & ~rests] > 0.0).all()
 
 
 def mirrored(surface, how):
@@ -358,7 +360,7 @@ def test_a_junction_that_is_pulled_through_the_plane_goes_there(target):
     result = solve(start.retensioned(pressures={"left": -1.0, "right": -1.0}), target=target)
     assert result.converged
     assert result.certificate.verdict is Verdict.STABLE
-    crest = walls(result.surface).can_rest
+    crest = find_walls(result.surface).can_rest
     assert (result.surface.vertices[crest, 2] < -0.1).all()
     assert result.energy == pytest.approx(solve(start).energy, rel=2e-3)
 

@@ -8,7 +8,7 @@ from starts import bezier_hall, stationary, two_caps, two_squares
 
 from pcmc import Surface, certify, solve
 from pcmc.base.errors import SurfaceError
-from pcmc.contact.pinching import hung, pinched, resting, walls
+from pcmc.contact.pinching import find_walls, pinched, place_wall_rows, resting
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.solvers.state import State
@@ -51,7 +51,7 @@ def test_the_way_from_a_pinched_surface_ends_in_the_same_shape():
 
 
 def test_the_rows_of_a_flat_wall_are_known_from_its_mesh():
-    start, end = walls(two_squares(8, alpha_aux=3.0)), walls(flat())
+    start, end = find_walls(two_squares(8, alpha_aux=3.0)), find_walls(flat())
     np.testing.assert_array_equal(start.hanging, end.hanging)
     np.testing.assert_allclose(end.share, start.share, atol=1e-12)
     assert 0.0 < end.share.max() < 1.0
@@ -63,14 +63,14 @@ def test_a_step_without_a_matrix_is_a_step_that_failed(kind, monkeypatch):
     def singular(*_):
         raise SingularMatrix("a pivot is zero")
 
-    state = State(two_squares(4), care=0.45)
+    state = State(two_squares(4), min_quality=0.45)
     stepper = Stepper(state, minimum=False, backend=None)
     X = state.X.copy()
     if kind == "descent":
         monkeypatch.setattr("pcmc.solvers.smoother.Smoother.refresh", singular)
         assert not stepper.descend()
     else:
-        monkeypatch.setattr("pcmc.solvers.smoother.Carrier.__init__", singular)
+        monkeypatch.setattr("pcmc.solvers.smoother.HarmonicExtension.__init__", singular)
         motion = np.ones_like(X)
         np.testing.assert_array_equal(stepper._carried(motion), motion)
     np.testing.assert_array_equal(state.X, X)
@@ -94,14 +94,14 @@ def test_levels_through_a_contact(alpha_aux):
 def test_refined_a_pinched_wall_has_rows_again_where_it_stands(make):
     coarse = make()
     fine = refine(coarse)
-    below = walls(fine)
+    below = find_walls(fine)
     rests = resting(fine, below)
-    crest = resting(coarse, walls(coarse))
+    crest = resting(coarse, find_walls(coarse))
     assert rests[: coarse.n].tolist() == crest.tolist()
     assert rests.sum() > crest.sum()  # and the middles between
     standing = pinched(fine, below, rests)
     quality = triangle_quality(standing.vertices, standing.faces)
-    before = pinched(coarse, walls(coarse), crest)
+    before = pinched(coarse, find_walls(coarse), crest)
     assert quality.min() > 0.4 * triangle_quality(before.vertices, before.faces).min()
     i, j = below.ends.T
     above = fine.plane.height((1 - below.along)[:, None] * fine.vertices[i])
@@ -124,7 +124,7 @@ CONVERGED = {
 @pytest.mark.parametrize("make", CONVERGED.values(), ids=CONVERGED)
 def test_a_wall_hangs_where_it_stands(make):
     surface = stationary(partial(make)).surface
-    place = hung(surface, walls(surface), surface.vertices)
+    place = place_wall_rows(surface, find_walls(surface), surface.vertices)
     np.testing.assert_allclose(place, surface.vertices, atol=1e-12 * surface.size)
 
 
@@ -144,10 +144,10 @@ def test_what_is_at_rest_stays_at_rest(make):
 def test_a_leaning_wall_lies_flat_with_its_crest():
     """What a wall vertex stands off from straight below its crest goes with the crest's height."""
     surface = stationary(partial(two_caps, 0.8)).surface
-    below = walls(surface)
+    below = find_walls(surface)
     X = surface.vertices.copy()
     X[below.can_rest] *= [1.0, 1.0, 0.0]
-    low = hung(surface, below, X)[below.hanging]
+    low = place_wall_rows(surface, below, X)[below.hanging]
     i, j = below.ends.T
     corner = ~(below.can_rest[i] & below.can_rest[j])
     above = (1 - below.along)[:, None] * X[i] + below.along[:, None] * X[j]
@@ -176,7 +176,9 @@ def test_a_pinched_surface_passes_the_checks(make):
     areas = triangle_quality(surface.vertices, surface.faces[surface.patch_of_face == 2])
     assert (areas == 0.0).any()
     again = rebuilt(surface)
-    np.testing.assert_array_equal(resting(again, walls(again)), resting(surface, walls(surface)))
+    np.testing.assert_array_equal(
+        resting(again, find_walls(again)), resting(surface, find_walls(surface))
+    )
     assert certify(again).index == certify(surface).index
 
 
@@ -196,14 +198,14 @@ def test_other_triangles_without_area_are_still_refused():
         rebuilt(surface.retensioned({}, {"left": 0.0, "right": 0.0}))  # nothing rests but walls
     with pytest.raises(SurfaceError, match="of patch 'wall' has zero area"):
         rebuilt(surface.retensioned({}, {"wall": 1.0}))
-    held = surface.fixed | walls(surface).can_rest
+    held = surface.fixed | find_walls(surface).can_rest
     with pytest.raises(SurfaceError, match="of patch 'wall' has zero area"):
         rebuilt(surface, fixed=held)
 
 
 def test_a_standing_wall_with_a_triangle_of_no_area_is_refused():
     surface = two_squares(8)
-    below = walls(surface)
+    below = find_walls(surface)
     inside = below.hanging[(below.share > 0.0) & (below.along != 0.5)][0]
     face = int(np.flatnonzero((surface.faces == inside).any(axis=1))[0])
     with pytest.raises(SurfaceError, match="of patch 'wall' has zero area"):

@@ -167,7 +167,7 @@ def test_directions_that_are_none(arguments, message):
         ({"steps": -1}, "steps: expected a whole number"),
         ({"tolerance": 0.0}, "tolerance: expected a finite number > 0"),
         ({"folds": 0}, "folds: expected a whole number ≥ 1"),
-        ({"care": 1.0}, "care: expected a finite number ≥ 0 and < 1"),
+        ({"min_quality": 1.0}, "min_quality: expected a finite number ≥ 0 and < 1"),
         ({"keep": 0}, "keep: expected a whole number ≥ 1"),
         ({"remesh": -1.0}, "remesh: expected a finite number > 0"),
     ],
@@ -205,7 +205,7 @@ def test_tensions_that_are_zero_have_no_ratio_and_no_branch():
 
 def test_remeshing_without_its_library_is_refused_at_once(monkeypatch):
     monkeypatch.setattr("pcmc.continuation.branch.find_spec", lambda name: None)
-    with pytest.raises(MissingExtra, match=r"pcmc\[remesh\]"):
+    with pytest.raises(MissingExtra, match=r"pcmc-surfaces\[remesh\]"):
         follow(pyramid(height=AT_REST), "roof", remesh=0.5)
 
 

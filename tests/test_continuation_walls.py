@@ -9,7 +9,7 @@ from pcmc import Direction, certify, follow, solve
 from pcmc.contact.pinching import pull_and_capacity, standing
 from pcmc.continuation import Ending
 from pcmc.plan import Divider, Plan
-from pcmc.surface.wall_pressures import pressed
+from pcmc.surface.wall_pressures import with_pressures
 
 
 def test_walls_of_the_fans_lose_stability_in_two_directions_at_once():
@@ -23,7 +23,7 @@ def test_walls_of_the_fans_lose_stability_in_two_directions_at_once():
         value = event.parameter * (1.0 + shift)
         row = int((branch.points.parameter < value).sum()) - 1
         near = branch.surfaces[row].retensioned(dict.fromkeys(walls, value))
-        assert certify(solve(near, target="stationary", care=0.0).surface).index == index
+        assert certify(solve(near, target="stationary", min_quality=0.0).surface).index == index
 
 
 def test_fold_of_two_caps_on_a_coarse_mesh():
@@ -117,7 +117,9 @@ def test_ctrl_c_while_a_contact_is_solved_for_ends_the_branch(monkeypatch):
 @pytest.mark.slow
 def test_new_mesh_on_the_way_keeps_to_the_branch(small_cap):
     pytest.importorskip("mmgpy")
-    branch = follow(small_cap, "cap", until={"height": 1.5}, step=-0.05, care=0.93, remesh=0.25)
+    branch = follow(
+        small_cap, "cap", until={"height": 1.5}, step=-0.05, min_quality=0.93, remesh=0.25
+    )
     assert branch.ending is Ending.REACHED
     assert branch.last.m != small_cap.m
     assert branch.points.residual.max() <= 1e-10
@@ -128,7 +130,7 @@ def test_new_mesh_on_the_way_keeps_to_the_branch(small_cap):
 @pytest.mark.slow
 def test_new_mesh_does_not_leap_over_a_goal(small_cap):
     pytest.importorskip("mmgpy")
-    options = {"step": -0.05, "care": 0.93, "remesh": 0.25}
+    options = {"step": -0.05, "min_quality": 0.93, "remesh": 0.25}
     branch = follow(small_cap, "cap", until={"height": 0.8}, steps=2, **options)
     before, after = branch.points.volume.iloc[-1], certify(branch.surfaces[2]).volume
     assert after == pytest.approx(before)
@@ -156,7 +158,7 @@ def test_a_branch_in_one_rooms_pressure_does_not_depend_on_where_the_plan_is_dra
     assert end["pressure wall 1"] == pytest.approx(0.3, rel=1e-12)
     assert here.last.walls.tolist() == [False, False, True]
     assert certify(here.last).detail == ""
-    direct = solve(pressed(two_rooms(0, 0), None, {"west": 1.3}))
+    direct = solve(with_pressures(two_rooms(0, 0), None, {"west": 1.3}))
     assert direct.energy == pytest.approx(end["energy"], rel=1e-4)
     named = Direction(pressures={"west": 1.0, "wall 1": 0.5}, relative=True)
     assert named.line(two_rooms(0, 0)).pressure_rates.tolist() == [1.0, 0.0, 0.5]

@@ -5,8 +5,8 @@ import pytest
 from shapes import disc
 
 from pcmc import Patch, Surface
-from pcmc.energy.motion_space import motion_space, structure
-from pcmc.solvers.smoother import Carrier
+from pcmc.energy.motion_space import motion_space, vertex_classes
+from pcmc.solvers.smoother import HarmonicExtension
 from pcmc.stability.factorisation import available
 
 
@@ -19,9 +19,9 @@ def test_sheets_are_carried_along_rigidly_however_thin_a_triangle_beside_the_bou
     inside = int(np.flatnonzero(~rim)[np.linalg.norm(X[~rim] - X[rim][0], axis=1).argmin()])
     X[inside] = X[rim][0] + gap * (X[inside] - X[rim][0])
     film = Surface(X, F, np.zeros(len(F), int), [Patch("film", 1.0)], fixed=rim)
-    frame = structure(film)
+    classes = vertex_classes(film)
     shift = np.array([0.3, -0.2, 0.0])
-    carried = Carrier(film, frame, X, backend).carry(
-        motion_space(film, frame, X), np.where(rim[:, None], shift, 0.0)
+    carried = HarmonicExtension(film, classes, X, backend).extend(
+        motion_space(film, classes, X), np.where(rim[:, None], shift, 0.0)
     )
     np.testing.assert_allclose(carried, np.broadcast_to(shift, X.shape), atol=1e-5)

@@ -13,7 +13,7 @@ from generators import bezier_hall, four_fans, spherical_cap
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate.certificate import Verdict
 from pcmc.explore.draft import Draft, begin, between, reach
-from pcmc.surface.wall_pressures import pressed
+from pcmc.surface.wall_pressures import with_pressures
 
 CAP = spherical_cap(edge_length=0.25)
 HALL = bezier_hall(edge_length=10.0)
@@ -50,7 +50,7 @@ def test_following_gives_the_surface_that_solving_gives(hall):
     state = Draft(hall).follow(values)
     assert state.trouble is None
     assert [p.tension for p in state.surface.patches] == [30.0, 30.0, 30.0, 12.0, 15.0]
-    wanted = pressed(hall.surface, **values)
+    wanted = with_pressures(hall.surface, **values)
     assert state.surface.pressures == pytest.approx([1.0, 1.02, 1.0, -0.02, 0.02])
     assert state.surface.patches == wanted.patches
     solved = pcmc.solve(wanted)

@@ -8,8 +8,8 @@ from motion_cases import SURFACES
 from scipy.sparse import csr_array
 
 from pcmc.base.errors import MissingExtra, OptionError
-from pcmc.energy.motion_space import motion_space, structure
-from pcmc.energy.projected_hessian import Pattern, assemble, pattern
+from pcmc.energy.motion_space import motion_space, vertex_classes
+from pcmc.energy.projected_hessian import Pattern, assemble, hessian_pattern
 from pcmc.stability import factorisation as factor
 from pcmc.stability.factorisation import SingularMatrix, available, factoriser
 
@@ -23,8 +23,10 @@ every_backend = pytest.mark.parametrize("backend", BACKENDS)
 def upper(A):
     """The pattern (with every diagonal entry) and values of a symmetric matrix's upper triangle."""
     rows, columns = np.nonzero(np.triu(A) + np.eye(len(A)))
-    kept = csr_array((np.ones(len(rows)), (rows, columns)), shape=A.shape)
-    return Pattern(kept.indptr, kept.indices, np.empty((0, 3))), A[rows, columns].astype(float)
+    pattern = csr_array((np.ones(len(rows)), (rows, columns)), shape=A.shape)
+    return Pattern(pattern.indptr, pattern.indices, np.empty((0, 3))), A[rows, columns].astype(
+        float
+    )
 
 
 def random_symmetric(size, seed):
@@ -35,14 +37,14 @@ def random_symmetric(size, seed):
 
 def assembled(name):
     surface = SURFACES[name]()
-    frame = structure(surface)
-    space = motion_space(surface, frame, surface.vertices)
-    kept = pattern(frame, space)
-    return kept, assemble(surface, frame, space, kept, surface.vertices)
+    classes = vertex_classes(surface)
+    space = motion_space(surface, classes, surface.vertices)
+    pattern = hessian_pattern(classes, space)
+    return pattern, assemble(surface, classes, space, pattern, surface.vertices)
 
 
-def dense(kept, data):
-    U = kept.matrix(data).toarray()
+def dense(pattern, data):
+    U = pattern.matrix(data).toarray()
     return U + np.triu(U, 1).T
 
 
@@ -50,8 +52,8 @@ def dense(kept, data):
 @pytest.mark.parametrize("seed", range(4))
 def test_solutions_and_inertia_of_random_matrices(backend, seed):
     A = random_symmetric(60, seed)
-    kept, data = upper(A)
-    found = factoriser(kept, backend).factor(data)
+    pattern, data = upper(A)
+    found = factoriser(pattern, backend).factor(data)
     values = np.linalg.eigvalsh(A)
     assert found.negative == (values < 0).sum()
     assert 0 < found.negative < 60
@@ -66,9 +68,9 @@ def test_solutions_and_inertia_of_random_matrices(backend, seed):
 @every_backend
 @pytest.mark.parametrize("name", ["three patches, tilted", "tent", "pyramid"])
 def test_solutions_and_inertia_of_hessians(backend, name):
-    kept, data = assembled(name)
-    A = dense(kept, data)
-    found = factoriser(kept, backend).factor(data)
+    pattern, data = assembled(name)
+    A = dense(pattern, data)
+    found = factoriser(pattern, backend).factor(data)
     assert found.negative == (np.linalg.eigvalsh(A) < 0).sum()
     right = np.cos(np.arange(len(A)))
     assert np.linalg.norm(A @ found.solve(right) - right) < 1e-11 * np.linalg.norm(right)
@@ -76,12 +78,12 @@ def test_solutions_and_inertia_of_hessians(backend, name):
 
 @every_backend
 def test_new_values_in_the_same_pattern(backend):
-    kept, data = assembled("three patches")
-    keeper = factoriser(kept, backend)
-    right = np.ones(kept.size)
+    pattern, data = assembled("three patches")
+    keeper = factoriser(pattern, backend)
+    right = np.ones(pattern.size)
     for scale in (1.0, 2.0, -1.0):
         found = keeper.factor(scale * data)
-        A = dense(kept, scale * data)
+        A = dense(pattern, scale * data)
         assert found.negative == (np.linalg.eigvalsh(A) < 0).sum()
         np.testing.assert_allclose(A @ found.solve(right), right, atol=1e-10)
 
@@ -106,9 +108,9 @@ def _one(value, backend):
     ids=["zero", "rank 1", "row"],
 )
 def test_a_singular_matrix_is_refused(backend, A):
-    kept, data = upper(A)
+    pattern, data = upper(A)
     with pytest.raises(SingularMatrix):
-        factoriser(kept, backend).factor(data)
+        factoriser(pattern, backend).factor(data)
 
 
 @every_backend
@@ -118,30 +120,30 @@ def test_what_counts_as_zero_does_not_depend_on_units(backend, unit):
     A[3] = A[:, 3] = 0.0
     for small, negative in ((1e-11, 0), (-1e-11, 1)):
         A[3, 3] = small
-        kept, data = upper(A)
-        found = factoriser(kept, backend).factor(unit * data)
+        pattern, data = upper(A)
+        found = factoriser(pattern, backend).factor(unit * data)
         assert found.negative == negative
         right = A @ [1.0, 2.0, 3.0, 4.0]
         np.testing.assert_allclose(found.solve(unit * right), [1.0, 2.0, 3.0, 4.0], rtol=1e-12)
     A[3, 3] = 1e-15
-    kept, data = upper(A)
+    pattern, data = upper(A)
     with pytest.raises(SingularMatrix, match="zero to rounding"):
-        assert factoriser(kept, backend).factor(unit * data).negative == 0
+        assert factoriser(pattern, backend).factor(unit * data).negative == 0
 
 
 @every_backend
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])
 def test_numbers_that_are_not_finite_are_refused(backend, wrong):
-    kept, data = upper(np.eye(3))
+    pattern, data = upper(np.eye(3))
     data[1] = wrong
     with pytest.raises(SingularMatrix, match="entries that are not finite"):
-        factoriser(kept, backend).factor(data)
+        factoriser(pattern, backend).factor(data)
 
 
 @every_backend
 def test_a_matrix_without_rows(backend):
-    kept, data = upper(np.eye(0))
-    found = factoriser(kept, backend).factor(data)
+    pattern, data = upper(np.eye(0))
+    found = factoriser(pattern, backend).factor(data)
     assert found.negative == 0
     assert found.solve(np.empty(0)).shape == (0,)
 
@@ -149,9 +151,9 @@ def test_a_matrix_without_rows(backend):
 @every_backend
 @pytest.mark.parametrize("used", [False, True])
 def test_memory_is_given_back_with_the_factoriser(backend, used):
-    kept, data = upper(np.eye(50))
+    pattern, data = upper(np.eye(50))
     for _ in range(20):
-        keeper = factoriser(kept, backend)
+        keeper = factoriser(pattern, backend)
         if used:
             keeper.factor(data)
         del keeper
@@ -159,23 +161,23 @@ def test_memory_is_given_back_with_the_factoriser(backend, used):
 
 
 def test_superlu_says_where_a_row_exchange_hides_the_inertia():
-    kept, data = upper(np.array([[0.0, 1.0], [1.0, 0.0]]))
-    found = factoriser(kept, "superlu").factor(data)
+    pattern, data = upper(np.array([[0.0, 1.0], [1.0, 0.0]]))
+    found = factoriser(pattern, "superlu").factor(data)
     np.testing.assert_allclose(found.solve(np.array([2.0, 3.0])), [3.0, 2.0])
     with pytest.raises(SingularMatrix, match="zero pivot forced a row exchange"):
         _ = found.negative
 
 
 def test_unknown_and_missing_backends(monkeypatch):
-    kept, _ = upper(np.eye(2))
+    pattern, _ = upper(np.eye(2))
     with pytest.raises(
         OptionError, match="unknown factorisation backend 'superl'; did you mean 'super"
     ):
-        factoriser(kept, "superl")
+        factoriser(pattern, "superl")
     monkeypatch.setattr(factor, "available", lambda: ("superlu",))
-    with pytest.raises(MissingExtra, match=r"pypardiso is not installed.*pcmc\[fast\]"):
-        factoriser(kept, "pardiso")
-    assert factoriser(kept).factor(np.ones(2)).negative == 0
+    with pytest.raises(MissingExtra, match=r"pypardiso is not installed.*pcmc-surfaces\[fast\]"):
+        factoriser(pattern, "pardiso")
+    assert factoriser(pattern).factor(np.ones(2)).negative == 0
 
 
 def test_the_fastest_backend_comes_first(monkeypatch):

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from pcmc.base.files import folder, together
+from pcmc.base.files import atomic_writes, folder
 
 NAMES = ("a.obj", "b.3dm", "c.glb")
 
@@ -23,7 +23,7 @@ def contents(where):
 
 
 def write(wanted, upto=3):
-    with together(wanted) as temporaries:
+    with atomic_writes(wanted) as temporaries:
         for path, temporary in list(zip(wanted, temporaries, strict=True))[:upto]:
             assert temporary.parent == path.parent
             assert temporary.suffix == path.suffix

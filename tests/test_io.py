@@ -240,7 +240,7 @@ def test_missing_libraries_are_named(tmp_path, monkeypatch, suffix, name):
     path = tmp_path / f"a{suffix}"
     pcmc.write(path, tent())
     monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(MissingExtra, match=rf"{name} is not installed.*pcmc\[files\]"):
+    with pytest.raises(MissingExtra, match=rf"{name} is not installed.*pcmc-surfaces\[files\]"):
         pcmc.read(path)
 
 

@@ -10,7 +10,7 @@ from pcmc import Plane, Surface, solve
 from pcmc.contact.pinching import standing
 from pcmc.energy.functional import energy_and_gradient
 from pcmc.energy.jacobian import linearise
-from pcmc.energy.motion_space import motion_space, structure
+from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.surface.topology import SHEET
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
@@ -31,21 +31,21 @@ def equator() -> Surface:
     )
 
 
-def forces(surface, frame, X):
-    return motion_space(surface, frame, X).project(energy_and_gradient(surface, X)[1])
+def forces(surface, classes, X):
+    return motion_space(surface, classes, X).project(energy_and_gradient(surface, X)[1])
 
 
-def slope(surface, frame):
+def slope(surface, classes):
     """How fast the error of central differences falls when their step is halved: log2 of it."""
     X = surface.vertices
-    space = motion_space(surface, frame, X)
+    space = motion_space(surface, classes, X)
     d = np.random.default_rng(0).standard_normal(X.shape)  # off the motion space too
     d[surface.fixed] = 0.0
     d[surface.on_plane] = surface.plane.along(d[surface.on_plane])
-    exact = linearise(surface, frame, space, X, energy_and_gradient(surface, X)[1]).times(d)
+    exact = linearise(surface, classes, space, X, energy_and_gradient(surface, X)[1]).times(d)
     errors = [
         np.abs(
-            space.pull(forces(surface, frame, X + t * d) - forces(surface, frame, X - t * d))
+            space.to_coordinates(forces(surface, classes, X + t * d) - forces(surface, classes, X - t * d))
             / (2.0 * t) - exact
         ).max()
         for t in surface.size * np.array([2e-5, 1e-5])
@@ -57,20 +57,20 @@ def slope(surface, frame):
 @pytest.mark.parametrize("name", SURFACES)
 def test_it_is_the_limit_of_differences(name):
     surface = SURFACES[name]()
-    assert slope(surface, structure(surface)) == pytest.approx(2.0, abs=0.05)
+    assert slope(surface, vertex_classes(surface)) == pytest.approx(2.0, abs=0.05)
 
 
 def test_sheets_that_slide_on_the_plane():
     surface = equator()
-    frame = structure(surface)
-    assert (frame.kind[surface.on_plane] == SHEET).all()
-    assert slope(surface, frame) == pytest.approx(2.0, abs=0.05)
+    classes = vertex_classes(surface)
+    assert (classes.kind[surface.on_plane] == SHEET).all()
+    assert slope(surface, classes) == pytest.approx(2.0, abs=0.05)
 
 
 def test_a_junction_beside_one_that_rests():
     surface = solve(two_squares(6, alpha_aux=2.5), target="stationary").surface
     found = standing(surface)
-    frame = found.frame
-    assert frame.level.any()
+    classes = found.classes
+    assert classes.level.any()
     moves = shaken(found.surface, 0.02)
-    assert slope(moves, frame) == pytest.approx(2.0, abs=0.05)
+    assert slope(moves, classes) == pytest.approx(2.0, abs=0.05)

@@ -8,7 +8,7 @@ from shapes import disc, pyramid, rotation, shaken, three_patches
 from starts import double_bubble, sphere, two_squares
 
 from pcmc import Patch, Surface, hessian
-from pcmc.energy.motion_space import motion_space, structure
+from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.energy.projected_hessian import Pattern
 from pcmc.energy.rigid_motions import rigid_modes, rigid_motions
 from pcmc.stability.factorisation import factoriser
@@ -20,16 +20,18 @@ LARGER = ("three patches", "three patches, tilted", "wall without tension", "bub
 
 
 def system_of(surface, rigid=None, backend=None):
-    frame = structure(surface)
-    space = motion_space(surface, frame, surface.vertices)
+    classes = vertex_classes(surface)
+    space = motion_space(surface, classes, surface.vertices)
     if rigid is None:
         rigid = rigid_modes(space, rigid_motions(surface), surface.vertices)
-    return stiffness(surface, frame, space, rigid, backend)
+    return stiffness(surface, classes, space, rigid, backend)
 
 
 def dense_pencil(surface, system):
     """BᵀHB and M on the complement of the rigid motions, and the basis Z of that."""
-    B = np.stack([system.space.push(column).ravel() for column in np.eye(len(system.mass))], axis=1)
+    B = np.stack(
+        [system.space.to_vectors(column).ravel() for column in np.eye(len(system.mass))], axis=1
+    )
     H = B.T @ hessian(surface).toarray() @ B
     Z = scipy.linalg.null_space(system.rigid.T) if system.rigid.shape[1] else np.eye(len(H))
     return Z.T @ H @ Z, Z.T @ (system.mass[:, None] * Z), Z
@@ -60,7 +62,7 @@ def test_index_and_lowest_modes_are_those_of_the_dense_pencil(name, backend):
     mass[np.repeat(np.arange(surface.n), system.space.dimension)] = system.mass
     gram = np.einsum("ivd,jvd,v->ij", modes, modes, mass)
     np.testing.assert_allclose(gram, np.eye(count), atol=1e-9)
-    s = np.stack([system.space.pull(mode) for mode in modes], axis=1)
+    s = np.stack([system.space.to_coordinates(mode) for mode in modes], axis=1)
     np.testing.assert_allclose(system.rigid.T @ s, 0.0, atol=1e-9)
     wholly = Z @ vectors[:, :count]
     residue = s - wholly @ (wholly.T @ (system.mass[:, None] * s))
@@ -82,7 +84,7 @@ def test_the_matrix_and_the_mass_are_whole(name):
 
 
 def system_faces(surface):
-    return structure(surface).faces
+    return vertex_classes(surface).faces
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -92,12 +94,12 @@ def test_negatives_on_the_complement_of_any_columns(seed):
     A = A + A.T
     Q = np.linalg.qr(random.standard_normal((12, seed)))[0]
     rows, columns = np.triu_indices(12)
-    kept = Pattern(
+    pattern = Pattern(
         np.searchsorted(rows, np.arange(13)).astype(np.int32),
         columns.astype(np.int32),
         np.empty((0, 3)),
     )
-    factor = factoriser(kept).factor(A[rows, columns])
+    factor = factoriser(pattern).factor(A[rows, columns])
     Z = scipy.linalg.null_space(Q.T) if seed else np.eye(12)
     assert negatives_without(factor, Q) == (np.linalg.eigvalsh(Z.T @ A @ Z) < 0).sum()
 
@@ -177,11 +179,11 @@ def test_an_ordinary_roof_has_no_rigid_motion():
 
 def test_a_spheres_turning_only_slides_it():
     surface = sphere(0.8, exact=True)
-    space = motion_space(surface, structure(surface), surface.vertices)
+    space = motion_space(surface, vertex_classes(surface), surface.vertices)
     Q = rigid_modes(space, rigid_motions(surface), surface.vertices)
     assert Q.shape == (space.size, 3)
     np.testing.assert_allclose(Q.T @ Q, np.eye(3), atol=1e-12)
-    shift = space.pull(np.tile([1.0, 2.0, 3.0], (surface.n, 1)))
+    shift = space.to_coordinates(np.tile([1.0, 2.0, 3.0], (surface.n, 1)))
     np.testing.assert_allclose(Q @ (Q.T @ shift), shift, atol=1e-12 * np.linalg.norm(shift))
 
 

@@ -9,15 +9,15 @@ from generators import two_squares
 from pcmc import Patch, Plane, Surface, energy, gradient, solve
 from pcmc.contact.pinching import resting_crest, standing
 from pcmc.energy.functional import energy_and_gradient
-from pcmc.energy.motion_space import force_scale, motion_space, structure
+from pcmc.energy.motion_space import force_scale, motion_space, vertex_classes
 from pcmc.surface.topology import CURVE, POINT, SHEET
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
 
 def frame_and_space(surface: Surface):
-    frame = structure(surface)
-    return frame, motion_space(surface, frame, surface.vertices)
+    classes = vertex_classes(surface)
+    return classes, motion_space(surface, classes, surface.vertices)
 
 
 @pytest.mark.parametrize("name", SURFACES)
@@ -39,8 +39,8 @@ def test_pull_and_push_are_transposes_and_project_is_a_projection(name):
     _, space = frame_and_space(surface)
     random = np.random.default_rng(1)
     s, v = random.standard_normal(space.size), random.standard_normal((surface.n, 3))
-    assert space.pull(v) @ s == pytest.approx((v * space.push(s)).sum(), rel=1e-12)
-    np.testing.assert_allclose(space.pull(space.push(s)), s, atol=1e-14)
+    assert space.to_coordinates(v) @ s == pytest.approx((v * space.to_vectors(s)).sum(), rel=1e-12)
+    np.testing.assert_allclose(space.to_coordinates(space.to_vectors(s)), s, atol=1e-14)
     once = space.project(v)
     np.testing.assert_allclose(space.project(once), once, atol=1e-14)
     assert np.abs(v - once).max() > 0.1
@@ -48,31 +48,31 @@ def test_pull_and_push_are_transposes_and_project_is_a_projection(name):
 
 def test_each_kind_of_vertex_has_its_dimension():
     surface = shaken(three_patches())
-    frame, space = frame_and_space(surface)
+    classes, space = frame_and_space(surface)
     free, sliding = surface.free, surface.on_plane
     for kind, dimension in ((SHEET, 1), (CURVE, 2), (POINT, 3)):
-        assert (frame.kind[free] == kind).any()
-        assert (space.dimension[free & (frame.kind == kind)] == dimension).all()
-    assert (space.dimension[sliding & (frame.kind == CURVE)] == 1).all()
-    assert (space.dimension[sliding & (frame.kind == POINT)] == 2).all()
+        assert (classes.kind[free] == kind).any()
+        assert (space.dimension[free & (classes.kind == kind)] == dimension).all()
+    assert (space.dimension[sliding & (classes.kind == CURVE)] == 1).all()
+    assert (space.dimension[sliding & (classes.kind == POINT)] == 2).all()
 
 
 def test_directions_are_the_normal_and_the_plane_across_the_curve():
     surface = shaken(three_patches(plane=TILTED))
-    frame, space = frame_and_space(surface)
+    classes, space = frame_and_space(surface)
     X = surface.vertices
-    corners = X[frame.faces]
+    corners = X[classes.faces]
     vector = np.zeros_like(X)
     for corner in range(3):
         np.add.at(
-            vector, frame.faces[:, corner],
+            vector, classes.faces[:, corner],
             np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]),
         )  # fmt: skip
-    sheet = surface.free & (frame.kind == SHEET)
+    sheet = surface.free & (classes.kind == SHEET)
     normal = vector[sheet] / np.linalg.norm(vector[sheet], axis=1)[:, None]
     np.testing.assert_allclose(space.basis[sheet, 0], normal, atol=1e-14)
-    assert frame.curve.tolist() == np.flatnonzero(frame.kind == CURVE).tolist()
-    for v, (one, two) in zip(frame.curve, frame.beside, strict=True):
+    assert classes.curve.tolist() == np.flatnonzero(classes.kind == CURVE).tolist()
+    for v, (one, two) in zip(classes.curve, classes.beside, strict=True):
         if not surface.free[v]:
             continue
         # the chord weighted by lengths or not: both lie in the plane of the two edges
@@ -143,35 +143,35 @@ def test_what_is_left_out_changes_no_shape():
 
 def test_a_wall_without_tension_has_no_motion_and_its_junction_is_one_smooth_sheet():
     surface = two_squares(4, alpha_aux=0.0)
-    frame, space = frame_and_space(surface)
+    classes, space = frame_and_space(surface)
     wall = surface.patch_of_face == 2
-    assert not frame.active[wall].any()
-    assert frame.active[~wall].all()
+    assert not classes.active[wall].any()
+    assert classes.active[~wall].all()
     idle = np.setdiff1d(surface.faces[wall], surface.faces[~wall])
-    assert frame.idle[idle].all()
+    assert classes.idle[idle].all()
     assert (space.dimension[idle] == 0).all()
     crest = np.setdiff1d(
         np.intersect1d(surface.faces[wall], surface.faces[~wall]), np.flatnonzero(surface.fixed)
     )
-    assert (frame.kind[crest] == SHEET).all()
+    assert (classes.kind[crest] == SHEET).all()
     assert (space.dimension[crest] == 1).all()
 
 
 def test_a_seam_is_smooth_until_tension_or_pressure_differ():
     surface = seam()
     middle = [6, 7, 8]
-    assert (structure(surface).kind[middle] == SHEET).all()
-    assert (structure(surface.retensioned({"north": 3.0})).kind[middle] == CURVE).all()
+    assert (vertex_classes(surface).kind[middle] == SHEET).all()
+    assert (vertex_classes(surface.retensioned({"north": 3.0})).kind[middle] == CURVE).all()
     pushed = surface.retensioned(pressures={"north": 0.5})
-    assert (structure(pushed).kind[middle] == CURVE).all()
+    assert (vertex_classes(pushed).kind[middle] == CURVE).all()
 
 
 def test_films_are_one_sheet_whichever_way_their_faces_run():
     """Where two patches ran against each other their normals cancelled, and with them the forces."""
     one, other = seam(), against()
-    frame = structure(other)
-    assert (frame.kind[[6, 7, 8]] == SHEET).all()
-    turned = (frame.faces != other.faces).any(axis=1)
+    classes = vertex_classes(other)
+    assert (classes.kind[[6, 7, 8]] == SHEET).all()
+    turned = (classes.faces != other.faces).any(axis=1)
     assert set(other.patch_of_face[turned].tolist()) in ({0}, {1})
     held = [*range(6), *range(9, 15)]
     here, there = (
@@ -182,7 +182,7 @@ def test_films_are_one_sheet_whichever_way_their_faces_run():
     np.testing.assert_allclose(there.surface.vertices, here.surface.vertices, atol=1e-12)
     # under pressure they are pushed apart: what they share is a curve
     pushed = other.retensioned(pressures={"south": 0.3, "north": 0.3})
-    assert (structure(pushed).kind[[6, 7, 8]] == CURVE).all()
+    assert (vertex_classes(pushed).kind[[6, 7, 8]] == CURVE).all()
 
 
 def moebius(count: int = 24) -> Surface:
@@ -206,14 +206,14 @@ def moebius(count: int = 24) -> Surface:
 
 def test_a_moebius_band_keeps_a_curve_where_its_side_changes():
     surface = moebius()
-    frame = structure(surface)
+    classes = vertex_classes(surface)
     middle = np.flatnonzero(surface.free)
-    assert np.count_nonzero(frame.kind[middle] == CURVE) == 1
-    assert np.count_nonzero(frame.kind[middle] == SHEET) == len(middle) - 1
+    assert np.count_nonzero(classes.kind[middle] == CURVE) == 1
+    assert np.count_nonzero(classes.kind[middle] == SHEET) == len(middle) - 1
     result = solve(surface)
     assert result.converged
-    seam = middle[frame.kind[middle] == CURVE]
-    along = result.surface.vertices[frame.beside[np.isin(frame.curve, seam)]]
+    seam = middle[classes.kind[middle] == CURVE]
+    along = result.surface.vertices[classes.beside[np.isin(classes.curve, seam)]]
     left = gradient(result.surface)[seam]
     assert np.abs(np.cross(left, along[:, 1] - along[:, 0])).max() < 1e-10
 
@@ -221,8 +221,8 @@ def test_a_moebius_band_keeps_a_curve_where_its_side_changes():
 def test_a_vertex_that_sheets_share_without_an_edge_moves_in_all_directions():
     """Along the sum of their normals alone it was at rest where each sheet still pulled it."""
     surface = touching()
-    frame, space = frame_and_space(surface)
-    assert frame.kind[4] == POINT
+    classes, space = frame_and_space(surface)
+    assert classes.kind[4] == POINT
     assert space.dimension[4] == 3
     result = solve(surface)
     assert result.converged
@@ -232,51 +232,60 @@ def test_a_vertex_that_sheets_share_without_an_edge_moves_in_all_directions():
 
 def test_a_crest_at_rest_is_a_curve_whatever_meets_there():
     surface = seam()
-    frame = structure(surface, np.array([[6, 7], [7, 6], [7, 8], [8, 7]]))
-    assert frame.kind[[6, 7, 8]].tolist() == [POINT, CURVE, POINT]
-    assert motion_space(surface, frame, surface.vertices).dimension[[6, 7, 8]].tolist() == [3, 2, 3]
+    classes = vertex_classes(surface, np.array([[6, 7], [7, 6], [7, 8], [8, 7]]))
+    assert classes.kind[[6, 7, 8]].tolist() == [POINT, CURVE, POINT]
+    assert motion_space(surface, classes, surface.vertices).dimension[[6, 7, 8]].tolist() == [
+        3,
+        2,
+        3,
+    ]
 
 
 def test_where_a_standing_wall_begins_a_resting_vertex_keeps_to_the_crest():
     """Three curves meet there, two sheets' junction and the wall's foot; only the junction counts."""
     surface = solve(two_squares(6, alpha_aux=2.5), target="stationary").surface
     found = standing(surface)
-    frame, rests = found.frame, found.rests
+    classes, rests = found.classes, found.rests
     links = resting_crest(found.walls, rests)
     tip = np.unique(links[(found.walls.can_rest & ~rests)[links[:, 1]], 0])
     assert len(tip) == 2
-    assert (frame.kind[tip] == CURVE).all()
-    space = motion_space(found.surface, frame, found.surface.vertices)
+    assert (classes.kind[tip] == CURVE).all()
+    space = motion_space(found.surface, classes, found.surface.vertices)
     assert (space.dimension[tip] == 1).all()
-    one, two = found.surface.vertices[frame.beside[np.isin(frame.curve, tip)]].transpose(1, 0, 2)
+    one, two = found.surface.vertices[classes.beside[np.isin(classes.curve, tip)]].transpose(
+        1, 0, 2
+    )
     assert np.einsum("ij,ij->i", two - one, space.basis[tip, 0]) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_curve_that_turns_back_on_itself_moves_in_all_directions():
     surface = seam()
-    frame = structure(surface, np.array([[7, 6], [7, 8]]))
+    classes = vertex_classes(surface, np.array([[7, 6], [7, 8]]))
     X = surface.vertices.copy()
     X[8] = 2 * X[7] - X[8]
     X[8] += X[6] - X[8]  # both neighbours in one place: no tangent
-    assert motion_space(surface, frame, X).dimension[7] == 3
+    assert motion_space(surface, classes, X).dimension[7] == 3
 
 
 def test_the_residual_is_the_slope_of_the_energy_along_the_basis():
     surface = SURFACES["three patches, tilted"]()
     _, space = frame_and_space(surface)
     X = surface.vertices
-    residual = space.pull(energy_and_gradient(surface, X)[1])
+    residual = space.to_coordinates(energy_and_gradient(surface, X)[1])
     s = np.random.default_rng(3).standard_normal(space.size)
     t = 1e-5
     slope = (
-        energy(surface.moved(X + t * space.push(s))) - energy(surface.moved(X - t * space.push(s)))
+        energy(surface.moved(X + t * space.to_vectors(s)))
+        - energy(surface.moved(X - t * space.to_vectors(s)))
     ) / (2 * t)
     assert residual @ s == pytest.approx(slope, rel=1e-8)
 
 
 def test_force_scale_is_the_norm_of_the_triangles_forces():
     surface = pyramid(1.5)
-    frame = structure(surface)
+    classes = vertex_classes(surface)
     # four triangles with sides 2, √3, √3: each corner is pulled with ½ α of the side opposite
-    assert force_scale(surface, frame, surface.vertices) == pytest.approx(0.75 * np.sqrt(4 * 10.0))
-    assert force_scale(surface, frame, 0 * surface.vertices) == 1.0
+    assert force_scale(surface, classes, surface.vertices) == pytest.approx(
+        0.75 * np.sqrt(4 * 10.0)
+    )
+    assert force_scale(surface, classes, 0 * surface.vertices) == 1.0

@@ -134,7 +134,7 @@ def test_a_loose_tolerance_ends_early(backend):
         ({"target": "minimal"}, "unknown target 'minimal'; did you mean 'minimum'"),
         ({"levels": -1}, "levels: expected a whole number ≥ 0, found -1"),
         ({"levles": 1}, "unknown option of method 'newton' 'levles'; did you mean 'levels'"),
-        ({"care": "x"}, "care: expected a finite number ≥ 0 and < 1, found 'x'"),
+        ({"min_quality": "x"}, "min_quality: expected a finite number ≥ 0 and < 1, found 'x'"),
         ({"inflation": 0.5}, "inflation: expected a finite number > 1, found 0.5"),
         ({"inflation": float("nan")}, "inflation: expected a finite number > 1, found nan"),
         (
@@ -179,7 +179,7 @@ def test_a_collapsed_surface_is_no_start(backend):
 
 
 def test_a_backend_that_is_not_installed_is_said_so(backend, monkeypatch):
-    monkeypatch.setattr("pcmc.factor.available", lambda: ("superlu",))
+    monkeypatch.setattr("pcmc.stability.factorisation.available", lambda: ("superlu",))
     with pytest.raises(MissingExtra, match="pypardiso is not installed"):
         solve(two_squares(4), backend="pardiso")
     assert solve(two_squares(4)).converged

@@ -138,5 +138,5 @@ def test_without_shapely_the_extra_is_named(monkeypatch):
     for module in ("pcmc.plan.lines", "pcmc.plan.arrangement", "pcmc.plan.drafting"):
         monkeypatch.delitem(sys.modules, module, raising=False)
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(MissingExtra, match=r"pcmc\[plan\]"):
+    with pytest.raises(MissingExtra, match=r"pcmc-surfaces\[plan\]"):
         plan.surface()

@@ -357,7 +357,7 @@ def test_bad_paths_leave_nothing(tmp_path):
 def test_missing_libraries_are_named(monkeypatch):
     raster.opengl.cache_clear()
     monkeypatch.setitem(sys.modules, "pyvista", None)
-    with pytest.raises(MissingExtra, match=r"pyvista is not installed.*pcmc\[plot\]"):
+    with pytest.raises(MissingExtra, match=r"pyvista is not installed.*pcmc-surfaces\[plot\]"):
         plot.draw(flat_square())
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     monkeypatch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)

@@ -219,7 +219,7 @@ def test_without_mmgpy_the_extra_is_named(monkeypatch):
         return real(name, *rest, **more)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(MissingExtra, match=r"pcmc\[remesh\]"):
+    with pytest.raises(MissingExtra, match=r"pcmc-surfaces\[remesh\]"):
         remesh(generators.two_squares(2), 0.5)
 
 

@@ -7,7 +7,32 @@ from difflib import get_close_matches
 
 
 class PcmcError(ValueError):
-    """Base of every error that pcmc raises on purpose."""
+    """Base of every error that pcmc raises on purpose.
+
+    The message is a sentence for a person; the attributes say the same to a program.
+
+    Attributes
+    ----------
+    what : the argument, option, key, patch or file that is wrong.
+    where : where in it: an index, a line, a key; None where there is no such place.
+    found, expected : what it holds, and what it may hold.
+
+    >>> error = PcmcError("tension: expected a number ≥ 0, found -1", what="tension", found=-1)
+    >>> error.what, error.where, error.found
+    ('tension', None, -1)
+    """
+
+    def __init__(
+        self,
+        message: str = "",
+        *,
+        what: str | None = None,
+        where: object = None,
+        found: object = None,
+        expected: object = None,
+    ) -> None:
+        super().__init__(message)
+        self.what, self.where, self.found, self.expected = what, where, found, expected
 
 
 class SurfaceError(PcmcError):
@@ -51,7 +76,7 @@ class MissingExtra(ImportError):
 
     def __init__(self, library: str, extra: str) -> None:
         super().__init__(
-            f"{library} is not installed; install it with: python -m pip install 'pcmc[{extra}]'"
+            f"{library} is not installed; install it with: python -m pip install 'pcmc-surfaces[{extra}]'"
         )
 
 

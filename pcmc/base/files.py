@@ -9,26 +9,26 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .interrupts import held
+from .interrupts import defer_interrupts
 
 
 @contextmanager
-def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A path beside ``path`` to write to, which takes its place when the block ends without error.
 
     >>> import tempfile
     >>> folder = Path(tempfile.mkdtemp())
-    >>> with whole(folder / "a.txt") as temporary:
+    >>> with atomic_write(folder / "a.txt") as temporary:
     ...     _ = temporary.write_text("all of it")
     >>> [p.name for p in folder.iterdir()]
     ['a.txt']
     """
-    with together([path]) as (temporary,):
+    with atomic_writes([path]) as (temporary,):
         yield temporary
 
 
 @contextmanager
-def together(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path]]:
+def atomic_writes(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path]]:
     """Paths beside ``paths`` to write to, which take their places together when the block ends.
 
     No file system replaces several files at once. So each is written first, then each takes its place,
@@ -39,7 +39,7 @@ def together(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path]]:
     kept = [_beside(path) for path in wanted]
     try:
         yield written
-        with held():
+        with defer_interrupts():
             for path, old in zip(wanted, kept, strict=True):
                 _keep(path, old)
             _replace(wanted, written, kept)

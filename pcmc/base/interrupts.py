@@ -12,11 +12,11 @@ ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP")  # the last is not on every system
 
 
 @contextmanager
-def held() -> Iterator[None]:
+def defer_interrupts() -> Iterator[None]:
     """Ctrl-C within the block is answered when it ends.
 
     >>> try:
-    ...     with held():
+    ...     with defer_interrupts():
     ...         signal.raise_signal(signal.SIGINT)
     ...         print("all of it")
     ... except KeyboardInterrupt:
@@ -32,7 +32,7 @@ def held() -> Iterator[None]:
 
 
 @contextmanager
-def endings() -> Iterator[None]:
+def termination_as_interrupt() -> Iterator[None]:
     """Within the block the program is ended like by Ctrl-C where its terminal is closed or it is told to
     end: files begun are cleared away."""
     with _handled(signal.default_int_handler, instead_of=signal.SIG_DFL):

@@ -16,7 +16,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import Walls, excess, standing
 from ..energy.curvature import METHODS, curvature_error, mean_curvature
 from ..energy.functional import energy_and_gradient, patch_areas, volume
-from ..energy.motion_space import MotionSpace, Structure, force_scale, motion_space
+from ..energy.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
@@ -172,22 +172,25 @@ def certify(
     ('STABLE', 0, True)
     """
     found = standing(surface)
-    shown, below, rests, frame = found.surface, found.walls, found.rests, found.frame
+    shown, below, rests, classes = found.surface, found.walls, found.rests, found.classes
     X = shown.vertices
-    space = motion_space(shown, frame, X)
+    space = motion_space(shown, classes, X)
     value, forces = energy_and_gradient(shown, X, supports=False)
-    scale = force_scale(shown, frame, X)
+    scale = force_scale(shown, classes, X)
     unheld = excess(shown, below, rests)
-    residual = float(np.hypot(np.linalg.norm(space.pull(forces)), np.linalg.norm(unheld))) / scale
+    residual = (
+        float(np.hypot(np.linalg.norm(space.to_coordinates(forces)), np.linalg.norm(unheld)))
+        / scale
+    )
     quality, walls_quality = _quality(shown, below)
     system = None
     if residual <= tolerance and quality > COLLAPSED:
-        system = _system(shown, frame, space)
+        system = _system(shown, classes, space)
     values, fields = _modes(system, modes)
     ratio, carried = load_ratio(shown), reactions(shown)
     missing = space.project(forces)
-    own = _own_residuals(shown, frame, missing)
-    softest = _softest(shown, frame, values, fields)
+    own = _own_residuals(shown, classes, missing)
+    softest = _softest(shown, classes, values, fields)
     verdict, detail = _verdict(
         surface, residual, tolerance, quality, system, own, softest, ratio, status, below.pinchable
     )
@@ -216,10 +219,10 @@ def certify(
     )
 
 
-def _system(surface: Surface, frame: Structure, space: MotionSpace) -> Stiffness | None:
+def _system(surface: Surface, classes: VertexClasses, space: MotionSpace) -> Stiffness | None:
     rigid = rigid_modes(space, rigid_motions(surface), surface.vertices)
     try:
-        return stiffness(surface, frame, space, rigid)
+        return stiffness(surface, classes, space, rigid)
     except SingularMatrix:
         return None
 
@@ -282,7 +285,7 @@ def _verdict(
     return Verdict.STABLE, ""
 
 
-def _own_residuals(surface: Surface, frame: Structure, missing: Floats) -> Floats:
+def _own_residuals(surface: Surface, classes: VertexClasses, missing: Floats) -> Floats:
     """(k,) of each patch: the forces missing inside over the norm of its own triangles' forces."""
     F, patch, count = surface.faces, surface.patch_of_face, len(surface.patches)
     sides = surface.vertices[F[:, [1, 2, 0]]] - surface.vertices[F]
@@ -290,18 +293,18 @@ def _own_residuals(surface: Surface, frame: Structure, missing: Floats) -> Float
     scale = np.bincount(patch, forces, count)
     owner = np.zeros(surface.n, dtype=np.int64)
     owner[F] = patch[:, None]
-    left = np.einsum("ij,ij->i", missing, missing) * (frame.kind == SHEET)
+    left = np.einsum("ij,ij->i", missing, missing) * (classes.kind == SHEET)
     return np.asarray(np.sqrt(np.bincount(owner, left, count) / np.where(scale > 0.0, scale, 1.0)))
 
 
-def _softest(surface: Surface, frame: Structure, values: Floats, fields: Floats) -> float:
+def _softest(surface: Surface, classes: VertexClasses, values: Floats, fields: Floats) -> float:
     """The lowest λ in units of α/size², α the tension of what its mode moves; infinite without one."""
     if not len(values):
         return np.inf
-    X, F = surface.vertices, frame.faces
+    X, F = surface.vertices, classes.faces
     area = np.linalg.norm(np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]), axis=1)
     moved = area * np.einsum("fij,fij->f", fields[0][F], fields[0][F])
-    tension = float(surface.tensions[frame.patch_of_face] @ moved / moved.sum())
+    tension = float(surface.tensions[classes.patch_of_face] @ moved / moved.sum())
     return float(values[0]) * surface.size**2 / tension
 
 

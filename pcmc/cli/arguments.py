@@ -13,7 +13,7 @@ from .. import project as projects
 from ..base.errors import FileError, OptionError, unknown
 from ..io import FORMATS, read_bare
 from ..surface import Surface
-from ..surface.wall_pressures import pressed
+from ..surface.wall_pressures import with_pressures
 
 TOML = ".toml"
 
@@ -83,7 +83,7 @@ def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str]
         _by_name(loaded, tension, "--tension"),
         _by_name(loaded, pressure, "--pressure"),
     )
-    return pressed(surface, tensions, pressures)
+    return with_pressures(surface, tensions, pressures)
 
 
 def _by_name(names: list[str], given: list[str] | None, option: str) -> dict[str, float]:

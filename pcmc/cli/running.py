@@ -17,7 +17,7 @@ from ..base.errors import (
     PcmcError,
     PlanWarning,
 )
-from ..base.interrupts import endings
+from ..base.interrupts import termination_as_interrupt
 from .codes import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
 NARROW = ("strict", "surrogateescape")  # the second in the locale C
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.simplefilter("always", kind)
         warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")
         _any_letter(sys.stdout)
-        with endings():
+        with termination_as_interrupt():
             return _run(sys.argv[1:] if arguments is None else list(arguments))
 
 

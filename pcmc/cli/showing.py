@@ -10,7 +10,7 @@ import typer
 
 from .. import project as projects
 from ..base.errors import FileError, OptionError, unknown
-from ..base.interrupts import held
+from ..base.interrupts import defer_interrupts
 from ..io import load, write
 from ..surface import Surface
 from .arguments import (
@@ -46,7 +46,7 @@ def convert(
     projects.check_outputs([output])
     surface = retensioned(surface_in(file), tension, pressure)
     kept = _kept(file) if not (tension or pressure) else {}
-    with held():
+    with defer_interrupts():
         write(output, surface, **kept)
     print(f"written: {output}")
     return OK

@@ -15,11 +15,11 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..energy.functional import energy_and_gradient
-from ..energy.motion_space import MotionSpace, Structure, structure
+from ..energy.motion_space import MotionSpace, VertexClasses, vertex_classes
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.topology import topology
-from .wall_rows import crest_places, hang, joined, places
+from .wall_rows import crest_places, joined, places, wall_rows
 
 SLACK = 1e-9  # of the capacity: an excess below is rounding
 
@@ -59,7 +59,7 @@ class Walls:
     pinchable: Bools
 
 
-def walls(surface: Surface) -> Walls:
+def find_walls(surface: Surface) -> Walls:
     """The walls of a surface that can pinch, and how each vertex hangs from the crest."""
     n = surface.n
     height = surface.plane.height(surface.vertices)
@@ -79,7 +79,7 @@ def walls(surface: Surface) -> Walls:
             continue
         pinchable[index] = True
         below = members[~outer[members]]
-        hanging.append((below, *hang(surface, below, crest, sides)))
+        hanging.append((below, *wall_rows(surface, below, crest, sides)))
         edges.append(crest)
         tension.append(np.full(len(crest), patch.tension))
     above = np.zeros(n, dtype=bool)
@@ -101,7 +101,9 @@ def walls(surface: Surface) -> Walls:
     )
 
 
-def hung(surface: Surface, below: Walls, X: Floats, space: MotionSpace | None = None) -> Floats:
+def place_wall_rows(
+    surface: Surface, below: Walls, X: Floats, space: MotionSpace | None = None
+) -> Floats:
     """X (n,3) with every hanging vertex brought below its place on the crest.
 
     With the motion space given, only along the wall: what the vertex stands off across it stays.
@@ -126,7 +128,7 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
     start, end = edges.T
     X = surface.vertices
     middle = 0.5 * (X[start] + X[end])
-    below = walls(surface)
+    below = find_walls(surface)
     rests = resting(surface, below)
     if not rests.any():
         return middle
@@ -194,13 +196,13 @@ class Standing:
     ----------
     surface : the pinched surface; see ``pinched``.
     walls, rests : of the whole surface; its junction vertices at rest on Π.
-    frame : what the vertices lie on; those that rest follow the junction.
+    classes : what the vertices lie on; those that rest follow the junction.
     """
 
     surface: Surface
     walls: Walls
     rests: Bools
-    frame: Structure
+    classes: VertexClasses
 
     @property
     def judged(self) -> Ints:
@@ -210,11 +212,11 @@ class Standing:
 
 def standing(surface: Surface, below: Walls | None = None, rests: Bools | None = None) -> Standing:
     """What stands of a surface; with its walls, and what rests, seen from the positions if not given."""
-    below = walls(surface) if below is None else below
+    below = find_walls(surface) if below is None else below
     rests = resting(surface, below) if rests is None else rests
     shown = pinched(surface, below, rests)
-    frame = structure(shown, resting_crest(below, rests), beside(below, rests))
-    return Standing(shown, below, rests, frame)
+    classes = vertex_classes(shown, resting_crest(below, rests), beside(below, rests))
+    return Standing(shown, below, rests, classes)
 
 
 def pull_and_capacity(surface: Surface, below: Walls, rests: Bools) -> tuple[Floats, Floats]:
@@ -262,7 +264,7 @@ def lifted(surface: Surface, below: Walls, free: Bools, fraction: float | Floats
     rise = fraction * np.where(free, crest_spacing(surface, below), 0.0) * below.side
     X = surface.vertices + rise[:, None] * np.array(surface.plane.normal)
     back = free[below.ends].any(axis=1)
-    place = hung(surface, below, X)
+    place = place_wall_rows(surface, below, X)
     X[below.hanging[back]] = place[below.hanging[back]]
     return surface.moved(X)
 

@@ -29,7 +29,7 @@ def places(
     return above + height * ((share[:, None] - 1.0) * np.array(surface.plane.normal) + lean)
 
 
-def hang(
+def wall_rows(
     surface: Surface, below: Ints, crest: Ints, sides: Ints
 ) -> tuple[Ints, Floats, Floats, Floats]:
     """Crest edge ends (w,2), λ, ρ and what wall vertices stand off, by nearness seen along Π's normal.

@@ -19,7 +19,7 @@ from ..base.errors import OptionError
 from ..energy import kernels
 from ..energy.functional import apply_supports
 from ..surface import Surface
-from ..surface.wall_pressures import following
+from ..surface.wall_pressures import wall_pressure_changes
 
 EQUAL = 1e-9  # relative difference up to which two tensions give the same λ
 
@@ -80,7 +80,9 @@ class Direction:
         w = _rates(surface, self.tensions)
         u = _rates(surface, self.pressures)
         value = 0.0 if self.relative else _common_value(surface, w, u)
-        u = u + following(surface, u, {surface.patch_index(name) for name in self.pressures})
+        u = u + wall_pressure_changes(
+            surface, u, {surface.patch_index(name) for name in self.pressures}
+        )
         line = Line(value, surface.tensions - w * value, surface.pressures - u * value, w, u)
         if not (surface.tensions[w != 0.0] > 0.0).all():
             name = surface.patches[int(np.argmax((w != 0.0) & (surface.tensions <= 0.0)))].name

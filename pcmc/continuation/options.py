@@ -38,7 +38,7 @@ class FollowOptions:
     steps : the most steps.
     tolerance : relative residual of each point.
     folds : end after this many folds; None for any number.
-    care : triangles are spread along the shape while the worst has less than this quality.
+    min_quality : triangles are spread along the shape while the worst has less than this quality.
     remesh : edge length of a new mesh (`pcmc.remesh`) where spreading leaves a triangle below that
         quality; None keeps the triangles.
     keep : every so many points the surface is kept; the last one is in any case.
@@ -52,7 +52,7 @@ class FollowOptions:
     steps: int = 200
     tolerance: float = 1e-10
     folds: int | None = None
-    care: float = 0.45
+    min_quality: float = 0.45
     remesh: float | None = None
     keep: int = 1
     backend: str | None = None
@@ -67,7 +67,7 @@ class FollowOptions:
         validate.number("tolerance", self.tolerance, above=0.0)
         if self.folds is not None:
             validate.integer("folds", self.folds, least=1)
-        validate.number("care", self.care, least=0.0, below=1.0)
+        validate.number("min_quality", self.min_quality, least=0.0, below=1.0)
         if self.remesh is not None:
             validate.number("remesh", self.remesh, above=0.0)
         validate.integer("keep", self.keep, least=1)

@@ -128,7 +128,7 @@ class Bordered:
     def solve(self, right: Floats, last: float, accuracy: float) -> tuple[Floats, float]:
         """(s, δ) with  J s + f δ = right,  ⟨row, motion⟩ + rate δ = last."""
         size = len(right) + 1
-        behind, c = self.factor.solve(self.f), self.space.pull(self.row)
+        behind, c = self.factor.solve(self.f), self.space.to_coordinates(self.row)
         pivot = self.rate - float(c @ behind)
         if not np.isfinite(pivot) or pivot == 0.0:
             raise Lost("the bordered matrix is singular: branches meet here")
@@ -164,7 +164,7 @@ class Bordered:
     def linear(self) -> Linearisation:
         """J, as it acts on motions of the vertices."""
         gradient = energy_and_gradient(self.surface, self.X)[1]
-        return linearise(self.surface, self.shape.frame, self.space, self.X, gradient)
+        return linearise(self.surface, self.shape.classes, self.space, self.X, gradient)
 
 
 def correct(
@@ -182,8 +182,8 @@ def correct(
     for iteration in range(ITERATIONS + 1):
         surface = line.applied(shape.surface, value)
         space = shape.space(X)
-        right = space.pull(energy_and_gradient(surface, X)[1])
-        residual = float(np.linalg.norm(right)) / force_scale(surface, shape.frame, X)
+        right = space.to_coordinates(energy_and_gradient(surface, X)[1])
+        residual = float(np.linalg.norm(right)) / force_scale(surface, shape.classes, X)
         g = border.value(X, value)
         if residual <= tolerance and abs(g) <= 1e-9:
             return Solution(shape, X, value, residual, iteration)
@@ -290,7 +290,7 @@ def _bordered(
     shape: Shape, surface: Surface, line: Line, space: MotionSpace, X: Floats, factor: Factor,
     row: Floats, rate: float,
 ) -> Bordered:  # fmt: skip
-    f = space.pull(line.gradient(surface, X))
+    f = space.to_coordinates(line.gradient(surface, X))
     unit = (float(np.linalg.norm(f)) or 1.0) / float(np.linalg.norm(row) + abs(rate))
     return Bordered(shape, surface, space, X, factor, f, row, rate, unit)
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..contact.pinching import excess, hung, settled, standing, walls
+from ..contact.pinching import excess, find_walls, place_wall_rows, settled, standing
 from ..energy.functional import energy_and_gradient, patch_volumes
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
-from ..energy.projected_hessian import Pattern, assemble, pattern
+from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
 from ..meshing.quality import triangle_quality
-from ..meshing.redistribution import spread
-from ..solvers.smoother import Carrier
+from ..meshing.redistribution import redistribute
+from ..solvers.smoother import HarmonicExtension
 from ..stability.factorisation import Factor, Factoriser, factoriser
 from ..stability.modes import Stiffness, full_matrix, lumped_mass
 from ..surface import Surface
@@ -31,33 +31,33 @@ class Shape:
     ----------
     full : the surface as it was given.
     surface : the same without the walls that are gone where a junction rests on Π.
-    frame : what its vertices lie on.
+    classes : what its vertices lie on.
     """
 
     def __init__(self, surface: Surface, backend: str | None = None) -> None:
         self.full = surface
         self._found = found = standing(surface)
         self.surface, self.below, self.rests = found.surface, found.walls, found.rests
-        self.frame, self.judged = found.frame, found.judged
+        self.classes, self.judged = found.classes, found.judged
         self.pressed: Floats = (~surface.walls).astype(float)
         self._backend = backend
-        self._carrier: Carrier | None = None
-        self._travels = bool(((self.frame.kind != SHEET) & ~self.surface.fixed).any())
+        self._extension: HarmonicExtension | None = None
+        self._travels = bool(((self.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._dimension: Ints | None = None
 
     # -- equilibrium ---------------------------------------------------------------------------
 
     def space(self, X: Floats) -> MotionSpace:
         """The motion space at X (n,3)."""
-        return motion_space(self.surface, self.frame, X)
+        return motion_space(self.surface, self.classes, X)
 
     def residual(self, X: Floats) -> float:
         """‖Bᵀ∇E‖ over the norm of the single triangles' forces, at X, the tensions being the first."""
-        left = self.space(X).pull(energy_and_gradient(self.surface, X)[1])
-        return float(np.linalg.norm(left)) / force_scale(self.surface, self.frame, X)
+        left = self.space(X).to_coordinates(energy_and_gradient(self.surface, X)[1])
+        return float(np.linalg.norm(left)) / force_scale(self.surface, self.classes, X)
 
     def hessian(self, surface: Surface, space: MotionSpace, X: Floats) -> tuple[Floats, Factor]:
-        """Values of Bᵀ(∂²E)B in the pattern, and its factor. The symbolic work is kept.
+        """Values of Bᵀ(∂²E)B in the pattern, and its factor. The symbolic work is pattern.
 
         Raises
         ------
@@ -65,15 +65,15 @@ class Shape:
         """
         if self._dimension is None or not np.array_equal(self._dimension, space.dimension):
             self._dimension = space.dimension
-            self._pattern: Pattern = pattern(self.frame, space)
+            self._pattern: Pattern = hessian_pattern(self.classes, space)
             self._factoriser: Factoriser = factoriser(self._pattern, self._backend)
-        data = assemble(surface, self.frame, space, self._pattern, X)
+        data = assemble(surface, self.classes, space, self._pattern, X)
         return data, self._factoriser.factor(data)
 
     def stiffness(self, space: MotionSpace, X: Floats, data: Floats, factor: Factor) -> Stiffness:
         """The Hessian, its mass and its inertia."""
         return Stiffness(
-            space, full_matrix(self._pattern, data), lumped_mass(space, self.frame, X), factor,
+            space, full_matrix(self._pattern, data), lumped_mass(space, self.classes, X), factor,
             np.zeros((space.size, 0)), factor.negative,
         )  # fmt: skip
 
@@ -97,7 +97,7 @@ class Shape:
 
     def weights(self, X: Floats) -> Floats:
         """(n,) the area around each vertex over all area, over size²."""
-        area = area_vectors(X, self.frame.faces)[1]
+        area = area_vectors(X, self.classes.faces)[1]
         return area / (area.sum() * self.full.size**2)
 
     # -- contact of walls with Π ---------------------------------------------------------------
@@ -118,13 +118,13 @@ class Shape:
         X, down = X.copy(), self.down(X)
         normal = np.array(self.surface.plane.normal)
         X[down] -= self.surface.plane.height(X[down])[:, None] * normal
-        return self.whole(hung(self.surface, self.below, X))
+        return self.whole(place_wall_rows(self.surface, self.below, X))
 
     def unheld(self, line: Line, value: float, X: Floats) -> Floats:
         """(n,) the pull on resting junction vertices beyond what their walls can hold at λ, force."""
         if not self.rests.any():
             return np.zeros(self.full.n)
-        below = replace(self.below, tension=walls(line.applied(self.full, value)).tension)
+        below = replace(self.below, tension=find_walls(line.applied(self.full, value)).tension)
         return excess(line.applied(self.surface, value).moved(X), below, self.rests)
 
     # -- triangles -----------------------------------------------------------------------------
@@ -140,21 +140,21 @@ class Shape:
 
     def swept(self, X: Floats, space: MotionSpace) -> Floats:
         """X (n,3) with the rows of walls brought below their crest, within the wall."""
-        return hung(self.surface, self.below, X, space)
+        return place_wall_rows(self.surface, self.below, X, space)
 
     def motion(self, space: MotionSpace, X: Floats, s: Floats) -> Floats:
         """Bs (n,3), with the insides of the sheets sliding along after their curves."""
-        if self._carrier is None and self._travels:
-            self._carrier = Carrier(self.surface, self.frame, X, self._backend)
-        d = space.push(s)
-        return d if self._carrier is None else self._carrier.carry(space, d)
+        if self._extension is None and self._travels:
+            self._extension = HarmonicExtension(self.surface, self.classes, X, self._backend)
+        d = space.to_vectors(s)
+        return d if self._extension is None else self._extension.extend(space, d)
 
-    def spread(self, X: Floats, aim: float) -> Floats | None:
+    def redistribute(self, X: Floats, aim: float) -> Floats | None:
         """X with its vertices spread along the shape until the worst triangle has quality ``aim``.
 
         The best of the sweeps; None where none is clearly better.
         """
-        best, worst = spread(self._found, X, aim, slide=False)
+        best, worst = redistribute(self._found, X, aim, slide=False)
         return best if worst > CLEAR * self.quality(X) else None
 
 

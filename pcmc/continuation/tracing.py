@@ -86,7 +86,7 @@ class Tracer:
                 f"follow: nothing holds the surface against {drifts} rigid motions, and it would"
                 " drift instead of following the parameter; hold it with fixed= or on_plane="
             )
-        moves = space.pull(self.line.gradient(shape.surface, X)).any()
+        moves = space.to_coordinates(self.line.gradient(shape.surface, X)).any()
         if not (moves or shape.rests.any()):  # a wall that is gone may come back
             raise OptionError(
                 "the parameter moves nothing: no vertex of what it names is free, or a change of it"
@@ -160,7 +160,7 @@ class Tracer:
             raise Lost("the correction hardly converges")
         if here.shape.turned(here.X, found.X):
             raise Collapsed("triangles turn over")
-        if found.shape.quality(found.X) < SPOILT * min(here.quality, self.options.care):
+        if found.shape.quality(found.X) < SPOILT * min(here.quality, self.options.min_quality):
             raise Collapsed("triangles collapse")
         there = examine(found, self.line, self.scale, here)
         stretch = Stretch(self.line, self.scale, here, there, length, self.solution)
@@ -224,9 +224,9 @@ class Tracer:
 
     def tend(self) -> None:
         """Spread the triangles where they are poor, or remesh, and return to the branch."""
-        aim = self.options.care
+        aim = self.options.min_quality
         if self.here.quality < aim:
-            X = self.here.shape.spread(self.here.X, aim)
+            X = self.here.shape.redistribute(self.here.X, aim)
             if X is not None:
                 self.settle(self.here, X)
         if self.options.remesh is not None and self.here.quality < aim:
@@ -252,7 +252,9 @@ class Tracer:
         if passes(here, after, self.goals):
             return
         events = self.unlocated(here, after, 0.0)
-        if after.quality > here.quality and not (events and here.quality > 0.5 * self.options.care):
+        if after.quality > here.quality and not (
+            events and here.quality > 0.5 * self.options.min_quality
+        ):
             self.events += events
             self.here = after
 

@@ -25,7 +25,7 @@ from ..certificate.balance import coarseness, load_ratio
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
-from ..surface.wall_pressures import pressed
+from ..surface.wall_pressures import with_pressures
 from .outcome import Design, Reach
 from .quantities import Parameter, Target, measure
 from .sensitivity import sensitivities
@@ -148,9 +148,9 @@ class Search:
     def at(self, x: Floats, near: Point) -> Point | None:
         """The solution with these unknowns, from one nearby; None where none is found."""
         still = bool((np.abs(x - near.x) < STILL * self.sizes(near)).all())
-        return self.solved(x, near.result.surface, {"care": 0.0} if still else {})
+        return self.solved(x, near.result.surface, {"min_quality": 0.0} if still else {})
 
-    def solved(self, x: Floats, start: Surface, care: dict[str, float]) -> Point | None:
+    def solved(self, x: Floats, start: Surface, quality: dict[str, float]) -> Point | None:
         """Solve once, from a surface, unless its boundary cannot carry the load.
 
         None where no equilibrium is found, or at a fold, where nothing can be said of what is ahead.
@@ -159,7 +159,7 @@ class Search:
         if load_ratio(trial) > 1.0 + coarseness(trial):
             self.record(x, OVERLOADED)
             return None
-        result = solve(trial, "newton", **{**care, **self.options})
+        result = solve(trial, "newton", **{**quality, **self.options})
         self.solves += 1
         tried = self.tried(x, result) if result.converged else None
         if tried is not None and (self.best is None or tried.phi < self.best.phi):
@@ -174,7 +174,7 @@ class Search:
         chosen: dict[str, dict[str, float]] = {"tension": {}, "pressure": {}}
         for parameter, value in zip(self.parameters, self.turned(x).tolist(), strict=True):
             chosen[parameter.kind][parameter.patch] = value
-        return pressed(surface, chosen["tension"], chosen["pressure"])
+        return with_pressures(surface, chosen["tension"], chosen["pressure"])
 
     def tried(self, x: Floats, result: Result) -> Tried:
         """What a solve has given."""

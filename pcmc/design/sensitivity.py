@@ -22,15 +22,15 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from ..base.arrays import Floats
 from ..base.errors import OptionError, SurfaceError
 from ..certificate.certificate import TOLERANCE
-from ..contact.pinching import Standing, excess, hung, standing
+from ..contact.pinching import Standing, excess, place_wall_rows, standing
 from ..energy import kernels
 from ..energy.functional import energy_and_gradient
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
-from ..energy.projected_hessian import assemble, pattern
+from ..energy.projected_hessian import assemble, hessian_pattern
 from ..stability.factorisation import Factor, SingularMatrix, factoriser
 from ..surface import Surface
-from ..surface.wall_pressures import following
+from ..surface.wall_pressures import wall_pressure_changes
 from .quantities import Measure, Parameter, Target, measure
 
 ACCURACY = 1e-9  # relative, to which J s = b is solved
@@ -143,7 +143,7 @@ def _shares(surface: Surface, parameter: Parameter, parameters: Sequence[Paramet
     if parameter.kind == "tension":
         return one
     named = {surface.patch_index(p.patch) for p in parameters if p.kind == "pressure"}
-    return one + following(surface, one, named)
+    return one + wall_pressure_changes(surface, one, named)
 
 
 def _answers(surface: Surface, parameters: Sequence[Parameter]) -> tuple[Surface, Floats]:
@@ -170,30 +170,30 @@ class _AtRest:
     @classmethod
     def of(cls, surface: Surface) -> _AtRest:
         found = standing(surface)
-        shown, below, rests, frame = found.surface, found.walls, found.rests, found.frame
+        shown, below, rests, classes = found.surface, found.walls, found.rests, found.classes
         X = shown.vertices
-        space = motion_space(shown, frame, X)
+        space = motion_space(shown, classes, X)
         gradient = energy_and_gradient(shown, X)[1]
         unheld = np.linalg.norm(excess(shown, below, rests))
-        left = np.hypot(np.linalg.norm(space.pull(gradient)), unheld)
-        residual = float(left) / force_scale(shown, frame, X)
+        left = np.hypot(np.linalg.norm(space.to_coordinates(gradient)), unheld)
+        residual = float(left) / force_scale(shown, classes, X)
         if residual > TOLERANCE:
             raise SurfaceError(
                 f"sensitivities: the surface is not at rest (relative residual {residual:.1e});"
                 " solve it first"
             )
-        kept = pattern(frame, space)
+        pattern = hessian_pattern(classes, space)
         try:
-            factor = factoriser(kept).factor(assemble(shown, frame, space, kept, X))
+            factor = factoriser(pattern).factor(assemble(shown, classes, space, pattern, X))
         except SingularMatrix:
             raise SurfaceError(AT_FOLD) from None
         follows = bool((below.can_rest & ~rests).any())
-        linear = linearise(shown, frame, space, X, gradient)
+        linear = linearise(shown, classes, space, X, gradient)
         return cls(found, follows, space, linear, factor)
 
     def answer(self, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
         """dX/dλ (n,3) for one of the parameters."""
-        right = -self.space.pull(self._force(parameter, parameters))
+        right = -self.space.to_coordinates(self._force(parameter, parameters))
         if not np.any(right):
             return np.zeros_like(self.found.surface.vertices)
         size = self.space.size
@@ -218,9 +218,9 @@ class _AtRest:
 
     def _moved(self, s: Floats) -> Floats:
         """B s (n,3) with walls that hang from their crest following it, as they do in the solver."""
-        d = self.space.push(s)
+        d = self.space.to_vectors(s)
         if not self.follows:
             return d
         shown, walls = self.found.surface, self.found.walls
-        ahead = hung(shown, walls, shown.vertices + d, self.space)
-        return ahead - hung(shown, walls, shown.vertices, self.space)
+        ahead = place_wall_rows(shown, walls, shown.vertices + d, self.space)
+        return ahead - place_wall_rows(shown, walls, shown.vertices, self.space)

@@ -23,7 +23,7 @@ from ..base.compiled import compiled
 from ..surface import Surface
 from ..surface.geometry import area_vectors
 from ..surface.topology import SHEET
-from .motion_space import MotionSpace, Structure, curve_chords
+from .motion_space import MotionSpace, VertexClasses, curve_chords
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +33,11 @@ class Linearisation:
     Attributes
     ----------
     sheets : (n,3) what the change of a vertex's area vector is multiplied with, else zero; pressure.
-    bends, pull : (b,) curve vertices, as numbers in ``frame.curve``, and -(t·∇E)/|c| there.
+    bends, pull : (b,) curve vertices, as numbers in ``classes.curve``, and -(t·∇E)/|c| there.
     """
 
     surface: Surface
-    frame: Structure
+    classes: VertexClasses
     space: MotionSpace
     X: Floats
     sheets: Floats
@@ -46,48 +46,48 @@ class Linearisation:
 
     def times(self, d: Floats) -> Floats:
         """Bᵀ Df[d] (size,), for a motion d (n,3) of the vertices."""
-        surface, frame, space = self.surface, self.frame, self.space
+        surface, classes, space = self.surface, self.classes, self.space
         change = np.zeros_like(self.X)
         turn = np.zeros(len(self.X))
         _along(
-            self.X, d, frame.faces, frame.patch_of_face, surface.origin,
+            self.X, d, classes.faces, classes.patch_of_face, surface.origin,
             surface.tensions, surface.pressures, self.sheets, change, turn,
         )  # fmt: skip
-        where = frame.curve[self.bends]
-        change[where] += self.pull[:, None] * curve_chords(surface, frame, d)[self.bends]
-        out = space.pull(change)
-        single = (frame.kind == SHEET) & (space.dimension == 1)
+        where = classes.curve[self.bends]
+        change[where] += self.pull[:, None] * curve_chords(surface, classes, d)[self.bends]
+        out = space.to_coordinates(change)
+        single = (classes.kind == SHEET) & (space.dimension == 1)
         out[space.start[:-1][single]] += turn[single]
         return out
 
 
 def linearise(
-    surface: Surface, frame: Structure, space: MotionSpace, X: Floats, gradient: Floats
+    surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
 ) -> Linearisation:
     """The derivative of the forces of ``surface`` at X, where ∇E is ``gradient`` (n,3)."""
-    bends, pull = _at_curves(surface, frame, space, X, gradient)
-    sheets = _at_sheets(surface, frame, space, X, gradient)
-    return Linearisation(surface, frame, space, X, sheets, bends, pull)
+    bends, pull = _at_curves(surface, classes, space, X, gradient)
+    sheets = _at_sheets(surface, classes, space, X, gradient)
+    return Linearisation(surface, classes, space, X, sheets, bends, pull)
 
 
 def _at_curves(
-    surface: Surface, frame: Structure, space: MotionSpace, X: Floats, gradient: Floats
+    surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
 ) -> tuple[Ints, Floats]:
-    slides = surface.on_plane[frame.curve]
-    bends = np.flatnonzero(space.dimension[frame.curve] == np.where(slides, 1, 2))
-    chord = curve_chords(surface, frame, X)[bends]
+    slides = surface.on_plane[classes.curve]
+    bends = np.flatnonzero(space.dimension[classes.curve] == np.where(slides, 1, 2))
+    chord = curve_chords(surface, classes, X)[bends]
     chord[slides[bends]] = surface.plane.along(chord[slides[bends]])
     square = np.einsum("ij,ij->i", chord, chord)
-    along = np.einsum("ij,ij->i", chord, gradient[frame.curve[bends]])
+    along = np.einsum("ij,ij->i", chord, gradient[classes.curve[bends]])
     return bends, -along / square
 
 
 def _at_sheets(
-    surface: Surface, frame: Structure, space: MotionSpace, X: Floats, gradient: Floats
+    surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
 ) -> Floats:
-    single = (frame.kind == SHEET) & (space.dimension == 1)
+    single = (classes.kind == SHEET) & (space.dimension == 1)
     out = np.zeros_like(X)
-    vector = area_vectors(X, frame.faces)[0]
+    vector = area_vectors(X, classes.faces)[0]
     _across_normals(vector, single, space.basis, gradient, out)
     sliding = np.flatnonzero(single & surface.on_plane)
     if len(sliding):

@@ -37,7 +37,7 @@ PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
+class VertexClasses:
     """What stays the same while the vertices move: the pulling faces and what each vertex lies on.
 
     Attributes
@@ -86,20 +86,22 @@ class MotionSpace:
         """Number of unknowns."""
         return int(self.start[-1])
 
-    def pull(self, vectors: Floats) -> Floats:
+    def to_coordinates(self, vectors: Floats) -> Floats:
         """Bᵀ v (size,): the components of vectors (n,3) along the basis."""
-        return _pull(self.basis, self.dimension, self.start, vectors)
+        return _to_coordinates(self.basis, self.dimension, self.start, vectors)
 
-    def push(self, components: Floats) -> Floats:
+    def to_vectors(self, components: Floats) -> Floats:
         """B s (n,3): the vectors that have these components (size,)."""
-        return _push(self.basis, self.dimension, self.start, components)
+        return _to_vectors(self.basis, self.dimension, self.start, components)
 
     def project(self, vectors: Floats) -> Floats:
         """B Bᵀ v (n,3): the part of the vectors that changes the shape."""
-        return self.push(self.pull(vectors))
+        return self.to_vectors(self.to_coordinates(vectors))
 
 
-def structure(surface: Surface, crest: Ints | None = None, level: Bools | None = None) -> Structure:
+def vertex_classes(
+    surface: Surface, crest: Ints | None = None, level: Bools | None = None
+) -> VertexClasses:
     """The pulling faces of a surface and what its vertices lie on.
 
     ``crest`` (k,2) leads from each junction vertex that rests on Π to its neighbours on the junction:
@@ -134,7 +136,7 @@ def structure(surface: Surface, crest: Ints | None = None, level: Bools | None =
     kind[shared] = POINT
     curve, beside = curve[~shared[curve]], beside[~shared[curve]]
     idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
-    return Structure(
+    return VertexClasses(
         active=active,
         faces=faces,
         patch_of_face=patch,
@@ -147,27 +149,27 @@ def structure(surface: Surface, crest: Ints | None = None, level: Bools | None =
     )
 
 
-def motion_space(surface: Surface, frame: Structure, X: Floats) -> MotionSpace:
+def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionSpace:
     """Basis of the motion space of the surface with its vertices at X (n,3)."""
     n = surface.n
     basis = np.zeros((n, 3, 3))
     dimension = np.zeros(n, dtype=np.int64)
-    moving = ~(surface.fixed | frame.idle)
+    moving = ~(surface.fixed | classes.idle)
 
-    sheet = moving & (frame.kind == SHEET)
-    _along_normals(area_vectors(X, frame.faces)[0], sheet, basis, dimension)
+    sheet = moving & (classes.kind == SHEET)
+    _along_normals(area_vectors(X, classes.faces)[0], sheet, basis, dimension)
 
-    curve = np.flatnonzero(moving & (frame.kind == CURVE))
+    curve = np.flatnonzero(moving & (classes.kind == CURVE))
     tangent = np.zeros((n, 3))
-    chord = curve_chords(surface, frame, X)
+    chord = curve_chords(surface, classes, X)
     length = np.linalg.norm(chord, axis=1)
-    tangent[frame.curve] = chord / np.where(length > 0.0, length, 1.0)[:, None]
+    tangent[classes.curve] = chord / np.where(length > 0.0, length, 1.0)[:, None]
     straight = np.einsum("ij,ij->i", tangent[curve], tangent[curve]) > 0.5
     ring = curve[straight]
     basis[ring, 0], basis[ring, 1] = perpendicular(tangent[ring])
     dimension[ring] = 2
 
-    ends = np.flatnonzero(moving & (frame.kind == POINT))
+    ends = np.flatnonzero(moving & (classes.kind == POINT))
     point = np.concatenate([ends, curve[~straight]])
     basis[point] = np.eye(3)
     dimension[point] = 3
@@ -178,22 +180,22 @@ def motion_space(surface: Surface, frame: Structure, X: Floats) -> MotionSpace:
     return MotionSpace(basis, dimension)
 
 
-def curve_chords(surface: Surface, frame: Structure, X: Floats) -> Floats:
+def curve_chords(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
     """(c,3) from the vertex before to the one after each curve vertex: along its tangent."""
-    chord = X[frame.beside[:, 1]] - X[frame.beside[:, 0]]
-    level = frame.level[frame.curve]
+    chord = X[classes.beside[:, 1]] - X[classes.beside[:, 0]]
+    level = classes.level[classes.curve]
     chord[level] = surface.plane.along(chord[level])
     return np.asarray(chord)
 
 
-def force_scale(surface: Surface, frame: Structure, X: Floats) -> float:
+def force_scale(surface: Surface, classes: VertexClasses, X: Floats) -> float:
     """The norm of the single triangles' tension forces ½ α |e|, which cancel at rest, force."""
-    square = _square_of_forces(X, frame.faces, surface.tensions[frame.patch_of_face])
+    square = _square_of_forces(X, classes.faces, surface.tensions[classes.patch_of_face])
     return float(np.sqrt(square)) or 1.0
 
 
 def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors (k,3) that complete each unit direction (k,3) to a right-handed frame."""
+    """Two unit vectors (k,3) that complete each unit direction (k,3) to a right-handed classes."""
     axis = np.eye(3)[np.abs(directions).argmin(axis=1)]
     first = np.cross(directions, axis)
     first /= np.linalg.norm(first, axis=1)[:, None]
@@ -263,7 +265,7 @@ def _square_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
 
 
 @compiled
-def _pull(basis: Floats, dimension: Ints, start: Ints, vectors: Floats) -> Floats:
+def _to_coordinates(basis: Floats, dimension: Ints, start: Ints, vectors: Floats) -> Floats:
     out = np.empty(start[-1])
     for v in range(len(dimension)):
         for c in range(dimension[v]):
@@ -273,7 +275,7 @@ def _pull(basis: Floats, dimension: Ints, start: Ints, vectors: Floats) -> Float
 
 
 @compiled
-def _push(basis: Floats, dimension: Ints, start: Ints, components: Floats) -> Floats:
+def _to_vectors(basis: Floats, dimension: Ints, start: Ints, components: Floats) -> Floats:
     out = np.zeros((len(dimension), 3))
     for v in range(len(dimension)):
         for c in range(dimension[v]):

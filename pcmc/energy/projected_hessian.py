@@ -20,7 +20,7 @@ from scipy.sparse import csr_array
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled
 from ..surface import Surface
-from .motion_space import MotionSpace, Structure
+from .motion_space import MotionSpace, VertexClasses
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +48,9 @@ class Pattern:
         return csr_array((data, self.indices, self.indptr), shape=(self.size, self.size))
 
 
-def pattern(frame: Structure, space: MotionSpace) -> Pattern:
+def hessian_pattern(classes: VertexClasses, space: MotionSpace) -> Pattern:
     """Sparsity of Bᵀ (∂²E) B: it depends on the faces and on the dimensions of the motion space."""
-    low, high = frame.topology.edges.T.astype(np.int64)
+    low, high = classes.topology.edges.T.astype(np.int64)
     dimension, start = space.dimension, space.start
     first = np.searchsorted(low, np.arange(len(dimension) + 1))
     width = dimension[high]
@@ -59,24 +59,24 @@ def pattern(frame: Structure, space: MotionSpace) -> Pattern:
     beyond = before[first[1:]] - before[first[:-1]]
     indptr, indices = _fill_pattern(dimension, start, first, high, beyond)
     # edge (i,j) opposite corner k: pairs (0,1), (1,2), (2,0) are opposite corners 2, 0, 1
-    offset = edge_offset[frame.topology.edge_of_face[:, [2, 0, 1]]]
+    offset = edge_offset[classes.topology.edge_of_face[:, [2, 0, 1]]]
     return Pattern(indptr, indices, np.ascontiguousarray(offset.astype(np.int32)))
 
 
 def assemble(
     surface: Surface,
-    frame: Structure,
+    classes: VertexClasses,
     space: MotionSpace,
-    kept: Pattern,
+    pattern: Pattern,
     X: Floats,
     hessian: float = 1.0,
     stiffness: float = 0.0,
 ) -> Floats:
     """Values of hessian · Bᵀ(∂²E)B + stiffness · Bᵀ(L_α⊗I)B in the kept pattern."""
-    data = np.zeros(len(kept.indices))
+    data = np.zeros(len(pattern.indices))
     _assemble(
-        X, frame.faces, frame.patch_of_face, surface.origin, surface.tensions,
-        surface.pressures, space.basis, space.dimension, space.start, kept.indptr, kept.offset,
+        X, classes.faces, classes.patch_of_face, surface.origin, surface.tensions,
+        surface.pressures, space.basis, space.dimension, space.start, pattern.indptr, pattern.offset,
         hessian, stiffness, data,
     )  # fmt: skip
     return data

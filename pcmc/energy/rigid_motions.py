@@ -48,7 +48,7 @@ def rigid_modes(space: MotionSpace, motions: Floats, X: Floats) -> Floats:
         return np.zeros((space.size, 0))
     arm = X - X.mean(axis=0)
     fields = [translation + np.cross(rotation, arm) for translation, rotation in motions]
-    parts = np.stack([space.pull(f) / np.linalg.norm(f) for f in fields], axis=1)
+    parts = np.stack([space.to_coordinates(f) / np.linalg.norm(f) for f in fields], axis=1)
     u, s, _ = np.linalg.svd(parts, full_matrices=False)
     return u[:, s > SEEN]
 

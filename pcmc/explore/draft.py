@@ -17,7 +17,7 @@ from ..certificate.certificate import Certificate, Verdict, certify
 from ..solvers import solve
 from ..solvers.result import Progress, Result
 from ..surface import Patch, Surface
-from ..surface.wall_pressures import pressed
+from ..surface.wall_pressures import with_pressures
 
 AT_REST = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.SADDLE)
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
@@ -192,7 +192,7 @@ class Draft:
     def _wanted(self, values: Values) -> Surface:
         """The surface shown, with the values asked for."""
         given = {key: dict(values.get(key) or {}) for key in ("tensions", "pressures")}
-        wanted = pressed(self.surface, given["tensions"], given["pressures"])
+        wanted = with_pressures(self.surface, given["tensions"], given["pressures"])
         self._asked = wanted.patches
         return wanted
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknown
-from ..base.files import whole
+from ..base.files import atomic_write
 from ..contact.pinching import standing
 from ..surface import Plane, Surface
 from .contents import Contents, merged, to_surface, without_unused
@@ -169,7 +169,7 @@ def write(
             lost.append(f"{surface.m - shown.m} triangles of walls without height")
         surface = shown
     try:
-        with whole(path) as temporary:
+        with atomic_write(path) as temporary:
             moved = module.write(
                 temporary, surface, scalars=scalars, certificate=_values(certificate), walls=told
             )

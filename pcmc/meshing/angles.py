@@ -25,7 +25,7 @@ def angles(X: Floats, F: Ints) -> Floats:
     return np.degrees(np.arctan2(np.sqrt(np.maximum(both - cosine**2, 0.0)), cosine))
 
 
-def polished(X: Floats, F: Ints, movable: Bools, goal: float) -> Floats:
+def improve_angles(X: Floats, F: Ints, movable: Bools, goal: float) -> Floats:
     """Vertices (n,3) with fewer angles below ``goal`` degrees.
 
     Each movable vertex of a triangle below the goal tries places around it in the plane of its star
@@ -35,7 +35,7 @@ def polished(X: Floats, F: Ints, movable: Bools, goal: float) -> Floats:
     >>> square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.9, 0.5, 0]])
     >>> fan = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
     >>> free = np.array([False, False, False, False, True])
-    >>> moved = polished(square, fan, free, goal=40.0)
+    >>> moved = improve_angles(square, fan, free, goal=40.0)
     >>> bool(angles(moved, fan).min() > 38.0 > angles(square, fan).min())
     True
     """

@@ -89,7 +89,7 @@ def edge_lengths(surface: Surface) -> Floats:
     return np.linalg.norm(surface.vertices[end] - surface.vertices[start], axis=1)
 
 
-def redistribution(
+def towards_star_centres(
     surface: Surface, X: Floats, kind: Ints, curve: Ints, beside: Ints, step: float = 0.5
 ) -> Floats:
     """Move (n,3) of each vertex towards a better-shaped star, before any projection.

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from ..base.arrays import Floats
-from ..contact.pinching import Standing, hung
+from ..contact.pinching import Standing, place_wall_rows
 from ..energy.motion_space import motion_space
-from .quality import redistribution, worst_quality
+from .quality import towards_star_centres, worst_quality
 
 SWEEPS = 20  # at most
 
 
-def spread(found: Standing, X: Floats, aim: float, *, slide: bool) -> tuple[Floats, float]:
+def redistribute(found: Standing, X: Floats, aim: float, *, slide: bool) -> tuple[Floats, float]:
     """The best of a few sweeps of redistribution, (n,3), and the quality of its worst triangle.
 
     Sweeps end where that is at least ``aim``. Each vertex moves towards the middle of its star, without
@@ -22,14 +22,14 @@ def spread(found: Standing, X: Floats, aim: float, *, slide: bool) -> tuple[Floa
     X : (n,3) where its vertices are.
     slide : whether junction vertices at rest on Π may slide along their junction.
     """
-    surface, frame, judged = found.surface, found.frame, found.judged
+    surface, classes, judged = found.surface, found.classes, found.judged
     best, worst = X, worst_quality(X, judged)
     for _ in range(SWEEPS):
-        move = redistribution(surface, X, frame.kind, frame.curve, frame.beside)
+        move = towards_star_centres(surface, X, classes.kind, classes.curve, classes.beside)
         if not slide:
             move[found.rests] = 0.0
-        space = motion_space(surface, frame, X)
-        X = hung(surface, found.walls, X + move - space.project(move), space)
+        space = motion_space(surface, classes, X)
+        X = place_wall_rows(surface, found.walls, X + move - space.project(move), space)
         quality = worst_quality(X, judged)
         if quality > worst:
             best, worst = X, quality

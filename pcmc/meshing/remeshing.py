@@ -12,9 +12,9 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import MissingExtra, OptionError, SurfaceError
-from ..contact.pinching import lifted, resting, walls
+from ..contact.pinching import find_walls, lifted, resting
 from ..surface import Surface
-from .angles import angles, polished
+from .angles import angles, improve_angles
 from .quality import edge_lengths
 from .refinement import held_midpoints, refine
 
@@ -80,7 +80,7 @@ def remesh(
     for _ in range(PASSES):
         size = _sizes(mesh, edge_length, growth)
         mesh = _by_mmg(mesh, size, growth, CHORD * edge_length if chord is None else chord)
-        mesh = replace(mesh, X=polished(mesh.X, mesh.F, mesh.source < 0, GOOD_ANGLE))
+        mesh = replace(mesh, X=improve_angles(mesh.X, mesh.F, mesh.source < 0, GOOD_ANGLE))
         candidates.append(mesh)
         if angles(mesh.X, mesh.F).min() >= GOOD_ANGLE:
             break
@@ -89,7 +89,7 @@ def remesh(
 
 def _raised(surface: Surface) -> Surface:
     """The surface with the walls standing again that had vanished below a junction at rest."""
-    below = walls(surface)
+    below = find_walls(surface)
     return lifted(surface, below, resting(surface, below), RAISED)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, PlanWarning, SurfaceError
-from ..meshing.angles import polished
+from ..meshing.angles import improve_angles
 from ..surface import Patch, Surface
 from .arrangement import Arrangement, arrange, hole_points
 from .curves import Curve, to_local, to_space
@@ -49,7 +49,7 @@ def surface(plan: Plan) -> Surface:
     patches, patch_of_face = _patches(plan, mesh)
     raised = np.column_stack([mesh.points, height])
     inner = np.arange(len(raised)) >= len(drawn.points)
-    X = to_space(polished(raised, mesh.triangles, inner, GOOD_ANGLE), plan.plane)
+    X = to_space(improve_angles(raised, mesh.triangles, inner, GOOD_ANGLE), plan.plane)
     pressure = np.array([p.pressure for p in patches])[patch_of_face]
     walls, wall_patches = _walls(plan, drawn, lines, mesh.triangles, pressure, X, base, fixed)
     return Surface(

@@ -12,7 +12,7 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..meshing.angles import angles, polished
+from ..meshing.angles import angles, improve_angles
 
 CLEARANCE = 0.62  # of the edge length: nearer to a segment, a free point would crowd it
 GOOD_ANGLE = 30.0  # degrees; where it is not reached, points are added and moved
@@ -93,7 +93,7 @@ def triangulate(
         mesh = _inside(X, segments, holes, len(fixed))
     movable = np.arange(len(mesh.points)) >= len(fixed)
     flat = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
-    return replace(mesh, points=polished(flat, mesh.triangles, movable, GOOD_ANGLE)[:, :2])
+    return replace(mesh, points=improve_angles(flat, mesh.triangles, movable, GOOD_ANGLE)[:, :2])
 
 
 def signed_areas(points: Floats, triangles: Ints) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.errors import FileError, MissingExtra
-from ..base.files import whole
+from ..base.files import atomic_write
 
 DPI = 200.0
 TEXT, SMALL = 7.0, 6.0  # points
@@ -81,7 +81,7 @@ def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
         small = picture.quantize(256, method=Pillow.Quantize.MAXCOVERAGE, kmeans=1)
         small.save(stream, format="PNG", optimize=True)
     try:
-        with whole(path) as temporary:
+        with atomic_write(path) as temporary:
             temporary.write_bytes(stream.getvalue())
     except OSError as error:
         text = f"{os.fspath(path)}: cannot be written ({error.strerror or error})"

@@ -15,8 +15,8 @@ import numpy as np
 from .. import io
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, OptionError, PcmcError, unknown
-from ..base.files import together
-from ..base.interrupts import held
+from ..base.files import atomic_writes
+from ..base.interrupts import defer_interrupts
 from ..certificate.certificate import Certificate
 from ..energy.curvature import curvature_error, mean_curvature
 from ..solvers.result import Result
@@ -74,11 +74,11 @@ def write_all(
     say, works = progress or silent, list(works)
     paths = [path for path, _ in works]
     check_outputs(paths)
-    with together(paths) as temporaries:
+    with atomic_writes(paths) as temporaries:
         for (path, write), temporary in zip(works, temporaries, strict=True):
             say(f"writing {path.name}")
             try:
-                with held(), _named(temporary, path):
+                with defer_interrupts(), _named(temporary, path):
                     write(temporary)
             except OSError as error:
                 raise FileError(f"{path}: cannot be written ({error.strerror or error})") from None

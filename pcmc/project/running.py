@@ -12,7 +12,7 @@ from ..base.errors import BalanceWarning, OptionError, PcmcError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
 from ..certificate.certificate import Certificate
-from ..contact.pinching import walls
+from ..contact.pinching import find_walls
 from ..meshing.remeshing import remesh
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
@@ -109,7 +109,7 @@ def carry_out(
 
 def _check_balance(surface: Surface) -> None:
     """Say before a long search what the tensions alone tell; it is made all the same."""
-    pinchable = walls(surface).pinchable
+    pinchable = find_walls(surface).pinchable
     found = unbalanced(surface, pinchable)
     if found:
         unless = ", unless the junction rests on the plane" if pinchable.any() else ""

@@ -12,7 +12,7 @@ from typing import Any
 from .. import io
 from ..base.errors import OptionError, PcmcError, unknown
 from ..surface import Surface
-from ..surface.wall_pressures import pressed
+from ..surface.wall_pressures import with_pressures
 from .file import PathLike, Project, project_of, read_data, surface_of
 
 WHAT = ("tension", "pressure")
@@ -138,6 +138,6 @@ def _retensioned(path: Path, surface: Surface, values: Mapping[str, float]) -> S
             raise OptionError(f"{path}: {unknown('number', name, keys)}")
         given[what][patch] = values[name]
     try:
-        return pressed(surface, given["tension"], given["pressure"])
+        return with_pressures(surface, given["tension"], given["pressure"])
     except PcmcError as error:
         raise OptionError(f"{path}: {error}") from None

@@ -48,7 +48,7 @@ class NewtonOptions:
     iterations : the most steps of any kind, on each level and in each attempt.
     target : ``"minimum"`` leaves saddles; ``"stationary"`` converges to them.
     levels : solve here, refine 1→4 this many times, and finish on each.
-    care : triangles are spread while the worst has less than this quality, or half the initial one.
+    min_quality : triangles are spread while the worst has less than this quality, or half the initial one.
     inflation : diverged when the bounding box is more than this many times its first diagonal.
     backend : factorisation, ``"pardiso"`` or ``"superlu"``; None for the fastest here.
     """
@@ -57,7 +57,7 @@ class NewtonOptions:
     iterations: int = 200
     target: str = "minimum"
     levels: int = 0
-    care: float = 0.45
+    min_quality: float = 0.45
     inflation: float = 10.0
     backend: str | None = None
 
@@ -66,7 +66,7 @@ class NewtonOptions:
         validate.integer("iterations", self.iterations)
         validate.choice("target", self.target, TARGETS)
         validate.integer("levels", self.levels)
-        validate.number("care", self.care, least=0.0, below=1.0)
+        validate.number("min_quality", self.min_quality, least=0.0, below=1.0)
         validate.number("inflation", self.inflation, above=1.0)
 
 
@@ -148,7 +148,7 @@ def _finish(
 def _attempt(
     surface: Surface, options: NewtonOptions, log: _Log, level: int, smooth: int = 0
 ) -> tuple[State, Status]:
-    state = State(surface, options.care)
+    state = State(surface, options.min_quality)
     stepper = Stepper(state, options.target == "minimum", options.backend)
     status = _run(state, stepper, options, log, level, smooth)
     log.evaluations += state.evaluations
@@ -177,7 +177,7 @@ def _run(
             elif step == options.iterations:
                 return _lost(state, start, Status.ITERATION_LIMIT)
             else:
-                if state.care():
+                if state.maintain_mesh():
                     stepper.drop_factor()
                 wait = _step(state, stepper, wait)
                 since += 1

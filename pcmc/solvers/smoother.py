@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import Bools, Floats
-from ..energy.motion_space import MotionSpace, Structure, perpendicular
-from ..energy.projected_hessian import Pattern, assemble, pattern
+from ..energy.motion_space import MotionSpace, VertexClasses, perpendicular
+from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
 from ..stability.factorisation import Factor, Factoriser, factoriser
 from ..surface import Surface
 from ..surface.topology import SHEET
@@ -32,12 +32,14 @@ class Smoother:
     slide; each of the two sets has a factorisation of its own.
     """
 
-    def __init__(self, surface: Surface, frame: Structure, backend: str | None = None) -> None:
+    def __init__(
+        self, surface: Surface, classes: VertexClasses, backend: str | None = None
+    ) -> None:
         floor = FLOOR * float(surface.tensions.max())
         tensions = {p.name: max(p.tension, floor) for p in surface.patches}
         self._surface = surface.retensioned(tensions, dict.fromkeys(tensions, 0.0))
         self._frame = replace(
-            frame, active=np.ones(surface.m, dtype=bool), faces=surface.faces,
+            classes, active=np.ones(surface.m, dtype=bool), faces=surface.faces,
             patch_of_face=surface.patch_of_face, topology=surface.topology,
         )  # fmt: skip
         used = np.bincount(surface.faces.ravel(), minlength=surface.n) > 0
@@ -76,13 +78,13 @@ class _Coordinate:
     """L_α over the vertices whose coordinate is free."""
 
     def __init__(
-        self, surface: Surface, frame: Structure, free: Bools, backend: str | None
+        self, surface: Surface, classes: VertexClasses, free: Bools, backend: str | None
     ) -> None:
         basis = np.zeros((surface.n, 3, 3))
         basis[:, 0, 0] = 1.0
         self._space = MotionSpace(basis, free.astype(np.int64))
-        self._surface, self._frame, self._free = surface, frame, free
-        self._pattern: Pattern = pattern(frame, self._space)
+        self._surface, self._frame, self._free = surface, classes, free
+        self._pattern: Pattern = hessian_pattern(classes, self._space)
         self._factoriser: Factoriser = factoriser(self._pattern, backend)
         self._factor: Factor | None = None
 
@@ -100,7 +102,7 @@ class _Coordinate:
         return out
 
 
-class Carrier:
+class HarmonicExtension:
     """Carries the inside of the sheets along with their curves.
 
     The motion of curves and points is extended harmonically into the sheets (L_α w = 0 there, w given on
@@ -108,27 +110,27 @@ class Carrier:
     """
 
     def __init__(
-        self, surface: Surface, frame: Structure, X: Floats, backend: str | None = None
+        self, surface: Surface, classes: VertexClasses, X: Floats, backend: str | None = None
     ) -> None:
-        used = ~frame.idle
+        used = ~classes.idle
         basis = np.zeros((surface.n, 3, 3))
         basis[:, 0, 0] = 1.0
         space = MotionSpace(basis, used.astype(np.int64))
         equal = surface.retensioned({p.name: 1.0 for p in surface.patches})
-        kept = pattern(frame, space)
-        data = assemble(equal, frame, space, kept, X, hessian=0.0, stiffness=1.0)
-        diagonal = kept.indptr[:-1]
+        pattern = hessian_pattern(classes, space)
+        data = assemble(equal, classes, space, pattern, X, hessian=0.0, stiffness=1.0)
+        diagonal = pattern.indptr[:-1]
         data[diagonal] *= 1.0 + SHIFT
         self._used = used
-        self._led = (frame.kind != SHEET) | surface.fixed
+        self._led = (classes.kind != SHEET) | surface.fixed
         self._weight = np.where(self._led[used], PIN * data[diagonal], 0.0)
         data[diagonal] += self._weight
         # to a diagonal of ones: beside held vertices of thin triangles no pivot then looks like zero
         self._scale = 1.0 / np.sqrt(data[diagonal])
-        data *= np.repeat(self._scale, np.diff(kept.indptr)) * self._scale[kept.indices]
-        self._factor = factoriser(kept, backend).factor(data)
+        data *= np.repeat(self._scale, np.diff(pattern.indptr)) * self._scale[pattern.indices]
+        self._factor = factoriser(pattern, backend).factor(data)
 
-    def carry(self, space: MotionSpace, motion: Floats) -> Floats:
+    def extend(self, space: MotionSpace, motion: Floats) -> Floats:
         """The motion (n,3) with the sheets' vertices carried along."""
         lead = np.where(self._led[:, None], motion, 0.0)[self._used]
         follow = np.zeros_like(motion)

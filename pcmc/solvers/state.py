@@ -11,17 +11,17 @@ from ..contact.pinching import (
     Walls,
     crest_spacing,
     excess,
-    hung,
+    find_walls,
     lifted,
+    place_wall_rows,
     resting,
     settled,
     standing,
-    walls,
 )
 from ..energy.functional import energy_and_gradient, energy_at
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..meshing.quality import compare, worst_quality
-from ..meshing.redistribution import spread
+from ..meshing.redistribution import redistribute
 from ..surface import Surface
 
 LOW = 5e-3  # height, in spacings along the crest, at which a sinking junction is set to rest
@@ -42,31 +42,34 @@ class State:
     size : of the mesh at the start.
     X : (n,3) where the standing surface is now.
     rests : (n,) junction vertices at rest on Π.
-    frame, space : what each vertex lies on, and the basis of its motion there.
+    classes, space : what each vertex lies on, and the basis of its motion there.
     energy, gradient, residual, norm, scale : E, ∇E, Bᵀ∇E, its norm and the forces it compares with.
     version : changes whenever the faces or the number of unknowns do.
     evaluations : passes over the triangles so far: E, ∇E or its derivative along a motion.
     """
 
-    def __init__(self, surface: Surface, care: float) -> None:
+    def __init__(self, surface: Surface, min_quality: float) -> None:
         self.full = surface
-        self.care_bound, self.size = care, surface.size
-        self.walls: Walls = walls(surface)
+        self.min_quality, self.size = min_quality, surface.size
+        self.walls: Walls = find_walls(surface)
         self.spacing = crest_spacing(surface, self.walls)
         self.evaluations = 0
         self.version = 0
         self.cares, self.releases = CARES, RELEASES
         self.caution: Floats = np.ones(surface.n)  # less where a vertex has been lifted in vain
-        self._care_from, self._care_below = care, np.inf  # quality and residual that ask for it
+        self._care_from, self._care_below = (
+            min_quality,
+            np.inf,
+        )  # quality and residual that ask for it
         self._pinch(resting(surface, self.walls))
 
     def _pinch(self, rests: Bools) -> None:
         self.standing = found = standing(self.full, self.walls, rests)
-        self.rests, self.surface, self.frame = rests, found.surface, found.frame
+        self.rests, self.surface, self.classes = rests, found.surface, found.classes
         self.judged: Ints = found.judged
         self.X: Floats = self.surface.vertices.copy()
         self.version += 1
-        self.space: MotionSpace = motion_space(self.surface, self.frame, self.X)
+        self.space: MotionSpace = motion_space(self.surface, self.classes, self.X)
         self.measure()
 
     def measure(self) -> None:
@@ -74,11 +77,11 @@ class State:
         self.energy, self.gradient = energy_and_gradient(self.surface, self.X)
         self.evaluations += 1
         before = self.space.dimension
-        self.space = motion_space(self.surface, self.frame, self.X)
+        self.space = motion_space(self.surface, self.classes, self.X)
         if not np.array_equal(before, self.space.dimension):
             self.version += 1
-        self.scale = force_scale(self.surface, self.frame, self.X)
-        self.residual = self.space.pull(self.gradient)
+        self.scale = force_scale(self.surface, self.classes, self.X)
+        self.residual = self.space.to_coordinates(self.gradient)
         self.norm = float(np.linalg.norm(self.residual))
 
     def energy_at(self, X: Floats) -> float:
@@ -132,7 +135,7 @@ class State:
         low = LOW * self.caution * self.spacing
         down = standing & ((above <= 0.0) | (sinks & (above <= low)))
         X[down] -= height[down, None] * np.array(self.surface.plane.normal)
-        X = hung(self.surface, self.walls, X, self.space)
+        X = place_wall_rows(self.surface, self.walls, X, self.space)
         return X, down
 
     def spoils(self, X: Floats) -> bool:
@@ -141,9 +144,9 @@ class State:
         The triangles of walls that may pinch are not judged: there a vanishing height is the answer.
         """
         turned, before, after = compare(self.X, X, self.judged)
-        return turned or after < 0.7 * min(before, self.care_bound)
+        return turned or after < 0.7 * min(before, self.min_quality)
 
-    def care(self) -> bool:
+    def maintain_mesh(self) -> bool:
         """Spread the vertices along the shape while triangles are poor; True if they moved."""
         start = self.worst
         if self.cares <= 0 or start >= self._care_from:
@@ -151,9 +154,9 @@ class State:
         if not 1e-7 <= self.relative < self._care_below:
             return False
         self.cares -= 1
-        best, worst = spread(self.standing, self.X, self.care_bound, slide=True)
+        best, worst = redistribute(self.standing, self.X, self.min_quality, slide=True)
         if worst <= 1.02 * start:
-            self._care_from = POOR * self.care_bound
+            self._care_from = POOR * self.min_quality
             self._care_below = 0.1 * self.relative
             return False
         self.X = best
@@ -170,7 +173,7 @@ class State:
         A foot that has come below its crest is one with it from then on.
         """
         full = self.result_surface()
-        anew = replace(walls(full), side=self.walls.side)
+        anew = replace(find_walls(full), side=self.walls.side)
         same = np.array_equal(standing(full, anew, self.rests).surface.faces, self.surface.faces)
         if same or self.releases <= 0:
             return False

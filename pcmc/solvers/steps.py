@@ -11,13 +11,13 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from ..base.arrays import Floats
 from ..energy.jacobian import linearise
 from ..energy.motion_space import MotionSpace
-from ..energy.projected_hessian import Pattern, assemble, pattern
+from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import edge_lengths
 from ..stability.factorisation import Factor, Factoriser, SingularMatrix, factoriser
 from ..stability.modes import SOFT, full_matrix, lowest, negatives_without, stiffness
 from ..surface.geometry import area_vectors
-from .smoother import Carrier, Smoother
+from .smoother import HarmonicExtension, Smoother
 from .state import State
 
 SHIFTS = (0.0, 0.25, 1.0, 4.0)  # of the stiffness, tried in turn until the matrix is positive
@@ -56,7 +56,7 @@ class Stepper:
         self._factor: Factor | None = None
         self._soft: csr_array | None = None
         self._smoother: Smoother | None = None
-        self._carrier: Carrier | None = None
+        self._extension: HarmonicExtension | None = None
         self._motions = rigid_motions(self.state.surface)
         self._age = REFRESH
 
@@ -100,7 +100,7 @@ class Stepper:
         self._forget()
         state = self.state
         if self._smoother is None:
-            self._smoother = Smoother(state.surface, state.frame, self.backend)
+            self._smoother = Smoother(state.surface, state.classes, self.backend)
         if self._age >= REFRESH:
             try:
                 self._smoother.refresh(state.X)
@@ -109,7 +109,7 @@ class Stepper:
             self.factorisations += self._smoother.factorisations
             self._age = 0
         self._age += 1
-        forces = state.space.push(state.residual)
+        forces = state.space.to_vectors(state.residual)
         d = -self._smoother.solve(forces)
         slope = float((forces * d).sum())
         for t in 0.5 ** np.arange(12):
@@ -134,7 +134,7 @@ class Stepper:
         rigid = rigid_modes(state.space, self._motions, state.X)
         try:
             system = stiffness(
-                state.surface.moved(state.X), state.frame, state.space, rigid, self.backend
+                state.surface.moved(state.X), state.classes, state.space, rigid, self.backend
             )
         except SingularMatrix:
             return False
@@ -144,7 +144,7 @@ class Stepper:
         modes = lowest(system, 1)[1]
         if not len(modes):
             return False
-        normals, area = area_vectors(state.X, state.frame.faces)
+        normals, area = area_vectors(state.X, state.classes.faces)
         unit = modes[0] * (np.sqrt(area.sum() / 3.0) / np.linalg.norm(modes[0], axis=1).max())
         if (unit * normals).sum() < 0.0:
             unit = -unit  # first where it swells: no matter how the surface is turned
@@ -187,12 +187,12 @@ class Stepper:
             return True
         state = self.state
         if self._pattern is None or self._factoriser is None:
-            self._pattern = pattern(state.frame, state.space)
+            self._pattern = hessian_pattern(state.classes, state.space)
             self._factoriser = factoriser(self._pattern, self.backend)
         rigid = rigid_modes(state.space, self._motions, state.X)
         for weight in (shift, shift + SOFT):
             data = assemble(
-                state.surface, state.frame, state.space, self._pattern, state.X, 1.0, weight
+                state.surface, state.classes, state.space, self._pattern, state.X, 1.0, weight
             )
             try:
                 factor = self._factoriser.factor(data)
@@ -209,7 +209,9 @@ class Stepper:
         """The little stiffness that a singular matrix was given."""
         state = self.state
         assert self._pattern is not None
-        data = assemble(state.surface, state.frame, state.space, self._pattern, state.X, 0.0, SOFT)
+        data = assemble(
+            state.surface, state.classes, state.space, self._pattern, state.X, 0.0, SOFT
+        )
         return full_matrix(self._pattern, data)
 
     def _as_kept(self, action: Callable[[Floats], Floats], s: Floats) -> Floats:
@@ -217,7 +219,7 @@ class Stepper:
         now, then = self.state.space, self._space
         if now is then:
             return action(s)
-        return now.pull(then.push(action(then.pull(now.push(s)))))
+        return now.to_coordinates(then.to_vectors(action(then.to_coordinates(now.to_vectors(s)))))
 
     def _direction(self) -> Floats:
         """-B J⁻¹ r with J the derivative of r itself, by GMRES on the kept factor.
@@ -229,10 +231,10 @@ class Stepper:
         assert factor is not None
         residual = state.residual
         size = (len(residual), len(residual))
-        here = linearise(state.surface, state.frame, state.space, state.X, state.gradient)
+        here = linearise(state.surface, state.classes, state.space, state.X, state.gradient)
 
         def times(s: Floats) -> Floats:
-            change = here.times(state.space.push(s))
+            change = here.times(state.space.to_vectors(s))
             return change if soft is None else change + self._as_kept(soft.__matmul__, s)
 
         norms: list[float] = []
@@ -243,7 +245,7 @@ class Stepper:
         )  # fmt: skip
         self._inner = len(norms)
         state.evaluations += len(norms)
-        return state.space.push(self._held_back(s) if len(self._motions) else s)
+        return state.space.to_vectors(self._held_back(s) if len(self._motions) else s)
 
     def _held_back(self, s: Floats) -> Floats:
         """s with its rigid part short: all it does is slide the mesh along the surface.
@@ -253,7 +255,7 @@ class Stepper:
         state = self.state
         rigid = rigid_modes(state.space, self._motions, state.X)
         drift = rigid @ (rigid.T @ s)
-        far = float(np.abs(state.space.push(drift)).max())
+        far = float(np.abs(state.space.to_vectors(drift)).max())
         room = DRIFT * float(np.median(edge_lengths(state.surface.moved(state.X))))
         if far <= room:
             return s
@@ -263,18 +265,20 @@ class Stepper:
     def _shifted_direction(self) -> Floats:
         self._inner = 0
         assert self._factor is not None
-        return -self.state.space.push(self._as_kept(self._factor.solve, self.state.residual))
+        return -self.state.space.to_vectors(self._as_kept(self._factor.solve, self.state.residual))
 
     def _carried(self, d: Floats) -> Floats:
         """The motion d with the insides of the sheets carried along."""
-        if self._carrier is None:
+        if self._extension is None:
             state = self.state
             try:
-                self._carrier = Carrier(state.surface, state.frame, state.X, self.backend)
+                self._extension = HarmonicExtension(
+                    state.surface, state.classes, state.X, self.backend
+                )
             except SingularMatrix:
                 return d
             self.factorisations += 1
-        return self._carrier.carry(self.state.space, d)
+        return self._extension.extend(self.state.space, d)
 
     def _helps(self, t: float, slope: float, energy: float, norm: float) -> bool:
         """Whether the step just taken lowers the residual enough or, towards a minimum, E.

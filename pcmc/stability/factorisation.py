@@ -65,13 +65,13 @@ def available() -> tuple[str, ...]:
     return BACKENDS if found else ("superlu",)
 
 
-def factoriser(kept: Pattern, backend: str | None = None) -> Factoriser:
+def factoriser(pattern: Pattern, backend: str | None = None) -> Factoriser:
     """A factoriser for the pattern: the fastest backend available, or the one named.
 
     >>> import numpy as np
     >>> from scipy.sparse import csr_array
-    >>> kept = Pattern(np.array([0, 2, 3]), np.array([0, 1, 1]), np.empty((0, 3)))
-    >>> factor = factoriser(kept, "superlu").factor(np.array([1.0, 2.0, 1.0]))
+    >>> pattern = Pattern(np.array([0, 2, 3]), np.array([0, 1, 1]), np.empty((0, 3)))
+    >>> factor = factoriser(pattern, "superlu").factor(np.array([1.0, 2.0, 1.0]))
     >>> factor.negative, factor.solve(np.array([3.0, 3.0])).round(12).tolist()
     (1, [1.0, 1.0])
     """
@@ -81,7 +81,7 @@ def factoriser(kept: Pattern, backend: str | None = None) -> Factoriser:
     if chosen not in available():
         raise MissingExtra("pypardiso", "fast")
     # MKL refuses a matrix without rows
-    return _Pardiso(kept) if chosen == "pardiso" and kept.size else _SuperLU(kept)
+    return _Pardiso(pattern) if chosen == "pardiso" and pattern.size else _SuperLU(pattern)
 
 
 def _finite(data: Floats) -> None:
@@ -97,17 +97,19 @@ class _SuperLU:
     asked once; later matrices come in the order it found.
     """
 
-    def __init__(self, kept: Pattern) -> None:
-        entry = np.arange(1, len(kept.indices) + 1)
-        upper = csr_array((entry, kept.indices, kept.indptr), shape=(kept.size, kept.size))
-        rows = np.repeat(np.arange(kept.size), np.diff(kept.indptr))
-        off = rows != kept.indices
-        lower = csr_array((entry[off], (kept.indices[off], rows[off])), shape=upper.shape)
+    def __init__(self, pattern: Pattern) -> None:
+        entry = np.arange(1, len(pattern.indices) + 1)
+        upper = csr_array(
+            (entry, pattern.indices, pattern.indptr), shape=(pattern.size, pattern.size)
+        )
+        rows = np.repeat(np.arange(pattern.size), np.diff(pattern.indptr))
+        off = rows != pattern.indices
+        lower = csr_array((entry[off], (pattern.indices[off], rows[off])), shape=upper.shape)
         self._full = csr_array(upper + lower)
         self._ordering: Literal["MMD_AT_PLUS_A", "NATURAL"] = "MMD_AT_PLUS_A"
         empty = np.empty(0, dtype=np.int32)
         self._arrange(
-            reverse_cuthill_mckee(self._full, symmetric_mode=True) if kept.size else empty
+            reverse_cuthill_mckee(self._full, symmetric_mode=True) if pattern.size else empty
         )
 
     def _arrange(self, order: Ints) -> None:
@@ -164,13 +166,13 @@ class _SuperLUFactor:
 class _Pardiso:
     """MKL PARDISO on the upper triangle: mtype -2, real symmetric indefinite."""
 
-    def __init__(self, kept: Pattern) -> None:
+    def __init__(self, pattern: Pattern) -> None:
         # pypardiso looks for MKL in the whole prefix, 0.2 s each time, unless it is told where
         if known := _mkl():
             os.environ.setdefault("PYPARDISO_MKL_RT", known)
         import pypardiso
 
-        self._kept = kept
+        self._pattern = pattern
         self._solver = pypardiso.PyPardisoSolver(mtype=-2)
         os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
         self._error = pypardiso.pardiso_wrapper.PyPardisoError
@@ -192,14 +194,14 @@ class _Pardiso:
         _finite(data)
         # what MKL holds a pivot against does not depend on the units of the matrix
         unit = 0.5 ** math.frexp(np.abs(data).max(initial=TINY))[1]
-        matrix = self._kept.matrix(unit * data)
-        nothing = np.zeros((self._kept.size, 1), order="F")
+        matrix = self._pattern.matrix(unit * data)
+        nothing = np.zeros((self._pattern.size, 1), order="F")
         try:
             if not self._analysed:
                 self.run(11, matrix, nothing)
                 self._analysed = True
                 # MKL keeps the factor outside Python: free it with this object, not at exit.
-                weakref.finalize(self, _release, self._solver, self._kept).atexit = False
+                weakref.finalize(self, _release, self._solver, self._pattern).atexit = False
             self.run(22, matrix, nothing)
         except self._error as error:
             raise SingularMatrix(str(error)) from None
@@ -216,7 +218,7 @@ class _Pardiso:
     @contextmanager
     def _threads(self) -> Iterator[None]:
         """A single one within the block where the matrix is small."""
-        if self._kept.size > ALONE:
+        if self._pattern.size > ALONE:
             yield
             return
         choose = self._solver.libmkl.MKL_Set_Num_Threads_Local
@@ -238,9 +240,11 @@ def _mkl() -> str:
     return ""
 
 
-def _release(solver: Any, kept: Pattern) -> None:
+def _release(solver: Any, pattern: Pattern) -> None:
     solver.set_phase(-1)
-    solver._call_pardiso(kept.matrix(np.zeros(len(kept.indices))), np.zeros((kept.size, 1)))
+    solver._call_pardiso(
+        pattern.matrix(np.zeros(len(pattern.indices))), np.zeros((pattern.size, 1))
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,8 @@ from scipy.sparse import csr_array, diags_array, triu
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from ..base.arrays import Floats
-from ..energy.motion_space import MotionSpace, Structure
-from ..energy.projected_hessian import Pattern, assemble, pattern
+from ..energy.motion_space import MotionSpace, VertexClasses
+from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
 from ..surface import Surface
 from ..surface.geometry import area_vectors
 from .factorisation import Factor, SingularMatrix, factoriser
@@ -42,15 +42,15 @@ class Stiffness:
     negative: int
 
 
-def full_matrix(kept: Pattern, data: Floats) -> csr_array:
+def full_matrix(pattern: Pattern, data: Floats) -> csr_array:
     """The symmetric matrix (N,N) of which the pattern holds the upper triangle."""
-    upper = kept.matrix(data)
+    upper = pattern.matrix(data)
     return csr_array(upper + triu(upper, k=1).T)
 
 
-def lumped_mass(space: MotionSpace, frame: Structure, X: Floats) -> Floats:
+def lumped_mass(space: MotionSpace, classes: VertexClasses, X: Floats) -> Floats:
     """(N,) a third of the area of the active triangles around each unknown's vertex, length²."""
-    return np.repeat(area_vectors(X, frame.faces)[1] / 3.0, space.dimension)
+    return np.repeat(area_vectors(X, classes.faces)[1] / 3.0, space.dimension)
 
 
 def negatives_without(factor: Factor, rigid: Floats) -> int:
@@ -69,7 +69,7 @@ def negatives_without(factor: Factor, rigid: Floats) -> int:
 
 def stiffness(
     surface: Surface,
-    frame: Structure,
+    classes: VertexClasses,
     space: MotionSpace,
     rigid: Floats,
     backend: str | None = None,
@@ -80,18 +80,18 @@ def stiffness(
     little of the stiffness BᵀLB: they are no way down.
     """
     X = surface.vertices
-    kept = pattern(frame, space)
-    solver = factoriser(kept, backend)
-    data = assemble(surface, frame, space, kept, X)
+    pattern = hessian_pattern(classes, space)
+    solver = factoriser(pattern, backend)
+    data = assemble(surface, classes, space, pattern, X)
     try:
         factor = solver.factor(data)
         negative = negatives_without(factor, rigid)
     except SingularMatrix:
-        data = assemble(surface, frame, space, kept, X, 1.0, SOFT)
+        data = assemble(surface, classes, space, pattern, X, 1.0, SOFT)
         factor = solver.factor(data)
         negative = negatives_without(factor, rigid)
-    mass = lumped_mass(space, frame, X)
-    return Stiffness(space, full_matrix(kept, data), mass, factor, rigid, negative)
+    mass = lumped_mass(space, classes, X)
+    return Stiffness(space, full_matrix(pattern, data), mass, factor, rigid, negative)
 
 
 def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
@@ -125,5 +125,5 @@ def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
             break
         k *= 2  # a strongly negative one is farther from zero than some positive ones
     order = np.argsort(values)[:count]
-    fields = [system.space.push(vectors[:, i] / root) for i in order]
+    fields = [system.space.to_vectors(vectors[:, i] / root) for i in order]
     return values[order], np.array(fields).reshape(len(order), len(system.space.dimension), 3)

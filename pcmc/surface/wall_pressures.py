@@ -12,7 +12,7 @@ from . import Surface
 ALIKE = 1e-12  # of the largest change: what rounding leaves
 
 
-def pressed(
+def with_pressures(
     surface: Surface,
     tensions: Mapping[str, float] | None = None,
     pressures: Mapping[str, float] | None = None,
@@ -25,12 +25,12 @@ def pressed(
     >>> from pcmc.plan import Divider, Plan
     >>> hall = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], [Divider([[4, 0], [4, 4]])], edge_length=1.0,
     ...             patches={"west": {"tension": 4.0}, "east": {"tension": 4.0}}).surface()
-    >>> pressed(hall, None, {"west": 1.25}).pressures.tolist()
+    >>> with_pressures(hall, None, {"west": 1.25}).pressures.tolist()
     [1.25, 1.0, 0.25]
     """
     changed = surface.retensioned(tensions, pressures)
     named = {surface.patch_index(name) for name in pressures or ()}
-    follow = following(surface, changed.pressures - surface.pressures, named)
+    follow = wall_pressure_changes(surface, changed.pressures - surface.pressures, named)
     walls = {
         surface.patches[k].name: float(surface.pressures[k] + follow[k])
         for k in np.flatnonzero(follow)
@@ -38,7 +38,7 @@ def pressed(
     return changed.retensioned(None, walls, walls) if walls else changed
 
 
-def following(surface: Surface, change: Floats, named: Collection[int] = ()) -> Floats:
+def wall_pressure_changes(surface: Surface, change: Floats, named: Collection[int] = ()) -> Floats:
     """(k,) by what the pressures of walls change where those of the patches change by ``change`` (k,).
 
     Such that along the edges where one wall meets two sheets the changes cancel. 0 for the walls in

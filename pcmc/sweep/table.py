@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import FileError, MissingExtra
-from ..base.files import whole
+from ..base.files import atomic_write
 from .store import Record
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def write_table(path: str | os.PathLike[str], frame: pd.DataFrame) -> None:
     if path.suffix not in (".csv", ".parquet"):
         raise FileError(f"{path}: a table is written as .csv or .parquet; name it so")
     try:
-        with whole(path) as temporary:
+        with atomic_write(path) as temporary:
             if path.suffix == ".csv":
                 frame.to_csv(temporary, lineterminator="\n")
             else:
