@@ -166,8 +166,8 @@ def conormals(surface: Surface, patch: str) -> Floats:
     """(n,3) area gradient of one patch at every vertex (17a): on its edge the outward co-normal."""
     tension = np.zeros(len(surface.patches))
     tension[surface.patch_index(patch)] = 1.0
-    mesh = surface.vertices, surface.faces, surface.patch_of_face
-    return kernels.measure(*mesh, np.zeros(3), tension, np.zeros_like(tension))[2]
+    mesh = kernels.energy_mesh(surface, tension, np.zeros_like(tension))
+    return kernels.measure(mesh, surface.vertices)[2]
 
 
 def turn(surface: Surface, vertex: int, patches: tuple[str, str]) -> float:

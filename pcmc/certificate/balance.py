@@ -171,7 +171,7 @@ def reactions(surface: Surface) -> Floats:
     """
     X, F = surface.vertices, surface.faces
     zero = np.zeros(len(surface.patches))
-    forces = kernels.measure(X, F, surface.patch_of_face, np.zeros(3), surface.tensions, zero)[2]
+    forces = kernels.measure(kernels.energy_mesh(surface, pressure=zero), X)[2]
     vector = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]) / 6.0
     vector *= surface.pressures[surface.patch_of_face, None]
     for axis in range(3):

@@ -17,7 +17,7 @@ from ..solvers.smoother import HarmonicExtension
 from ..stability.factorisation import Factor, Factoriser, factoriser
 from ..stability.modes import Stiffness, full_matrix, lumped_mass
 from ..surface import Surface
-from ..surface.geometry import area_vectors
+from ..surface.geometry import vertex_area_vectors
 from ..surface.topology import SHEET
 from .direction import Line, weighted_gradient
 
@@ -97,7 +97,7 @@ class Shape:
 
     def weights(self, X: Floats) -> Floats:
         """(n,) the area around each vertex over all area, over size²."""
-        area = area_vectors(X, self.classes.faces)[1]
+        area = vertex_area_vectors(X, self.classes.faces)[1]
         return area / (area.sum() * self.full.size**2)
 
     # -- contact of walls with Π ---------------------------------------------------------------

@@ -294,12 +294,10 @@ def _pushes(surface: Surface, pressure: Floats) -> Floats:
 def _force_slope(surface: Surface, v: int, pull: Floats) -> Floats:
     """(n,3) derivative of ⟨pull, f_v⟩, f_v = Σ α ∂A - ⅓ Σ p A_T ν_T at v."""
     around = np.flatnonzero((surface.faces == v).any(axis=1))
-    F = np.ascontiguousarray(surface.faces[around])
+    F, patch = surface.faces[around], surface.patch_of_face[around]
     blocks = np.empty((len(F), 3, 3, 3, 3))
-    kernels.hessian_blocks(
-        surface.vertices, F, np.ascontiguousarray(surface.patch_of_face[around]),
-        surface.origin, surface.tensions, 0.0 * surface.pressures, blocks,
-    )  # fmt: skip
+    mesh = kernels.energy_mesh(surface, pressure=0.0 * surface.pressures)
+    kernels.hessian_blocks(mesh._replace(faces=F, patch=patch), surface.vertices, blocks)
     slope = np.zeros_like(surface.vertices)
     row, corner = np.nonzero(np.equal(F, v))
     np.add.at(slope, F[row], np.einsum("fjab,a->fjb", blocks[row, corner], pull))
@@ -324,10 +322,7 @@ def _by_patch(surface: Surface, v: int) -> tuple[Floats, Floats]:
 
 def _measured(surface: Surface, tension: Floats, pressure: Floats) -> tuple[Floats, Floats, Floats]:
     """Areas, volumes (k,) and ∇(Σ αA - pV) (n,3) with these tensions and pressures."""
-    return kernels.measure(
-        surface.vertices, surface.faces, surface.patch_of_face, surface.origin,
-        tension, pressure,
-    )  # fmt: skip
+    return kernels.measure(kernels.energy_mesh(surface, tension, pressure), surface.vertices)
 
 
 def _indicator(surface: Surface, of: str | None) -> Floats:

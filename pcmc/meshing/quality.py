@@ -10,6 +10,7 @@ from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled
 from ..energy.functional import apply_supports
 from ..surface import Surface
+from ..surface.geometry import cross, dot, norm, point, sub
 from ..surface.topology import SHEET
 
 SQRT3 = sqrt(3.0)
@@ -40,19 +41,12 @@ def compare(X: Floats, Y: Floats, F: Ints) -> tuple[bool, float, float]:
 def _worst(X: Floats, F: Ints) -> float:
     worst = 1.0
     for f in range(len(F)):
-        i, j, k = F[f, 0], F[f, 1], F[f, 2]
-        ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
-        wx, wy, wz = X[k, 0] - X[i, 0], X[k, 1] - X[i, 1], X[k, 2] - X[i, 2]
-        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-        uu, ww, uw = (
-            ux * ux + uy * uy + uz * uz,
-            wx * wx + wy * wy + wz * wz,
-            ux * wx + uy * wy + uz * wz,
-        )
-        squares = 2.0 * (uu + ww - uw)
-        twice = sqrt(nx * nx + ny * ny + nz * nz)
-        if twice * 2.0 * SQRT3 < worst * squares or squares == 0.0:
-            worst = twice * 2.0 * SQRT3 / squares if squares > 0.0 else 0.0
+        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+        u, w = sub(b, a), sub(c, a)
+        twice_area = norm(cross(u, w))
+        squared_edges = 2.0 * (dot(u, u) + dot(w, w) - dot(u, w))
+        if twice_area * 2.0 * SQRT3 < worst * squared_edges or squared_edges == 0.0:
+            worst = twice_area * 2.0 * SQRT3 / squared_edges if squared_edges > 0.0 else 0.0
     return worst
 
 
@@ -60,16 +54,9 @@ def _worst(X: Floats, F: Ints) -> float:
 def _turns(X: Floats, Y: Floats, F: Ints) -> bool:
     for f in range(len(F)):
         i, j, k = F[f, 0], F[f, 1], F[f, 2]
-        ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
-        wx, wy, wz = X[k, 0] - X[i, 0], X[k, 1] - X[i, 1], X[k, 2] - X[i, 2]
-        px, py, pz = Y[j, 0] - Y[i, 0], Y[j, 1] - Y[i, 1], Y[j, 2] - Y[i, 2]
-        qx, qy, qz = Y[k, 0] - Y[i, 0], Y[k, 1] - Y[i, 1], Y[k, 2] - Y[i, 2]
-        dot = (
-            (uy * wz - uz * wy) * (py * qz - pz * qy)
-            + (uz * wx - ux * wz) * (pz * qx - px * qz)
-            + (ux * wy - uy * wx) * (px * qy - py * qx)
-        )
-        if dot <= 0.0:
+        before = cross(sub(point(X, j), point(X, i)), sub(point(X, k), point(X, i)))
+        after = cross(sub(point(Y, j), point(Y, i)), sub(point(Y, k), point(Y, i)))
+        if dot(before, after) <= 0.0:
             return True
     return False
 
