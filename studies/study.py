@@ -65,7 +65,7 @@ def perform(
     if "data" in steps or "table" in steps:
         (folder.path / "measured.csv").unlink(missing_ok=True)
     if "data" in steps:
-        for mesh in folder.path.glob("*.npz"):
+        for mesh in folder.meshes():
             mesh.unlink()
     for step in (s for s in STEPS if s in steps):
         announce(step)

@@ -249,7 +249,7 @@ def test_a_study_that_fails_leaves_no_numbers_of_an_earlier_run(tmp_path):
 
 def test_new_data_takes_the_meshes_of_an_earlier_run_away(tmp_path):
     perform(_study(), tmp_path)
-    stale = tmp_path / "tiny" / "stale.npz"
+    stale = tmp_path / "tiny" / "stale.pcmc"
     stale.touch()
     perform(_study(), tmp_path, steps=["figure"])
     assert stale.exists()
