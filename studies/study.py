@@ -16,7 +16,7 @@ import pandas as pd
 from .folder import Folder, write_json
 
 STEPS = ("data", "table", "figure")
-LIBRARIES = ("pcmc", "numpy", "scipy", "numba", "pandas", "nlopt")
+LIBRARIES = ("pcmc-surfaces", "numpy", "scipy", "numba", "pandas", "nlopt")
 
 
 @dataclass(frozen=True)

@@ -223,7 +223,7 @@ def test_bad_input_is_2_in_one_line(folder, capsys, arguments, message):
 
 def test_the_version(capsys):
     assert cli.main(["--version"]) == 0
-    assert capsys.readouterr().out == f"pcmc {version('pcmc')}\n"
+    assert capsys.readouterr().out == f"pcmc {version('pcmc-surfaces')}\n"
 
 
 def test_why_cases_of_a_sweep_failed_is_said_once(folder, capsys):
