@@ -11,7 +11,7 @@ from ..contact.pinching import excess, find_walls, place_wall_rows, settled, sta
 from ..energy.functional import energy_and_gradient, patch_volumes
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
-from ..meshing.quality import triangle_quality
+from ..meshing.quality import turns_over, worst_quality
 from ..meshing.redistribution import redistribute
 from ..solvers.smoother import HarmonicExtension
 from ..stability.factorisation import Factor, Factoriser, factoriser
@@ -131,12 +131,11 @@ class Shape:
 
     def quality(self, X: Floats) -> float:
         """Quality of the worst triangle outside walls that may pinch."""
-        return float(triangle_quality(X, self.judged).min())
+        return worst_quality(X, self.judged)
 
     def turned(self, before: Floats, after: Floats) -> bool:
         """Whether a triangle's normal has turned by more than a right angle."""
-        first, second = (_normals(X, self.judged) for X in (before, after))
-        return bool((np.einsum("ij,ij->i", first, second) <= 0.0).any())
+        return turns_over(before, after, self.judged)
 
     def swept(self, X: Floats, space: MotionSpace) -> Floats:
         """X (n,3) with the rows of walls brought below their crest, within the wall."""
@@ -156,7 +155,3 @@ class Shape:
         """
         best, worst = redistribute(self._found, X, aim, slide=False)
         return best if worst > CLEAR * self.quality(X) else None
-
-
-def _normals(X: Floats, F: Ints) -> Floats:
-    return np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]])

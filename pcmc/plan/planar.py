@@ -12,7 +12,8 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..meshing.angles import angles, improve_angles
+from ..meshing.angles import improve_angles
+from ..surface.geometry import angles, cross_2d
 
 CLEARANCE = 0.62  # of the edge length: nearer to a segment, a free point would crowd it
 GOOD_ANGLE = 30.0  # degrees; where it is not reached, points are added and moved
@@ -99,12 +100,7 @@ def triangulate(
 def signed_areas(points: Floats, triangles: Ints) -> Floats:
     """(t,) areas, positive for counter-clockwise triangles."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
-    return 0.5 * cross(b - a, c - a)
-
-
-def cross(u: Floats, v: Floats) -> Floats:
-    """(…) the third component of u × v for plane vectors (…,2)."""
-    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    return 0.5 * cross_2d(b - a, c - a)
 
 
 def locate(mesh: PlanarMesh, points: Floats) -> Ints:
@@ -114,7 +110,7 @@ def locate(mesh: PlanarMesh, points: Floats) -> Ints:
     side = corner[:, [1, 2, 0]] - corner
     slack = -1e-12 * np.einsum("tij,tij->t", side, side).max(initial=0.0)
     for place, point in enumerate(points):
-        hit = np.flatnonzero((cross(side, point - corner) >= slack).all(axis=1))
+        hit = np.flatnonzero((cross_2d(side, point - corner) >= slack).all(axis=1))
         found[place] = hit[0] if len(hit) else OUTSIDE
     return found
 
@@ -239,8 +235,8 @@ def _with_segment(X: Floats, T: Ints, a: int, b: int) -> Ints:
     foreign = ~np.isin(E, [a, b]).any(axis=2)
     along = X[b] - X[a]
     crossed = (
-        (cross(along, u - X[a]) * cross(along, v - X[a]) < 0)
-        & (cross(v - u, X[a] - u) * cross(v - u, X[b] - u) < 0)
+        (cross_2d(along, u - X[a]) * cross_2d(along, v - X[a]) < 0)
+        & (cross_2d(v - u, X[a] - u) * cross_2d(v - u, X[b] - u) < 0)
         & foreign
     ).any(axis=1)
     cavity = E[crossed].reshape(-1, 2)
@@ -302,14 +298,14 @@ def _additions(mesh: PlanarMesh, segments: Ints, k: int, spacing: Floats, h: flo
     X, T = mesh.points, mesh.triangles
     a, b, c = (X[T[:, i]] for i in range(3))
     u, v = b - a, c - a
-    twice = 2.0 * cross(u, v)
+    twice = 2.0 * cross_2d(u, v)
     uu, vv = (u**2).sum(axis=1), (v**2).sum(axis=1)
     offset = np.stack([v[:, 1] * uu - u[:, 1] * vv, u[:, 0] * vv - v[:, 0] * uu], axis=1)
     flat = np.abs(twice) <= 1e-12 * (uu + vv)
     centre = a + offset / np.where(flat, 1.0, twice)[:, None]
     radius = np.linalg.norm(centre - a, axis=1)
     wanted = _wanted(X[T].mean(axis=1), X[:k], spacing, h)
-    sharp = angles(X, T).min(axis=1) < GOOD_ANGLE
+    sharp = angles(X[T]).min(axis=1) < GOOD_ANGLE
     chosen = np.flatnonzero(~flat & ((radius > wanted) | (sharp & (radius > 0.8 * wanted))))
     order = chosen[np.argsort(-radius[chosen] / wanted[chosen], kind="stable")]
     place, need = centre[order], 0.7 * wanted[order]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite, sqrt
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -74,15 +74,3 @@ def _hold(G: Floats, fixed: Bools, sliding: Bools, normal: Floats) -> float:
             accumulate(G, v, scaled(-dot(point(G, v), n), n))
         squared += dot(point(G, v), point(G, v))
     return squared
-
-
-@compiled
-def extent(X: Floats) -> float:
-    """Diagonal of the bounding box of X (n,3), length."""
-    total = 0.0
-    for c in range(3):
-        low = high = X[0, c]
-        for v in range(len(X)):
-            low, high = min(low, X[v, c]), max(high, X[v, c])
-        total += (high - low) ** 2
-    return sqrt(total)

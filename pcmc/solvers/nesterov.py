@@ -10,7 +10,8 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..surface import Surface
-from .evaluate import Evaluator, Point, extent
+from ..surface.geometry import bounding_size
+from .evaluate import Evaluator, Point
 from .result import Callback, Progress, Result, Status
 
 COLUMNS = ("iteration", "evaluation", "energy", "gradient_squared", "t", "armijo_held")
@@ -161,7 +162,7 @@ def _status(point: Point, options: NesterovOptions, size: float) -> Status | Non
         return Status.NON_FINITE
     if point.squared <= (options.tolerance or 0.0):
         return Status.CONVERGED
-    if extent(point.X) > options.inflation * size:
+    if bounding_size(point.X) > options.inflation * size:
         return Status.DIVERGED
     return None
 

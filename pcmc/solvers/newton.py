@@ -23,6 +23,7 @@ from ..certificate.certificate import certify
 from ..meshing.quality import worst_quality
 from ..meshing.refinement import refine
 from ..surface import Surface
+from ..surface.geometry import bounding_size
 from .result import Callback, Progress, Result, Status
 from .state import State
 from .steps import Stepper
@@ -200,7 +201,7 @@ def _ended(state: State, options: NewtonOptions) -> Status | None:
     if not np.isfinite(state.energy):
         return Status.NON_FINITE
     collapsed = state.worst < COLLAPSED
-    extent = np.linalg.norm(np.ptp(state.X, axis=0)) / state.size
+    extent = bounding_size(state.X) / state.size
     # a mesh that inflates may collapse on its way out
     if extent > options.inflation or (collapsed and extent > np.sqrt(options.inflation)):
         return Status.DIVERGED

@@ -111,3 +111,72 @@ def vertex_area_vectors(X: Floats, F: Ints) -> tuple[Floats, Floats]:
             accumulate(total, F[f, k], area_vector)
             area[F[f, k]] += face_area
     return total, area
+
+
+@compiled
+def bounding_size(X: Floats) -> float:
+    """Diagonal of the bounding box of points (n,d), length; 0 for none.
+
+    >>> bounding_size(np.array([[0.0, 0.0, 1.0], [3.0, 4.0, 1.0]]))
+    5.0
+    """
+    total = 0.0
+    for d in range(X.shape[1] if len(X) else 0):
+        low = high = X[0, d]
+        for v in range(len(X)):
+            low, high = min(low, X[v, d]), max(high, X[v, d])
+        total += (high - low) ** 2
+    return sqrt(total)
+
+
+def segment_lengths(X: Floats, ends: Ints) -> Floats:
+    """(e,) lengths of the segments between vertices ``ends`` (e,2)."""
+    return np.asarray(np.linalg.norm(X[ends[:, 1]] - X[ends[:, 0]], axis=1))
+
+
+def edge_vectors(P: Floats) -> Floats:
+    """(…,m,3,3) edges of triangles; edge k is opposite corner k.
+
+    >>> edge_vectors(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])).tolist()
+    [[-1.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]]
+    """
+    return np.roll(P, 1, axis=-2) - np.roll(P, -1, axis=-2)
+
+
+def area_vectors(P: Floats) -> Floats:
+    """(…,m,3) A ν of triangles: the area along the normal, length².
+
+    >>> area_vectors(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])).tolist()
+    [0.0, 0.0, 0.5]
+    """
+    a, b, c = P[..., 0, :], P[..., 1, :], P[..., 2, :]
+    return np.asarray(0.5 * np.cross(b - a, c - a))
+
+
+def face_areas(P: Floats) -> Floats:
+    """(…,m) areas of triangles, length²."""
+    return np.asarray(np.linalg.norm(area_vectors(P), axis=-1))
+
+
+def angles(P: Floats) -> Floats:
+    """(…,m,3) angles of triangles at their corners, degrees, to 1e-6; P (…,m,3,2) or (…,m,3,3).
+
+    >>> angles(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])).round(9).tolist()
+    [90.0, 45.0, 45.0]
+    """
+    a, b = np.roll(P, -1, axis=-2) - P, np.roll(P, 1, axis=-2) - P
+    cosine = (a * b).sum(axis=-1)
+    both = (a * a).sum(axis=-1) * (b * b).sum(axis=-1)
+    return np.degrees(np.arctan2(np.sqrt(np.maximum(both - cosine**2, 0.0)), cosine))
+
+
+def vertex_sums(values: Floats, F: Ints, n: int) -> Floats:
+    """(n,3) at each vertex the sum of the values (m,3) of the faces around it."""
+    return np.stack(
+        [np.bincount(F.ravel(), np.repeat(column, 3), n) for column in values.T], axis=1
+    )
+
+
+def cross_2d(u: Floats, v: Floats) -> Floats:
+    """(…) u × v of plane vectors (…,2): the area of their parallelogram, positive counter-clockwise."""
+    return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
