@@ -90,7 +90,7 @@ def _along(folder: Folder, family: Family, size: int) -> list[dict[str, Any]]:
     for wall in family.walls:
         start = _walled(surface, wall)
         result = solve(start, "newton", target="stationary")
-        found = certify(result.surface, modes=MODES, status=result.status.name)
+        found = result.certify(modes=MODES)
         rows.append(
             {
                 "family": family.name,

@@ -13,7 +13,7 @@ from starts import stationary, two_squares
 import pcmc
 from pcmc import Plane, Surface, certify
 from pcmc.base.errors import FileError, FileWarning, SurfaceError
-from pcmc.contact.pinching import find_walls, resting
+from pcmc.contact.pinching import find_walls, resting_vertices
 from pcmc.io import load
 from pcmc.io.flat import KEY
 
@@ -49,9 +49,9 @@ def test_a_pinched_surface_is_read_as_it_was(make, suffix, tmp_path):
     again = pcmc.read(tmp_path / f"pinched.{suffix}")
     np.testing.assert_allclose(again.vertices, surface.vertices, rtol=1e-15, atol=1e-15)
     np.testing.assert_array_equal(again.faces, surface.faces)
-    rests = resting(surface, find_walls(surface))
-    assert rests.any()
-    np.testing.assert_array_equal(resting(again, find_walls(again)), rests)
+    resting = resting_vertices(surface, find_walls(surface))
+    assert resting.any()
+    np.testing.assert_array_equal(resting_vertices(again, find_walls(again)), resting)
     one, two = certify(surface), certify(again)
     np.testing.assert_array_equal(two.pinched, one.pinched)
     assert (two.verdict, two.index) == (one.verdict, one.index)
@@ -80,9 +80,14 @@ def test_walls_without_height_come_back_where_patches_are_written_apart(make, su
             for s in (surface, again)
         ]
         np.testing.assert_allclose(corners[1], corners[0], rtol=0, atol=10 * digits * surface.size)
-    rests, back = resting(surface, find_walls(surface)), resting(again, find_walls(again))
+    resting, back = (
+        resting_vertices(surface, find_walls(surface)),
+        resting_vertices(again, find_walls(again)),
+    )
     np.testing.assert_allclose(
-        np.sort(again.vertices[back], axis=0), np.sort(surface.vertices[rests], axis=0), atol=1e-14
+        np.sort(again.vertices[back], axis=0),
+        np.sort(surface.vertices[resting], axis=0),
+        atol=1e-14,
     )
     one = certify(surface)
     assert pcmc.energy(again) == pytest.approx(one.energy, rel=10 * digits)
@@ -111,8 +116,8 @@ def test_where_nothing_can_be_told_what_stands_is_kept(make, names, tmp_path):
         pcmc.write(tmp_path / "pinched.stl", surface)
     again = pcmc.read(tmp_path / "pinched.stl")
     assert [p.name for p in again.patches] == ["left", "right", "wall"][:names]
-    rests = resting(surface, find_walls(surface))
-    place = np.linalg.norm(again.vertices[:, None] - surface.vertices[rests], axis=2)
+    resting = resting_vertices(surface, find_walls(surface))
+    place = np.linalg.norm(again.vertices[:, None] - surface.vertices[resting], axis=2)
     assert (place.min(axis=0) < 1e-6).all()
 
 

@@ -11,7 +11,7 @@ from browsing import until
 import pcmc
 from generators import bezier_hall, four_fans, spherical_cap
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.certificate.certificate import Verdict
+from pcmc.certificate import Verdict
 from pcmc.explore.draft import Draft, begin, between, reach
 from pcmc.surface.wall_pressures import with_pressures
 

@@ -16,7 +16,7 @@ from starts import (
 )
 
 from pcmc import Surface, certify, curvature_error, solve
-from pcmc.certificate.certificate import Verdict
+from pcmc.certificate import Verdict
 from pcmc.solvers.result import Status
 
 slow = pytest.mark.slow

@@ -7,9 +7,9 @@ import pytest
 from shapes import pyramid
 from starts import four_fans, sphere, spherical_cap, two_caps, two_squares
 
-from pcmc import Patch, Surface, certify, energy, solve
+from pcmc import Patch, Surface, energy, solve
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
-from pcmc.certificate.certificate import Verdict
+from pcmc.certificate import Verdict
 from pcmc.meshing.quality import triangle_quality
 from pcmc.solvers.newton import NewtonOptions
 from pcmc.solvers.result import Status
@@ -396,7 +396,7 @@ def test_a_start_of_pure_noise_ends_and_says_how(backend, target, seed):
     assert np.isfinite(result.energy)
     assert result.energy == pytest.approx(energy(result.surface), rel=1e-12)
     assert (result.surface.vertices[surface.fixed] == surface.vertices[surface.fixed]).all()
-    found = certify(result.surface, status=result.status.name)
+    found = result.certify()
     if result.converged:
         assert found.verdict in (Verdict.STABLE, Verdict.SADDLE)
     else:

@@ -7,7 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..contact.pinching import excess, find_walls, place_wall_rows, settled, standing
+from ..contact.pinching import (
+    excess_pull,
+    find_walls,
+    place_pinched_walls,
+    place_wall_rows,
+    standing_part,
+)
 from ..energy.functional import energy_and_gradient, patch_volumes
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
@@ -36,9 +42,9 @@ class Shape:
 
     def __init__(self, surface: Surface, backend: str | None = None) -> None:
         self.full = surface
-        self._found = found = standing(surface)
-        self.surface, self.below, self.rests = found.surface, found.walls, found.rests
-        self.classes, self.judged = found.classes, found.judged
+        self._part = part = standing_part(surface)
+        self.surface, self.walls, self.resting = part.surface, part.walls, part.resting
+        self.classes, self.quality_faces = part.classes, part.quality_faces
         self.pressed: Floats = (~surface.walls).astype(float)
         self._backend = backend
         self._extension: HarmonicExtension | None = None
@@ -104,42 +110,42 @@ class Shape:
 
     def whole(self, X: Floats) -> Surface:
         """The full surface, walls that are gone laid on Π."""
-        if not self.rests.any():
+        if not self.resting.any():
             return self.full.moved(X)
-        return self.full.moved(settled(self.full, self.below, self.rests, X))
+        return self.full.moved(place_pinched_walls(self.full, self.walls, self.resting, X))
 
     def down(self, X: Floats) -> Bools:
         """(n,) standing junction vertices that have come down to Π or below."""
-        standing = self.below.can_rest & ~self.rests
-        return standing & (self.below.side * self.surface.plane.height(X) <= 0.0)
+        standing = self.walls.top_free & ~self.resting
+        return standing & (self.walls.side * self.surface.plane.height(X) <= 0.0)
 
     def landed(self, X: Floats) -> Surface:
         """The full surface with the vertices that came down laid on Π."""
         X, down = X.copy(), self.down(X)
         normal = np.array(self.surface.plane.normal)
         X[down] -= self.surface.plane.height(X[down])[:, None] * normal
-        return self.whole(place_wall_rows(self.surface, self.below, X))
+        return self.whole(place_wall_rows(self.surface, self.walls, X))
 
     def unheld(self, line: Line, value: float, X: Floats) -> Floats:
         """(n,) the pull on resting junction vertices beyond what their walls can hold at λ, force."""
-        if not self.rests.any():
+        if not self.resting.any():
             return np.zeros(self.full.n)
-        below = replace(self.below, tension=find_walls(line.applied(self.full, value)).tension)
-        return excess(line.applied(self.surface, value).moved(X), below, self.rests)
+        walls = replace(self.walls, tension=find_walls(line.applied(self.full, value)).tension)
+        return excess_pull(line.applied(self.surface, value).moved(X), walls, self.resting)
 
     # -- triangles -----------------------------------------------------------------------------
 
     def quality(self, X: Floats) -> float:
         """Quality of the worst triangle outside walls that may pinch."""
-        return worst_quality(X, self.judged)
+        return worst_quality(X, self.quality_faces)
 
     def turned(self, before: Floats, after: Floats) -> bool:
         """Whether a triangle's normal has turned by more than a right angle."""
-        return turns_over(before, after, self.judged)
+        return turns_over(before, after, self.quality_faces)
 
     def swept(self, X: Floats, space: MotionSpace) -> Floats:
         """X (n,3) with the rows of walls brought below their crest, within the wall."""
-        return place_wall_rows(self.surface, self.below, X, space)
+        return place_wall_rows(self.surface, self.walls, X, space)
 
     def motion(self, space: MotionSpace, X: Floats, s: Floats) -> Floats:
         """Bs (n,3), with the insides of the sheets sliding along after their curves."""
@@ -153,5 +159,5 @@ class Shape:
 
         The best of the sweeps; None where none is clearly better.
         """
-        best, worst = redistribute(self._found, X, aim, slide=False)
+        best, worst = redistribute(self._part, X, aim, slide=False)
         return best if worst > CLEAR * self.quality(X) else None

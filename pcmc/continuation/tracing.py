@@ -87,7 +87,7 @@ class Tracer:
                 " drift instead of following the parameter; hold it with fixed= or on_plane="
             )
         moves = space.to_coordinates(self.line.gradient(shape.surface, X)).any()
-        if not (moves or shape.rests.any()):  # a wall that is gone may come back
+        if not (moves or shape.resting.any()):  # a wall that is gone may come back
             raise OptionError(
                 "the parameter moves nothing: no vertex of what it names is free, or a change of it"
                 " leaves every force as it is, as that of a flat patch's tension does"
@@ -265,7 +265,7 @@ class Tracer:
         here, there, length = stretch.here, stretch.there, stretch.length
         if not stretch.same_mesh:
             events = self.unlocated(here, there, length)
-            if (here.shape.rests != there.shape.rests).any():
+            if (here.shape.resting != there.shape.resting).any():
                 events.insert(0, self.event("contact", there, length, here.index, there.index))
             return events
         if length <= 2.0 * EXACT:

@@ -22,7 +22,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from ..base.arrays import Floats
 from ..base.errors import OptionError, SurfaceError
 from ..certificate.certificate import TOLERANCE
-from ..contact.pinching import Standing, excess, place_wall_rows, standing
+from ..contact.pinching import StandingPart, excess_pull, place_wall_rows, standing_part
 from ..energy import kernels
 from ..energy.functional import energy_and_gradient
 from ..energy.jacobian import Linearisation, linearise
@@ -151,7 +151,7 @@ def _answers(surface: Surface, parameters: Sequence[Parameter]) -> tuple[Surface
     for parameter in parameters:
         surface.patch_index(parameter.patch)
     at_rest = _AtRest.of(surface)
-    return at_rest.found.surface, np.stack([at_rest.answer(p, parameters) for p in parameters])
+    return at_rest.part.surface, np.stack([at_rest.answer(p, parameters) for p in parameters])
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +161,7 @@ class _AtRest:
     ``follows``: whether walls hang from a crest that moves.
     """
 
-    found: Standing
+    part: StandingPart
     follows: bool
     space: MotionSpace
     linear: Linearisation
@@ -169,12 +169,12 @@ class _AtRest:
 
     @classmethod
     def of(cls, surface: Surface) -> _AtRest:
-        found = standing(surface)
-        shown, below, rests, classes = found.surface, found.walls, found.rests, found.classes
+        part = standing_part(surface)
+        shown, walls, resting, classes = part.surface, part.walls, part.resting, part.classes
         X = shown.vertices
         space = motion_space(shown, classes, X)
         gradient = energy_and_gradient(shown, X)[1]
-        unheld = np.linalg.norm(excess(shown, below, rests))
+        unheld = np.linalg.norm(excess_pull(shown, walls, resting))
         left = np.hypot(np.linalg.norm(space.to_coordinates(gradient)), unheld)
         residual = float(left) / force_scale(shown, classes, X)
         if residual > TOLERANCE:
@@ -187,15 +187,15 @@ class _AtRest:
             factor = factoriser(pattern).factor(assemble(shown, classes, space, pattern, X))
         except SingularMatrix:
             raise SurfaceError(AT_FOLD) from None
-        follows = bool((below.can_rest & ~rests).any())
+        follows = bool((walls.top_free & ~resting).any())
         linear = linearise(shown, classes, space, X, gradient)
-        return cls(found, follows, space, linear, factor)
+        return cls(part, follows, space, linear, factor)
 
     def answer(self, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
         """dX/dλ (n,3) for one of the parameters."""
         right = -self.space.to_coordinates(self._force(parameter, parameters))
         if not np.any(right):
-            return np.zeros_like(self.found.surface.vertices)
+            return np.zeros_like(self.part.surface.vertices)
         size = self.space.size
         steps: list[float] = []
         s, _ = gmres(
@@ -209,7 +209,7 @@ class _AtRest:
 
     def _force(self, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
         """∂(∇E)/∂λ (n,3)."""
-        shown = self.found.surface
+        shown = self.part.surface
         one, zero = _shares(shown, parameter, parameters), np.zeros(len(shown.patches))
         tension, pressure = (one, zero) if parameter.kind == "tension" else (zero, one)
         return kernels.measure(kernels.energy_mesh(shown, tension, pressure), shown.vertices)[2]
@@ -219,6 +219,6 @@ class _AtRest:
         d = self.space.to_vectors(s)
         if not self.follows:
             return d
-        shown, walls = self.found.surface, self.found.walls
+        shown, walls = self.part.surface, self.part.walls
         ahead = place_wall_rows(shown, walls, shown.vertices + d, self.space)
         return ahead - place_wall_rows(shown, walls, shown.vertices, self.space)

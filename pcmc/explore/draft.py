@@ -13,7 +13,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
-from ..certificate.certificate import Certificate, Verdict, certify
+from ..certificate import Certificate, Verdict, certify
 from ..solvers import solve
 from ..solvers.result import Progress, Result
 from ..surface import Patch, Surface
@@ -70,7 +70,7 @@ def begin(surface: Surface) -> Beginning:
         if trouble is None:
             break
         result = solve(surface, target=target)
-        ended = certify(result.surface, status=result.status.name)
+        ended = result.certify()
         if ended.verdict in AT_REST:
             return Beginning(result.surface, ended, None)
         trouble = ended
@@ -141,7 +141,7 @@ class Draft:
         def act(stop: Callable[[], bool]) -> None:
             end = time.monotonic() + PATIENCE
             result = attempt(self.surface, until(stop, end), target="minimum")
-            found = certify(result.surface, status=result.status.name)
+            found = result.certify()
             if stop():
                 return
             if found.verdict in AT_REST:
@@ -265,7 +265,7 @@ def reach(
         ahead = min(1.0, done + step)
         aim = between(start, asked, ahead).moved(here.vertices)
         result = attempt(aim, stop, target="stationary", **options)
-        ended = certify(result.surface, modes=0, status=result.status.name)
+        ended = result.certify(modes=0)
         if ended.verdict in AT_REST:
             here, found, done, step = result.surface, ended, ahead, 2.0 * step
             if done == 1.0:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknown
 from ..base.files import atomic_write
-from ..contact.pinching import standing
+from ..contact.pinching import standing_part
 from ..surface import Plane, Surface
 from .contents import Contents, merged, to_surface, without_unused
 from .suspect import suspicions
@@ -160,7 +160,7 @@ def write(
         lost.append("certificate")
     told = None
     if getattr(module, "APART", False):
-        shown = standing(surface).surface
+        shown = standing_part(surface).surface
         if shown.m < surface.m and getattr(module, "WALLS", False):
             from .flat import walls_told
 

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import MissingExtra, OptionError, SurfaceError
-from ..contact.pinching import find_walls, lifted, resting
+from ..contact.pinching import lift, standing_part
 from ..surface import Surface
 from ..surface.geometry import angles, area_vectors, face_areas, segment_lengths
 from .angles import improve_angles
@@ -90,8 +90,8 @@ def remesh(
 
 def _raised(surface: Surface) -> Surface:
     """The surface with the walls standing again that had vanished below a junction at rest."""
-    below = find_walls(surface)
-    return lifted(surface, below, resting(surface, below), RAISED)
+    part = standing_part(surface)
+    return lift(surface, part.walls, part.resting, RAISED)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,22 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import fields
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import FileError, OptionError, unknown
+from ..base.errors import FileError, unknown
 from ..plan import Area, Divider, Hole, Plan
-from ..solvers import METHODS
+from ..solvers import METHODS, find_method
 from ..surface import Plane
 from .remeshing import Remeshing
 
 
 def options_of(method: str) -> Any:
     """The class of a method's options, such as NewtonOptions."""
-    if method not in METHODS:
-        raise OptionError(unknown("method", method, METHODS))
-    return getattr(import_module(f"pcmc.solvers.{method}"), METHODS[method])
+    return find_method(method).options
 
 
 def _keys(kind: Any) -> list[str]:

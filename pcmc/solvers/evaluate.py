@@ -1,4 +1,4 @@
-"""E and ∇E at many positions of one surface, with little around the compiled loop."""
+"""E and ∇E at many positions of one surface, with little overhead around the compiled loop."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Point(NamedTuple):
 
 
 class Evaluator:
-    """Calls to it measure E and ∇E of ``surface`` elsewhere; ``count`` says how many were made.
+    """E and ∇E of ``surface`` with its vertices at other positions; ``count`` is the number of calls.
 
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
@@ -51,20 +51,20 @@ class Evaluator:
         """E, ∇E and ‖∇E‖² with the vertices at X (n,3); not finite rather than an error."""
         self.count += 1
         tension, pressure = self._mesh.tension, self._mesh.pressure
-        if self._single:  # the same sums as kernels.measure, without what it spends on threads
+        if self._single:  # the same sums as kernels.measure, without its overhead for threads
             area, volume, G = np.zeros_like(tension), np.zeros_like(tension), np.zeros(X.shape)
             m = len(self._mesh.faces)
             kernels.measure_block(self._mesh, X, 0, m, area, volume, G)
         else:
             area, volume, G = kernels.measure(self._mesh, X)
-        squared = _hold(G, *self._supports)
+        squared = _apply_supports(G, *self._supports)
         with np.errstate(all="ignore"):
             return Point(X, float(tension @ area - pressure @ volume), G, squared)
 
 
 @compiled
-def _hold(G: Floats, fixed: Bools, sliding: Bools, normal: Floats) -> float:
-    """Take from G (n,3) what the supports carry, Eq. (19), in place; return its squared sum."""
+def _apply_supports(G: Floats, fixed: Bools, sliding: Bools, normal: Floats) -> float:
+    """Remove from G (n,3) the forces that the supports carry, Eq. (19), in place; return its squared sum."""
     squared = 0.0
     for v in range(len(G)):
         if fixed[v]:
