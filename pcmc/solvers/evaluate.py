@@ -10,6 +10,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats
 from ..base.compiled import blocks, compiled, threads
 from ..energy import kernels
+from ..energy.functional import total
 from ..surface import Surface
 from ..surface.geometry import accumulate, dot, point, scaled, vector
 
@@ -59,7 +60,7 @@ class Evaluator:
             area, volume, G = kernels.measure(self._mesh, X)
         squared = _apply_supports(G, *self._supports)
         with np.errstate(all="ignore"):
-            return Point(X, float(tension @ area - pressure @ volume), G, squared)
+            return Point(X, total(tension, area, pressure, volume), G, squared)
 
 
 @compiled
