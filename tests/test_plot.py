@@ -14,7 +14,7 @@ import pcmc
 from generators import two_squares
 from pcmc import plot
 from pcmc.base.errors import FileError, MissingExtra, OptionError
-from pcmc.explore.drawing import fields as page_fields
+from pcmc.explore.page_data import fields as page_fields
 from pcmc.plot import arrows, legend, raster
 from pcmc.plot.figure import CURVES, finish, new
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
