@@ -172,7 +172,7 @@ def reporter(say: Say) -> Callable[[Progress], None]:
 
 
 def _aim(project: Project, surface: Surface, say: Say) -> Design:
-    from ..design import Reach, meet  # needed by projects with targets only
+    from ..design import DesignStatus, meet  # needed by projects with targets only
 
     if project.method != "newton":
         raise OptionError(f"targets are met with method 'newton' only, found {project.method!r}")
@@ -181,6 +181,6 @@ def _aim(project: Project, surface: Surface, say: Say) -> Design:
         surface, project.targets, project.vary,
         callback=lambda row: say(f"meeting the targets: solve {next(count)}"), **project.options,
     )  # fmt: skip
-    if design.reach is Reach.STOPPED:  # as in ``uninterrupted``
+    if design.status is DesignStatus.STOPPED:  # as in ``uninterrupted``
         raise KeyboardInterrupt
     return design
