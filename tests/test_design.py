@@ -57,19 +57,25 @@ def test_two_apexes_over_a_wall_that_slides():
 
 def test_tensions_too_low_for_any_equilibrium_are_raised_first(roof):
     design = meet(
-        roof.retensioned({"north": 2.0, "east": 2.0, "corner": 2.0}), [Target("volume", None, 450.0)],
+        roof.retensioned({"north": 2.0, "east": 2.0, "corner": 2.0}),
+        [Target("volume", None, 450.0)],
         ["north", "east", "corner"],
-    )  # fmt: skip
+    )
     assert design.met
     assert measure(design.surface, Target("volume")).value == pytest.approx(450.0, rel=1e-7)
 
 
 @pytest.mark.parametrize(
     "target",
-    [Target("height", (0.2, 0.1), 0.3), Target("volume", "cap", 0.5), Target("area", "cap", 3.5),
-     Target("curvature", "cap", 0.8), Target("volume", None, at_least=0.6)],
+    [
+        Target("height", (0.2, 0.1), 0.3),
+        Target("volume", "cap", 0.5),
+        Target("area", "cap", 3.5),
+        Target("curvature", "cap", 0.8),
+        Target("volume", None, at_least=0.6),
+    ],
     ids=lambda t: t.label,
-)  # fmt: skip
+)
 def test_each_quantity_as_a_target(target):
     surface = cap()
     for kind in ("tension", "pressure"):

@@ -29,12 +29,19 @@ def roof():
 @pytest.mark.parametrize(
     "target",
     [
-        Target("apex", "north"), Target("height", (5, 20)), Target("height", (20.3, 8.1)),
-        Target("volume"), Target("volume", "east"), Target("area"), Target("area", "wall 1"),
-        Target("reaction"), Target("reaction", "north"), Target("reaction", "wall 2"),
+        Target("apex", "north"),
+        Target("height", (5, 20)),
+        Target("height", (20.3, 8.1)),
+        Target("volume"),
+        Target("volume", "east"),
+        Target("area"),
+        Target("area", "wall 1"),
+        Target("reaction"),
+        Target("reaction", "north"),
+        Target("reaction", "wall 2"),
     ],
     ids=lambda t: t.label,
-)  # fmt: skip
+)
 def test_derivatives_by_position_have_taylor_slope_two(roof, target):
     rng = np.random.default_rng(1)
     direction = rng.standard_normal(roof.vertices.shape)
@@ -109,9 +116,14 @@ def test_heights_are_the_meshs_own(roof):
 
 def drawn_at(surface, shift):
     return pcmc.Surface(
-        surface.vertices + shift, surface.faces, surface.patch_of_face, surface.patches,
-        surface.fixed, surface.on_plane, surface.plane,
-    )  # fmt: skip
+        surface.vertices + shift,
+        surface.faces,
+        surface.patch_of_face,
+        surface.patches,
+        surface.fixed,
+        surface.on_plane,
+        surface.plane,
+    )
 
 
 @pytest.mark.parametrize("make", [cap, lambda: two_caps(1.2)], ids=["cap", "two caps"])
@@ -164,10 +176,14 @@ def test_points_are_in_the_coordinates_of_a_tilted_plane():
 
 def test_sensitivities_are_the_slopes_of_resolved_surfaces(roof):
     targets = [
-        Target("apex", "north"), Target("height", (20.3, 8.1)), Target("volume"),
-        Target("area", "corner"), Target("area", "wall 1"), Target("reaction", "east"),
+        Target("apex", "north"),
+        Target("height", (20.3, 8.1)),
+        Target("volume"),
+        Target("area", "corner"),
+        Target("area", "wall 1"),
+        Target("reaction", "east"),
         Target("curvature", "north"),
-    ]  # fmt: skip
+    ]
     to = [Parameter("north"), Parameter("wall 1"), Parameter("east", "pressure")]
     table = sensitivities(roof, targets, to)
     assert list(table.index) == [t.label for t in targets]
