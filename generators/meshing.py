@@ -1,7 +1,7 @@
-"""Near-equilateral triangles inside plane outlines whose vertices are given and stay.
+"""Nearly equilateral triangles inside plane outlines with given vertices.
 
-The meshes of the paper's examples come from here and not from ``pcmc.plan``: what the flow does depends on
-the mesh, and a better mesher for plans must not move the reproduced numbers.
+The paper's examples are meshed here and not by ``pcmc.plan``: the flow depends on the mesh, and a better
+mesher for plans must not change the reproduced numbers.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from pcmc.base.errors import OptionError
 from pcmc.surface.geometry import cross_2d
 
 CLEARANCE = 0.65  # of the spacing: where the lattice ends before an outline
-SWEEPS, PUSHES = 4, 5  # triangulations, and steps on each; more gain nothing
-REACH = 1.05  # of the spacing: longer edges are left alone
-STEP = 0.1  # of an edge's shortness, from each of its triangles: twice that rings
+SWEEPS, RELAXATIONS = 4, 5  # triangulations, and steps on each; more gain nothing
+LONG = 1.05  # of the spacing: longer edges push no vertices
+STEP = 0.1  # part of an edge's missing length that each of its triangles adds: 0.2 oscillates
 
 
 def fill(outlines: Sequence[Floats], spacing: float) -> tuple[Floats, Ints]:
@@ -45,8 +45,8 @@ def fill(outlines: Sequence[Floats], spacing: float) -> tuple[Floats, Ints]:
     Raises
     ------
     OptionError
-        When an outline's side is not an edge of the triangulation: its segments are too long where
-        it comes near itself or another outline.
+        A side of an outline is not an edge of the triangulation: its segments are too long where it
+        comes near itself or another outline.
 
     >>> square = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [2, 2], [1, 2], [0, 2], [0, 1.0]])
     >>> points, faces = fill([square], 1.0)
@@ -60,9 +60,9 @@ def fill(outlines: Sequence[Floats], spacing: float) -> tuple[Floats, Ints]:
     points = points[region.contains(points)]
     points = points[_distance(points, rim, sides) > CLEARANCE * spacing]
     for _ in range(SWEEPS):
-        points = _pushed(rim, points, region.triangulate(points), spacing)
+        points = _relaxed(rim, points, region.triangulate(points), spacing)
     faces = region.triangulate(points)
-    _require_sides(faces, sides, rim)
+    _check_sides(faces, sides, rim)
     return points, faces
 
 
@@ -73,7 +73,7 @@ class _Region:
         self.rim = rim
         self.coarse: Any = Delaunay(rim)
         centroids = rim[self.coarse.simplices].mean(axis=1)
-        self.inside = np.append(_crossings(centroids, rim, sides) % 2 == 1, False)
+        self.inside = np.append(_ray_crossings(centroids, rim, sides) % 2 == 1, False)
 
     def contains(self, points: Floats) -> Bools:
         """(k,) bool."""
@@ -107,7 +107,7 @@ def _lattice(rim: Floats, spacing: float) -> Floats:
     return middle + points
 
 
-def _crossings(points: Floats, rim: Floats, sides: Ints) -> Ints:
+def _ray_crossings(points: Floats, rim: Floats, sides: Ints) -> Ints:
     """How many sides a ray to the right from each point meets: odd inside."""
     counts = np.zeros(len(points), dtype=np.int64)
     for part in np.array_split(np.arange(len(points)), 1 + len(points) * len(sides) // 10**7):
@@ -134,22 +134,22 @@ def _distance(points: Floats, rim: Floats, sides: Ints) -> Floats:
     return distance
 
 
-def _pushed(rim: Floats, points: Floats, faces: Ints, spacing: float) -> Floats:
+def _relaxed(rim: Floats, points: Floats, faces: Ints, spacing: float) -> Floats:
     """The interior points after short edges have pushed their ends apart; the rim stays."""
     both = np.concatenate([rim, points])
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     side = np.tile(np.arange(len(sides)), 2)
     signs = np.repeat([STEP, -STEP], len(sides))
     ends = coo_array((signs, (sides.T.ravel(), side)), shape=(len(both), len(sides))).tocsr()
-    for _ in range(PUSHES):
+    for _ in range(RELAXATIONS):
         apart = both[sides[:, 0]] - both[sides[:, 1]]
         length = np.linalg.norm(apart, axis=1)
-        short = np.maximum(REACH * spacing - length, 0.0)
+        short = np.maximum(LONG * spacing - length, 0.0)
         both[len(rim) :] += (ends @ (apart * (short / length)[:, None]))[len(rim) :]
     return both[len(rim) :]
 
 
-def _require_sides(faces: Ints, sides: Ints, rim: Floats) -> None:
+def _check_sides(faces: Ints, sides: Ints, rim: Floats) -> None:
     n = int(faces.max()) + 1
     pairs = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     wanted = np.sort(sides, axis=1)
@@ -157,6 +157,10 @@ def _require_sides(faces: Ints, sides: Ints, rim: Floats) -> None:
     if len(lost):
         point = rim[sides[lost[0], 0]].round(6).tolist()
         raise OptionError(
-            f"the outline's side at {point} is no edge of the triangulation ({len(lost)} such"
-            " sides): its segments are too long there; use a smaller edge length"
+            f"the outline's side at {point} is not an edge of the triangulation ({len(lost)}"
+            " such sides): its segments are too long there; use a smaller edge length",
+            what="outlines",
+            where=int(lost[0]),
+            found=len(lost),
+            expected=0,
         )

@@ -8,7 +8,7 @@ from generators import double_bubble, two_squares
 from pcmc import Parameter, Target, cli, meet
 from pcmc.contact.pinching import standing_part
 from pcmc.design import sensitivities
-from pcmc.design.quantities import measure
+from pcmc.design.targets import measure
 from pcmc.plan import Area, Divider, Plan
 from pcmc.surface.wall_pressures import wall_pressure_changes, with_pressures
 

@@ -86,7 +86,7 @@ def _with(design: Design) -> str:
 
     A sentence of ``design.message`` has them where a target is missed.
     """
-    found = (f"{label} {value:.6g}" for label, value in design.targets["found"].items())
+    found = (f"{label} {value:.6g}" for label, value in design.targets["value"].items())
     values = (f"{label} {value:.6g}" for label, value in design.parameters["value"].items())
     return f"{', '.join(found)}, with {', '.join(values)}"
 

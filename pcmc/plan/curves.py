@@ -278,12 +278,7 @@ def curve(spec: Any, closed: bool = False) -> Curve:
 
 def frame(plane: Plane) -> Floats:
     """(3,3) rows: two unit vectors along Π and its normal. The identity for the standard Π."""
-    normal = np.array(plane.normal)
-    axis = np.eye(3)[1 if abs(normal[0]) > 0.9 else 0]
-    first = axis - (axis @ normal) * normal
-    first /= np.linalg.norm(first)
-    second = np.cross(normal, first)
-    return np.stack([first, second, normal])
+    return plane.axes
 
 
 def to_local(points: Floats, plane: Plane) -> Floats:

@@ -181,7 +181,7 @@ def reporter(report: OnStep) -> Callable[[Progress], None]:
 
 
 def _meet(project: Project, surface: Surface, report: OnStep) -> Design:
-    from ..design import Reach, meet  # needed by projects with targets only
+    from ..design import DesignStatus, meet  # needed by projects with targets only
 
     if project.method != "newton":
         raise OptionError(
@@ -198,6 +198,6 @@ def _meet(project: Project, surface: Surface, report: OnStep) -> Design:
         callback=lambda row: report(f"meeting the targets: solve {next(count)}"),
         **project.options,
     )
-    if design.reach is Reach.STOPPED:  # as in ``raise_if_stopped``
+    if design.status is DesignStatus.STOPPED:  # as in ``raise_if_stopped``
         raise KeyboardInterrupt
     return design

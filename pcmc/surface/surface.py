@@ -113,6 +113,23 @@ class Plane:
             raise SurfaceError("Plane.normal must not be the zero vector")
         object.__setattr__(self, "normal", tuple(c / length for c in self.normal))
 
+    @cached_property
+    def axes(self) -> Floats:
+        """(3,3) rows: two unit vectors along the plane and its normal; the identity for z = 0."""
+        normal = np.array(self.normal)
+        axis = np.eye(3)[1 if abs(normal[0]) > 0.9 else 0]
+        first = axis - (axis @ normal) * normal
+        first /= np.linalg.norm(first)
+        return np.stack([first, np.cross(normal, first), normal])
+
+    def to_local(self, points: npt.ArrayLike) -> Floats:
+        """(…,3) two coordinates on the plane and the height above it, of points (…,3).
+
+        >>> Plane(point=(1, 2, 3)).to_local([1, 3, 5]).tolist()
+        [0.0, 1.0, 2.0]
+        """
+        return (np.asarray(points, dtype=float) - np.array(self.point)) @ self.axes.T
+
     def height(self, points: npt.ArrayLike) -> Floats:
         """(…) signed distance of points (…,3) from the plane, positive along the normal."""
         return (np.asarray(points, dtype=float) - np.array(self.point)) @ np.array(self.normal)
