@@ -17,7 +17,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, unknown
 from ..certificate.balance import held_lengths, reactions
 from ..energy import kernels
-from ..plan.curves import frame
+from ..plan.coordinates import frame
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d, vertex_sums
 
