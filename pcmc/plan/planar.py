@@ -170,12 +170,12 @@ def _inside(points: Floats, segments: Ints, holes: Sequence[Sequence[float]], k:
     mesh = PlanarMesh(points, T, part)
     dropped = set(outer.tolist())
     located = locate(mesh, np.reshape(holes, (-1, 2)).astype(float))
-    for number, triangle in enumerate(located):
+    for place, triangle in enumerate(located):
         if triangle == OUTSIDE or part[triangle] in outer:
             raise OptionError(
-                f"the point {list(holes[number])} of hole {number} lies outside the outline",
+                f"the point {list(holes[place])} of hole {place} lies outside the outline",
                 what="holes",
-                where=number,
+                where=place,
             )
         dropped.add(int(part[triangle]))
     kept = ~np.isin(part, sorted(dropped))
