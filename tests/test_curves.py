@@ -109,7 +109,7 @@ def test_curves_from_plain_data():
         ({"circl": {}}, "did you mean 'circle'"),
         ({"arc": [[0, 0], [1, 1]]}, "arc: expected 3 points, found 2"),
         ({"arc": [[0, 0], [1, 1], [2, 2]]}, "lie on one line"),
-        ({"circle": {"centre": [0, 0], "radius": -1.0}}, "radius must be a finite number > 0"),
+        ({"circle": {"centre": [0, 0], "radius": -1.0}}, "radius: expected a finite number > 0"),
         ({"circle": {"centre": [0, 0]}}, "expected centre and radius"),
         ({"bezier": [[1, 1], [1, 1]]}, "all control points"),
         ({"bezier": [[0, 0], [1, 1]], "closed": True}, "closed is for polylines"),

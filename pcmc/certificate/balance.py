@@ -11,6 +11,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import standing_part
 from ..energy import kernels
 from ..surface import Surface
+from ..surface.geometry import area_vectors, edge_vectors, segment_lengths, vertex_sums
 from ..surface.topology import Curve
 
 HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets meet at about 20°
@@ -34,18 +35,16 @@ def load_ratio(surface: Surface) -> float:
     inside = surface.fixed & ~topo.on_boundary
     line = inside[topo.edges].all(axis=1)
     carrying = topo.boundary_edge | line
-    ends = X[topo.edges[carrying]]
-    capacity = float(sheets[carrying] @ np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+    capacity = float(sheets[carrying] @ segment_lengths(X, topo.edges[carrying]))
     inside[topo.edges[line]] = False
-    opposite = np.linalg.norm(X[F[:, [2, 0, 1]]] - X[F[:, [1, 2, 0]]], axis=2)
+    opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
     capacity += 0.5 * float(tension @ (opposite * inside[F]).sum(axis=1))
     return abs(load(surface)) / capacity if capacity > 0.0 else 0.0
 
 
 def load(surface: Surface) -> float:
     """Σ p A_T ν_T · n: the force of the pressure along Π's normal n, which the supports carry."""
-    corners = surface.vertices[surface.faces]
-    vector = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    vector = area_vectors(surface.vertices[surface.faces])
     return float(
         surface.pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
     )
@@ -63,11 +62,9 @@ def coarseness(surface: Surface) -> float:
     4.0
     """
     X, topo = surface.vertices, surface.topology
-    ends = X[topo.edges[topo.boundary_edge]]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    length = segment_lengths(X, topo.edges[topo.boundary_edge])
     corners = X[surface.faces[~surface.walls[surface.patch_of_face]]]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
-    plan = 0.5 * abs(float(across @ np.array(surface.plane.normal)))
+    plan = abs(float(area_vectors(corners).sum(axis=0) @ np.array(surface.plane.normal)))
     if not len(length) or plan == 0.0:
         return 0.0
     return float((length.mean() * length.sum() / (2.0 * plan)) ** 2)
@@ -158,7 +155,7 @@ def held_lengths(surface: Surface) -> Floats:
     held = surface.fixed | surface.on_plane
     ends = surface.topology.edges[surface.topology.boundary_edge]
     ends = ends[held[ends].all(axis=1)]
-    half = 0.5 * np.linalg.norm(surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]], axis=1)
+    half = 0.5 * segment_lengths(surface.vertices, ends)
     return np.asarray(np.bincount(ends.ravel(), np.repeat(half, 2), surface.n), dtype=float)
 
 
@@ -171,11 +168,9 @@ def reactions(surface: Surface) -> Floats:
     """
     X, F = surface.vertices, surface.faces
     zero = np.zeros(len(surface.patches))
-    forces = kernels.measure(X, F, surface.patch_of_face, np.zeros(3), surface.tensions, zero)[2]
-    vector = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]) / 6.0
-    vector *= surface.pressures[surface.patch_of_face, None]
-    for axis in range(3):
-        forces[:, axis] -= np.bincount(F.ravel(), np.repeat(vector[:, axis], 3), surface.n)
+    forces = kernels.measure(kernels.energy_mesh(surface, pressure=zero), X)[2]
+    third = area_vectors(X[F]) / 3.0
+    forces -= vertex_sums(third * surface.pressures[surface.patch_of_face, None], F, surface.n)
     out = np.zeros_like(forces)
     out[surface.fixed] = forces[surface.fixed]
     sliding = surface.on_plane
@@ -261,8 +256,7 @@ def boundary_table(surface: Surface) -> pd.DataFrame:
 def _segments(surface: Surface, curve: Curve) -> tuple[Ints, Floats]:
     order = np.append(curve.vertices, curve.vertices[:1]) if curve.closed else curve.vertices
     pairs = np.stack([order[:-1], order[1:]], axis=1)
-    ends = surface.vertices[pairs]
-    return pairs, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    return pairs, segment_lengths(surface.vertices, pairs)
 
 
 def _middle(surface: Surface, curve: Curve) -> dict[str, float]:

@@ -21,6 +21,7 @@ from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import Stiffness, lowest, surface_stiffness
 from ..surface import Surface
+from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
 from .balance import (
     boundary_table,
@@ -239,7 +240,7 @@ def _softest(surface: Surface, classes: VertexClasses, values: Floats, fields: F
     if not len(values):
         return np.inf
     X, F = surface.vertices, classes.faces
-    area = np.linalg.norm(np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]), axis=1)
+    area = face_areas(X[F])
     moved = area * np.einsum("fij,fij->f", fields[0][F], fields[0][F])
     tension = float(surface.tensions[classes.patch_of_face] @ moved / moved.sum())
     return float(values[0]) * surface.size**2 / tension

@@ -18,6 +18,7 @@ from ..energy.functional import energy_and_gradient
 from ..energy.motion_space import MotionSpace, VertexClasses, vertex_classes
 from ..surface import Surface
 from ..surface.checks import lying
+from ..surface.geometry import area_vectors
 from ..surface.topology import topology
 from .wall_rows import WallRows, join_rows, wall_rows
 
@@ -308,9 +309,8 @@ def _lie_on_plane(walls: Walls, resting: Bools) -> Bools:
 
 def _pressure_push(surface: Surface) -> Floats:
     """(n,) force along Π's normal with which the pressure of the sheets pushes each vertex."""
-    corners = surface.vertices[surface.faces]
-    vector = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    force = (surface.pressures * ~surface.walls)[surface.patch_of_face] / 6.0
+    vector = area_vectors(surface.vertices[surface.faces])
+    force = (surface.pressures * ~surface.walls)[surface.patch_of_face] / 3.0
     push = force * (vector @ np.array(surface.plane.normal))
     return np.asarray(
         np.bincount(surface.faces.ravel(), np.repeat(push, 3), surface.n), dtype=float

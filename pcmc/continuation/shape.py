@@ -17,13 +17,13 @@ from ..contact.pinching import (
 from ..energy.functional import energy_and_gradient, patch_volumes
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
-from ..meshing.quality import triangle_quality
+from ..meshing.quality import turns_over, worst_quality
 from ..meshing.redistribution import redistribute
 from ..solvers.smoother import HarmonicExtension
 from ..stability.factorisation import Factor, Factoriser, factoriser
 from ..stability.modes import Stiffness, full_matrix, lumped_mass
 from ..surface import Surface
-from ..surface.geometry import area_vectors
+from ..surface.geometry import vertex_area_vectors
 from ..surface.topology import SHEET
 from .direction import Line, weighted_gradient
 
@@ -103,7 +103,7 @@ class Shape:
 
     def weights(self, X: Floats) -> Floats:
         """(n,) the area around each vertex over all area, over size²."""
-        area = area_vectors(X, self.classes.faces)[1]
+        area = vertex_area_vectors(X, self.classes.faces)[1]
         return area / (area.sum() * self.full.size**2)
 
     # -- contact of walls with Π ---------------------------------------------------------------
@@ -137,12 +137,11 @@ class Shape:
 
     def quality(self, X: Floats) -> float:
         """Quality of the worst triangle outside walls that may pinch."""
-        return float(triangle_quality(X, self.quality_faces).min())
+        return worst_quality(X, self.quality_faces)
 
     def turned(self, before: Floats, after: Floats) -> bool:
         """Whether a triangle's normal has turned by more than a right angle."""
-        first, second = (_normals(X, self.quality_faces) for X in (before, after))
-        return bool((np.einsum("ij,ij->i", first, second) <= 0.0).any())
+        return turns_over(before, after, self.quality_faces)
 
     def swept(self, X: Floats, space: MotionSpace) -> Floats:
         """X (n,3) with the rows of walls brought below their crest, within the wall."""
@@ -162,7 +161,3 @@ class Shape:
         """
         best, worst = redistribute(self._part, X, aim, slide=False)
         return best if worst > CLEAR * self.quality(X) else None
-
-
-def _normals(X: Floats, F: Ints) -> Floats:
-    return np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]])

@@ -212,9 +212,7 @@ class _AtRest:
         shown = self.part.surface
         one, zero = _shares(shown, parameter, parameters), np.zeros(len(shown.patches))
         tension, pressure = (one, zero) if parameter.kind == "tension" else (zero, one)
-        return kernels.measure(
-            shown.vertices, shown.faces, shown.patch_of_face, shown.origin, tension, pressure,
-        )[2]  # fmt: skip
+        return kernels.measure(kernels.energy_mesh(shown, tension, pressure), shown.vertices)[2]
 
     def _moved(self, s: Floats) -> Floats:
         """B s (n,3) with walls that hang from their crest following it, as they do in the solver."""

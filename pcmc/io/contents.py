@@ -13,6 +13,7 @@ import numpy.typing as npt
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
 from ..surface import Patch, Plane, Surface, checks
+from ..surface.geometry import bounding_size
 from ..surface.topology import topology
 
 FREE, SLIDING, FIXED = 0, 1, 2
@@ -129,7 +130,7 @@ def to_surface(
 
 def _on(plane: Plane, X: Floats, sliding: Bools) -> Floats:
     """Sliding vertices that single precision or few digits put beside the plane, back onto it."""
-    height, size = plane.height(X), float(np.linalg.norm(np.ptp(X, axis=0)))
+    height, size = plane.height(X), bounding_size(X)
     near = sliding & (np.abs(height) < ROUNDING * size) & (np.abs(height) > 1e-12 * size)
     return X - np.where(near, height, 0.0)[:, None] * np.array(plane.normal) if near.any() else X
 

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError
 from ..surface import Patch, Surface
+from ..surface.geometry import bounding_size
 from .contents import ROUNDING, Contents, support_of, without_unused
 
 KEY = "pcmc walls"
@@ -49,7 +50,7 @@ def with_walls(contents: Contents) -> Contents:
     names = {told.patches[k].name for k in told.patch}
     is_wall = np.array([p.name in names for p in contents.patches])[contents.patch_of_face]
     sheets = np.unique(contents.faces[~is_wall])
-    reach = ROUNDING * float(np.linalg.norm(np.ptp(contents.vertices, axis=0)))
+    reach = ROUNDING * bounding_size(contents.vertices)
     far, near = cKDTree(contents.vertices[sheets]).query(told.vertices[told.above])
     if np.count_nonzero(is_wall) != told.shown or np.any(far > reach):
         return replace(contents, walls=None, notes=(*contents.notes, CHANGED))

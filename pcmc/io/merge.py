@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
+from ..surface.geometry import bounding_size
 
 TOLERANCE = 1e-7  # of the size; single precision keeps this much
 
@@ -23,8 +24,7 @@ def coincident(X: Floats, tolerance: float = TOLERANCE) -> tuple[Ints, Ints]:
     ([0, 1, 3], [0, 1, 0, 2])
     """
     n = len(X)
-    size = float(np.linalg.norm(np.ptp(X, axis=0)))
-    pairs = cKDTree(X).query_pairs(tolerance * size, output_type="ndarray")
+    pairs = cKDTree(X).query_pairs(tolerance * bounding_size(X), output_type="ndarray")
     if not len(pairs):
         return np.arange(n), np.arange(n)
     graph = coo_array((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), shape=(n, n))

@@ -7,6 +7,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..meshing.quality import triangle_quality
+from ..surface.geometry import area_vectors
 
 
 def triangulate(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tuple[str, ...]]:
@@ -47,9 +48,7 @@ def _best_fans(X: Floats, polygon: Ints, number: Ints) -> Ints:
     relative = X[polygon] - X[polygon[:, :1]]
     vector_area = np.cross(relative, np.roll(relative, -1, axis=1)).sum(axis=1)
     fans = np.stack([_fan(np.roll(polygon, -s, axis=1)) for s in range(k)])
-    P = X[fans]
-    normal = np.cross(P[..., 1, :] - P[..., 0, :], P[..., 2, :] - P[..., 0, :])
-    side = np.sign(np.einsum("sptd,pd->spt", normal, vector_area))
+    side = np.sign(np.einsum("sptd,pd->spt", area_vectors(X[fans]), vector_area))
     quality = triangle_quality(X, fans.reshape(-1, 3)).reshape(side.shape)
     worst = (side * quality).min(axis=2)
     best = worst.argmax(axis=0)

@@ -16,6 +16,7 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..surface import Surface
 from ..surface.colours import patch_colors
+from ..surface.geometry import bounding_size
 from . import flat
 from .contents import (
     FIXED,
@@ -147,7 +148,7 @@ def _coordinates(points: Any) -> Floats:
 def _supports(X: Floats, held: dict[int, list[Floats]]) -> Ints:
     """Vertices at which a support's point lies."""
     support = np.full(len(X), FREE, dtype=np.int8)
-    tree, reach = cKDTree(X), TOLERANCE * float(np.linalg.norm(np.ptp(X, axis=0)))
+    tree, reach = cKDTree(X), TOLERANCE * bounding_size(X)
     for kind in (SLIDING, FIXED):
         for points in held[kind]:
             for near in tree.query_ball_point(points, reach):

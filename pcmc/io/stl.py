@@ -14,6 +14,7 @@ import numpy as np
 
 from ..base.errors import FileError
 from ..surface import Surface
+from ..surface.geometry import area_vectors
 from ..surface.surface import FAR
 from .contents import Contents
 from .optional import library, reading
@@ -34,7 +35,7 @@ def write(path: Path, surface: Surface, **_: Any) -> str:
     moved = bool(np.linalg.norm(middle) > FAR * surface.size)
     middle[np.abs(middle) <= surface.size] = 0.0  # heights stay what they are
     P = surface.vertices[surface.faces] - (middle if moved else 0.0)
-    normal = np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0])
+    normal = area_vectors(P)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     lines = np.concatenate([normal, P.reshape(-1, 9)], axis=1)
     with path.open("w", encoding="utf-8", newline="\n") as file:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
+from ..surface.geometry import area_vectors, segment_lengths
 from .contents import Contents
 
 GAP = 0.05  # of the boundary edges beside it: nearer vertices are one that was drawn twice
@@ -45,7 +46,7 @@ def _open_seams(contents: Contents) -> str:
     if not len(outer):
         return ""
     X: Floats = contents.vertices
-    length = np.linalg.norm(X[outer[:, 1]] - X[outer[:, 0]], axis=1)
+    length = segment_lengths(X, outer)
     beside = np.full(len(X), np.inf)
     np.minimum.at(beside, outer.ravel(), np.repeat(length, 2))
     rim = np.unique(outer)
@@ -80,8 +81,7 @@ def _against(contents: Contents) -> str:
 
 
 def _lying(contents: Contents) -> str:
-    P = contents.vertices[contents.faces]
-    vector = 0.5 * np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0])
+    vector = area_vectors(contents.vertices[contents.faces])
     total = np.abs(vector.sum(axis=0))
     size = float(np.linalg.norm(total))
     if size < LOOKS * float(np.linalg.norm(vector, axis=1).sum()) or total[2] > LEVEL * size:

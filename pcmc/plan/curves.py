@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError, unknown
 from ..surface import Plane
@@ -221,8 +222,7 @@ def circle(centre: npt.ArrayLike, radius: float) -> Curve:
     6.28
     """
     c = _points([centre], "circle", 1)[0]
-    if not (math.isfinite(radius) and radius > 0):
-        raise OptionError(f"circle: radius must be a finite number > 0, found {radius}")
+    validate.number("circle: radius", radius, above=0.0)
     u, v = np.zeros_like(c), np.zeros_like(c)
     u[0] = v[1] = radius
     return Curve((Piece(np.stack([c, u, v]), 2.0 * math.pi),), closed=True)

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError, unknown
 from ..surface import Patch, Plane, Surface, checks
+from ..surface.geometry import area_vectors
 from ..surface.topology import topology
 from .parts import EDGES
 from .walls import add_walls
@@ -162,7 +163,7 @@ def _neighbours(F: Ints, patch: Ints, n: int) -> tuple[Ints, Ints, Bools]:
 def _outwardness(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Floats:
     """(m,) area seen along Π's normal; in a closed mesh, volume seen from its middle."""
     corner = X[F] - X.mean(axis=0)
-    vector = 0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    vector = area_vectors(corner)
     if topology(F, patch, len(X)).boundary_edge.any():
         return vector @ np.array(plane.normal)
     return np.einsum("ij,ij->i", corner[:, 0], vector) / 3.0

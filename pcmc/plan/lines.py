@@ -12,8 +12,8 @@ import shapely
 
 from ..base.arrays import Floats
 from ..base.errors import PlanError
+from ..surface.geometry import cross_2d
 from .curves import Curve
-from .planar import cross
 
 SNAP = 0.01  # of the edge length: lines that miss each other by less are taken to meet
 
@@ -131,10 +131,13 @@ def crossing(one: Drawn, s: float, two: Drawn, t: float) -> tuple[float, float]:
     for _ in range(8):
         along_s = (apart(s - step, t) - apart(s + step, t)) / (2.0 * step)
         along_t = (apart(s, t + step) - apart(s, t - step)) / (2.0 * step)
-        turn = float(cross(along_s, along_t))
+        turn = float(cross_2d(along_s, along_t))
         if abs(turn) < 1e-9 * float(np.linalg.norm(along_s) * np.linalg.norm(along_t)):
             break
-        new_s, new_t = s + float(cross(gap, along_t)) / turn, t + float(cross(gap, along_s)) / turn
+        new_s, new_t = (
+            s + float(cross_2d(gap, along_t)) / turn,
+            t + float(cross_2d(gap, along_s)) / turn,
+        )
         new_s = min(max(new_s, 0.0), float(len(one.curve.pieces)))
         new_t = min(max(new_t, 0.0), float(len(two.curve.pieces)))
         new_gap = apart(new_s, new_t)

@@ -81,5 +81,8 @@ class Area:
             points = np.empty(0)
         if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
             raise OptionError(
-                f"patch {self.name!r}: at must be a point [x, y] or a list of such, found {self.at!r}"
+                f"patch {self.name!r}: at must be a point [x, y] or a list of points, found {self.at!r}",
+                what="at",
+                where=self.name,
+                found=self.at,
             )

@@ -11,6 +11,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError, unknown
 from ..meshing.quality import edge_lengths
 from ..surface import Patch, Plane, Surface
+from ..surface.geometry import bounding_size
 from ..surface.topology import Curve
 from .curves import to_local, to_space
 from .planar import triangulate
@@ -135,7 +136,7 @@ def stand(
     """
     local = to_local(vertices, plane)
     floor = np.zeros(len(vertices)) if floor is None else floor
-    tolerance = 1e-9 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    tolerance = 1e-9 * bounding_size(vertices)
     builder = _Builder(local, floor, fixed, edge_length, tolerance)
     for top in tops:
         builder.check(top)

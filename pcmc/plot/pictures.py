@@ -15,6 +15,7 @@ from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..surface import Surface
 from ..surface.colours import patch_colors
+from ..surface.geometry import area_vectors
 from .colors import color_scale
 from .figure import DPI, INK, SMALL, TEXT, Image, finish, new
 from .raster import paint
@@ -283,7 +284,7 @@ def _print_numbers(axes: Any, surface: Surface, view: View, numbers: Floats, for
 def _facing(surface: Surface, view: View) -> Bools:
     """(n,) vertices whose sheet turns its upper side, along the normal of Π, to the viewer."""
     X, F = surface.vertices, surface.faces
-    area = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]])
+    area = area_vectors(X[F])
     area *= np.where(area @ np.array(surface.plane.normal) < 0.0, -1.0, 1.0)[:, None]
     towards = np.repeat(area @ view.axes[2], 3)
     return np.bincount(F.ravel(), towards, surface.n) > 0.0

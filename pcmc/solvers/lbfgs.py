@@ -13,7 +13,8 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..surface import Surface
-from .evaluate import Evaluator, Point, extent
+from ..surface.geometry import bounding_size
+from .evaluate import Evaluator, Point
 from .result import Callback, Progress, Result, Status, until_stopped
 
 COLUMNS = ("evaluation", "energy", "gradient_squared")
@@ -136,7 +137,7 @@ class Objective:
             self.status = Status.NON_FINITE
         elif converged:
             self.status = Status.CONVERGED
-        elif extent(X) > self.options.inflation * self.surface.size:
+        elif bounding_size(X) > self.options.inflation * self.surface.size:
             self.status = Status.DIVERGED
         elif self.evaluate.count >= self.options.evaluations:  # NLopt's own limit waits for a step
             self.status = Status.ITERATION_LIMIT

@@ -11,7 +11,8 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..surface import Surface
-from .evaluate import Evaluator, Point, extent
+from ..surface.geometry import bounding_size
+from .evaluate import Evaluator, Point
 from .result import Callback, Progress, Result, Status, until_stopped
 
 
@@ -151,7 +152,7 @@ class _Flow:
             return Status.NON_FINITE
         if point.squared <= (self.options.tolerance or 0.0):
             return Status.CONVERGED
-        if extent(point.X) > self.options.inflation * self.surface.size:
+        if bounding_size(point.X) > self.options.inflation * self.surface.size:
             return Status.DIVERGED
         return None
 

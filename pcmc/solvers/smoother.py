@@ -84,7 +84,7 @@ class _Coordinate:
     ) -> None:
         basis = np.zeros((surface.n, 3, 3))
         basis[:, 0, 0] = 1.0
-        self._space = MotionSpace(basis, free.astype(np.int64))
+        self._space = MotionSpace.of(basis, free.astype(np.int64))
         self._surface, self._classes, self._free = surface, classes, free
         self._pattern: Pattern = hessian_pattern(classes, self._space)
         self._factoriser: Factoriser = factoriser(self._pattern, backend)
@@ -117,7 +117,7 @@ class HarmonicExtension:
         used = ~classes.idle
         basis = np.zeros((surface.n, 3, 3))
         basis[:, 0, 0] = 1.0
-        space = MotionSpace(basis, used.astype(np.int64))
+        space = MotionSpace.of(basis, used.astype(np.int64))
         equal = surface.retensioned({p.name: 1.0 for p in surface.patches})
         pattern = hessian_pattern(classes, space)
         data = assemble(equal, classes, space, pattern, X, hessian=0.0, stiffness=1.0)

@@ -16,7 +16,7 @@ from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import edge_lengths
 from ..stability.factorisation import Factor, Factoriser, SingularMatrix, factoriser
 from ..stability.modes import SOFT, full_matrix, lowest, negatives_without, stiffness
-from ..surface.geometry import area_vectors
+from ..surface.geometry import vertex_area_vectors
 from .smoother import HarmonicExtension, Smoother
 from .state import State
 
@@ -144,7 +144,7 @@ class Stepper:
         modes = lowest(system, 1)[1]
         if not len(modes):
             return False
-        normals, area = area_vectors(state.X, state.classes.faces)
+        normals, area = vertex_area_vectors(state.X, state.classes.faces)
         unit = modes[0] * (np.sqrt(area.sum() / 3.0) / np.linalg.norm(modes[0], axis=1).max())
         if (unit * normals).sum() < 0.0:
             unit = -unit  # outwards first, whichever way the surface is turned

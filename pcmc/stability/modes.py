@@ -19,7 +19,7 @@ from ..energy.motion_space import MotionSpace, VertexClasses, motion_space
 from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..surface import Surface
-from ..surface.geometry import area_vectors
+from ..surface.geometry import vertex_area_vectors
 from .factorisation import Factor, SingularMatrix, factoriser
 
 SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
@@ -55,7 +55,7 @@ def full_matrix(pattern: Pattern, data: Floats) -> csr_array:
 
 def lumped_mass(space: MotionSpace, classes: VertexClasses, X: Floats) -> Floats:
     """(N,) a third of the area of the active triangles around each unknown's vertex, length²."""
-    return np.repeat(area_vectors(X, classes.faces)[1] / 3.0, space.dimension)
+    return np.repeat(vertex_area_vectors(X, classes.faces)[1] / 3.0, space.dimension)
 
 
 def negatives_without(factor: Factor, rigid: Floats) -> int:
