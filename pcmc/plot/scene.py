@@ -50,7 +50,7 @@ def view_of(surface: Surface, view: str | tuple[float, float]) -> View:
     """
     if isinstance(view, str):
         if view not in VIEWS:
-            raise OptionError(unknown("view", view, VIEWS))
+            raise OptionError(unknown("view", view, VIEWS), what="view", found=view)
         view = VIEWS[view]
     azimuth, elevation = (math.radians(a) for a in view)
     up = np.array(surface.plane.normal)
