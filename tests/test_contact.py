@@ -69,7 +69,7 @@ def test_which_walls_can_pinch():
     wall = np.unique(surface.faces[surface.patch_of_face == 2])
     crest = np.unique(walls.top_edges)
     np.testing.assert_array_equal(walls.rows.vertices, np.setdiff1d(wall, crest))
-    assert set(walls.tension) == {2.0}
+    assert walls.wall_below.tolist() == [2] * 6
     assert find_walls(four_fans(4)).pinchable.sum() == 4
 
 

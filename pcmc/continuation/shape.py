@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import (
     excess_pull,
-    find_walls,
     place_pinched_walls,
     place_wall_rows,
     standing_part,
@@ -130,8 +127,8 @@ class Shape:
         """(n,) the pull on resting junction vertices beyond what their walls can hold at λ, force."""
         if not self.resting.any():
             return np.zeros(self.full.n)
-        walls = replace(self.walls, tension=find_walls(line.applied(self.full, value)).tension)
-        return excess_pull(line.applied(self.surface, value).moved(X), walls, self.resting)
+        surface = line.applied(self.surface, value).moved(X)
+        return excess_pull(surface, self.walls, self.resting)
 
     # -- triangles -----------------------------------------------------------------------------
 
