@@ -37,9 +37,14 @@ def turned():
     surface, R, shift = partly(), rotation(3), np.array([3.0, -1.0, 2.0])
     plane = Plane(R @ surface.plane.point + shift, R @ surface.plane.normal)
     return Surface(
-        surface.vertices @ R.T + shift, surface.faces, surface.patch_of_face, surface.patches,
-        fixed=surface.fixed, on_plane=surface.on_plane, plane=plane,
-    )  # fmt: skip
+        surface.vertices @ R.T + shift,
+        surface.faces,
+        surface.patch_of_face,
+        surface.patches,
+        fixed=surface.fixed,
+        on_plane=surface.on_plane,
+        plane=plane,
+    )
 
 
 @pytest.mark.parametrize("suffix", WHOLE)

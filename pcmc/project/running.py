@@ -12,7 +12,7 @@ from ..base.errors import BalanceWarning, OptionError, PcmcError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
 from ..certificate.certificate import Certificate
-from ..contact.pinching import find_walls
+from ..contact.pinching import standing_part
 from ..meshing.remeshing import remesh
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
@@ -116,7 +116,7 @@ def run_project(
 
 def _check_balance(surface: Surface) -> None:
     """Warn before a long computation if the tensions alone show that a junction cannot balance."""
-    pinchable = find_walls(surface).pinchable
+    pinchable = standing_part(surface).walls.pinchable
     imbalance = unbalanced(surface, pinchable)
     if imbalance:
         unless = ", unless the junction rests on the plane" if pinchable.any() else ""
