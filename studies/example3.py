@@ -54,7 +54,7 @@ def table(folder: Folder) -> dict[str, float]:
         "alpha": start.tensions[0],
         "alpha_wall": start.tensions[-1],
         "target": start.patches[0].target_curvature,
-        "radius": float(np.linalg.norm(start.vertices[:, :2], axis=1).max().round(DECIMALS)),
+        "radius": float(np.linalg.norm(start.vertices[:, :2], axis=1).max().round(DECIMALS - 1)),
         "height": float(start.vertices[:, 2].max()),
         "t0": T0,
         "axis_offset": _axis_offset(stages["final"]),
