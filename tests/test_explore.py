@@ -169,7 +169,7 @@ def test_the_least_recently_used_draft_is_put_away(client, monkeypatch):
     ("path", "body", "status", "line"),
     [
         ("/api/NAME/follow", '{"tensions": {"lefft": 3}}', 400, "did you mean 'left'"),
-        ("/api/NAME/follow", '{"tensions": {"left": -3}}', 400, "must be a finite number"),
+        ("/api/NAME/follow", '{"tensions": {"left": -3}}', 400, "expected a finite number"),
         ("/api/NAME/follow", '{"tensions": {"left": "a"}}', 400, "'left' is not a number: 'a'"),
         ("/api/NAME/follow", '{"tensions": {"left": true}}', 400, "is not a number"),
         ("/api/NAME/settle", '{"pressures": [1]}', 400, "pressures: expected numbers by patch"),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from pcmc import Patch, Plane, Surface
 from pcmc.base.errors import OptionError, SurfaceError
@@ -170,12 +171,12 @@ def test_projection_reaches_second_order_on_the_circle():
 
 @pytest.mark.parametrize("levels", [-1, 1.5, "two", True])
 def test_levels_must_be_whole(levels):
-    with pytest.raises(OptionError, match="levels must be a whole number"):
+    with refused(OptionError, what="levels", found=levels, expected="a whole number ≥ 0"):
         refine(tent(), levels)
 
 
 def test_bad_projections_are_refused():
-    with pytest.raises(OptionError, match="project must return shape"):
+    with refused(OptionError, what="project", found=(6, 2), expected=(6, 3)):
         refine(tent(), project=lambda p: p[:, :2])
-    with pytest.raises(SurfaceError, match="not finite"):
+    with refused(SurfaceError, what="vertices", where=int(np.argmax(refine(tent()).fixed))):
         refine(tent(), project=lambda p: np.full_like(p, np.nan))
