@@ -7,13 +7,13 @@ from itertools import pairwise
 import numpy as np
 
 from pcmc import Patch, Surface
+from pcmc.base import validate
 from pcmc.base.arrays import Floats, Ints
 
 from .bezier import chain
 from .building import Builder
 from .drape import membrane
 from .meshing import fill
-from .options import positive
 
 WIDTH, DEPTH, HEIGHT = 190.22, 101.56, 29.17
 LEFT, MIDDLE, RIGHT, LEFT_WALL, RIGHT_WALL = range(5)
@@ -83,7 +83,7 @@ def bezier_hall(
     >>> [round(float(side), 2) for side in np.ptp(surface.vertices, axis=0)]
     [190.22, 101.56, 29.17]
     """
-    edge_length = positive(edge_length, "edge_length")
+    edge_length = validate.positive("edge_length", edge_length)
     mesh = Builder()
     outline, arches, hole = _curves(mesh, edge_length)
     held = mesh.positions(np.arange(1 + hole[-1]))

@@ -61,7 +61,7 @@ def candidates(examples: Iterable[str] = tuple(PRINTED)) -> Iterator[Candidate]:
     """
     for example in examples:
         if example not in PRINTED:
-            raise OptionError(unknown("example", example, PRINTED))
+            raise OptionError(unknown("example", example, PRINTED), what="example", found=example)
         for family, parameter, resolutions, build in _families(example):
             for resolution in resolutions:
                 surface = build(resolution)

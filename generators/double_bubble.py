@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Patch, Surface
+from pcmc.base import validate
 from pcmc.base.arrays import Floats, Ints
 from pcmc.base.errors import OptionError
 
 from .building import Builder
 from .exact import Exact, Sphere, UprightPlane
-from .options import positive
 from .rosette import cap_directions, disc_points, even_segments, rosette
 from .sphere import STRETCH
 
@@ -41,7 +41,7 @@ def double_bubble(
     >>> bool(double_bubble_exact().distance(surface).max() < 1e-12)
     True
     """
-    edge_length = positive(edge_length, "edge_length")
+    edge_length = validate.positive("edge_length", edge_length)
     offsets, rim_radius = _offsets(alpha_left, alpha_right, alpha_aux)
     count = int(even_segments(np.array([rim_radius]), edge_length)[0])
     around = 2.0 * np.pi * np.arange(count) / count
@@ -98,8 +98,11 @@ def _offsets(
     alpha_left: float, alpha_right: float, alpha_aux: float
 ) -> tuple[tuple[float, float], float]:
     """Distance of each centre from the disc, and the disc's radius."""
-    left, right = positive(alpha_left, "alpha_left"), positive(alpha_right, "alpha_right")
-    wall = positive(alpha_aux, "alpha_aux")
+    left, right = (
+        validate.positive("alpha_left", alpha_left),
+        validate.positive("alpha_right", alpha_right),
+    )
+    wall = validate.positive("alpha_aux", alpha_aux)
     offset = wall + (left**2 - right**2) / wall
     square = 4.0 * left**2 - offset**2
     if square <= 0.0:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Patch, Surface
+from pcmc.base import validate
 from pcmc.base.arrays import Floats, Ints
-from pcmc.base.errors import OptionError, unknown
 
 from .building import Builder
 from .drape import soap_film
 from .meshing import fill
-from .options import positive, whole
 from .strips import numbered, strips
 
 MESHES = ("rings", "even", "double", "lattice")
@@ -42,12 +41,11 @@ def fans(
     mesh : "rings", ring k with k segments in each fan; "even", with as many as make them about as
         long as the rings are wide; "double", with 2 k; "lattice", a triangular lattice fitted in.
     """
-    rings = whole(rings, "rings", least=2)
-    radius, height = positive(radius, "radius"), positive(height, "height")
-    if bulge is not None and not np.isfinite(bulge):
-        raise OptionError(f"bulge must be a finite number, found {bulge!r}")
-    if mesh not in MESHES:
-        raise OptionError(unknown("mesh", mesh, MESHES))
+    rings = validate.integer("rings", rings, least=2)
+    radius, height = validate.positive("radius", radius), validate.positive("height", height)
+    if bulge is not None:
+        validate.number("bulge", bulge)
+    validate.choice("mesh", mesh, MESHES)
     builder = Builder()
     spacing = radius / rings
     levels = max(1, round(height / spacing))

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcmc import Patch, Surface
+from pcmc.base import validate
 from pcmc.base.errors import OptionError
 
 from .exact import Exact, Sphere, UprightPlane
-from .options import positive
 from .sphere_pair import Ball, build_pair
 
 RISE = 0.7  # of the exact height: a start that is plainly not the solution, and near enough to it
@@ -42,7 +42,7 @@ def joined_caps(
     >>> bool(joined_caps_exact().distance(surface).max() < 1e-12)
     True
     """
-    edge_length = positive(edge_length, "edge_length")
+    edge_length = validate.positive("edge_length", edge_length)
     pair = _Pair.of(alpha_left, alpha_right, alpha_aux, depth)
     left = Ball(-pair.left_offset, -depth, 2.0 * alpha_left)
     right = Ball(pair.right_offset, -depth, 2.0 * alpha_right)
@@ -97,13 +97,13 @@ class _Pair:
 
     @staticmethod
     def of(alpha_left: float, alpha_right: float, alpha_aux: float, depth: float) -> _Pair:
-        positive(depth, "depth")
+        validate.positive("depth", depth)
         for name, alpha in (
             ("alpha_left", alpha_left),
             ("alpha_right", alpha_right),
             ("alpha_aux", alpha_aux),
         ):
-            positive(alpha, name)
+            validate.positive(name, alpha)
         # offsets add up to 2 α_aux, and both triangles with a radius 2 α share the wall's circle
         offset = alpha_aux + (alpha_left**2 - alpha_right**2) / alpha_aux
         square = 4.0 * alpha_left**2 - offset**2

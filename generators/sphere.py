@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Patch, Surface
+from pcmc.base import validate
 from pcmc.base.arrays import Floats, Ints
 
 from .building import Builder
 from .exact import Exact, Sphere
-from .options import positive
 
 STRETCH = (1.05, 1.0, 0.95)  # plainly not a sphere, and near enough to one to find it again
 _GOLDEN = 0.5 * (1.0 + 5.0**0.5)
@@ -30,9 +30,11 @@ def sphere(edge_length: float = 0.4, *, alpha: float = 1.0, exact: bool = False)
     >>> bool(sphere_exact().distance(surface).max() < 1e-12), surface.free.all()
     (True, np.True_)
     """
-    radius = 2.0 * positive(alpha, "alpha")
+    radius = 2.0 * validate.positive("alpha", alpha)
     icosahedron_edge = 2.0 / np.hypot(1.0, _GOLDEN)
-    frequency = max(1, round(icosahedron_edge * radius / positive(edge_length, "edge_length")))
+    frequency = max(
+        1, round(icosahedron_edge * radius / validate.positive("edge_length", edge_length))
+    )
     directions, faces = geodesic(frequency)
     mesh = Builder()
     points = mesh.points(radius * directions * (1.0 if exact else np.array(STRETCH)))
@@ -47,7 +49,7 @@ def sphere_exact(*, alpha: float = 1.0) -> Exact:
     >>> round(ball.energy / np.pi, 12), ball.height
     (5.333333333333, 4.0)
     """
-    radius = 2.0 * positive(alpha, "alpha")
+    radius = 2.0 * validate.positive("alpha", alpha)
     area, volume = 4.0 * np.pi * radius**2, 4.0 / 3.0 * np.pi * radius**3
     shapes = {"bubble": Sphere((0.0, 0.0, 0.0), radius)}
     return Exact(alpha * area - volume, area, volume, 2.0 * radius, shapes)

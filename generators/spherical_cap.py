@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Patch, Surface
+from pcmc.base import validate
 from pcmc.base.errors import OptionError
 
 from .building import Builder
 from .exact import Exact, Sphere
-from .options import positive
 from .rosette import cap_directions, rosette
 
 
@@ -42,10 +42,13 @@ def spherical_cap(
     >>> bool(abs(surface.vertices[0, 2] - spherical_cap_exact().height) < 1e-12)
     True
     """
-    edge_length, radius = positive(edge_length, "edge_length"), positive(radius, "radius")
+    edge_length, radius = (
+        validate.positive("edge_length", edge_length),
+        validate.positive("radius", radius),
+    )
     if exact:
         height = spherical_cap_exact(radius=radius, alpha=alpha).height
-    dome = 0.3 * radius if height is None else positive(height, "height")
+    dome = 0.3 * radius if height is None else validate.positive("height", height)
     ball = (radius**2 + dome**2) / (2.0 * dome)
     opening = 2.0 * np.arctan2(dome, radius)  # from the pole to the rim, seen from the centre
     rings = max(2, round(radius / edge_length))
@@ -67,7 +70,7 @@ def spherical_cap_exact(*, radius: float = 1.0, alpha: float = 0.6) -> Exact:
     >>> round(cap.energy, 10), round(cap.height, 10)
     (1.5039191689, 0.5366750419)
     """
-    radius, alpha = positive(radius, "radius"), positive(alpha, "alpha")
+    radius, alpha = validate.positive("radius", radius), validate.positive("alpha", alpha)
     if 2.0 * alpha < radius:
         raise OptionError(
             f"alpha must be at least radius/2 = {radius / 2:g}, found {alpha:g}: below the"

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from pcmc import Patch, Surface
-from pcmc.base.errors import OptionError, unknown
+from pcmc.base import validate
 
-from .options import positive
 from .sphere_pair import Ball, build_pair
 
 LARGE = Ball(-5.0, -17.5, 18.5)
@@ -46,9 +45,8 @@ def two_caps(
     >>> [p.name for p in surface.patches], float(surface.vertices[:, 2].max().round(1))
     (['large', 'small', 'wall'], 1.0)
     """
-    edge_length = positive(edge_length, "edge_length")
-    if wall not in WALLS:
-        raise OptionError(unknown("wall", wall, WALLS))
+    edge_length = validate.positive("edge_length", edge_length)
+    validate.choice("wall", wall, WALLS)
     mesh, fixed, sliding = build_pair(LARGE, SMALL, edge_length, upright=wall == "upright")
     patches = (
         Patch("large", alpha_large),

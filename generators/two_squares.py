@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Patch, Surface
+from pcmc.base import validate
 from pcmc.base.arrays import Floats, Ints
-from pcmc.base.errors import OptionError, unknown
 
 from .building import Builder
-from .options import positive, whole
 
 LEFT, RIGHT, WALL = range(3)
 DIAGONALS = ("symmetric", "parallel")
@@ -47,10 +46,9 @@ def two_squares(
     >>> surface.n, surface.m, float(surface.vertices[:, 2].max())
     (48, 70, 1.0)
     """
-    n = whole(n, "n", least=2)
-    side, height = positive(side, "side"), positive(height, "height")
-    if diagonals not in DIAGONALS:
-        raise OptionError(unknown("diagonals", diagonals, DIAGONALS))
+    n = validate.integer("n", n, least=2)
+    side, height = validate.positive("side", side), validate.positive("height", height)
+    validate.choice("diagonals", diagonals, DIAGONALS)
     mesh = Builder()
     number = mesh.points(_roof(n, side, height)).reshape(2 * n + 1, n + 1)
     faces = _squares(number, n, diagonals)

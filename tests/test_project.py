@@ -330,7 +330,10 @@ def test_what_is_not_certified_is_not_remeshed(small):
         ),
         ("[[remesh]]\nedge_length = 1\n[[remesh]]\nwen = 1", "line 13: unknown key .*'when'"),
         ("[remesh]\nnear_curves = 0.5", "needs an edge_length"),
-        ("[remesh]\nedge_length = -1", "remesh: edge_length: expected a finite number > 0, found -1"),
+        (
+            "[remesh]\nedge_length = -1",
+            "remesh: edge_length: expected a finite number > 0, found -1",
+        ),
         (
             "[remesh]\nedge_length = 'a'",
             "remesh: edge_length: expected a finite number > 0, found 'a'",

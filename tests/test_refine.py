@@ -178,5 +178,6 @@ def test_levels_must_be_whole(levels):
 def test_bad_projections_are_refused():
     with refused(OptionError, what="project", found=(6, 2), expected=(6, 3)):
         refine(tent(), project=lambda p: p[:, :2])
-    with refused(SurfaceError, what="vertices", where=int(np.argmax(refine(tent()).fixed))):
+    first = int(np.flatnonzero(refine(tent()).fixed[tent().n :])[0])
+    with refused(SurfaceError, what="vertices", where=tent().n + first):
         refine(tent(), project=lambda p: np.full_like(p, np.nan))

@@ -55,6 +55,15 @@ def number(
     return given
 
 
+def positive(name: str, value: object) -> float:
+    """A finite float > 0.
+
+    >>> positive("radius", 2)
+    2.0
+    """
+    return number(name, value, above=0.0)
+
+
 def integer(
     name: str,
     value: object,

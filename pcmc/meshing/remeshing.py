@@ -123,10 +123,10 @@ def check_lengths(
     Traceback (most recent call last):
     pcmc.base.errors.OptionError: growth: expected a finite number > 1, found 1
     """
-    validate.number("edge_length", edge_length, above=0.0)
+    validate.positive("edge_length", edge_length)
     for name, value in {"near_curves": near_curves, "chord": chord}.items():
         if value is not None:
-            validate.number(name, value, above=0.0)
+            validate.positive(name, value)
     validate.number("growth", growth, above=1.0)
 
 
