@@ -170,7 +170,7 @@ def test_the_least_recently_used_session_expires(client, monkeypatch):
     ("path", "body", "status", "line"),
     [
         ("/api/NAME/follow", '{"tensions": {"lefft": 3}}', 400, "did you mean 'left'"),
-        ("/api/NAME/follow", '{"tensions": {"left": -3}}', 400, "must be a finite number"),
+        ("/api/NAME/follow", '{"tensions": {"left": -3}}', 400, "expected a finite number"),
         (
             "/api/NAME/follow",
             '{"tensions": {"left": "a"}}',

@@ -114,7 +114,7 @@ def test_without_an_equilibrium_the_verdict_shows_it_and_the_last_surface_stays(
         assert page.verdict == "stable"
         assert float(page.number("Tension α of cap").get_attribute("value")) > 0.47
         page.enter("Tension α of cap", -1)
-        assert "must be a finite number" in until(lambda: page.text("#note"), "the note")
+        assert "expected a finite number" in until(lambda: page.text("#note"), "the note")
         assert float(page.number("Tension α of cap").get_attribute("value")) > 0.47
         console = page.complaints()
         assert all("400 (Bad Request)" in line for line in console)

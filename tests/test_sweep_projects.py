@@ -109,7 +109,7 @@ BAD = [
     ("plan.edge_length", "x", "must be a finite number, found 'x'"),
     ("plan.edge_length", True, "must be a finite number, found True"),
     ("west.tension", float("nan"), "west.tension must be a finite number, found nan"),
-    ("west.tension", -2.0, "patch 'west': tension must be a finite number ≥ 0"),
+    ("west.tension", -2.0, "tension of 'west': expected a finite number ≥ 0"),
     ("solve.tolerance", -1.0, "tolerance"),
 ]
 
