@@ -148,9 +148,9 @@ def test_sweep(folder, capsys):
         "--csv",
         "t.csv",
     ]
-    assert cli.main([*given, "--store", "s.jsonl"]) == 0
+    assert cli.main([*given, "--store", "s.sqlite"]) == 0
     assert pd.read_csv("t.csv")["alpha_aux"].tolist() == [0.5, 1.0]
-    assert cli.main([*given, "--store", "s.jsonl"]) == 0  # nothing is left to do
+    assert cli.main([*given, "--store", "s.sqlite"]) == 0  # nothing is left to do
     assert cli.main([*given, "--method", "nesterov", "iterations=2"]) == 1
     assert "stable" in capsys.readouterr().out
 
