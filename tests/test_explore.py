@@ -199,9 +199,16 @@ def test_bad_requests_are_answered_in_one_line(client, path, body, status, line)
 
 @pytest.mark.parametrize(
     "path",
-    ["/page/../server.py", "/page/..%2fserver.py", "/page/none.js", "/page/__init__.py", "/x",
-     "/api/nobody/export?suffix=.obj", "/page/"],
-)  # fmt: skip
+    [
+        "/page/../server.py",
+        "/page/..%2fserver.py",
+        "/page/none.js",
+        "/page/__init__.py",
+        "/x",
+        "/api/nobody/export?suffix=.obj",
+        "/page/",
+    ],
+)
 def test_only_the_pages_own_files_are_served(client, path):
     answer, body = client.raw("GET", path)
     assert answer.status in (404, 410)

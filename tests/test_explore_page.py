@@ -181,9 +181,7 @@ def test_two_pages_are_two_sessions(driver, explorer):
 def test_colours_come_with_their_scale(page):
     before = page.picture()
     assert not page.find("#legend").is_displayed()
-    for name, words in (
-        ("curvature", "1/length"), ("error", "%"), ("reactions", "force/length"),
-    ):  # fmt: skip
+    for name, words in (("curvature", "1/length"), ("error", "%"), ("reactions", "force/length")):
         page.find(f"#colours input[value={name}]").click()
         page.idle()
         assert words in page.text("#legend .name")
