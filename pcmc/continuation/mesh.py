@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import (
     excess_pull,
-    find_walls,
     place_pinched_walls,
     place_wall_rows,
     standing_part,
@@ -127,6 +124,5 @@ class BranchMesh:
         """(n,) the pull on resting junction vertices beyond what their walls can hold at λ, force."""
         if not self.resting.any():
             return np.zeros(self.full.n)
-        tension = find_walls(self.line.surface_at(self.full, value)).tension
         pulled = self.line.surface_at(self.surface, value).moved(X)
-        return excess_pull(pulled, replace(self.walls, tension=tension), self.resting)
+        return excess_pull(pulled, self.walls, self.resting)
