@@ -124,5 +124,5 @@ class BranchMesh:
         """(n,) the pull on resting junction vertices beyond what their walls can hold at λ, force."""
         if not self.resting.any():
             return np.zeros(self.full.n)
-        surface = self.line.surface_at(self.surface, value).moved(X)
-        return excess_pull(surface, self.walls, self.resting)
+        pulled = self.line.surface_at(self.surface, value).moved(X)
+        return excess_pull(pulled, self.walls, self.resting)
