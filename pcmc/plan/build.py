@@ -170,8 +170,8 @@ def _warn_of_free_edges(drawn: Arrangement, lines: Sequence[Line], held: Bools) 
             place = drawn.points[free[0]].round(4).tolist()
             text = (
                 f"nothing holds {line.name} at {place} ({len(free)} such vertices): the tension has"
-                " nothing to pull against there, and the roof will hardly come to rest; hold the edge,"
-                " along a curve in space if it is to be above the plane"
+                " nothing to pull against there, and there is probably no equilibrium; fix the edge,"
+                " along a curve in space if it should be above the plane"
             )
             warnings.warn(text, PlanWarning, stacklevel=4)
 
