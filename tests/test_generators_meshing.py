@@ -94,13 +94,13 @@ def test_strips_fill_the_gap_once(mirrored):
     assert areas.sum() == pytest.approx(0.5 * (segments[:-1] + segments[1:]).sum())
 
 
-def test_even_strips_lean_as_told():
+def test_even_strips_lean_to_the_given_side():
     lean = [strips(np.arange(6), np.array([2, 2]), np.array([m])).tolist() for m in (False, True)]
     assert [0, 3, 1] in lean[0]
     assert [0, 3, 4] in lean[1]
 
 
-def test_a_wall_shares_what_it_is_given():
+def test_a_wall_shares_the_given_side():
     mesh = Builder()
     side = mesh.add_points([[0, 0, 0], [0, 0, 0.9], [0, 0, 2.0]])
     top = np.append(side[-1], mesh.add_points([[1, 0, 1.1], [2, 0, 0]]))

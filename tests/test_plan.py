@@ -147,7 +147,7 @@ def test_raised_boundary_has_posts_at_the_walls_ends():
     assert len(foot) == 7
 
 
-def test_what_is_drawn_across_a_hole_or_beyond_the_outline_is_left_out():
+def test_lines_across_a_hole_or_beyond_the_outline_are_left_out():
     cross = [[[10, -1], [10, 13]], [[-1, 6], [21, 6]]]
     surface = Plan(BOX, cross, [circle([10, 6], 2)], tension=10.0).surface()
     assert names(surface)[-2:] == ["wall 1", "wall 2"]
@@ -206,7 +206,7 @@ def test_points_curves_and_edges_as_supports():
     assert (gap.min(axis=1) < 0.01).sum() == len(middle) - 1 > 8
 
 
-def test_a_free_edge_that_is_held_all_along_is_none():
+def test_a_free_edge_with_supports_all_along_is_a_fixed_edge():
     held = Plan(BOX, edge="free", supports=[join(polyline([*BOX, BOX[0]]))], tension=10.0).surface()
     assert held.fixed.sum() == Plan(BOX, tension=10.0).surface().fixed.sum()
 

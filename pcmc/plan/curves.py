@@ -169,21 +169,13 @@ def polyline(points: npt.ArrayLike, closed: bool = False) -> Curve:
     if closed and len(P) > 2 and np.array_equal(P[0], P[-1]):
         P = P[:-1]
     if closed and len(P) < 3:
-        raise OptionError(
-            f"polyline: a closed polyline needs 3 points, found {len(P)}",
-            what="polyline",
-            found=len(P),
-            expected=3,
-        )
+        raise _error("polyline", f"closed, it needs 3 points, found {len(P)}", None, len(P), 3)
     following = np.roll(P, -1, axis=0) if closed else P[1:]
     double = np.flatnonzero((P[: len(following)] == following).all(axis=1))
     if len(double):
-        raise OptionError(
-            f"polyline: points {double[0]} and {(double[0] + 1) % len(P)} are both"
-            f" {P[double[0]].tolist()}; remove one",
-            what="polyline",
-            where=int(double[0]),
-        )
+        first = int(double[0])
+        both = f"points {first} and {(first + 1) % len(P)} are both {P[first].tolist()}"
+        raise _error("polyline", f"{both}; remove one", first)
     pieces = tuple(Piece(np.stack(ends)) for ends in zip(P, following, strict=False))
     return _closed_if_ends_meet(Curve(pieces, closed))
 
@@ -196,7 +188,7 @@ def bezier(control: npt.ArrayLike) -> Curve:
     """
     P = _points(control, "bezier", 2)
     if np.ptp(P, axis=0).max() == 0.0:
-        raise OptionError(f"bezier: all control points are {P[0].tolist()}", what="bezier")
+        raise _error("bezier", f"all control points are {P[0].tolist()}")
     return _closed_if_ends_meet(Curve((Piece(P),)))
 
 
@@ -211,7 +203,7 @@ def arc(start: npt.ArrayLike, through: npt.ArrayLike, end: npt.ArrayLike) -> Cur
     uu, uv, vv = u @ u, u @ v, v @ v
     area = uu * vv - uv * uv  # squared area of the parallelogram
     if area <= 1e-24 * max(uu, vv) ** 2:
-        raise OptionError("arc: its three points lie on one line; use a polyline", what="arc")
+        raise _error("arc", "its three points lie on one line; use a polyline")
     centre = a + (0.5 * vv * (uu - uv) * u + 0.5 * uu * (vv - uv) * v) / area
     first = a - centre
     across = (b - centre) - ((b - centre) @ first) / (first @ first) * first
@@ -243,29 +235,21 @@ def join(*curves: Curve) -> Curve:
     True
     """
     if not curves:
-        raise OptionError("join: give at least one curve", what="join")
+        raise _error("join", "give at least one curve")
     closed = [number for number, curve in enumerate(curves) if curve.closed]
     if closed and len(curves) > 1:
-        raise OptionError(
-            f"join: curve {closed[0]} is closed; only open curves can be joined",
-            what="join",
-            where=closed[0],
-        )
+        problem = f"curve {closed[0]} is closed; only open curves can be joined"
+        raise _error("join", problem, closed[0])
     dimensions = {curve.pieces[0].points.shape[1] for curve in curves}
     if len(dimensions) > 1:
-        raise OptionError(
-            "join: some curves are plane and some in space; give all in space", what="join"
-        )
+        raise _error("join", "some curves are plane and some in space; give all in space")
     tolerance = 1e-9 * max(curve.length for curve in curves)
     for number in range(1, len(curves)):
         before, after = _end(curves[number - 1], 1), _end(curves[number], 0)
         if np.linalg.norm(after - before) > tolerance:
-            raise OptionError(
-                f"join: curve {number} starts at {after.tolist()}, but curve {number - 1} ends at"
-                f" {before.tolist()}",
-                what="join",
-                where=number,
-            )
+            problem = f"curve {number} starts at {after.tolist()}"
+            before_it = f"curve {number - 1} ends at {before.tolist()}"
+            raise _error("join", f"{problem}, but {before_it}", number)
     return _closed_if_ends_meet(Curve(tuple(piece for curve in curves for piece in curve.pieces)))
 
 
@@ -325,9 +309,7 @@ def _from_mapping(spec: Mapping[str, Any]) -> Curve:
 
 def _circle_keys(spec: Any) -> dict[str, Any]:
     if not isinstance(spec, Mapping) or set(spec) != {"centre", "radius"}:
-        raise OptionError(
-            f"circle: expected centre and radius, found {spec!r}", what="circle", found=spec
-        )
+        raise _error("circle", f"expected centre and radius, found {spec!r}", None, spec)
     return dict(spec)
 
 
@@ -341,36 +323,30 @@ def _end(path: Curve, end: int) -> Floats:
     return path.at([float(end * len(path.pieces))])[0]
 
 
+def _error(
+    what: str, problem: str, where: object = None, found: object = None, expected: object = None
+) -> OptionError:
+    """The error about a kind of curve."""
+    return OptionError(f"{what}: {problem}", what=what, where=where, found=found, expected=expected)
+
+
 def _points(points: Any, what: str, least: int, exactly: bool = False) -> Floats:
     try:
         P = np.array(points)
         if P.dtype.kind not in "iuf":  # numpy would take the text "8" for a number
             raise ValueError
     except (TypeError, ValueError):
-        raise OptionError(
-            f"{what}: expected points, all [x, y] or all [x, y, z]", what=what, found=points
-        ) from None
+        problem = "expected points, all [x, y] or all [x, y, z]"
+        raise _error(what, problem, None, points) from None
     P = P.astype(float)
     if P.ndim != 2 or P.shape[1] not in (2, 3):
-        raise OptionError(
-            f"{what}: expected points [x, y] or [x, y, z], found shape {P.shape}",
-            what=what,
-            found=P.shape,
-        )
+        problem = f"expected points [x, y] or [x, y, z], found shape {P.shape}"
+        raise _error(what, problem, None, P.shape)
     if len(P) < least or (exactly and len(P) != least):
-        raise OptionError(
-            f"{what}: expected {least} points, found {len(P)}",
-            what=what,
-            found=len(P),
-            expected=least,
-        )
+        raise _error(what, f"expected {least} points, found {len(P)}", None, len(P), least)
     bad = np.flatnonzero(~np.isfinite(P).all(axis=1))
     if len(bad):
-        raise OptionError(
-            f"{what}: point {bad[0]} = {P[bad[0]].tolist()} is not finite",
-            what=what,
-            where=int(bad[0]),
-        )
+        raise _error(what, f"point {bad[0]} = {P[bad[0]].tolist()} is not finite", int(bad[0]))
     return P
 
 
