@@ -108,8 +108,9 @@ def vertex_area_vectors(X: Floats, F: Ints) -> tuple[Floats, Floats]:
         area_vector = scaled(0.5, cross(sub(b, a), sub(c, a)))
         face_area = norm(area_vector)
         for k in range(3):
-            accumulate(total, F[f, k], area_vector)
-            area[F[f, k]] += face_area
+            v = F[f, k]
+            accumulate(total, v, area_vector)
+            area[v] += face_area
     return total, area
 
 
