@@ -13,7 +13,7 @@ from pcmc.base.errors import MissingExtra, OptionError
 from pcmc.energy.functional import patch_areas
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.meshing.refinement import refine
-from pcmc.meshing.remeshing import _by_mmg, _cut_curves, _patch_angles, remesh
+from pcmc.meshing.remeshing import _cut_curves, _patch_angles, _remesh_with_mmg, remesh
 from pcmc.plan import Plan
 
 
@@ -117,7 +117,7 @@ def test_a_thin_wall_keeps_its_triangles_where_they_are_better():
 
 def test_good_triangles_in_corners_are_left_alone():
     mesh = _cut_curves(generators.two_squares(), 0.5)
-    done = _by_mmg(mesh, np.full(len(mesh.X), 0.5), 1.2, 0.05)
+    done = _remesh_with_mmg(mesh, np.full(len(mesh.X), 0.5), 1.2, 0.05)
     assert _patch_angles(done, 3)[2] > 25.0
 
 

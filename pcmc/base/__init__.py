@@ -1,4 +1,4 @@
-"""What every room uses: errors, array types, options checked, files written whole, Ctrl-C, compiled loops.
+"""Used by every room: errors, array types, checks of values, atomic file writing, interrupts, compiled loops.
 
 Imports nothing of pcmc from outside this folder.
 """

@@ -1,4 +1,4 @@
-"""The exceptions of pcmc. Every message says what was expected, what was found, where, and what to do."""
+"""The exceptions of pcmc. A message says what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from difflib import get_close_matches
 class PcmcError(ValueError):
     """Base of every error that pcmc raises on purpose.
 
-    The message is a sentence for a person; the attributes say the same to a program.
+    The message is for a person, the attributes are for a program.
 
     Attributes
     ----------
     what : the argument, option, key, patch or file that is wrong.
-    where : where in it: an index, a line, a key; None where there is no such place.
-    found, expected : what it holds, and what it may hold.
+    where : the index, line, key or owner of the wrong value, if there is one.
+    found, expected : the wrong value, and the values allowed.
 
     >>> error = PcmcError("tension: expected a number ≥ 0, found -1", what="tension", found=-1)
     >>> error.what, error.where, error.found
@@ -40,7 +40,7 @@ class SurfaceError(PcmcError):
 
 
 class OptionError(PcmcError):
-    """A parameter of a function or solver is outside what it may be."""
+    """A parameter has a value that is not allowed."""
 
 
 class FileError(PcmcError):
@@ -48,11 +48,11 @@ class FileError(PcmcError):
 
 
 class FileWarning(UserWarning):
-    """A file was read or written, but not everything in it could be kept as it was."""
+    """A file was read or written with changes to its content."""
 
 
 class LostWarning(FileWarning):
-    """What the format of a file cannot carry was left out."""
+    """Data were left out of a file because its format cannot store them."""
 
 
 class PlanError(PcmcError):
@@ -60,7 +60,7 @@ class PlanError(PcmcError):
 
 
 class PlanWarning(UserWarning):
-    """A plan can be meshed, but its roof will hardly come to rest."""
+    """A plan can be meshed, but its roof is unlikely to have an equilibrium."""
 
 
 class BalanceWarning(UserWarning):
@@ -72,7 +72,7 @@ class SweepError(PcmcError):
 
 
 class MissingExtra(ImportError):
-    """A part of pcmc was asked for whose libraries are not installed."""
+    """A library that this part of pcmc needs is not installed."""
 
     def __init__(self, library: str, extra: str) -> None:
         super().__init__(
@@ -81,11 +81,11 @@ class MissingExtra(ImportError):
 
 
 class FreeSurfaceWarning(UserWarning):
-    """Nothing holds the surface: translations cost no energy."""
+    """No support holds the surface: translations cost no energy."""
 
 
 def unknown(what: str, found: object, known: Iterable[str]) -> str:
-    """Message for a name that is not known, with the nearest known one.
+    """Message for an unknown name, with the nearest known one.
 
     >>> unknown("method", "newtn", ["newton", "lbfgs"])
     "unknown method 'newtn'; did you mean 'newton'? Known: newton, lbfgs"

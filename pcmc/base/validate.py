@@ -1,7 +1,7 @@
-"""The checks of single values for the whole package. Each error names the parameter.
+"""Checks of single values, for the whole package. Each error names the parameter.
 
-``where`` is what has the parameter, as a patch has a tension; ``hint`` ends the message with what to do;
-``error`` is the exception to raise.
+``where`` names the owner of the parameter, such as the patch of a tension; ``hint`` is added to the message
+and says what to do; ``error`` is the exception to raise.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def integer(
 
 
 def flag(name: str, value: object) -> bool:
-    """True or False and nothing that merely looks like it."""
+    """True or False; 0, 1 and others are refused."""
     if not isinstance(value, bool):
         refuse(name, value, "True or False")
     return value
@@ -110,7 +110,7 @@ def vector(
 
 
 def choice(name: str, value: object, known: Sequence[str]) -> str:
-    """One of the known words.
+    """One of the known names.
 
     >>> choice("armijo", "suficient", ["printed", "sufficient"])  # doctest: +ELLIPSIS
     Traceback (most recent call last):
@@ -140,7 +140,7 @@ def refuse(
     hint: str = "",
     error: type[PcmcError] = OptionError,
 ) -> NoReturn:
-    """Raise the error that says which parameter has a wrong value, and what was expected."""
+    """Raise the error for a parameter with a wrong value."""
     owner = "" if where is None else f" of {where!r}"
     message = f"{name}{owner}: expected {expected}, found {value!r}{hint and f'; {hint}'}"
     raise error(message, what=name, where=where, found=value, expected=expected)

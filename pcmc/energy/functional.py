@@ -59,9 +59,9 @@ def total(tensions: Floats, areas: Floats, pressures: Floats, volumes: Floats) -
 def energy_and_gradient(
     surface: Surface, X: Floats | None = None, *, supports: bool = True, workers: int | None = None
 ) -> tuple[float, Floats]:
-    """E and ∇E (n,3) in one pass over the triangles, at X or where the surface stands.
+    """E and ∇E (n,3) in one pass over the triangles, at X or at the surface's own vertices.
 
-    ``supports=False`` leaves the forces at held vertices in: what the supports must carry.
+    ``supports=False`` keeps the forces at held vertices, which the supports must carry.
     """
     areas, volumes, gradient = kernels.measure(
         kernels.energy_mesh(surface), surface.vertices if X is None else X, workers

@@ -4,7 +4,7 @@ The forces that a P-CMC surface lacks are f = B Bᵀ ∇E, and along a motion d 
 
     Bᵀ Df[d] = Bᵀ (∂²E) d + Bᵀ D(B Bᵀ)[d] ∇E.
 
-The second part counts off rest, and it is what makes Newton's method converge quadratically:
+The second part vanishes at rest. Newton's method converges quadratically only with it:
 
 - inside a sheet, with the area vector a = |a| n:   (∇E - n n·∇E) · Da / |a|;
 - on a curve, with the chord c = |c| t between its neighbours:   -(t·∇E) Bᵀ Dc / |c|;
@@ -150,7 +150,7 @@ def _add_times(
         nu = scaled(scale, n)
         half_nu = scaled(0.5 * alpha, nu)
         half_Dnu = scaled(scale * (0.5 * alpha), sub(Dn, scaled(dot(nu, Dn), nu)))
-        # tension: ν × u acts at c, -ν × w at b, and what balances both at a
+        # tension: ½ α ν × u acts at c, -½ α ν × w at b, and the negative of their sum at a
         along_u = cross_sum(half_Dnu, u, half_nu, Du)
         along_w = cross_sum(half_Dnu, w, half_nu, Dw)
         # pressure: the corners seen from the point of Π

@@ -35,7 +35,7 @@ from ..surface.geometry import (
 
 
 class Mesh(NamedTuple):
-    """Triangles with their energy's weights, as compiled loops take them; positions come separately.
+    """Faces with the weights of their energy, as one argument of compiled loops; positions are another.
 
     Attributes
     ----------

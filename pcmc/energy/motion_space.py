@@ -49,7 +49,7 @@ PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
 
 @dataclass(frozen=True, eq=False)
 class VertexClasses:
-    """What stays the same while the vertices move: the pulling faces and what each vertex lies on.
+    """The active faces, which exert forces, and the class of each vertex: both stay as vertices move.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class MotionSpace(NamedTuple):
 def vertex_classes(
     surface: Surface, crest: Ints | None = None, level: Bools | None = None
 ) -> VertexClasses:
-    """The pulling faces of a surface and what its vertices lie on.
+    """The active faces of a surface and the classes of its vertices.
 
     ``crest`` (k,2) leads from each junction vertex that rests on Π to its neighbours on the junction:
     that is its curve, sharp or not, and whatever else ends there, as a standing wall does beside.
@@ -211,7 +211,7 @@ def force_scale(surface: Surface, classes: VertexClasses, X: Floats) -> float:
 
 
 def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors (k,3) that complete each unit direction (k,3) to a right-handed classes."""
+    """Two unit vectors (k,3) that complete each unit direction (k,3) to a right-handed frame."""
     axis = np.eye(3)[np.abs(directions).argmin(axis=1)]
     first = np.cross(directions, axis)
     first /= np.linalg.norm(first, axis=1)[:, None]
@@ -224,7 +224,7 @@ def _against_the_others(topo: Topology) -> Bools:
     smooth = (topo.valence == 2) & ~topo.seam_edge
     hit = np.flatnonzero(smooth[flat])
     one, other = (hit[np.argsort(flat[hit], kind="stable")] // 3).reshape(-1, 2).T
-    # every face twice, as it is and turned over: what hangs together runs the same way
+    # every face twice, as it is and turned over: connected copies run the same way
     m = len(topo.faces)
     across = topo.one_way_edge[smooth] * m
     second = np.append(other + across, other + m - across)

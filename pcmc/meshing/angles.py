@@ -1,4 +1,4 @@
-"""The few worst triangles of a mesh, made better by moving single vertices along the surface."""
+"""Larger smallest angles: single vertices of the worst triangles move along the surface."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..surface.geometry import angles, area_vectors
 
 SWEEPS = 12
-MOST = 400  # vertices a sweep: this is for leftovers, not for whole meshes
+MOST = 400  # vertices a sweep: only the worst triangles are worth the time
 TURNS = 2.0 * np.pi * np.arange(8) / 8.0
 REACHES = (0.02, 0.06, 0.15)  # of the longest edge of the star
 

@@ -1,4 +1,4 @@
-"""How good the triangles are: one number each, 1 for equilateral, 0 for degenerate."""
+"""Quality of triangles: 1 for an equilateral one, 0 for a degenerate one."""
 
 from __future__ import annotations
 

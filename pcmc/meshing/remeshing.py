@@ -26,7 +26,9 @@ PASSES = 3  # of MMG at most, each on the result of the one before; a patch take
 GOOD_ANGLE = 25.0  # degrees; no further pass is made when all angles reach it
 LEAST_ANGLE = 20.0  # degrees; a patch that stays below it ...
 WORSE = 0.8  # ... and below this share of its old smallest angle keeps its old triangles, cut
-RAISED = 0.25  # of its spacing: what a resting junction is lifted by, so that its wall has area
+RAISED = (
+    0.25  # of its spacing: height to which a resting junction is lifted, so that its wall has area
+)
 BLUNT, OBTUSE = 25.0, 100.0  # degrees; for the upper two angles of one that fills a corner well
 
 
@@ -40,12 +42,12 @@ def remesh(
 ) -> Surface:
     """The same surface with triangles near a wanted edge length.
 
-    Patches, tensions, the plane and all names stay. Boundaries, junctions and seams stay where they
-    are to rounding: their vertices are kept, and new ones are put on the straight edges between
-    them, with the same support as their edge. (So along curves the mesh gets finer, never coarser.)
-    Vertices held inside a patch stay. A junction that rests on the plane is lifted off it by a quarter
-    of its edges, for its wall to have triangles; solving brings it down again. Everywhere else MMG
-    puts new vertices on a smooth approximation of the surface: solve again afterwards.
+    Patches, tensions, the plane and all names stay. Boundaries, junctions and seams do not move, to
+    rounding: their vertices stay, and new ones are put on the straight edges between them, with the
+    same support as the edge. So along curves the mesh gets finer, never coarser. Vertices held inside a
+    patch stay. A junction that rests on the plane is lifted off it by a quarter of its edges, so that
+    its wall has triangles; solving brings it down again. Everywhere else MMG puts new vertices on a
+    smooth approximation of the surface: solve again afterwards.
 
     Parameters
     ----------
@@ -81,7 +83,7 @@ def remesh(
     mesh = old
     for _ in range(PASSES):
         size = _sizes(mesh, edge_length, growth)
-        mesh = _by_mmg(mesh, size, growth, CHORD * edge_length if chord is None else chord)
+        mesh = _remesh_with_mmg(mesh, size, growth, CHORD * edge_length if chord is None else chord)
         mesh = replace(mesh, X=improve_angles(mesh.X, mesh.F, mesh.source < 0, GOOD_ANGLE))
         candidates.append(mesh)
         if angles(mesh.X[mesh.F]).min() >= GOOD_ANGLE:
@@ -282,23 +284,23 @@ def _sizes(mesh: _Mesh, edge_length: float, growth: float) -> Floats:
     return size
 
 
-def _by_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> _Mesh:
+def _remesh_with_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> _Mesh:
     """The mesh after MMG, with the same curves."""
     try:
         from mmgpy import MmgMeshS
     except ImportError:
         raise MissingExtra("mmgpy", "remesh") from None
     held = np.flatnonzero(mesh.fixed | mesh.sliding)
-    kept = np.unique(np.concatenate([mesh.curves.ravel(), held]))
+    fixed = np.unique(np.concatenate([mesh.curves.ravel(), held]))
     reference = np.zeros(len(mesh.X), dtype=np.int64)
-    reference[kept] = 1 + np.arange(len(kept))
+    reference[fixed] = 1 + np.arange(len(fixed))
     tool: Any = MmgMeshS()
     tool.set_mesh_size(vertices=len(mesh.X), triangles=len(mesh.F), edges=len(mesh.curves))
     tool.set_vertices(np.ascontiguousarray(mesh.X), reference)
     tool.set_triangles(mesh.F.astype(np.int32), mesh.patch.astype(np.int64) + 1)
     tool.set_edges(mesh.curves.astype(np.int32), np.ones(len(mesh.curves), dtype=np.int64))
     tool.set_required_edges(np.arange(len(mesh.curves), dtype=np.int32))
-    tool.set_required_vertices(kept.astype(np.int32))
+    tool.set_required_vertices(fixed.astype(np.int32))
     tool.set_required_triangles(_corners_to_keep(mesh).astype(np.int32))
     tool["metric"] = size[:, None]
     try:
@@ -318,7 +320,7 @@ def _by_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> _Mesh:
         ) from None
     X, reference = tool.get_vertices_with_refs()
     F, patch = tool.get_triangles_with_refs()
-    place = np.append(-1, kept)[reference]
+    place = np.append(-1, fixed)[reference]
     known = place >= 0
     number = np.full(len(mesh.X), -1)
     number[place[known]] = np.flatnonzero(known)
@@ -364,7 +366,7 @@ def _check_curves(before: _Mesh, curves: Ints, F: Ints, n: int) -> None:
 def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Surface:
     """A Surface of the best triangles for each patch: they fit, because the curves are the same.
 
-    Kept vertices are taken from ``old``: MMG scales the mesh, which changes the last digits.
+    Vertices of ``old`` keep its positions: MMG scales the mesh, which changes the last digits.
     """
     meshes = [old, *candidates]
     angle = np.array([_patch_angles(mesh, len(surface.patches)) for mesh in meshes])

@@ -1,4 +1,4 @@
-"""The checks that stand between a caller's arrays and a Surface. Each names the first offender."""
+"""Checks of the arrays that a Surface is made of. Each error names the first wrong entry."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def mesh(
     held: Bools,
     height: Floats,
 ) -> None:
-    """Unreferenced vertices, zero areas, double faces, and each patch an oriented manifold."""
+    """Every vertex is used, no triangle is flat or doubled, each patch is an oriented manifold."""
     names = [p.name for p in patches]
     unused = np.flatnonzero(np.bincount(F.ravel(), minlength=len(X)) == 0)
     if len(unused):
@@ -137,10 +137,10 @@ def mesh(
 
 
 def _vanished(F: Ints, patch: Ints, patches: Sequence[Any], held: Bools, low: Bools) -> Bools:
-    """(m,) faces of a wall that has no height there, because its junction rests on Π.
+    """(m,) faces of a wall without height, because its junction rests on Π.
 
-    Such a wall has a vertex on Π that nothing holds there and that a sheet under pressure shares. Of
-    its faces those may have no area that have two vertices on Π, one of them not held.
+    Such a wall shares a vertex on Π, which no support holds, with a sheet under pressure. A face of it
+    may have no area if two of its vertices are on Π and one of these is not held.
     """
     wall = np.array([p.auxiliary for p in patches])[patch]
     rests = low & ~held

@@ -1,4 +1,4 @@
-"""Colours that can be told apart with every kind of colour blindness."""
+"""Colours that remain distinct with every kind of colour blindness."""
 
 from __future__ import annotations
 

@@ -3,12 +3,12 @@
 A triangle has corners a, b, c, counter-clockwise seen from its positive side. Edge k is opposite corner
 k: c - b, a - c, b - a. Its area vector is A ν = ½ (b - a) × (c - a), of length A along the normal ν.
 
-Two layers say the same. Compiled loops take three-vectors as tuples of floats: ``point``, ``cross``,
-``dot`` and the others are inlined. Elsewhere whole arrays are taken at once: functions of ``P``
-(…,m,3,3) take the corners of m triangles, ``X[F]`` for vertices X (n,3) and faces F (m,3).
+There are two layers. Compiled loops use three-vectors, tuples of floats, with inlined operations: ``point``,
+``cross``, ``dot`` and others. All other code uses whole arrays: a function of ``P`` (…,m,3,3) takes the
+corners of m triangles, ``X[F]`` for vertices X (n,3) and faces F (m,3).
 
-Numba caches each loop with the file that holds it: after a change of this file's compiled functions,
-delete the cached loops of the others (``__pycache__/*.nb?``).
+Numba caches a compiled loop by the file it stands in. After a change of the inlined operations here, delete
+the caches of the loops that use them (``__pycache__/*.nb?``).
 """
 
 from __future__ import annotations
@@ -108,8 +108,9 @@ def vertex_area_vectors(X: Floats, F: Ints) -> tuple[Floats, Floats]:
         area_vector = scaled(0.5, cross(sub(b, a), sub(c, a)))
         face_area = norm(area_vector)
         for k in range(3):
-            accumulate(total, F[f, k], area_vector)
-            area[F[f, k]] += face_area
+            v = F[f, k]
+            accumulate(total, v, area_vector)
+            area[v] += face_area
     return total, area
 
 

@@ -30,12 +30,11 @@ class Patch:
     ----------
     name : str, unique in its surface.
     tension : α ≥ 0, force per length. At rest the patch has mean curvature pressure / (2 α).
-    pressure : p, force per area along the positive normal. It is a difference, that below the patch
-        less that above it. So a wall between two rooms of pressures p_1 and p_2 carries p_1 - p_2,
-        its normal pointing from room 1 to room 2; see ``pcmc.energy`` for what E means where it does
-        not.
-    wall : whether the patch stands between rooms and is no roof: its cone is no part of the volume,
-        and it may pinch. A patch without pressure is a wall in any case.
+    pressure : p, force per area along the positive normal: the pressure below the patch minus the one
+        above it. A wall between rooms of pressures p_1 and p_2 has pressure p_1 - p_2, its normal
+        pointing from room 1 to room 2; ``pcmc.energy`` describes E for other wall pressures.
+    wall : whether the patch is a wall between rooms: its cone is not part of the volume, and it may
+        pinch. A patch without pressure is always a wall.
 
     >>> Patch("roof", tension=2.0).target_curvature
     0.25
@@ -75,7 +74,7 @@ class Patch:
 
     @property
     def auxiliary(self) -> bool:
-        """Whether the patch is a wall: said to be one, or without pressure."""
+        """Whether the patch is a wall: declared as one, or without pressure."""
         return self.wall or self.pressure == 0.0
 
     @property
@@ -223,10 +222,10 @@ class Surface:
 
     @cached_property
     def uncancelled(self) -> Floats:
-        """(e,) the pressures left over at each edge that may leave its support, force/area.
+        """(e,) the sum of the pressures at each edge that is not held, force/area.
 
-        Each triangle's counts along its sense there. Where all are zero, no force depends on which
-        point of Π the volumes are seen from.
+        A triangle's pressure counts with the sense in which the triangle runs along the edge. Where all
+        sums are zero, no force depends on the point of Π that volumes are seen from.
         """
         topo = self.topology
         pressure = self.pressures[self.patch_of_face, None] * topo.sense
@@ -239,11 +238,11 @@ class Surface:
     def origin(self) -> Floats:
         """(3,) the point that volumes are seen from: that of Π.
 
-        Drawn far from it, as in a survey's coordinates, a surface would lose its digits in volumes of
-        that size; there it is the point of Π below the middle of the surface, so that a volume over Π
-        is the same wherever it is drawn, or that middle, where it is as far above Π and nothing slides.
-        Forces are the same as long as the pressures cancel along all edges that nothing holds; where
-        they do not, the point of Π it remains.
+        Far from that point, as in survey coordinates, volumes would lose their digits. There the origin
+        is the point of Π below the middle of the surface, so that a volume over Π does not depend on
+        where it is drawn; or the middle itself, if that is far above Π and nothing slides. Forces do not
+        change as long as the pressures cancel along all edges that are not held; where they do not
+        cancel, the origin stays the point of Π.
         """
         point, middle = np.array(self.plane.point), self.vertices.mean(axis=0)
         near = np.linalg.norm(middle - point) <= FAR * self.size
@@ -284,7 +283,7 @@ class Surface:
     def moved(self, vertices: npt.ArrayLike) -> Surface:
         """The same surface with its vertices elsewhere, (n,3); faces, supports, patches are shared.
 
-        Sliding vertices must stay on Π. Triangles may collapse: ``solve`` mends what it can.
+        Sliding vertices must stay on Π. Triangles may collapse; ``solve`` can repair many of them.
         """
         X = checks.positions(vertices)
         if X.shape != self.vertices.shape:

@@ -1,4 +1,4 @@
-"""What the faces alone say: edges, sheets around an edge, junction curves and points, boundary loops.
+"""Topology of the faces: edges, sheets around an edge, junction curves and points, boundary loops.
 
 A *junction* is an edge that three or more triangles share, a *seam* an edge between two triangles of
 different patches, a *boundary* edge belongs to one triangle only. All three are *curve* edges; a vertex
@@ -70,11 +70,10 @@ class Topology:
 
     @cached_property
     def fans(self) -> Ints:
-        """(n,) int: how many parts the triangles around each vertex fall into that share no edge there.
+        """(n,) int: the number of fans of triangles around each vertex that share no edge there.
 
-        1 within a sheet and along curves, 2 where two sheets just touch, 0 for a vertex of no triangle.
+        1 within a sheet and along curves, 2 where two sheets only touch, 0 for a vertex without triangles.
         """
-
         count: Ints = fans(self.faces, self.edge_of_face, self.edges, self.vertex_count)
         return count
 
@@ -173,7 +172,7 @@ class Topology:
 
 
 def topology(faces: Ints, patch_of_face: Ints, vertex_count: int) -> Topology:
-    """Edges of the faces and what lies on what.
+    """The topology of faces (m,3) whose patches are ``patch_of_face`` (m,).
 
     >>> import numpy as np
     >>> t = topology(np.array([[0, 1, 2], [0, 2, 3]]), np.array([0, 0]), 4)
@@ -208,9 +207,9 @@ def components(edges: Ints, vertex_count: int) -> Ints:
 
 
 def curve_neighbours(links: Ints, vertex_count: int) -> tuple[Ints, Ints]:
-    """The vertices (c,) that two of the links lead from, and where these lead to (c,2).
+    """The vertices (c,) with exactly two links, and their two neighbours (c,2).
 
-    ``links`` (k,2) are curve edges, each twice: as seen from the one end and from the other.
+    ``links`` (k,2) are curve edges in both directions: from each end to the other.
 
     >>> import numpy as np
     >>> edges = np.array([[0, 1], [1, 4], [4, 2]])
@@ -268,7 +267,7 @@ def _chain(graph: csr_array, start: int, closed: bool) -> Ints:
 
 @compiled
 def fans(F: Ints, edge_of_face: Ints, edges: Ints, n: int) -> Ints:
-    """(n,) how many parts the triangles around each vertex fall into that share no edge there."""
+    """(n,) the number of fans of triangles around each vertex that share no edge there."""
     parent = np.arange(2 * len(edges))  # node 2 e + s is the end edges[e, s] of edge e
     for f in range(len(F)):
         for c in range(3):

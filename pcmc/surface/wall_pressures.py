@@ -1,4 +1,4 @@
-"""Rooms of other pressures: the walls between them carry what the difference becomes."""
+"""Changed room pressures: the walls between the rooms take the new differences."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from ..base.arrays import Floats
 from . import Surface
 
-ALIKE = 1e-12  # of the largest change: what rounding leaves
+ALIKE = 1e-12  # of the largest change; smaller differences are rounding
 
 
 def with_pressures(
@@ -17,10 +17,10 @@ def with_pressures(
     tensions: Mapping[str, float] | None = None,
     pressures: Mapping[str, float] | None = None,
 ) -> Surface:
-    """``surface.retensioned``, where walls follow the pressures of the rooms that they stand between.
+    """``surface.retensioned``, with the pressures of walls updated to those of their rooms.
 
-    A wall carries the pressure of one room less that of the other; it changes by what that difference
-    changes by, unless ``pressures`` names the wall itself.
+    A wall's pressure is the difference of its two rooms' pressures. It changes with that difference,
+    unless ``pressures`` names the wall itself.
 
     >>> from pcmc.plan import Divider, Plan
     >>> hall = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], [Divider([[4, 0], [4, 4]])], edge_length=1.0,
@@ -39,10 +39,10 @@ def with_pressures(
 
 
 def wall_pressure_changes(surface: Surface, change: Floats, named: Collection[int] = ()) -> Floats:
-    """(k,) by what the pressures of walls change where those of the patches change by ``change`` (k,).
+    """(k,) changes of the walls' pressures that follow from the changes ``change`` (k,) of the patches'.
 
-    Such that along the edges where one wall meets two sheets the changes cancel. 0 for the walls in
-    ``named``, and for a wall between different rooms along its length, which has no one pressure.
+    The changes cancel along the edges where one wall meets two sheets. They are 0 for the walls in
+    ``named``, and for a wall that stands between different rooms along its length.
     """
     follow = np.zeros(len(surface.patches))
     wall = surface.walls.copy()
