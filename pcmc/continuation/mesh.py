@@ -30,7 +30,7 @@ class BranchMesh:
     full : the surface with all its walls.
     surface : the surface without the walls that vanish where a junction rests on Π.
     line : the tensions and pressures as functions of the parameter λ.
-    walls, rests : the walls that can pinch, and (n,) which junction vertices rest on Π.
+    walls, resting : the walls that can pinch, and (n,) which junction vertices rest on Π.
     classes : what each vertex lies on.
     quality_faces : (k,3) the faces outside walls that can pinch.
     loaded : (patches,) 1 for the patches under pressure, 0 for walls.
@@ -39,7 +39,7 @@ class BranchMesh:
     def __init__(self, surface: Surface, line: ParameterLine, backend: str | None = None) -> None:
         self.full, self.line, self._backend = surface, line, backend
         self._standing = contact = standing(surface)
-        self.surface, self.walls, self.rests = contact.surface, contact.walls, contact.rests
+        self.surface, self.walls, self.resting = contact.surface, contact.walls, contact.rests
         self.classes, self.quality_faces = contact.classes, contact.judged
         self.loaded: Floats = (~surface.walls).astype(float)
         self._curves_move = bool(((self.classes.kind != SHEET) & ~self.surface.fixed).any())
@@ -102,9 +102,9 @@ class BranchMesh:
 
     def full_surface(self, X: Floats) -> Surface:
         """The surface with all its walls; those that vanish lie on Π."""
-        if not self.rests.any():
+        if not self.resting.any():
             return self.full.moved(X)
-        return self.full.moved(settled(self.full, self.walls, self.rests, X))
+        return self.full.moved(settled(self.full, self.walls, self.resting, X))
 
     def surface_in_contact(self, X: Floats) -> Surface:
         """The full surface, with the vertices that came down to Π placed on it."""
@@ -115,16 +115,16 @@ class BranchMesh:
 
     def reaches_plane(self, X: Floats) -> Bools:
         """(n,) bool, junction vertices that stood off Π and are now on it or beyond."""
-        standing_off = self.walls.can_rest & ~self.rests
+        standing_off = self.walls.can_rest & ~self.resting
         return standing_off & (self.walls.side * self.surface.plane.height(X) <= 0.0)
 
     def excess_pull(self, value: float, X: Floats) -> Floats:
         """(n,) the pull on resting junction vertices beyond what their walls can hold at λ, force."""
-        if not self.rests.any():
+        if not self.resting.any():
             return np.zeros(self.full.n)
         tension = find_walls(self.line.surface_at(self.full, value)).tension
         pulled = self.line.surface_at(self.surface, value).moved(X)
-        return excess(pulled, replace(self.walls, tension=tension), self.rests)
+        return excess(pulled, replace(self.walls, tension=tension), self.resting)
 
 
 def _normals(X: Floats, F: Ints) -> Floats:

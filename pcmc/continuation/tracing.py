@@ -88,7 +88,7 @@ class Tracer:
                 found=free,
                 expected=0,
             )
-        if not (start.parameter_derivative.any() or mesh.rests.any()):  # a wall may come back
+        if not (start.parameter_derivative.any() or mesh.resting.any()):  # a wall may come back
             raise OptionError(
                 "the parameter changes no force: its patches have no free vertex, or they are flat"
                 " and only their tension varies",
@@ -275,7 +275,7 @@ class Tracer:
         start, end, length = segment.start, segment.end, segment.length
         if not segment.same_mesh:
             events = self.events_between(start, end, length)
-            if (start.state.mesh.rests != end.state.mesh.rests).any():
+            if (start.state.mesh.resting != end.state.mesh.resting).any():
                 contact = self.event("contact", end.state, length, start.index, end.index)
                 events.insert(0, contact)
             return events
