@@ -15,6 +15,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 from pcmc.base.arrays import Bools, Floats, Ints
 from pcmc.base.errors import OptionError
+from pcmc.surface.geometry import cross_2d
 
 CLEARANCE = 0.65  # of the spacing: where the lattice ends before an outline
 SWEEPS, RELAXATIONS = 4, 5  # triangulations, and steps on each; more gain nothing
@@ -83,7 +84,7 @@ class _Region:
         both = np.concatenate([self.rim, points])
         faces = Delaunay(both).simplices.astype(np.int64)
         corner, u, v = both[faces[:, 0]], both[faces[:, 1]], both[faces[:, 2]]
-        turn = _cross(u - corner, v - corner)
+        turn = cross_2d(u - corner, v - corner)
         faces[turn < 0] = faces[turn < 0][:, ::-1]
         return faces[self.contains(both[faces].mean(axis=1))]
 
@@ -131,10 +132,6 @@ def _distance(points: Floats, rim: Floats, sides: Ints) -> Floats:
         foot = start + np.clip(share, 0.0, 1.0)[:, None] * along
         distance = np.minimum(distance, np.linalg.norm(points - foot, axis=1))
     return distance
-
-
-def _cross(u: Floats, v: Floats) -> Floats:
-    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
 
 
 def _relaxed(rim: Floats, points: Floats, faces: Ints, spacing: float) -> Floats:

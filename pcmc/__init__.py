@@ -1,21 +1,22 @@
 """Piecewise constant-mean-curvature surfaces: triangle meshes of patches in equilibrium."""
 
+import sys
 from importlib import import_module
-from importlib.util import find_spec
+from types import ModuleType
 from typing import TYPE_CHECKING
 
-from . import explore
 from .base import errors
-from .energy.curvature import curvature_error, mean_curvature, target_curvature
-from .energy.functional import energy, gradient, hessian
-from .solvers import solve
-from .surface import Patch, Plane, Surface
 
 if TYPE_CHECKING:
+    from . import explore
     from .certificate import Certificate, Verdict, certify
     from .continuation import Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
+    from .energy.curvature import curvature_error, mean_curvature, target_curvature
+    from .energy.functional import energy, gradient, hessian
     from .io import read, write
+    from .solvers import solve
+    from .surface import Patch, Plane, Surface
 
 __all__ = [
     "Certificate",
@@ -44,21 +45,39 @@ __all__ = [
     "write",
 ]
 
-# Imported when first asked for: they bring pandas and much of scipy, which take longer than all else.
-_LATER = {
+# Each name is imported at its first use. So ``import pcmc`` takes milliseconds, and the command can
+# handle Ctrl-C before numpy and scipy are imported.
+_NAMES = {
     "certificate": ("Certificate", "Verdict", "certify"),
     "continuation": ("Direction", "follow"),
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
+    "energy.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
+    "energy.functional": ("energy", "gradient", "hessian"),
     "io": ("read", "write"),
+    "solvers": ("solve",),
+    "surface": ("Patch", "Plane", "Surface"),
 }
+
+
+class _Package(ModuleType):
+    """``pcmc.energy`` is the function, although a folder has the same name."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name != "energy" or not isinstance(value, ModuleType):  # the import sets the folder
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
 
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> object:
-        for module, names in _LATER.items():
+        for module, names in _NAMES.items():
             if name in names:
-                globals()[name] = found = getattr(import_module(f".{module}", __name__), name)
-                return found
+                globals()[name] = value = getattr(import_module(f".{module}", __name__), name)
+                return value
+        from importlib.util import find_spec
+
         if find_spec(f"{__name__}.{name}") is not None:
             return import_module(f".{name}", __name__)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -48,7 +48,10 @@ def _parser() -> argparse.ArgumentParser:
     act.add_argument("--quick", action="store_true", help="small meshes; within a minute")
     act.add_argument("--results", type=Path, help="where to write (default: results/)")
     act.set_defaults(act=_benchmark)
-    act = acts.add_parser("readme", help="bring the README's tables up to date with results/")
+    act = acts.add_parser(
+        "readme",
+        help="write results/REPORT.md and the README's summary from the tables in results/",
+    )
     act.set_defaults(act=_readme)
     return parser
 
@@ -71,8 +74,9 @@ def _run(studies: Sequence[Study], asked: argparse.Namespace, steps: Sequence[st
         from rich.console import Console
     except ImportError:
         raise MissingExtra("rich", "cli") from None
-    from .report import show, show_outcomes, write_comparison
+    from .report import write_comparison
     from .runner import run_all
+    from .screen import show, show_outcomes
 
     start = time.perf_counter()
     results = asked.results or (_scratch() if asked.short else HOME / "results")

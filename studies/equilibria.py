@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 
 from generators import bezier_hall, four_fans, two_caps, two_squares
-from pcmc import Surface, certify, gradient, solve
+from pcmc import Surface, gradient, solve
 
 from .flow import errors
 from .folder import Folder
@@ -34,7 +34,7 @@ def data(folder: Folder, short: bool) -> None:
         start = build()
         options: dict[str, Any] = {"iterations": 5} if short else {}
         result = solve(start, "newton", target="stationary", **options)
-        found = certify(result.surface, modes=0, status=result.status.name)
+        found = result.certify(modes=0)
         rows.append(
             {
                 "example": name,

@@ -11,7 +11,7 @@ from generators import four_fans
 from pcmc import Surface
 
 from .example import gradient_history, numbers, shapes
-from .flow import Case, curvature_table, run_cases
+from .flow import DECIMALS, Case, curvature_table, run_cases
 from .folder import Folder
 from .study import Study
 
@@ -54,7 +54,7 @@ def table(folder: Folder) -> dict[str, float]:
         "alpha": start.tensions[0],
         "alpha_wall": start.tensions[-1],
         "target": start.patches[0].target_curvature,
-        "radius": float(np.linalg.norm(start.vertices[:, :2], axis=1).max()),
+        "radius": float(np.linalg.norm(start.vertices[:, :2], axis=1).max().round(DECIMALS - 1)),
         "height": float(start.vertices[:, 2].max()),
         "t0": T0,
         "axis_offset": _axis_offset(stages["final"]),

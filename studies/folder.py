@@ -13,12 +13,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pcmc import Patch, Plane, Surface
+import pcmc
+from pcmc import Surface
 from pcmc.base.errors import FileError
 from pcmc.base.files import atomic_write
+from pcmc.io import load
 
 FLOATS = "%.10g"  # enough to compare with what is printed, few enough to read
-
+MESH = ".pcmc"
 LARGE = 100_000  # bytes of a figure: a repository keeps every version
 
 
@@ -48,36 +50,33 @@ class Folder:
         return pd.read_csv(path)
 
     def write_mesh(self, name: str, stages: Mapping[str, Surface]) -> None:
-        """``name.npz``: one surface at several stages of its motion, exactly.
+        """``name.pcmc``: one surface at several stages of its motion, exactly.
 
-        The first stage must be a sound mesh; the others may have collapsed triangles.
+        The file is the surface at its first stage, which must be a sound mesh. The positions at every
+        stage, whose triangles may have collapsed, are scalars "<stage> x", "<stage> y", "<stage> z".
         """
         first = next(iter(stages.values()))
-        data = BytesIO()
-        np.savez_compressed(
-            data,
-            faces=first.faces,
-            patch_of_face=first.patch_of_face,
-            patches=json.dumps([(p.name, p.tension, p.pressure) for p in first.patches]),
-            fixed=first.fixed,
-            on_plane=first.on_plane,
-            plane=np.array([first.plane.point, first.plane.normal]),
-            stages=np.array(list(stages)),
-            vertices=np.array([surface.vertices for surface in stages.values()]),
-        )
-        write_bytes(self.path / f"{name}.npz", data.getvalue())
+        positions = {
+            f"{stage} {axis}": surface.vertices[:, k]
+            for stage, surface in stages.items()
+            for k, axis in enumerate("xyz")
+        }
+        self.path.mkdir(parents=True, exist_ok=True)
+        pcmc.write(self.path / f"{name}{MESH}", first, scalars=positions)
 
     def read_mesh(self, name: str) -> dict[str, Surface]:
         """The stages that ``write_mesh`` wrote under this name."""
-        with np.load(self._existing(f"{name}.npz")) as data:
-            plane = Plane(*data["plane"].tolist())
-            stages, vertices = data["stages"].tolist(), data["vertices"]
-            first = Surface(
-                vertices[0], data["faces"], data["patch_of_face"],
-                tuple(Patch(*patch) for patch in json.loads(str(data["patches"]))),
-                fixed=data["fixed"], on_plane=data["on_plane"], plane=plane,
-            )  # fmt: skip
-        return {stage: first.moved(X) for stage, X in zip(stages, vertices, strict=True)}
+        path = self._existing(f"{name}{MESH}")
+        first, positions = pcmc.read(path), load(path).scalars
+        stages = dict.fromkeys(key[:-2] for key in positions)
+        return {
+            stage: first.moved(np.stack([positions[f"{stage} {axis}"] for axis in "xyz"], axis=1))
+            for stage in stages
+        }
+
+    def meshes(self) -> list[Path]:
+        """The files that ``write_mesh`` wrote."""
+        return sorted(self.path.glob(f"*{MESH}"))
 
     def figure(self, name: str) -> Path:
         """Where the figure ``name`` goes: a PNG in this folder."""
@@ -99,7 +98,7 @@ class Folder:
         """16 hexadecimal digits of each mesh's faces and positions, by mesh and stage."""
         return {
             f"{path.stem} {stage}": mesh_hash(surface)
-            for path in sorted(self.path.glob("*.npz"))
+            for path in self.meshes()
             for stage, surface in self.read_mesh(path.stem).items()
         }
 
@@ -108,7 +107,8 @@ class Folder:
         if not path.is_file():
             raise FileError(
                 f"{path} does not exist; run the step that writes it:"
-                f" python -m studies run {self.path.name}"
+                f" python -m studies run {self.path.name}",
+                what=str(path),
             )
         return path
 
@@ -117,8 +117,10 @@ def mesh_hash(surface: Surface) -> str:
     """16 hexadecimal digits that change with any position, face or patch."""
     digest = hashlib.sha256()
     for array, kind in (
-        (surface.vertices, "<f8"), (surface.faces, "<i8"), (surface.patch_of_face, "<i8"),
-    ):  # fmt: skip
+        (surface.vertices, "<f8"),
+        (surface.faces, "<i8"),
+        (surface.patch_of_face, "<i8"),
+    ):
         digest.update(np.ascontiguousarray(array, dtype=kind).tobytes())
     return digest.hexdigest()[:16]
 

@@ -19,7 +19,7 @@ from pcmc.base.arrays import Bools
 from pcmc.meshing.quality import triangle_quality
 from pcmc.solvers.result import Result
 
-from .flow import Case, Watch, describe, ending, measured_vertices, settings
+from .flow import Case, Watch, describe, ending, measured_vertices, settings, start_of
 from .folder import Folder
 from .paper import printed
 from .study import Study
@@ -77,7 +77,7 @@ def data(folder: Folder, short: bool) -> None:
     """Solve every case and weigh its vertices."""
     rows = []
     for case in cases()[:: 7 if short else 1]:
-        start = case.build()
+        start = start_of(case)
         watch = Watch(start) if case.watched else None
         result = solve(start, "nesterov", watch, **settings(case, short))
         rows.append(

@@ -39,6 +39,7 @@ from pcmc import Surface, solve
 from pcmc.base.arrays import Floats
 from pcmc.meshing.refinement import refine
 from pcmc.solvers.result import Result
+from pcmc.surface.geometry import area_vectors, face_areas
 
 from .flow import errors
 from .folder import Folder
@@ -199,7 +200,7 @@ def run_family(name: str, levels: int) -> list[dict[str, Any]]:
 def _edge_length(surface: Surface) -> float:
     """Of the equilateral triangle with the mean area, length: it halves with each refinement."""
     X, F = surface.vertices, surface.faces
-    areas = 0.5 * np.linalg.norm(np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]), axis=1)
+    areas = face_areas(X[F])
     outer = surface.pressures[surface.patch_of_face] != 0.0
     return float(np.sqrt(4.0 / 3.0**0.5 * areas[outer].mean()))
 
@@ -210,7 +211,7 @@ def _moved(coarse: Surface, fine: Surface) -> float:
     Vertex i of a mesh is vertex i of its refinement.
     """
     X, F = coarse.vertices, coarse.faces
-    across = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]])
+    across = area_vectors(X[F])
     normal = np.zeros_like(X)
     for corner in F.T:
         np.add.at(normal, corner, across)

@@ -130,7 +130,7 @@ def _run(
     result = solve(start, method, samples, **options)
     seconds = time.process_time() - samples.begin - samples.own
     final = result.surface
-    found = certify(final, modes=0, status=result.status.name)
+    found = result.certify(modes=0)
     history = pd.DataFrame(
         [(i, e, t, certify(surface, modes=0).residual) for i, e, t, surface in samples.rows]
         + [(result.iterations, result.evaluations, seconds, found.residual)],

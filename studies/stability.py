@@ -25,7 +25,7 @@ from pcmc import Certificate, Surface, certify, solve
 from pcmc.base.arrays import Floats
 
 from .cone import cone
-from .folder import Folder
+from .folder import MESH, Folder
 from .study import Study
 
 MODES = 4
@@ -91,7 +91,7 @@ def _along(folder: Folder, family: Family, size: int) -> list[dict[str, Any]]:
     for wall in family.walls:
         start = _walled(surface, wall)
         result = solve(start, "newton", target="stationary")
-        found = certify(result.surface, modes=MODES, status=result.status.name)
+        found = result.certify(modes=MODES)
         rows.append(
             {
                 "family": family.name,
@@ -253,7 +253,7 @@ def figure(folder: Folder) -> None:
             y="lowest eigenvalue, force/length³", title=f"{family.title}: below 0 a saddle",
             markers=True,
         )  # fmt: skip
-        if (folder.path / f"{family.name}.npz").is_file():
+        if (folder.path / f"{family.name}{MESH}").is_file():
             surface = folder.read_mesh(family.name)["at rest"]
             found, wall = certify(surface, modes=1), surface.tensions[-1]
             vectors(

@@ -16,7 +16,7 @@ import pandas as pd
 from .folder import Folder, write_json
 
 STEPS = ("data", "table", "figure")
-LIBRARIES = ("pcmc", "numpy", "scipy", "numba", "pandas", "nlopt")
+LIBRARIES = ("pcmc-surfaces", "numpy", "scipy", "numba", "pandas", "nlopt")
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def perform(
     if "data" in steps or "table" in steps:
         (folder.path / "measured.csv").unlink(missing_ok=True)
     if "data" in steps:
-        for mesh in folder.path.glob("*.npz"):
+        for mesh in folder.meshes():
             mesh.unlink()
     for step in (s for s in STEPS if s in steps):
         announce(step)

@@ -1,9 +1,19 @@
 """What several test files start from."""
 
+import signal
+
 import pytest
 
 from generators import spherical_cap
 from pcmc import solve
+
+
+def pytest_sessionstart():
+    """Answer Ctrl-C as Python does, also where the parent ignores it, as for jobs in the background.
+
+    Some tests raise SIGINT, and a process that they start inherits whether it is ignored.
+    """
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,8 @@
 """The certificate: its numbers against their definitions and closed forms, and every verdict."""
 
+from dataclasses import replace
+from unittest import mock
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -8,11 +11,15 @@ from starts import double_bubble, four_fans, joined_caps, sphere, spherical_cap,
 
 from generators import spherical_cap_exact
 from pcmc import Patch, Surface, certify, curvature_error, energy, gradient, mean_curvature, solve
-from pcmc.certificate.balance import coarseness, conormal_sum, load_ratio
-from pcmc.certificate.certificate import Verdict
+from pcmc.certificate import Evidence, Verdict
+from pcmc.certificate.balance import coarseness, conormal_sum, load_ratio, reactions_per_length
+from pcmc.certificate.verdict import Findings, judge
+from pcmc.contact.pinching import standing_part
 from pcmc.energy.functional import patch_areas, volume
 from pcmc.meshing.quality import triangle_quality
 from pcmc.plan import Divider, Plan
+from pcmc.solvers.result import Status
+from pcmc.stability.modes import morse_index
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
@@ -34,7 +41,6 @@ def test_a_roof_at_rest(squares):
     assert found.volume == pytest.approx(volume(surface), rel=1e-14)
     assert found.curvature_error < 1e-9
     assert len(found.pinched) == 0
-    assert found.status == "CONVERGED"
 
 
 def test_the_rows_of_the_patches(squares):
@@ -202,9 +208,10 @@ def beside_a_stiff_cap(soft: Surface, times: float) -> Surface:
     return Surface(
         np.concatenate([soft.vertices, stiff.vertices + np.array([3.0, 0.0, 0.0])]),
         np.concatenate([soft.faces, soft.n + stiff.faces]),
-        np.repeat([0, 1], [soft.m, stiff.m]), patches,
+        np.repeat([0, 1], [soft.m, stiff.m]),
+        patches,
         fixed=np.concatenate([soft.fixed, stiff.fixed]),
-    )  # fmt: skip
+    )
 
 
 def test_a_mode_is_soft_beside_the_tension_of_what_it_moves():
@@ -223,7 +230,7 @@ def test_strong_forces_do_not_hide_what_a_weak_patch_lacks():
     assert found.residual < 1e-8
     assert found.curvature_error > 0.1
     assert found.verdict is Verdict.NOT_CONVERGED
-    assert found.detail.startswith("patch 'soft' lacks 9.7e-02 of its own forces")
+    assert found.detail.startswith("the forces left in patch 'soft' are 9.7e-02 of its own")
     both = solve(beside_a_stiff_cap(spherical_cap(0.25), 1e8), tolerance=1e-18)
     assert both.certificate.verdict is Verdict.STABLE
 
@@ -305,14 +312,76 @@ def test_a_collapsed_triangle_is_named():
     assert found.quality < 1e-3
 
 
-def test_the_solvers_ending_counts():
-    surface = solve(spherical_cap(0.25)).surface
-    away = certify(two_squares(4), status="DIVERGED")
+def test_evidence_of_the_way_decides_what_the_shape_leaves_open():
+    away = certify(two_squares(4), evidence=Evidence.INFLATED)
     assert away.verdict is Verdict.NO_EQUILIBRIUM
-    assert away.detail.startswith("the surface inflates without bound (seen on this way")
-    assert certify(surface, status="DIVERGED").verdict is Verdict.STABLE
-    assert certify(surface, status="DEGENERATE").verdict is Verdict.DEGENERATE
-    assert certify(surface, status="CONVERGED").verdict is Verdict.STABLE
+    assert "inflates" in away.detail
+    assert certify(two_squares(4)).verdict is Verdict.NOT_CONVERGED
+    gone = certify(two_squares(4), evidence=Evidence.VANISHED)
+    assert gone.verdict is Verdict.NO_EQUILIBRIUM
+    surface = solve(spherical_cap(0.25)).surface
+    assert certify(surface, evidence=Evidence.INFLATED).verdict is Verdict.STABLE
+    assert certify(surface, evidence=Evidence.COLLAPSED).verdict is Verdict.DEGENERATE
+
+
+@pytest.mark.parametrize(
+    ("status", "verdict"),
+    [
+        (Status.DIVERGED, Verdict.NO_EQUILIBRIUM),
+        (Status.VANISHED, Verdict.NO_EQUILIBRIUM),
+        (Status.DEGENERATE, Verdict.DEGENERATE),
+        (Status.STALLED, Verdict.NOT_CONVERGED),
+        (Status.STOPPED, Verdict.NOT_CONVERGED),
+    ],
+)
+def test_a_result_passes_on_how_its_solver_ended(status, verdict):
+    result = replace(solve(two_squares(4), iterations=0), status=status)
+    assert result.certificate.verdict is verdict
+    assert result.certify(modes=0).verdict is verdict
+
+
+def findings(**changes):
+    """Findings about a stable pyramid, but for the changes."""
+    given = {
+        "surface": pyramid(),
+        "pinchable": np.array([False]),
+        "residual": 0.0,
+        "tolerance": 1e-8,
+        "quality": 0.9,
+        "index": 0,
+        "own_residuals": np.zeros(1),
+        "softest": 5.0,
+        "load_ratio": 0.5,
+    }
+    return Findings(**(given | changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "verdict"),
+    [
+        ({}, Verdict.STABLE),
+        ({"softest": 1e-3}, Verdict.NEUTRAL),
+        ({"softest": -1e-3, "index": 1}, Verdict.SADDLE),
+        ({"own_residuals": np.array([1e-4])}, Verdict.NOT_CONVERGED),
+        ({"own_residuals": np.array([1e-6])}, Verdict.STABLE),
+        ({"index": None}, Verdict.NOT_CONVERGED),
+        ({"residual": 1e-7}, Verdict.NOT_CONVERGED),
+        ({"residual": 1e-7, "tolerance": 1e-6}, Verdict.STABLE),
+        ({"quality": 1e-4}, Verdict.DEGENERATE),
+        ({"load_ratio": 1e3}, Verdict.STABLE),
+        ({"residual": 1e-7, "load_ratio": 1e3}, Verdict.NO_EQUILIBRIUM),
+        ({"residual": 1e-7, "load_ratio": 1.1}, Verdict.NOT_CONVERGED),  # the mesh is coarse
+        (
+            {"residual": 1e-7, "load_ratio": 1.1, "evidence": Evidence.COLLAPSED},
+            Verdict.NO_EQUILIBRIUM,
+        ),
+        ({"residual": 1e-7, "quality": 1e-4, "load_ratio": 1e3}, Verdict.NO_EQUILIBRIUM),
+        ({"evidence": Evidence.VANISHED}, Verdict.STABLE),
+        ({"surface": pyramid().retensioned({"roof": 0.0}, {"roof": 0.0})}, Verdict.NEUTRAL),
+    ],
+)
+def test_the_first_rule_that_applies_decides(changes, verdict):
+    assert judge(findings(**changes))[0] is verdict
 
 
 def test_what_nothing_holds_has_no_reactions():
@@ -365,10 +434,29 @@ def test_supports_carry_the_whole_load_and_the_tension_of_the_rim():
     assert found.boundaries["per_length_max"][0] == pytest.approx(0.6, rel=2e-3)
 
 
-def test_every_verdict_is_a_sentence():
-    sentences = [verdict.value for verdict in Verdict]
-    assert len(set(sentences)) == len(sentences)
-    assert all(": " in sentence for sentence in sentences)
+def test_every_verdict_names_itself_and_says_what_it_means():
+    for verdict in Verdict:
+        name, meaning = verdict.value.split(": ")
+        assert name.startswith(verdict.name.lower().replace("_", " "))
+        assert len(meaning.split()) > 3
+
+
+def test_the_standing_part_is_computed_once_for_each_surface():
+    surface = solve(two_squares(6, alpha_aux=3.0)).surface
+    part = standing_part(surface)
+    assert part.surface.m < surface.m
+    with mock.patch("pcmc.contact.pinching.find_walls", side_effect=AssertionError):
+        certify(surface)
+        reactions_per_length(surface)
+        assert standing_part(surface) is part
+    moved = surface.moved(two_squares(6, alpha_aux=3.0).vertices)
+    assert standing_part(moved).surface is moved
+
+
+@pytest.mark.parametrize("make", [four_fans, two_squares])
+def test_the_morse_index_alone_is_that_of_the_certificate(make):
+    surface = solve(make(5), target="stationary").surface
+    assert morse_index(surface) == certify(surface).index
 
 
 def test_the_certificate_sees_walls_apart():

@@ -124,13 +124,15 @@ def test_convert_and_plot(solved, capsys):
 def test_tensions_that_cannot_balance_are_told_before_solving(folder, capsys, monkeypatch):
     pcmc.write("two.pcmc", two_squares(4, alpha_aux=1.0))
     said = []
-    settle = running.settle
+    solve_project = running.solve_project
     monkeypatch.setattr(
-        running, "settle", lambda *given: said.append(capsys.readouterr().err) or settle(*given)
+        running,
+        "solve_project",
+        lambda *given: said.append(capsys.readouterr().err) or solve_project(*given),
     )
     assert cli.main(["solve", "two.pcmc", "--tension", "left=4"]) == 1
     assert "note: the tensions at the junction left | right | wall cannot balance: 4 > " in said[0]
-    assert "unless the junction rests on the plane; solving all the same" in said[0]
+    assert "unless the junction rests on the plane; solving anyway" in said[0]
     assert "no equilibrium" in capsys.readouterr().out
     assert cli.main(["solve", "two.pcmc", "--tension", "wall=9"]) == 0  # the wall comes down
     assert said[1] == ""
@@ -156,7 +158,9 @@ def test_sweep(folder, capsys):
 def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
     seen = []
     monkeypatch.setattr("pcmc.explore.start", lambda *given: given)
-    monkeypatch.setattr("pcmc.explore.attend", lambda given, page: seen.append((*given, page)))
+    monkeypatch.setattr(
+        "pcmc.explore.open_and_wait", lambda given, page: seen.append((*given, page))
+    )
     assert cli.main(["explore", "roof.pcmc", "--no-browser"]) == 0
     assert (
         cli.main(["explore", "--example", "two_squares", "--set", "alpha_aux=1", "--port", "8"])
@@ -178,8 +182,8 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["solve", "roof.toml", "-o", "x.obk"], "did you mean '.obj'"),
         (["solve", "roof"], "Known: .toml, .pcmc"),
         (["certify", "roof.txt"], "Known: .toml, .pcmc"),
-        (["solve", "roof.toml", "-o", "roof.png"], "a picture has an option of its own"),
-        (["solve", "roof.toml", "--picture", "roof.obj"], "a picture is written as .png"),
+        (["solve", "roof.toml", "-o", "roof.png"], "a picture has its own option"),
+        (["solve", "roof.toml", "--picture", "roof.obj"], "pictures are written as .png only"),
         (["convert", "roof.toml", "roof.png"], "roof.png: unknown suffix"),
         (["remesh", "roof.toml", "--edge-length", "1", "-o", "x.png"], "x.png: unknown suffix"),
         (["solve", "roof.toml", "--folder", "roof.toml/new"], "roof.toml is a file"),
@@ -223,7 +227,7 @@ def test_bad_input_is_2_in_one_line(folder, capsys, arguments, message):
 
 def test_the_version(capsys):
     assert cli.main(["--version"]) == 0
-    assert capsys.readouterr().out == f"pcmc {version('pcmc')}\n"
+    assert capsys.readouterr().out == f"pcmc {version('pcmc-surfaces')}\n"
 
 
 def test_why_cases_of_a_sweep_failed_is_said_once(folder, capsys):
@@ -354,29 +358,27 @@ def test_as_a_process(folder):
 def begun(code, *arguments):
     """The command run as its installed script does, after some code; exit code, output, errors."""
     settings = tomllib.loads((HOME / "pyproject.toml").read_text(encoding="utf-8"))
-    module, name = settings["project"]["scripts"]["pcmc"].split(":")
-    places = settings["tool"]["setuptools"]["package-dir"]
-    assert module in settings["tool"]["setuptools"]["packages"]
+    assert settings["project"]["scripts"]["pcmc"] == "pcmc.cli:main"
     start = f"""
+import signal
 import sys
-from importlib.util import module_from_spec, spec_from_file_location
+signal.signal(signal.SIGINT, signal.default_int_handler)  # the parent may ignore it
 {code}
-assert not [name for name in sys.modules if name.startswith(("pcmc", "numpy"))]
-spec = spec_from_file_location({module!r}, {str(HOME / places[module] / "__init__.py")!r})
-started = module_from_spec(spec)
-spec.loader.exec_module(started)
-sys.exit(started.{name}())
+from pcmc.cli import main
+heavy = {{"numpy", "scipy", "pandas", "numba", "typer", "rich"}} & set(sys.modules)
+assert not heavy, f"imported before Ctrl-C is handled: {{heavy}}"
+sys.exit(main())
 """
     run = [sys.executable, "-c", start, *arguments]
     done = subprocess.run(run, capture_output=True, text=True, timeout=120, check=False)
     return done.returncode, done.stdout, done.stderr
 
 
-@pytest.mark.parametrize("module", ["pcmc", "numpy", "numba", "pcmc.cli.running", "typer"])
+@pytest.mark.parametrize(
+    "module", ["pcmc.cli.running", "numpy", "scipy", "numba", "typer", "pcmc.cli.app"]
+)
 def test_ctrl_c_while_a_module_is_imported_is_one_line(folder, module):
     press = f"""
-import signal
-
 class Press:
     def find_spec(name, *_):
         if name == {module!r}:
@@ -388,14 +390,14 @@ sys.meta_path.insert(0, Press)
 
 
 def test_ctrl_c_while_python_ends_is_one_line(folder):
-    press = "import atexit, signal; atexit.register(signal.raise_signal, signal.SIGINT)"
+    press = "import atexit; atexit.register(signal.raise_signal, signal.SIGINT)"
     code, out, err = begun(press, "--help")
     assert (code, err) == (130, "pcmc: stopped\n")
     assert "solve" in out
 
 
 def test_ctrl_c_stays_ignored_where_it_was(folder):
-    ignore = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
+    ignore = "signal.signal(signal.SIGINT, signal.SIG_IGN)"
     press = ignore + "; import atexit; atexit.register(signal.raise_signal, signal.SIGINT)"
     code, _, err = begun(press, "certify", "none.obj")
     assert (code, err.count("\n")) == (2, 1)

@@ -43,9 +43,9 @@ def test_a_number_that_is_none_is_shown_with_its_option(folder, capsys, argument
 
 def test_the_help_named_is_that_of_the_command(folder, capsys):
     assert cli.main(["remesh", "roof.toml", "--edge", "1"]) == 2
-    assert "(pcmc remesh --help shows what there is)" in capsys.readouterr().err
+    assert "(see pcmc remesh --help)" in capsys.readouterr().err
     assert cli.main(["slove"]) == 2
-    assert "(pcmc --help shows what there is)" in capsys.readouterr().err
+    assert "(see pcmc --help)" in capsys.readouterr().err
 
 
 def test_met_targets_are_told_with_the_tensions_that_meet_them(folder, capsys):

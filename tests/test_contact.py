@@ -7,16 +7,16 @@ from starts import double_bubble, four_fans, two_caps, two_squares
 
 from pcmc import Patch, Plane, Surface, Verdict, certify, energy, solve
 from pcmc.contact.pinching import (
-    beside,
-    crest_spacing,
+    beside_resting,
     find_walls,
-    lifted,
-    pinched,
+    lift,
+    place_pinched_walls,
     place_wall_rows,
     pull_and_capacity,
-    resting,
-    resting_crest,
-    settled,
+    remove_pinched_walls,
+    resting_links,
+    resting_vertices,
+    top_spacing,
 )
 from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.meshing.quality import triangle_quality
@@ -25,21 +25,21 @@ from pcmc.solvers.state import State
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
 
-def crest_of(surface, below):
+def crest_of(surface, walls):
     """Free crest vertices in order along y (all these walls stand on x = 0)."""
-    free = np.flatnonzero(below.can_rest)
+    free = np.flatnonzero(walls.top_free)
     return free[np.argsort(surface.vertices[free, 1])]
 
 
 def pressed(n=6, count=2, **arguments):
     """Two squares whose junction rests on Π at the first ``count`` vertices from one corner."""
     surface = two_squares(n, **arguments)
-    below = find_walls(surface)
-    rests = np.zeros(surface.n, dtype=bool)
-    rests[crest_of(surface, below)[:count]] = True
-    standing = pinched(surface, below, rests)
-    full = surface.moved(settled(surface, below, rests, standing.vertices))
-    return full, below, rests, standing
+    walls = find_walls(surface)
+    resting = np.zeros(surface.n, dtype=bool)
+    resting[crest_of(surface, walls)[:count]] = True
+    standing = remove_pinched_walls(surface, walls, resting)
+    full = surface.moved(place_pinched_walls(surface, walls, resting, standing.vertices))
+    return full, walls, resting, standing
 
 
 def elsewhere(surface, seed=0):
@@ -47,67 +47,75 @@ def elsewhere(surface, seed=0):
     R, shift = rotation(seed), np.array([3.0, -1.0, 2.0])
     plane = Plane(R @ surface.plane.point + shift, R @ surface.plane.normal)
     turned = Surface(
-        surface.vertices @ R.T + shift, surface.faces, surface.patch_of_face, surface.patches,
-        fixed=surface.fixed, on_plane=surface.on_plane, plane=plane,
-    )  # fmt: skip
+        surface.vertices @ R.T + shift,
+        surface.faces,
+        surface.patch_of_face,
+        surface.patches,
+        fixed=surface.fixed,
+        on_plane=surface.on_plane,
+        plane=plane,
+    )
     return turned, lambda X: X @ R.T + shift
 
 
 def test_which_walls_can_pinch():
     surface = two_squares(6)
-    below = find_walls(surface)
-    assert below.pinchable.tolist() == [False, False, True]
-    assert len(below.edges) == 6
-    assert below.can_rest.sum() == 5
-    assert below.anchored.sum() == 2
-    assert surface.fixed[below.anchored].all()
+    walls = find_walls(surface)
+    assert walls.pinchable.tolist() == [False, False, True]
+    assert len(walls.top_edges) == 6
+    assert walls.top_free.sum() == 5
+    assert walls.corner.sum() == 2
+    assert surface.fixed[walls.corner].all()
     wall = np.unique(surface.faces[surface.patch_of_face == 2])
-    crest = np.unique(below.edges)
-    np.testing.assert_array_equal(below.hanging, np.setdiff1d(wall, crest))
-    assert set(below.tension) == {2.0}
+    crest = np.unique(walls.top_edges)
+    np.testing.assert_array_equal(walls.rows.vertices, np.setdiff1d(wall, crest))
+    assert walls.wall_below.tolist() == [2] * 6
     assert find_walls(four_fans(4)).pinchable.sum() == 4
 
 
 def test_a_wall_that_does_not_stand_on_the_plane_cannot():
-    below = find_walls(double_bubble(1.2))
-    assert not below.pinchable.any()
-    assert not below.can_rest.any()
-    assert len(below.hanging) == len(below.edges) == 0
+    walls = find_walls(double_bubble(1.2))
+    assert not walls.pinchable.any()
+    assert not walls.top_free.any()
+    assert len(walls.rows.vertices) == len(walls.top_edges) == 0
 
 
 @pytest.mark.parametrize(
-    "make", [lambda: two_squares(6), lambda: four_fans(5), lambda: two_caps(0.8)],
+    "make",
+    [lambda: two_squares(6), lambda: four_fans(5), lambda: two_caps(0.8)],
     ids=["two squares", "four fans", "two caps"],
-)  # fmt: skip
+)
 def test_each_wall_vertex_hangs_where_it_is(make):
     surface = make()
-    below = find_walls(surface)
+    walls = find_walls(surface)
     np.testing.assert_allclose(
-        place_wall_rows(surface, below, surface.vertices), surface.vertices, atol=1e-2
+        place_wall_rows(surface, walls, surface.vertices), surface.vertices, atol=1e-2
     )
-    i, j = below.ends.T
-    assert ((below.along >= 0) & (below.along <= 1) & (below.share >= 0) & (below.share <= 1)).all()
-    crest = np.unique(below.edges)
+    i, j = walls.rows.top_ends.T
+    for part in (walls.rows.fraction, walls.rows.relative_height):
+        assert ((part >= 0.0) & (part <= 1.0)).all()
+    crest = np.unique(walls.top_edges)
     assert np.isin(i, crest).all()
     assert np.isin(j, crest).all()
-    foot = np.abs(surface.plane.height(surface.vertices[below.hanging])) < 1e-12
-    assert (below.share[foot] == 0.0).all()
-    assert (below.share[~foot] > 0.0).all()
+    foot = np.abs(surface.plane.height(surface.vertices[walls.rows.vertices])) < 1e-12
+    assert (walls.rows.relative_height[foot] == 0.0).all()
+    assert (walls.rows.relative_height[~foot] > 0.0).all()
 
 
 def test_the_rows_of_a_wall_follow_its_crest():
     surface = two_squares(6)
-    below = find_walls(surface)
+    walls = find_walls(surface)
     X = surface.vertices.copy()
-    crest = crest_of(surface, below)
+    crest = crest_of(surface, walls)
     X[crest] = X[crest] * [1, 1, 1.7] + [0.3, 0.0, 0.0]
-    moved = place_wall_rows(surface, below, X)
-    straight = (below.along == 0.0) | (below.along == 1.0)
-    assert straight.all()
-    owner = np.where(below.along == 0.0, below.ends[:, 0], below.ends[:, 1])
-    np.testing.assert_allclose(moved[below.hanging, :2], X[owner, :2], atol=1e-12)
-    np.testing.assert_allclose(moved[below.hanging, 2], below.share * X[owner, 2], atol=1e-12)
-    others = np.setdiff1d(np.arange(surface.n), below.hanging)
+    moved = place_wall_rows(surface, walls, X)
+    rows = walls.rows
+    assert ((rows.fraction == 0.0) | (rows.fraction == 1.0)).all()
+    owner = np.where(rows.fraction == 0.0, rows.top_ends[:, 0], rows.top_ends[:, 1])
+    np.testing.assert_allclose(moved[rows.vertices, :2], X[owner, :2], atol=1e-12)
+    height = rows.relative_height * X[owner, 2]
+    np.testing.assert_allclose(moved[rows.vertices, 2], height, atol=1e-12)
+    others = np.setdiff1d(np.arange(surface.n), rows.vertices)
     np.testing.assert_array_equal(moved[others], X[others])
 
 
@@ -119,21 +127,25 @@ def test_the_crest_is_where_a_roof_is_too():
     wall = [[1, 3, 2], [7, 8, 3], [7, 3, 1], [0, 7, 1], [8, 4, 3]]
     patches = [Patch("left", 2.0), Patch("right", 2.0), Patch("wall", 1.0, pressure=0.0)]
     surface = Surface(
-        X, [*left, *right, *wall], [0] * 4 + [1] * 4 + [2] * 5, patches, fixed=[0, 4, 5, 6],
+        X,
+        [*left, *right, *wall],
+        [0] * 4 + [1] * 4 + [2] * 5,
+        patches,
+        fixed=[0, 4, 5, 6],
         on_plane=[7, 8],
-    )  # fmt: skip
-    below = find_walls(surface)
-    assert below.edges.tolist() == [[0, 1], [1, 2], [2, 3], [3, 4]]
-    assert np.flatnonzero(below.can_rest).tolist() == [1, 2, 3]
+    )
+    walls = find_walls(surface)
+    assert walls.top_edges.tolist() == [[0, 1], [1, 2], [2, 3], [3, 4]]
+    assert np.flatnonzero(walls.top_free).tolist() == [1, 2, 3]
 
 
 def test_with_a_motion_space_only_what_lies_along_the_wall():
     surface = shaken(two_squares(6), 0.02)
-    below = find_walls(surface)
+    walls = find_walls(surface)
     space = motion_space(surface, vertex_classes(surface), surface.vertices)
     X = surface.vertices.copy()
-    X[below.can_rest] += [0.1, 0.0, 0.2]
-    change = place_wall_rows(surface, below, X, space) - X
+    X[walls.top_free] += [0.1, 0.0, 0.2]
+    change = place_wall_rows(surface, walls, X, space) - X
     np.testing.assert_allclose(space.project(change), 0.0, atol=1e-14)
     assert np.abs(change).max() > 0.05
 
@@ -143,74 +155,74 @@ def test_hanging_turns_with_the_plane():
     turned, place = elsewhere(surface)
     here, there = find_walls(surface), find_walls(turned)
     X = surface.vertices.copy()
-    X[here.can_rest] += [0.3, 0.0, 0.5]
+    X[here.top_free] += [0.3, 0.0, 0.5]
     expected = place(place_wall_rows(surface, here, X))
     np.testing.assert_allclose(place_wall_rows(turned, there, place(X)), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("count", [1, 3, 5])
 def test_what_is_left_when_a_junction_rests(count):
-    full, below, rests, standing = pressed(count=count)
-    assert rests.sum() == count
-    np.testing.assert_array_equal(resting(full, below), rests)
+    full, walls, resting, standing = pressed(count=count)
+    assert resting.sum() == count
+    np.testing.assert_array_equal(resting_vertices(full, walls), resting)
     assert triangle_quality(standing.vertices, standing.faces).min() > 0.1
-    assert standing.on_plane[rests].all()
+    assert standing.on_plane[resting].all()
     outer = full.patch_of_face != 2
     assert (standing.patch_of_face != 2).sum() == outer.sum()
     if count == 5:
         assert (standing.patch_of_face != 2).all()
     # what is gone has no area, so E is that of the full surface with its wall pressed flat
     assert energy(standing) == pytest.approx(energy(full), rel=1e-13)
-    again = pinched(full, below, rests)
+    again = remove_pinched_walls(full, walls, resting)
     np.testing.assert_array_equal(again.faces, standing.faces)
     np.testing.assert_allclose(again.vertices, standing.vertices, atol=1e-14)
 
 
 def test_without_a_resting_vertex_nothing_changes():
     surface = two_squares(4)
-    below = find_walls(surface)
-    assert not resting(surface, below).any()
-    assert pinched(surface, below, resting(surface, below)) is surface
+    walls = find_walls(surface)
+    assert not resting_vertices(surface, walls).any()
+    assert remove_pinched_walls(surface, walls, resting_vertices(surface, walls)) is surface
 
 
 def test_pinching_turns_with_the_plane():
-    full, below, rests, standing = pressed()
+    full, walls, resting, standing = pressed()
     turned, place = elsewhere(two_squares(6))
     there = find_walls(turned)
     turned = turned.moved(place(full.vertices))
-    np.testing.assert_array_equal(resting(turned, there), rests)
-    other = pinched(turned, there, rests)
+    np.testing.assert_array_equal(resting_vertices(turned, there), resting)
+    other = remove_pinched_walls(turned, there, resting)
     np.testing.assert_array_equal(other.faces, standing.faces)
     np.testing.assert_allclose(other.vertices, place(standing.vertices), atol=1e-12)
     for one, two in zip(
-        pull_and_capacity(standing, below, rests),
-        pull_and_capacity(other, there, rests),
+        pull_and_capacity(standing, walls, resting),
+        pull_and_capacity(other, there, resting),
         strict=True,
     ):
         np.testing.assert_allclose(one, two, atol=1e-12)
 
 
 def test_a_foot_that_still_carries_a_triangle_stays_where_it_slid():
-    surface, below, rests, _ = pressed()
-    crest = crest_of(surface, below)
+    surface, walls, resting, _ = pressed()
+    crest = crest_of(surface, walls)
     under = surface.vertices[crest[1]] * [1.0, 1.0, 0.0]
     gap = np.linalg.norm(surface.vertices - under, axis=1)
     foot = np.flatnonzero((gap < 1e-9) & surface.on_plane)
     X = surface.vertices.copy()
     X[foot] += 0.01 * (X[crest[0]] - X[crest[1]]) * [1.0, 1.0, 0.0]
     surface = surface.moved(X)
-    below = find_walls(surface)
-    standing = pinched(surface, below, rests)
+    walls = find_walls(surface)
+    standing = remove_pinched_walls(surface, walls, resting)
     assert len(foot) == 1
     assert np.isin(foot, standing.faces).all()
-    moved = settled(surface, below, rests, standing.vertices)
+    moved = place_pinched_walls(surface, walls, resting, standing.vertices)
     np.testing.assert_array_equal(moved[foot], X[foot])
 
 
 def test_curves_and_neighbours_of_the_resting_part():
-    full, below, rests, _ = pressed(count=2)
-    crest = crest_of(full, below)
-    corner = np.flatnonzero(below.anchored)
+    full, walls, resting, _ = pressed(count=2)
+    crest = crest_of(full, walls)
+    corner = np.flatnonzero(walls.corner)
     corner = corner[np.argsort(full.vertices[corner, 1])][0]
     expected = [
         (crest[0], corner),
@@ -218,42 +230,40 @@ def test_curves_and_neighbours_of_the_resting_part():
         (crest[1], crest[0]),
         (crest[1], crest[2]),
     ]
-    assert sorted(map(tuple, resting_crest(below, rests).tolist())) == sorted(expected)
-    assert np.flatnonzero(beside(below, rests)).tolist() == [crest[2]]
-    spacing = crest_spacing(full, below)
+    assert sorted(map(tuple, resting_links(walls, resting).tolist())) == sorted(expected)
+    assert np.flatnonzero(beside_resting(walls, resting)).tolist() == [crest[2]]
+    spacing = top_spacing(full, walls)
     assert spacing[corner] == pytest.approx(4 / 6)
-    assert np.isinf(spacing[np.setdiff1d(np.arange(full.n), below.edges)]).all()
+    assert np.isinf(spacing[np.setdiff1d(np.arange(full.n), walls.top_edges)]).all()
 
 
 @pytest.mark.parametrize("count", [1, 3, 5])
 def test_pull_less_capacity_is_what_lifting_gains(count):
     """(E(lifted by z) - E(resting)) / z tends to capacity - pull."""
-    full, below, rests, standing = pressed(count=count)
-    pull, capacity = pull_and_capacity(standing, below, rests)
-    assert (capacity[~rests] == 0).all()
-    assert (pull[~rests] == 0).all()
-    spacing = crest_spacing(full, below)
-    for v in np.flatnonzero(rests):
+    full, walls, resting, standing = pressed(count=count)
+    pull, capacity = pull_and_capacity(standing, walls, resting)
+    assert (capacity[~resting] == 0).all()
+    assert (pull[~resting] == 0).all()
+    spacing = top_spacing(full, walls)
+    for v in np.flatnonzero(resting):
         one = np.arange(full.n) == v
         fraction = 1e-6
-        slope = (energy(lifted(full, below, one, fraction)) - energy(full)) / (
-            fraction * spacing[v]
-        )
+        slope = (energy(lift(full, walls, one, fraction)) - energy(full)) / (fraction * spacing[v])
         assert slope == pytest.approx(capacity[v] - pull[v], abs=1e-5)
         assert capacity[v] == pytest.approx(2.0 * 4 / 6, rel=1e-12)  # α_w times the spacing
 
 
 def test_a_lifted_wall_is_back():
-    full, below, rests, _ = pressed(count=3)
-    up = lifted(full, below, rests, 0.1)
-    assert not resting(up, below).any()
-    assert up.plane.height(up.vertices[rests]) == pytest.approx(0.1 * 4 / 6)
+    full, walls, resting, _ = pressed(count=3)
+    up = lift(full, walls, resting, 0.1)
+    assert not resting_vertices(up, walls).any()
+    assert up.plane.height(up.vertices[resting]) == pytest.approx(0.1 * 4 / 6)
     assert triangle_quality(up.vertices, up.faces).min() > 0.02
-    partly = lifted(full, below, np.arange(full.n) == crest_of(full, below)[2], 0.1)
+    partly = lift(full, walls, np.arange(full.n) == crest_of(full, walls)[2], 0.1)
     np.testing.assert_array_equal(
-        resting(partly, below), rests & (partly.plane.height(partly.vertices) == 0)
+        resting_vertices(partly, walls), resting & (partly.plane.height(partly.vertices) == 0)
     )
-    assert resting(partly, below).sum() == 2
+    assert resting_vertices(partly, walls).sum() == 2
 
 
 @pytest.mark.parametrize(("alpha_aux", "lifts"), [(0.5, 3), (50.0, 0)])
@@ -262,13 +272,13 @@ def test_a_junction_put_down_comes_up_where_the_wall_cannot_hold_it(alpha_aux, l
     crest = crest_of(state.full, state.walls)[:3]
     drop = np.zeros_like(state.X)
     drop[crest, 2] = -state.X[crest, 2]
-    X, down = state.moved_by(drop)
+    X, down = state.displaced(drop)
     np.testing.assert_array_equal(np.flatnonzero(down), np.sort(crest))
     state.move(X, down)
-    np.testing.assert_array_equal(state.rests, down)
+    np.testing.assert_array_equal(state.resting, down)
     assert state.energy == pytest.approx(energy(state.result_surface()), rel=1e-13)
-    assert state.release() == (lifts > 0)
-    assert state.rests.sum() == 3 - lifts
+    assert state.lift_overpulled() == (lifts > 0)
+    assert state.resting.sum() == 3 - lifts
     height = state.result_surface().vertices[crest, 2]
     assert ((height > 0.0) == (lifts > 0)).all()
     if lifts:  # its wall is back, with all its rows
@@ -279,34 +289,36 @@ def test_a_junction_put_down_comes_up_where_the_wall_cannot_hold_it(alpha_aux, l
 
 def complementary(surface):
     """Whether the pull on each resting vertex is one that its wall can take."""
-    below = find_walls(surface)
-    rests = resting(surface, below)
-    pull, capacity = pull_and_capacity(pinched(surface, below, rests), below, rests)
-    return rests, pull, capacity
+    walls = find_walls(surface)
+    resting = resting_vertices(surface, walls)
+    pull, capacity = pull_and_capacity(
+        remove_pinched_walls(surface, walls, resting), walls, resting
+    )
+    return resting, pull, capacity
 
 
 @pytest.mark.parametrize(("n", "alpha_aux", "count"), [(8, 3.0, 7), (16, 2.0, 2)])
 def test_a_converged_contact_is_one(n, alpha_aux, count):
     result = solve(two_squares(n, alpha_aux=alpha_aux), target="stationary")
     assert result.converged
-    rests, pull, capacity = complementary(result.surface)
-    assert rests.sum() == count
+    resting, pull, capacity = complementary(result.surface)
+    assert resting.sum() == count
     assert (pull <= capacity * (1 + 1e-9)).all()
-    assert (pull[rests] > 0.0).all()
+    assert (pull[resting] > 0.0).all()
     found = result.certificate
-    np.testing.assert_array_equal(found.pinched, np.flatnonzero(rests))
+    np.testing.assert_array_equal(found.pinched, np.flatnonzero(resting))
     assert found.curvature_error < 1e-9
     heights = result.surface.plane.height(result.surface.vertices)
-    assert (heights[find_walls(result.surface).can_rest & ~rests] > 0.0).all()
+    assert (heights[find_walls(result.surface).top_free & ~resting] > 0.0).all()
 
 
 def test_the_wall_stands_just_below_the_tension_that_keeps_it_down():
     """With the whole junction at rest the shape does not depend on α_w; its largest pull per length is
     the tension below which the wall stands up somewhere."""
     low = solve(two_squares(8, alpha_aux=3.0), target="stationary")
-    rests, pull, capacity = complementary(low.surface)
-    assert rests.sum() == 7
-    threshold = 3.0 * float((pull[rests] / capacity[rests]).max())
+    resting, pull, capacity = complementary(low.surface)
+    assert resting.sum() == 7
+    threshold = 3.0 * float((pull[resting] / capacity[resting]).max())
     assert 2.5 < threshold < 2.8
     above = solve(two_squares(8, alpha_aux=1.03 * threshold), target="stationary")
     below = solve(two_squares(8, alpha_aux=0.9 * threshold), target="stationary")
@@ -324,10 +336,10 @@ def test_any_strength_of_wall_settles(n, alpha_aux):
     result = solve(two_squares(n, alpha_aux=alpha_aux), target="stationary")
     assert result.converged
     assert result.certificate.residual < 1e-11
-    rests, pull, capacity = complementary(result.surface)
+    resting, pull, capacity = complementary(result.surface)
     assert (pull <= capacity * (1 + 1e-9)).all()
     heights = result.surface.plane.height(result.surface.vertices)
-    assert (heights[find_walls(result.surface).can_rest & ~rests] > 0.0).all()
+    assert (heights[find_walls(result.surface).top_free & ~resting] > 0.0).all()
 
 
 def mirrored(surface, how):
@@ -335,10 +347,13 @@ def mirrored(surface, how):
     faces = surface.faces if how == "pressure" else surface.faces[:, ::-1]
     sign = -1.0 if how == "pressure" else 1.0
     return Surface(
-        surface.vertices * [1, 1, -1], faces, surface.patch_of_face,
+        surface.vertices * [1, 1, -1],
+        faces,
+        surface.patch_of_face,
         [Patch(p.name, p.tension, sign * p.pressure) for p in surface.patches],
-        fixed=surface.fixed, on_plane=surface.on_plane,
-    )  # fmt: skip
+        fixed=surface.fixed,
+        on_plane=surface.on_plane,
+    )
 
 
 @pytest.mark.parametrize("how", ["pressure", "faces"])
@@ -360,7 +375,7 @@ def test_a_junction_that_is_pulled_through_the_plane_goes_there(target):
     result = solve(start.retensioned(pressures={"left": -1.0, "right": -1.0}), target=target)
     assert result.converged
     assert result.certificate.verdict is Verdict.STABLE
-    crest = find_walls(result.surface).can_rest
+    crest = find_walls(result.surface).top_free
     assert (result.surface.vertices[crest, 2] < -0.1).all()
     assert result.energy == pytest.approx(solve(start).energy, rel=2e-3)
 
@@ -383,10 +398,14 @@ def test_a_wall_under_pressure_pinches_like_one_without():
     patches[wall] = Patch("wall", 3.0, 1e-3, wall=True)
     pressed = solve(
         Surface(
-            given.vertices, given.faces, given.patch_of_face, patches, fixed=given.fixed,
+            given.vertices,
+            given.faces,
+            given.patch_of_face,
+            patches,
+            fixed=given.fixed,
             on_plane=given.on_plane,
         )
-    )  # fmt: skip
+    )
     assert pressed.converged
     assert len(pressed.certificate.pinched) == 5
     assert pressed.energy == pytest.approx(plain.energy, rel=1e-6)  # vertices lie elsewhere

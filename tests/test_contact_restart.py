@@ -8,7 +8,12 @@ from starts import bezier_hall, stationary, two_caps, two_squares
 
 from pcmc import Surface, certify, solve
 from pcmc.base.errors import SurfaceError
-from pcmc.contact.pinching import find_walls, pinched, place_wall_rows, resting
+from pcmc.contact.pinching import (
+    find_walls,
+    place_wall_rows,
+    remove_pinched_walls,
+    resting_vertices,
+)
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.solvers.state import State
@@ -52,10 +57,10 @@ def test_the_way_from_a_pinched_surface_ends_in_the_same_shape():
 
 def test_the_rows_of_a_flat_wall_are_known_from_its_mesh():
     start, end = find_walls(two_squares(8, alpha_aux=3.0)), find_walls(flat())
-    np.testing.assert_array_equal(start.hanging, end.hanging)
-    np.testing.assert_allclose(end.share, start.share, atol=1e-12)
-    assert 0.0 < end.share.max() < 1.0
-    assert (end.lean == 0.0).all()
+    np.testing.assert_array_equal(start.rows.vertices, end.rows.vertices)
+    np.testing.assert_allclose(end.rows.relative_height, start.rows.relative_height, atol=1e-12)
+    assert 0.0 < end.rows.relative_height.max() < 1.0
+    assert (end.rows.offset == 0.0).all()
 
 
 @pytest.mark.parametrize("kind", ["descent", "carried"])
@@ -72,7 +77,7 @@ def test_a_step_without_a_matrix_is_a_step_that_failed(kind, monkeypatch):
     else:
         monkeypatch.setattr("pcmc.solvers.smoother.HarmonicExtension.__init__", singular)
         motion = np.ones_like(X)
-        np.testing.assert_array_equal(stepper._carried(motion), motion)
+        np.testing.assert_array_equal(stepper._with_sheets(motion), motion)
     np.testing.assert_array_equal(state.X, X)
 
 
@@ -94,21 +99,23 @@ def test_levels_through_a_contact(alpha_aux):
 def test_refined_a_pinched_wall_has_rows_again_where_it_stands(make):
     coarse = make()
     fine = refine(coarse)
-    below = find_walls(fine)
-    rests = resting(fine, below)
-    crest = resting(coarse, find_walls(coarse))
-    assert rests[: coarse.n].tolist() == crest.tolist()
-    assert rests.sum() > crest.sum()  # and the middles between
-    standing = pinched(fine, below, rests)
+    walls = find_walls(fine)
+    resting = resting_vertices(fine, walls)
+    crest = resting_vertices(coarse, find_walls(coarse))
+    assert resting[: coarse.n].tolist() == crest.tolist()
+    assert resting.sum() > crest.sum()  # and the middles between
+    standing = remove_pinched_walls(fine, walls, resting)
     quality = triangle_quality(standing.vertices, standing.faces)
-    before = pinched(coarse, find_walls(coarse), crest)
+    before = remove_pinched_walls(coarse, find_walls(coarse), crest)
     assert quality.min() > 0.4 * triangle_quality(before.vertices, before.faces).min()
-    i, j = below.ends.T
-    above = fine.plane.height((1 - below.along)[:, None] * fine.vertices[i])
-    above += fine.plane.height(below.along[:, None] * fine.vertices[j])
-    low = fine.plane.height(fine.vertices[below.hanging])
-    np.testing.assert_allclose(low, below.share * above, atol=1e-12)
-    standing_rows = np.column_stack([below.ends, below.along, below.share])[above > 1e-6]
+    rows = walls.rows
+    i, j = rows.top_ends.T
+    above = fine.plane.height((1 - rows.fraction)[:, None] * fine.vertices[i])
+    above += fine.plane.height(rows.fraction[:, None] * fine.vertices[j])
+    low = fine.plane.height(fine.vertices[rows.vertices])
+    np.testing.assert_allclose(low, rows.relative_height * above, atol=1e-12)
+    places = np.column_stack([rows.top_ends, rows.fraction, rows.relative_height])
+    standing_rows = places[above > 1e-6]
     assert len(np.unique(standing_rows, axis=0)) == len(standing_rows)
 
 
@@ -144,15 +151,15 @@ def test_what_is_at_rest_stays_at_rest(make):
 def test_a_leaning_wall_lies_flat_with_its_crest():
     """What a wall vertex stands off from straight below its crest goes with the crest's height."""
     surface = stationary(partial(two_caps, 0.8)).surface
-    below = find_walls(surface)
+    walls = find_walls(surface)
     X = surface.vertices.copy()
-    X[below.can_rest] *= [1.0, 1.0, 0.0]
-    low = place_wall_rows(surface, below, X)[below.hanging]
-    i, j = below.ends.T
-    corner = ~(below.can_rest[i] & below.can_rest[j])
-    above = (1 - below.along)[:, None] * X[i] + below.along[:, None] * X[j]
+    X[walls.top_free] *= [1.0, 1.0, 0.0]
+    low = place_wall_rows(surface, walls, X)[walls.rows.vertices]
+    i, j = walls.rows.top_ends.T
+    corner = ~(walls.top_free[i] & walls.top_free[j])
+    above = (1 - walls.rows.fraction)[:, None] * X[i] + walls.rows.fraction[:, None] * X[j]
     np.testing.assert_allclose(low[~corner], above[~corner], atol=1e-12)
-    assert np.linalg.norm(below.lean, axis=1).max() > 0.05
+    assert np.linalg.norm(walls.rows.offset, axis=1).max() > 0.05
 
 
 def test_a_release_is_in_the_history():
@@ -177,7 +184,7 @@ def test_a_pinched_surface_passes_the_checks(make):
     assert (areas == 0.0).any()
     again = rebuilt(surface)
     np.testing.assert_array_equal(
-        resting(again, find_walls(again)), resting(surface, find_walls(surface))
+        resting_vertices(again, find_walls(again)), resting_vertices(surface, find_walls(surface))
     )
     assert certify(again).index == certify(surface).index
 
@@ -195,18 +202,19 @@ def test_other_triangles_without_area_are_still_refused():
     with pytest.raises(SurfaceError, match=rf"face {outer} = .* of patch 'left' has zero area"):
         rebuilt(surface, **collapsed(surface, outer))
     with pytest.raises(SurfaceError, match="of patch 'wall' has zero area"):
-        rebuilt(surface.retensioned({}, {"left": 0.0, "right": 0.0}))  # nothing rests but walls
+        rebuilt(surface.retensioned({}, {"left": 0.0, "right": 0.0}))  # nothing resting but walls
     with pytest.raises(SurfaceError, match="of patch 'wall' has zero area"):
         rebuilt(surface.retensioned({}, {"wall": 1.0}))
-    held = surface.fixed | find_walls(surface).can_rest
+    held = surface.fixed | find_walls(surface).top_free
     with pytest.raises(SurfaceError, match="of patch 'wall' has zero area"):
         rebuilt(surface, fixed=held)
 
 
 def test_a_standing_wall_with_a_triangle_of_no_area_is_refused():
     surface = two_squares(8)
-    below = find_walls(surface)
-    inside = below.hanging[(below.share > 0.0) & (below.along != 0.5)][0]
+    walls = find_walls(surface)
+    rows = walls.rows
+    inside = rows.vertices[(rows.relative_height > 0.0) & (rows.fraction != 0.5)][0]
     face = int(np.flatnonzero((surface.faces == inside).any(axis=1))[0])
     with pytest.raises(SurfaceError, match="of patch 'wall' has zero area"):
         rebuilt(surface, **collapsed(surface, face))

@@ -6,7 +6,7 @@ from branches import tension_of_height
 
 from generators import four_fans, two_caps, two_squares
 from pcmc import Direction, certify, follow, solve
-from pcmc.contact.pinching import pull_and_capacity, standing
+from pcmc.contact.pinching import pull_and_capacity, standing_part
 from pcmc.continuation import Ending
 from pcmc.plan import Divider, Plan
 from pcmc.surface.wall_pressures import with_pressures
@@ -88,9 +88,9 @@ def test_junction_that_rests_on_the_plane_is_lifted_when_its_wall_pulls_less():
 
 def test_junction_stands_off_as_soon_as_its_wall_pulls_less_than_the_sheets():
     start = solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
-    found = standing(start)
-    pull, capacity = pull_and_capacity(found.surface, found.walls, found.rests)
-    least = 3.0 * float((pull[found.rests] / capacity[found.rests]).max())
+    found = standing_part(start)
+    pull, capacity = pull_and_capacity(found.surface, found.walls, found.resting)
+    least = 3.0 * float((pull[found.resting] / capacity[found.resting]).max())
     for part, resting in ((1.001, 5), (0.995, 3)):
         branch = follow(start, "wall", part * least)
         assert branch.ending is Ending.REACHED

@@ -7,7 +7,7 @@ from shapes import octahedron, rotation, shaken
 from starts import two_squares
 
 from pcmc import Plane, Surface, solve
-from pcmc.contact.pinching import standing
+from pcmc.contact.pinching import standing_part
 from pcmc.energy.functional import energy_and_gradient
 from pcmc.energy.jacobian import linearise
 from pcmc.energy.motion_space import motion_space, vertex_classes
@@ -69,7 +69,7 @@ def test_sheets_that_slide_on_the_plane():
 
 def test_a_junction_beside_one_that_rests():
     surface = solve(two_squares(6, alpha_aux=2.5), target="stationary").surface
-    found = standing(surface)
+    found = standing_part(surface)
     classes = found.classes
     assert classes.level.any()
     moves = shaken(found.surface, 0.02)

@@ -7,7 +7,7 @@ from shapes import disc, pyramid, rotation, shaken, three_patches
 
 from generators import two_squares
 from pcmc import Patch, Plane, Surface, energy, gradient, solve
-from pcmc.contact.pinching import resting_crest, standing
+from pcmc.contact.pinching import resting_links, standing_part
 from pcmc.energy.functional import energy_and_gradient
 from pcmc.energy.motion_space import force_scale, motion_space, vertex_classes
 from pcmc.surface.topology import CURVE, POINT, SHEET
@@ -244,10 +244,10 @@ def test_a_crest_at_rest_is_a_curve_whatever_meets_there():
 def test_where_a_standing_wall_begins_a_resting_vertex_keeps_to_the_crest():
     """Three curves meet there, two sheets' junction and the wall's foot; only the junction counts."""
     surface = solve(two_squares(6, alpha_aux=2.5), target="stationary").surface
-    found = standing(surface)
-    classes, rests = found.classes, found.rests
-    links = resting_crest(found.walls, rests)
-    tip = np.unique(links[(found.walls.can_rest & ~rests)[links[:, 1]], 0])
+    found = standing_part(surface)
+    classes, resting = found.classes, found.resting
+    links = resting_links(found.walls, resting)
+    tip = np.unique(links[(found.walls.top_free & ~resting)[links[:, 1]], 0])
     assert len(tip) == 2
     assert (classes.kind[tip] == CURVE).all()
     space = motion_space(found.surface, classes, found.surface.vertices)

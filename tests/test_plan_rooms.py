@@ -74,7 +74,7 @@ def test_walls_put_under_a_mesh_carry_the_difference_too():
         patches=[Area("west", 6.0, 1.0), Area("east", 6.0, 0.8)],
     ).surface()  # fmt: skip
     found = certify(bare)
-    assert "the pressures leave 0.2 over" in found.detail
+    assert "the pressures do not cancel: 0.2 is left over" in found.detail
     wall = add_walls(bare).patches[-1]
     assert wall.pressure == pytest.approx(0.2)
     assert "point of Π" not in certify(add_walls(bare)).detail

@@ -11,7 +11,9 @@ import pytest
 
 from pcmc import cli
 from pcmc.project import build, run
-from studies.readme import up_to_date
+from studies.folder import Folder
+from studies.readme import of_the_paper, summary, up_to_date
+from studies.report import report
 
 HOME = Path(__file__).resolve().parent.parent
 README = (HOME / "README.md").read_text(encoding="utf-8")
@@ -64,8 +66,22 @@ def test_the_sections_added_to_the_project_give_what_they_say(tmp_path):
     assert surface.vertices[corner, 2].max() == pytest.approx(2.5, abs=1e-6)
 
 
-def test_tables_are_up_to_date_with_the_results():
+def test_summary_and_report_are_up_to_date_with_the_results():
     assert up_to_date(README, HOME / "results") == README, "run: python -m studies readme"
+    written = (HOME / "results" / "REPORT.md").read_text(encoding="utf-8")
+    assert report(HOME / "results") == written, "run: python -m studies readme"
+
+
+def test_the_summary_has_ten_rows_and_hides_no_number_that_differs():
+    comparison = Folder(HOME / "results").read_table("comparison")
+    shown = summary(comparison)
+    assert len(shown) == 10
+    own = of_the_paper(comparison, "number")
+    assert set(own[own.verdict == "differs"].what) <= set(shown.what)
+
+
+def test_it_is_short():
+    assert len(README.splitlines()) < 160
 
 
 def test_every_picture_and_folder_named_is_there():
@@ -75,8 +91,8 @@ def test_every_picture_and_folder_named_is_there():
         f"notebooks/{path.name}" for path in (HOME / "notebooks").glob("*.ipynb")
     }
     pictures += [link for link in links if not link.startswith("http") and link]
-    folders = re.findall(r"^\| `(\w+/)`", README, re.MULTILINE)
-    assert pictures
-    assert len(folders) >= 5
+    folders = re.findall(r"`(\w+/)`", README)
+    assert "results/equilibria/shapes.png" in pictures
+    assert {"pcmc/", "generators/", "studies/", "results/"} == set(folders)
     for name in pictures + folders:
         assert (HOME / name).exists(), name

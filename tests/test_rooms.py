@@ -6,7 +6,7 @@ import pytest
 import pcmc
 from generators import double_bubble, two_squares
 from pcmc import Parameter, Target, cli, meet
-from pcmc.contact.pinching import standing
+from pcmc.contact.pinching import standing_part
 from pcmc.design import sensitivities
 from pcmc.design.targets import measure
 from pcmc.plan import Area, Divider, Plan
@@ -61,7 +61,7 @@ def test_a_pinched_wall_with_a_pressure_comes_back_where_patches_are_written_apa
 ):
     pinched = pcmc.solve(two_squares(16, alpha_aux=2.0), target="stationary").surface
     surface = with_pressures(pinched, None, {"left": 1.02})
-    assert standing(surface).surface.m < surface.m
+    assert standing_part(surface).surface.m < surface.m
     pcmc.write(tmp_path / f"a{suffix}", surface)
     again = pcmc.read(tmp_path / f"a{suffix}")
     assert (again.m, again.patches) == (surface.m, surface.patches)
@@ -106,7 +106,7 @@ def test_a_height_is_met_by_a_room_s_pressure():
 def test_sensitivities_to_a_room_s_pressure_are_slopes_with_its_wall_following(kind):
     tight = {"tolerance": 1e-13, "min_quality": 0.0}
     at_rest = pcmc.solve(hall(1.0, 0.9), **tight).surface
-    assert standing(at_rest).surface.m == at_rest.m
+    assert standing_part(at_rest).surface.m == at_rest.m
     target, step = Target(kind, "west"), 1e-3
 
     def found(west):

@@ -15,6 +15,7 @@ from .errors import OptionError
 BLOCK = 32_768  # below this many triangles a second thread costs more than it gains
 
 compiled = numba.njit(cache=True, nogil=True, error_model="numpy")
+inlined = numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 
 def threads() -> int:

@@ -1,8 +1,9 @@
-"""The certificate: what a surface is. Residual, balance, reactions, collapse, verdict.
+"""The certificate of a surface: residual, balance, reactions, collapse, verdict.
 
 Gives ``certify`` to the solvers' callers. Imports ``stability``, ``meshing``, ``contact`` and below.
 """
 
-from .certificate import Certificate, Verdict, certify
+from .certificate import Certificate, certify
+from .verdict import Evidence, Verdict
 
-__all__ = ["Certificate", "Verdict", "certify"]
+__all__ = ["Certificate", "Evidence", "Verdict", "certify"]

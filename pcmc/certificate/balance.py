@@ -1,4 +1,4 @@
-"""Who holds whom: the forces along junctions and at supports, and what they could carry."""
+"""Balance: the forces along junctions and at supports, and the most that these could carry."""
 
 from __future__ import annotations
 
@@ -8,44 +8,43 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Bools, Floats, Ints
-from ..contact.pinching import standing
+from ..contact.pinching import standing_part
 from ..energy import kernels
 from ..surface import Surface
+from ..surface.geometry import area_vectors, edge_vectors, segment_lengths, vertex_sums
 from ..surface.topology import Curve
 
-HARDLY = 0.99  # of the sum of the others: the largest tension at which two sheets meet at some 20°
+HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets meet at about 20°
 ROUNDING = 1e-12  # of the size: a coordinate below is 0
 
 
 def load_ratio(surface: Surface) -> float:
     """Pressure along Π's normal over the most that tension at the boundary could carry.
 
-    Vertical balance of the whole: p |Ω| ≤ Σ α length(∂Ω) + Σ α_wall length(wall feet). Lines that are
-    fixed inside carry too, Σ α of all their sheets per length, and so do single fixed vertices with
-    the most that their triangles pull. Above 1 no smooth surface with this boundary is at rest,
-    whatever its shape. A mesh may be: its triangles balance along the normals alone. A cap over the
-    unit disc with edge length 0.2 comes to rest down to α = 0.493, where the ratio is 1.014; a pyramid
-    over a square with one free vertex down to α = 1/3, at 1.5. The verdict draws on the ratio only
-    above ``1 + coarseness``. 0 for a closed surface that nothing holds.
+    Vertical balance of the whole: p |Ω| ≤ Σ α length(∂Ω) + Σ α_wall length(wall feet). Fixed lines
+    inside the surface carry, too: Σ α of all their sheets per length. So do single fixed vertices, at
+    most what their triangles pull. Above 1 no smooth surface with this boundary is at rest, whatever its
+    shape. A mesh may be, as its triangles balance along the normals alone. A cap over the unit disc with
+    edge length 0.2 comes to rest down to α = 0.493, where the ratio is 1.014; a pyramid over a square
+    with one free vertex down to α = 1/3, at 1.5. So the verdict uses the ratio only above
+    ``1 + coarseness``. 0 for a closed surface that nothing holds.
     """
     topo, X, F = surface.topology, surface.vertices, surface.faces
     tension = surface.tensions[surface.patch_of_face]
     sheets = np.bincount(topo.edge_of_face.ravel(), np.repeat(tension, 3), len(topo.edges))
     inside = surface.fixed & ~topo.on_boundary
     line = inside[topo.edges].all(axis=1)
-    carries = topo.boundary_edge | line
-    ends = X[topo.edges[carries]]
-    capacity = float(sheets[carries] @ np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+    carrying = topo.boundary_edge | line
+    capacity = float(sheets[carrying] @ segment_lengths(X, topo.edges[carrying]))
     inside[topo.edges[line]] = False
-    opposite = np.linalg.norm(X[F[:, [2, 0, 1]]] - X[F[:, [1, 2, 0]]], axis=2)
+    opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
     capacity += 0.5 * float(tension @ (opposite * inside[F]).sum(axis=1))
     return abs(load(surface)) / capacity if capacity > 0.0 else 0.0
 
 
 def load(surface: Surface) -> float:
     """Σ p A_T ν_T · n: the force of the pressure along Π's normal n, which the supports carry."""
-    corners = surface.vertices[surface.faces]
-    vector = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    vector = area_vectors(surface.vertices[surface.faces])
     return float(
         surface.pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
     )
@@ -54,7 +53,7 @@ def load(surface: Surface) -> float:
 def coarseness(surface: Surface) -> float:
     """(h / R)², h the mean length of the boundary's edges and R = 2 · area / length of the plan.
 
-    Of the size of the error with which a mesh balances; 0 for a closed surface.
+    The balance of a mesh has an error of about this size; 0 for a closed surface.
 
     >>> from pcmc import Patch
     >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
@@ -63,22 +62,20 @@ def coarseness(surface: Surface) -> float:
     4.0
     """
     X, topo = surface.vertices, surface.topology
-    ends = X[topo.edges[topo.boundary_edge]]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    length = segment_lengths(X, topo.edges[topo.boundary_edge])
     corners = X[surface.faces[~surface.walls[surface.patch_of_face]]]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
-    plan = 0.5 * abs(float(across @ np.array(surface.plane.normal)))
+    plan = abs(float(area_vectors(corners).sum(axis=0) @ np.array(surface.plane.normal)))
     if not len(length) or plan == 0.0:
         return 0.0
     return float((length.mean() * length.sum() / (2.0 * plan)) ** 2)
 
 
 def unbalanced(surface: Surface, pinchable: Bools) -> str:
-    """Names a junction whose tensions cannot balance whatever the angles; empty if there is none.
+    """Names a junction whose tensions cannot balance at any angles; empty if there is none.
 
-    Σ α n = 0 (7) needs the largest tension to be at most the sum of the others. Where a junction is
-    held all along, its support takes the difference; a wall that slides on Π and is stronger than its
-    sheets brings its junction down to rest there. ``pinchable`` (k,) tells which patches are such walls.
+    Σ α n = 0 (7) needs the largest tension to be at most the sum of the others. A junction that is held
+    all along is left out, as its support takes the difference, and so is one with a wall that slides on
+    Π and is stronger than its sheets: it comes down to rest on Π. ``pinchable`` (k,) marks such walls.
     """
     names, strongest, others = _strained(surface, pinchable, 1.0 + 1e-9)
     if not names:
@@ -87,10 +84,10 @@ def unbalanced(surface: Surface, pinchable: Bools) -> str:
 
 
 def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
-    """Names a junction whose tensions balance only if its sheets lie nearly on each other, or cannot.
+    """Names a junction whose tensions balance only with sheets nearly on each other, or not at all.
 
-    At the limit, 5 = 4.5 + 0.5, two of three lie on each other, which no mesh can follow. Arguments as
-    of ``unbalanced``.
+    At the limit, 5 = 4.5 + 0.5, two of three lie on each other, and no mesh can follow. Arguments as
+    for ``unbalanced``.
     """
     names, strongest, others = _strained(surface, pinchable, HARDLY)
     if not names:
@@ -115,20 +112,20 @@ def _strained(surface: Surface, pinchable: Bools, share: float) -> tuple[str, st
     return "", "", ""
 
 
-def seen_from_point(surface: Surface) -> str:
-    """Names where the shape depends on the point of Π, as pressures do not cancel; or empty."""
+def pressures_left_over(surface: Surface) -> str:
+    """Names free edges where pressures do not cancel, so that the shape depends on Π's point; or empty."""
     left = surface.uncancelled
-    found = np.flatnonzero(left)
-    if not len(found):
+    edges = np.flatnonzero(left)
+    if not len(edges):
         return ""
-    edge = found[0]
+    edge = edges[0]
     at = (surface.topology.edge_of_face == edge).any(axis=1)
     names = " | ".join(surface.patches[k].name for k in np.unique(surface.patch_of_face[at]))
     place = surface.vertices[surface.topology.edges[edge]].mean(axis=0).round(4).tolist()
     return (
-        f"along {len(found)} edges that nothing holds ({names} near {place}) the pressures leave"
-        f" {abs(left[edge]):.3g} over, which acts from there to the point of Π: the shape depends on"
-        " that point; a wall takes the pressure of one room less that of the other"
+        f"along {len(edges)} edges that nothing holds ({names} near {place}) the pressures do not"
+        f" cancel: {abs(left[edge]):.3g} is left over and acts from there to the point of Π, so the"
+        " shape depends on that point; give a wall the pressure of one room less that of the other"
     )
 
 
@@ -158,24 +155,22 @@ def held_lengths(surface: Surface) -> Floats:
     held = surface.fixed | surface.on_plane
     ends = surface.topology.edges[surface.topology.boundary_edge]
     ends = ends[held[ends].all(axis=1)]
-    half = 0.5 * np.linalg.norm(surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]], axis=1)
+    half = 0.5 * segment_lengths(surface.vertices, ends)
     return np.asarray(np.bincount(ends.ravel(), np.repeat(half, 2), surface.n), dtype=float)
 
 
 def reactions(surface: Surface) -> Floats:
-    """(n,3) what the supports exert: all of the force where fixed, its part normal to Π where sliding.
+    """(n,3) forces of the supports: the whole force where fixed, its part normal to Π where sliding.
 
-    The force at a vertex is Σ α ∂A - ⅓ Σ p A_T ν_T: a third of each triangle's tension and pressure.
-    At a boundary this is not ∇E, whose volume is that of a cone to the point of Π: the cone's side
-    moves with the boundary too, and has no pressure on it.
+    The force at a vertex is Σ α ∂A - ⅓ Σ p A_T ν_T, with a third of each triangle's pressure. At a
+    boundary this is not ∇E: there the volume is that of a cone to the point of Π, whose side moves with
+    the boundary but is under no pressure.
     """
     X, F = surface.vertices, surface.faces
     zero = np.zeros(len(surface.patches))
-    forces = kernels.measure(X, F, surface.patch_of_face, np.zeros(3), surface.tensions, zero)[2]
-    vector = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]) / 6.0
-    vector *= surface.pressures[surface.patch_of_face, None]
-    for axis in range(3):
-        forces[:, axis] -= np.bincount(F.ravel(), np.repeat(vector[:, axis], 3), surface.n)
+    forces = kernels.measure(kernels.energy_mesh(surface, pressure=zero), X)[2]
+    third = area_vectors(X[F]) / 3.0
+    forces -= vertex_sums(third * surface.pressures[surface.patch_of_face, None], F, surface.n)
     out = np.zeros_like(forces)
     out[surface.fixed] = forces[surface.fixed]
     sliding = surface.on_plane
@@ -186,8 +181,8 @@ def reactions(surface: Surface) -> Floats:
 def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floats:
     """(n,3) the reactions over the length of held boundary at each vertex; NaN where there is none.
 
-    Half of each boundary edge that is held belongs to either end. ``forces`` (n,3) are by default the
-    surface's own, of what stands of it.
+    Each end of a held boundary edge gets half of its length. ``forces`` (n,3) are by default the
+    reactions of the part of the surface that stands.
 
     >>> from pcmc import Patch
     >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
@@ -196,7 +191,7 @@ def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floa
     [-1.5, 1.5, -1.0]
     """
     if forces is None:
-        forces = reactions(standing(surface).surface)
+        forces = reactions(standing_part(surface).surface)
     share = held_lengths(surface)
     result = np.full((surface.n, 3), np.nan)
     result[share > 0.0] = forces[share > 0.0] / share[share > 0.0, None]
@@ -204,7 +199,7 @@ def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floa
 
 
 def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
-    """Per junction curve: where it is, the forces left per length, and Σ α n of the triangles along it."""
+    """One row per junction curve: where it is, the forces left per length, Σ α n of its triangles."""
     topo = surface.topology
     imbalance = np.linalg.norm(conormal_sum(surface), axis=1)
     number = {tuple(edge): i for i, edge in enumerate(topo.edges[_seams(topo)].tolist())}
@@ -214,23 +209,26 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
         pairs, lengths = _segments(surface, curve)
         edges = chosen[[number[tuple(pair)] for pair in np.sort(pairs, axis=1).tolist()]]
         total = float(lengths.sum())
-        rows.append({
-            "junction": " | ".join(surface.patches[i].name for i in curve.sheets),
-            "length": total,
-            **_middle(surface, curve),
-            "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max()) / _mean(lengths),
-            "sum_alpha_n_mean": float(imbalance[edges] @ lengths) / total if total else 0.0,
-            "sum_alpha_n_max": float(imbalance[edges].max()),
-        })  # fmt: skip
+        rows.append(
+            {
+                "junction": " | ".join(surface.patches[i].name for i in curve.sheets),
+                "length": total,
+                **_middle(surface, curve),
+                "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max())
+                / _mean(lengths),
+                "sum_alpha_n_mean": float(imbalance[edges] @ lengths) / total if total else 0.0,
+                "sum_alpha_n_max": float(imbalance[edges].max()),
+            }
+        )
     return pd.DataFrame(rows)
 
 
 def boundary_table(surface: Surface) -> pd.DataFrame:
-    """Per held boundary curve: where it is, the force on it, and the largest force per length."""
+    """One row per held boundary curve: where it is, the force on it, the largest force per length."""
     forces = reactions(surface)
     held = surface.fixed | surface.on_plane
     loops = surface.topology.boundary_loops
-    # a corner that several curves share gives each an equal part, so that the rows add up
+    # the reaction of a corner is shared equally by its curves, so that the rows add up to the total
     count = np.zeros(surface.n)
     for curve in loops:
         count[curve.vertices] += 1.0
@@ -241,26 +239,28 @@ def boundary_table(surface: Surface) -> pd.DataFrame:
         if not held[curve.vertices].any():
             continue
         total = parts[curve.vertices].sum(axis=0)
-        rows.append({
-            "boundary": " | ".join(surface.patches[i].name for i in curve.sheets),
-            "length": float(_segments(surface, curve)[1].sum()),
-            **_middle(surface, curve),
-            "reaction_x": float(total[0]), "reaction_y": float(total[1]),
-            "reaction_z": float(total[2]),
-            "per_length_max": float(per_length[curve.vertices].max()),
-        })  # fmt: skip
+        rows.append(
+            {
+                "boundary": " | ".join(surface.patches[i].name for i in curve.sheets),
+                "length": float(_segments(surface, curve)[1].sum()),
+                **_middle(surface, curve),
+                "reaction_x": float(total[0]),
+                "reaction_y": float(total[1]),
+                "reaction_z": float(total[2]),
+                "per_length_max": float(per_length[curve.vertices].max()),
+            }
+        )
     return pd.DataFrame(rows)
 
 
 def _segments(surface: Surface, curve: Curve) -> tuple[Ints, Floats]:
     order = np.append(curve.vertices, curve.vertices[:1]) if curve.closed else curve.vertices
     pairs = np.stack([order[:-1], order[1:]], axis=1)
-    ends = surface.vertices[pairs]
-    return pairs, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    return pairs, segment_lengths(surface.vertices, pairs)
 
 
 def _middle(surface: Surface, curve: Curve) -> dict[str, float]:
-    """The point half way along a curve, or the centre of a closed one: curves of one name apart."""
+    """The point half way along a curve, or the centre of a closed one; tells curves of one name apart."""
     pairs, lengths = _segments(surface, curve)
     ends = surface.vertices[pairs]
     if curve.closed:

@@ -1,4 +1,4 @@
-"""Why the triangles of a mesh have collapsed: where the worst is, and what pressed on it."""
+"""Why the triangles of a mesh have collapsed: where the worst one is, and the likely cause."""
 
 from __future__ import annotations
 
@@ -9,43 +9,43 @@ from ..base.arrays import Bools, Floats, Ints
 from ..meshing.quality import edge_lengths, triangle_quality
 from ..surface import Surface
 
-REACH = 1.5  # median edge lengths around the worst triangle in which its cause is looked for
+REACH = 1.5  # median edge lengths: the cause is looked for this near to the worst triangle
 LOW = 0.2  # median edge lengths: a held wall this low has no room for triangles
-ALONG = 30.0  # degrees; a junction that leaves its end at a smaller angle lies along the support
+ALONG = 30.0  # degrees: at a smaller angle to the support a junction counts as lying along it
 
 
-def where_collapsed(surface: Surface, sliding: Bools) -> str:
-    """Names the worst triangle outside the patches that may pinch, and what pressed on it.
+def where_collapsed(surface: Surface, pinchable: Bools) -> str:
+    """Names the worst triangle outside walls that can pinch, and its cause if that is a known one.
 
-    ``sliding`` (k,) tells which patches may. What is known to press: a junction that slips along the
-    support away from its own end, where the mesh alone holds it; and one that comes down on the held
-    bottom of its wall, which cannot pinch.
+    ``pinchable`` (k,) marks these walls. Two causes are known: a junction slips along a support away
+    from its own end, where only the mesh holds it; or it comes down on the held bottom of its wall,
+    which cannot pinch.
     """
     quality = triangle_quality(surface.vertices, surface.faces)
-    outer = np.where(sliding[surface.patch_of_face], np.inf, quality)
+    outer = np.where(pinchable[surface.patch_of_face], np.inf, quality)
     face = int(outer.argmin())
     patch = int(surface.patch_of_face[face])
     place = surface.vertices[surface.faces[face]].mean(axis=0)
     edge = float(np.median(edge_lengths(surface)))
-    said = (
+    worst = (
         f"worst is face {face} of patch {surface.patches[patch].name!r} near"
         f" {place.round(4).tolist()}, quality {outer[face]:.1e}"
     )
     if surface.walls[patch] and _height(surface, patch) < LOW * edge:
-        return said + (
-            "; the junction there comes down on the held bottom of its wall, which leaves the wall no"
-            " height: a weaker wall stands, and one whose bottom slides may rest on the plane"
+        return worst + (
+            "; the junction there comes down on the held bottom of its wall, so the wall has no height"
+            " left: make the wall weaker, or let its bottom slide so that the junction can rest on the plane"
         )
-    if _slips(surface, sliding, place, REACH * edge):
-        said += (
+    if _slips(surface, pinchable, place, REACH * edge):
+        worst += (
             "; the junction there slips along a support, which does not hold its end: hold the bottom"
             " of its wall"
         )
-    return said
+    return worst
 
 
 def _height(surface: Surface, patch: int) -> float:
-    """The least height, in space, of a wall's free junction vertices over its held bottom."""
+    """The least distance of a wall's free junction vertices from its held bottom."""
     X = surface.vertices
     used = np.zeros(surface.n, dtype=bool)
     used[surface.faces[surface.patch_of_face == patch]] = True
@@ -57,8 +57,8 @@ def _height(surface: Surface, patch: int) -> float:
     return float(np.min(cKDTree(X[bottom]).query(X[top])[0]))
 
 
-def _slips(surface: Surface, sliding: Bools, place: Floats, reach: float) -> bool:
-    """Whether near a place a junction slides on a support next to its fixed end, or lies along it."""
+def _slips(surface: Surface, pinchable: Bools, place: Floats, reach: float) -> bool:
+    """Whether a junction near the place slides on a support next to its fixed end, or lies along it."""
     X, topo = surface.vertices, surface.topology
     near = np.linalg.norm(X - place, axis=1) <= reach
     of_junction = topo.on_junction & ~surface.fixed
@@ -68,7 +68,7 @@ def _slips(surface: Surface, sliding: Bools, place: Floats, reach: float) -> boo
         return True
     held = topo.edges[topo.boundary_edge & surface.fixed[topo.edges].all(axis=1)]
     for curve in topo.junctions:
-        if near[curve.vertices].any() and sliding[list(curve.sheets)].any() and not curve.closed:
+        if near[curve.vertices].any() and pinchable[list(curve.sheets)].any() and not curve.closed:
             for end, beside in (curve.vertices[:2], curve.vertices[:-3:-1]):
                 if surface.fixed[end] and _along(X, held, int(end), int(beside)):
                     return True

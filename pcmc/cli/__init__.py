@@ -1,5 +1,52 @@
-"""The ``pcmc`` command."""
+"""The ``pcmc`` command: arguments, messages, exit codes. May import every other room.
 
-from .running import main
+This file imports nothing heavy, so that ``main`` handles Ctrl-C before numpy and scipy are imported.
+"""
 
-__all__ = ["main"]
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Sequence
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command. The shell's ``pcmc`` calls this.
+
+    Parameters
+    ----------
+    arguments : of the command line, without the command's name; default ``sys.argv[1:]``.
+
+    Returns
+    -------
+    int : the exit code. 0: the result is certified, or a command that certifies nothing has succeeded;
+        1: the result is not certified; 2: bad input; 130: stopped by Ctrl-C.
+
+    >>> main(["certify", "roof.obk"])
+    2
+    """
+    default = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # nohup ignores it
+    own_process = arguments is None and default
+    if own_process:
+        signal.signal(signal.SIGINT, _exit)  # a library that is half imported may lose an exception
+    from .running import run
+
+    try:
+        if own_process:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        return run(sys.argv[1:] if arguments is None else list(arguments))
+    except KeyboardInterrupt:
+        return _stopped()
+    finally:
+        if own_process:
+            signal.signal(signal.SIGINT, _exit)  # until Python has ended
+
+
+def _stopped() -> int:
+    print("pcmc: stopped", file=sys.stderr, flush=True)
+    return 130
+
+
+def _exit(*_: object) -> None:
+    os._exit(_stopped())

@@ -27,7 +27,7 @@ app = typer.Typer(
 
 def _version(asked: bool) -> None:
     if asked:
-        print("pcmc", version("pcmc"))
+        print("pcmc", version("pcmc-surfaces"))
         raise typer.Exit
 
 

@@ -1,11 +1,11 @@
-"""Running the command: errors in a line, and the exit code."""
+"""Run the command: errors in one line on stderr, and the exit code."""
 
 from __future__ import annotations
 
 import os
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
@@ -20,44 +20,31 @@ from ..base.errors import (
 from ..base.interrupts import termination_as_interrupt
 from .codes import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
-NARROW = ("strict", "surrogateescape")  # the second in the locale C
+FAILING = ("strict", "surrogateescape")  # error handlers; the second is the locale C's
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command.
-
-    Parameters
-    ----------
-    arguments : of the command line, without the command's own name; by default those given to it.
-
-    Returns
-    -------
-    int : the exit code. 0 for a certified result (or, of a command that certifies nothing, for one that
-        did its work), 1 for a result that is not certified, 2 for bad input, 130 after Ctrl-C.
-
-    >>> main(["certify", "roof.obk"])
-    2
-    """
+def run(arguments: list[str]) -> int:
+    """Run the command; errors become one line on stderr, and the exit code says how it ended."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for kind in (BalanceWarning, FileWarning, FreeSurfaceWarning, PlanWarning):
             warnings.simplefilter("always", kind)
         warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")
-        _any_letter(sys.stdout)
+        _escape_missing_letters(sys.stdout)
         with termination_as_interrupt():
-            return _run(sys.argv[1:] if arguments is None else list(arguments))
+            return _run(arguments)
 
 
 def _run(arguments: list[str]) -> int:
     try:
         command, exits = _command()
         code = command(args=arguments, prog_name="pcmc", standalone_mode=False)
-        if sys.stdout is not None:  # it is where the shell closed it
+        if sys.stdout is not None:  # None if the shell closed it
             sys.stdout.flush()
         return _interrupted() if code == INTERRUPTED else int(code or OK)
     except KeyboardInterrupt:
         return _interrupted()
-    except BrokenPipeError:  # the reader of a pipe has seen enough
+    except BrokenPipeError:  # the reader closed the pipe: pcmc ... | head
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return NOT_CERTIFIED
     except (PcmcError, MissingExtra) as error:
@@ -72,15 +59,15 @@ def _run(arguments: list[str]) -> int:
             return _interrupted()
         if isinstance(error, exits.Exit):
             return int(error.exit_code)
-        if not hasattr(error, "format_message"):  # those of the command line have it
+        if not hasattr(error, "format_message"):  # typer's errors have it
             raise
         path = getattr(getattr(error, "ctx", None), "command_path", "pcmc")
-        _say(f"error: {error.format_message()} ({path} --help shows what there is)")
+        _say(f"error: {error.format_message()} (see {path} --help)")
         return BAD_INPUT
 
 
 def _command() -> tuple[Callable[..., Any], ModuleType]:
-    """The command line, and the module with the exceptions that end it."""
+    """The command line, and the module that has its exceptions."""
     for library in ("typer", "rich"):
         try:
             __import__(library)
@@ -93,9 +80,9 @@ def _command() -> tuple[Callable[..., Any], ModuleType]:
     return typer.main.get_command(app), typer
 
 
-def _any_letter(stream: Any) -> None:
-    r"""Have letters that the terminal's or a pipe's encoding lacks written as \\xf6 instead of failing."""
-    if getattr(stream, "errors", None) in NARROW and hasattr(stream, "reconfigure"):
+def _escape_missing_letters(stream: Any) -> None:
+    r"""Write a letter that the stream's encoding lacks as \\xf6, instead of failing."""
+    if getattr(stream, "errors", None) in FAILING and hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")
 
 
@@ -105,7 +92,7 @@ def _interrupted() -> int:
 
 
 def _say(text: str) -> None:
-    """One line on stderr, which is None where the shell closed it."""
+    """Print one line to stderr, which is None if the shell closed it."""
     if sys.stderr is None:
         return
     print("pcmc: " + " ".join(text.split()), file=sys.stderr)

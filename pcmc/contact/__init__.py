@@ -1,4 +1,4 @@
-"""Walls that pinch: where a junction comes down to Π, its wall has no height and it rests there.
+"""Walls that pinch: where a junction comes down to Π, its wall has no height left and it rests there.
 
 Gives the walls and the part of a surface that stands. Imports ``energy`` and the rooms below it.
 """

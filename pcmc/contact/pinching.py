@@ -1,10 +1,10 @@
-"""Walls that pinch: where a junction comes down to Π the wall's height vanishes and it rests there.
+"""Walls that pinch: where a junction comes down to Π its wall has no height left, and it rests there.
 
 A wall of tension α_w and height z over a length s costs α_w |z| s: not differentiable at z = 0. The
-junction rests on Π where the pull of the sheets on it, up or down, is at most α_w per length, and stands
-off, to the side it is pulled to, where the forces balance. While it rests, the wall below has no area: its
-vertices coincide with the junction vertex above them (their *owner*), and its triangles are left out. So a
-pinched wall is seen from the positions alone, and a surface with one needs no extra state.
+junction rests on Π where the pull of the sheets on it, up or down, is at most α_w per length. Where it is
+more, the junction stands off Π, to the side it is pulled to, and the forces balance there. While it rests,
+the wall below has no area: its vertices coincide with the junction vertex above them (their *owner*), and
+its triangles are left out. So positions alone show which walls are pinched: a surface needs no extra state.
 """
 
 from __future__ import annotations
@@ -18,101 +18,86 @@ from ..energy.functional import energy_and_gradient
 from ..energy.motion_space import MotionSpace, VertexClasses, vertex_classes
 from ..surface import Surface
 from ..surface.checks import lying
+from ..surface.geometry import area_vectors
 from ..surface.topology import topology
-from .wall_rows import crest_places, joined, places, wall_rows
+from .wall_rows import WallRows, join_rows, wall_rows
 
 SLACK = 1e-9  # of the capacity: an excess below is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Walls:
-    """The walls that can pinch, those whose lower edge slides on Π, and how they hang from their crest.
-
-    The crest is the junction above such a wall. A wall vertex hangs below the crest edge (i, j), at
-    the fraction λ along it and the fraction ρ of the height there: 0 on Π, 1 at the crest. In a wall
-    that leans or bulges it stands off from there, in proportion to the height.
+    """The walls that can pinch: those whose lower edge slides on Π. Their top edge is a junction.
 
     Attributes
     ----------
-    hanging : (w,) vertices of such walls below the crest.
-    ends : (w,2) crest vertices i, j that each hangs from.
-    along, share : (w,) λ and ρ.
-    lean : (w,3) what it stands off, over the height of the crest.
-    can_rest : (n,) bool, free crest vertices.
-    anchored : (n,) bool, fixed crest vertices on Π, where a wall ends in a corner.
-    edges : (k,2) crest edges.
-    tension : (k,) tension of the wall below each of those edges.
-    side : (n,) +1 or -1, the side of Π a vertex stands on; on Π, the side it is pushed to.
+    rows : where their other vertices lie below the top edges.
+    top_edges : (k,2) the top edges.
+    wall_below : (k,) the patch of the wall below each of them.
+    top_free : (n,) bool, free vertices of top edges: these can come to rest on Π.
+    corner : (n,) bool, fixed vertices of top edges on Π, where a wall ends.
+    side : (n,) +1 or -1, the side of Π a vertex is on; on Π, the side the pressure pushes it to.
     pinchable : (patches,) bool, the patches that are such walls.
     """
 
-    hanging: Ints
-    ends: Ints
-    along: Floats
-    share: Floats
-    lean: Floats
-    can_rest: Bools
-    anchored: Bools
-    edges: Ints
-    tension: Floats
+    rows: WallRows
+    top_edges: Ints
+    wall_below: Ints
+    top_free: Bools
+    corner: Bools
     side: Floats
     pinchable: Bools
 
 
 def find_walls(surface: Surface) -> Walls:
-    """The walls of a surface that can pinch, and how each vertex hangs from the crest."""
+    """The walls of a surface that can pinch, and their rows."""
     n = surface.n
     height = surface.plane.height(surface.vertices)
     topo, roof = surface.topology, ~surface.walls[surface.patch_of_face]
-    of_roof, outer = np.zeros(len(topo.edges), dtype=bool), np.zeros(n, dtype=bool)
-    of_roof[topo.edge_of_face[roof]] = True
-    outer[surface.faces[roof]] = True
+    roof_edge, roof_vertex = np.zeros(len(topo.edges), dtype=bool), np.zeros(n, dtype=bool)
+    roof_edge[topo.edge_of_face[roof]] = True
+    roof_vertex[surface.faces[roof]] = True
     pinchable = np.zeros(len(surface.patches), dtype=bool)
-    hanging, edges, tension = [], [np.empty((0, 2), dtype=np.int64)], [np.empty(0)]
+    none = np.empty(0, dtype=np.int64)
+    rows, top_edges, wall_below = [], [none.reshape(0, 2)], [none]
     for index, patch in enumerate(surface.patches):
         if not patch.auxiliary:
             continue
-        found = np.unique(topo.edge_of_face[surface.patch_of_face == index])
-        sides, crest = topo.edges[found], topo.edges[found[of_roof[found]]]
-        members = np.unique(sides)
-        if not surface.on_plane[members].any() or not len(crest):
+        of_wall = np.unique(topo.edge_of_face[surface.patch_of_face == index])
+        edges, top = topo.edges[of_wall], topo.edges[of_wall[roof_edge[of_wall]]]
+        vertices = np.unique(edges)
+        if not surface.on_plane[vertices].any() or not len(top):
             continue
         pinchable[index] = True
-        below = members[~outer[members]]
-        hanging.append((below, *wall_rows(surface, below, crest, sides)))
-        edges.append(crest)
-        tension.append(np.full(len(crest), patch.tension))
-    above = np.zeros(n, dtype=bool)
-    above[np.concatenate(edges)] = True
+        rows.append(wall_rows(surface, vertices[~roof_vertex[vertices]], top, edges))
+        top_edges.append(top)
+        wall_below.append(np.full(len(top), index))
+    on_top = np.zeros(n, dtype=bool)
+    on_top[np.concatenate(top_edges)] = True
     low = lying(height, surface.vertices)
-    below, ends, along, share, lean = joined(hanging)
     return Walls(
-        hanging=below,
-        ends=ends,
-        along=along,
-        share=share,
-        lean=lean,
-        can_rest=above & ~surface.fixed & ~surface.on_plane,
-        anchored=above & surface.fixed & low,
-        edges=np.concatenate(edges),
-        tension=np.concatenate(tension),
-        side=np.where(np.where(low, _pushed(surface), height) < 0.0, -1.0, 1.0),
+        rows=join_rows(rows),
+        top_edges=np.concatenate(top_edges),
+        wall_below=np.concatenate(wall_below),
+        top_free=on_top & ~surface.fixed & ~surface.on_plane,
+        corner=on_top & surface.fixed & low,
+        side=np.where(np.where(low, _pressure_push(surface), height) < 0.0, -1.0, 1.0),
         pinchable=pinchable,
     )
 
 
 def place_wall_rows(
-    surface: Surface, below: Walls, X: Floats, space: MotionSpace | None = None
+    surface: Surface, walls: Walls, X: Floats, space: MotionSpace | None = None
 ) -> Floats:
-    """X (n,3) with every hanging vertex brought below its place on the crest.
+    """X (n,3) with the rows of walls moved to their places below the top edges.
 
-    With the motion space given, only along the wall: what the vertex stands off across it stays.
+    With a motion space given, they move within the wall only: they keep their distance across it.
     """
-    if not len(below.hanging):
+    rows = walls.rows
+    if not len(rows.vertices):
         return X
-    place = places(surface, X, below.ends, below.along, below.share, below.lean)
     change = np.zeros_like(X)
-    change[below.hanging] = place - X[below.hanging]
+    change[rows.vertices] = rows.places(surface, X) - X[rows.vertices]
     if space is not None:
         change -= space.project(change)
     change[surface.fixed] = 0.0
@@ -122,197 +107,213 @@ def place_wall_rows(
 def midpoints(surface: Surface, edges: Ints) -> Floats:
     """(k,3) the middles of edges (k,2), for a finer mesh.
 
-    Where a wall's edge leads from a junction at rest to a standing vertex, its middle hangs in its row
-    below the crest's middle: rows that coincide where the crest rests are apart again beside it.
+    A wall's edge may lead from a resting junction to a standing vertex. Its middle is placed in its row
+    below the middle of the top edge: rows that coincide where the junction rests part again beside it.
     """
     start, end = edges.T
     X = surface.vertices
     middle = 0.5 * (X[start] + X[end])
-    below = find_walls(surface)
-    rests = resting(surface, below)
-    if not rests.any():
+    part = standing_part(surface)
+    walls, rows, resting = part.walls, part.walls.rows, part.resting
+    if not resting.any():
         return middle
-    crest, drop = X.copy(), np.zeros_like(X)
-    crest[below.hanging] = crest_places(X, below.ends, below.along)
-    drop[below.hanging] = (below.share - 1.0)[:, None] * np.array(surface.plane.normal) + below.lean
-    down = rests.copy()
-    down[below.hanging] = (rests | below.anchored)[below.ends].all(axis=1)
-    of_wall = rests | below.can_rest
-    of_wall[below.hanging] = True
-    leaves = of_wall[start] & of_wall[end] & (down[start] != down[end])
-    start, end = edges[leaves].T
-    place = 0.5 * (crest[start] + crest[end])
+    top, direction = X.copy(), np.zeros_like(X)
+    top[rows.vertices] = rows.top_places(X)
+    direction[rows.vertices] = rows.directions(surface)
+    down = resting.copy()
+    down[rows.vertices] = (resting | walls.corner)[rows.top_ends].all(axis=1)
+    of_wall = resting | walls.top_free
+    of_wall[rows.vertices] = True
+    rising = of_wall[start] & of_wall[end] & (down[start] != down[end])
+    start, end = edges[rising].T
+    place = 0.5 * (top[start] + top[end])
     height = surface.plane.height(place)[:, None]
-    middle[leaves] = place + 0.5 * height * (drop[start] + drop[end])
+    middle[rising] = place + 0.5 * height * (direction[start] + direction[end])
     return middle
 
 
-def resting(surface: Surface, below: Walls) -> Bools:
-    """(n,) junction vertices that rest on Π, seen from the positions."""
+def resting_vertices(surface: Surface, walls: Walls) -> Bools:
+    """(n,) junction vertices that rest on Π, by their positions."""
     height = surface.plane.height(surface.vertices)
-    return below.can_rest & lying(height, surface.vertices)
+    return walls.top_free & lying(height, surface.vertices)
 
 
-def pinched(surface: Surface, below: Walls, rests: Bools) -> Surface:
-    """The surface whose wall is gone below the resting vertices, which slide on Π.
+def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surface:
+    """The surface without the wall below the resting vertices, which slide on Π.
 
-    It has the same vertex array; vertices of the vanished wall belong to no face.
+    It has the same vertex array; vertices of the removed wall belong to no face.
     """
-    if not rests.any():
+    if not resting.any():
         return surface
     X = surface.vertices.copy()
-    X[rests] -= surface.plane.height(X[rests])[:, None] * np.array(surface.plane.normal)
-    group = _merged(surface.n, below, rests)
-    X = X[group]
-    F = group[surface.faces]
+    X[resting] -= surface.plane.height(X[resting])[:, None] * np.array(surface.plane.normal)
+    owner = _owners(surface.n, walls, resting)
+    X = X[owner]
+    F = owner[surface.faces]
     apart = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
-    keep = apart & ~(_down(surface, below, rests)[F].all(axis=1) & _of_walls(surface))
-    F, patch = np.ascontiguousarray(F[keep]), np.ascontiguousarray(surface.patch_of_face[keep])
+    flat = _lie_on_plane(walls, resting)[F].all(axis=1)
+    left = apart & ~(flat & surface.walls[surface.patch_of_face])
+    F, patch = np.ascontiguousarray(F[left]), np.ascontiguousarray(surface.patch_of_face[left])
     return surface._with(
-        vertices=X, faces=F, patch_of_face=patch, topology=topology(F, patch, surface.n),
-        on_plane=surface.on_plane | rests,
-    )  # fmt: skip
+        vertices=X,
+        faces=F,
+        patch_of_face=patch,
+        topology=topology(F, patch, surface.n),
+        on_plane=surface.on_plane | resting,
+    )
 
 
-def resting_crest(below: Walls, rests: Bools) -> Ints:
+def resting_links(walls: Walls, resting: Bools) -> Ints:
     """(k,2) from each resting junction vertex to its neighbours along the junction."""
-    links = np.concatenate([below.edges, below.edges[:, ::-1]])
-    return links[rests[links[:, 0]]]
+    links = np.concatenate([walls.top_edges, walls.top_edges[:, ::-1]])
+    return links[resting[links[:, 0]]]
 
 
-def beside(below: Walls, rests: Bools) -> Bools:
-    """(n,) standing crest vertices next to a resting one."""
-    mask = np.zeros(len(rests), dtype=bool)
-    for one, other in (below.edges.T, below.edges.T[::-1]):
-        mask[one[rests[other]]] = True
-    return mask & below.can_rest & ~rests
+def beside_resting(walls: Walls, resting: Bools) -> Bools:
+    """(n,) standing junction vertices next to a resting one."""
+    mask = np.zeros(len(resting), dtype=bool)
+    for one, other in (walls.top_edges.T, walls.top_edges.T[::-1]):
+        mask[one[resting[other]]] = True
+    return mask & walls.top_free & ~resting
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
-    """What of a surface stands, as the solver and the certificate see it.
+class StandingPart:
+    """A surface without its pinched walls: the part that carries forces. See ``standing_part``.
 
     Attributes
     ----------
-    surface : the pinched surface; see ``pinched``.
-    walls, rests : of the whole surface; its junction vertices at rest on Π.
-    classes : what the vertices lie on; those that rest follow the junction.
+    surface : the standing part, with the vertex array of the whole surface.
+    walls, resting : the walls of the whole surface, and its junction vertices at rest on Π.
+    classes : what the vertices lie on; resting ones lie on the junction.
     """
 
     surface: Surface
     walls: Walls
-    rests: Bools
+    resting: Bools
     classes: VertexClasses
 
+    @classmethod
+    def of(cls, surface: Surface, walls: Walls, resting: Bools) -> StandingPart:
+        """The part that stands where the given vertices rest."""
+        part = remove_pinched_walls(surface, walls, resting)
+        links, beside = resting_links(walls, resting), beside_resting(walls, resting)
+        return cls(part, walls, resting, vertex_classes(part, links, beside))
+
     @property
-    def judged(self) -> Ints:
-        """(k,3) the faces outside walls that may pinch, whose quality is judged."""
+    def quality_faces(self) -> Ints:
+        """(k,3) the faces whose quality counts: those outside walls that can pinch."""
         return self.surface.faces[~self.walls.pinchable[self.surface.patch_of_face]]
 
 
-def standing(surface: Surface, below: Walls | None = None, rests: Bools | None = None) -> Standing:
-    """What stands of a surface; with its walls, and what rests, seen from the positions if not given."""
-    below = find_walls(surface) if below is None else below
-    rests = resting(surface, below) if rests is None else rests
-    shown = pinched(surface, below, rests)
-    classes = vertex_classes(shown, resting_crest(below, rests), beside(below, rests))
-    return Standing(shown, below, rests, classes)
+def standing_part(surface: Surface) -> StandingPart:
+    """The part of a surface that stands, by its positions. Computed once per surface.
+
+    >>> from pcmc import Patch
+    >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
+    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+    >>> standing_part(square).surface is square
+    True
+    """
+    cache = vars(surface)  # where a cached property would put it
+    if "standing_part" not in cache:
+        walls = find_walls(surface)
+        cache["standing_part"] = StandingPart.of(surface, walls, resting_vertices(surface, walls))
+    part: StandingPart = cache["standing_part"]
+    return part
 
 
-def pull_and_capacity(surface: Surface, below: Walls, rests: Bools) -> tuple[Floats, Floats]:
-    """Pull (n,) on each resting vertex of a pinched surface and what the wall can take, force.
+def pull_and_capacity(surface: Surface, walls: Walls, resting: Bools) -> tuple[Floats, Floats]:
+    """Pull (n,) on each resting vertex of a standing part and what the wall can take, force.
 
     The pull is the force of the sheets away from Π, to the vertex's own side; negative to the other.
-    Lifting the vertex by dz to either side makes a wall of area ½ ℓ dz under each crest edge there, ℓ
+    Lifting the vertex by dz to either side makes a wall of area ½ ℓ dz under each top edge there, ℓ
     its length along Π, so the capacity is ½ Σ α_w ℓ; the vertex rests while |pull| ≤ capacity.
     """
     force = -energy_and_gradient(surface, supports=False)[1]
-    pull = np.where(rests, below.side * (force @ np.array(surface.plane.normal)), 0.0)
-    start, end = surface.vertices[below.edges.T]
-    half = 0.5 * below.tension * np.linalg.norm(surface.plane.along(end - start), axis=1)
+    pull = np.where(resting, walls.side * (force @ np.array(surface.plane.normal)), 0.0)
+    start, end = surface.vertices[walls.top_edges.T]
+    tension = surface.tensions[walls.wall_below]
+    half = 0.5 * tension * np.linalg.norm(surface.plane.along(end - start), axis=1)
     capacity = np.zeros(surface.n)
-    np.add.at(capacity, below.edges[:, 0], half)
-    np.add.at(capacity, below.edges[:, 1], half)
-    return pull, np.where(rests, capacity, 0.0)
+    np.add.at(capacity, walls.top_edges[:, 0], half)
+    np.add.at(capacity, walls.top_edges[:, 1], half)
+    return pull, np.where(resting, capacity, 0.0)
 
 
-def excess(surface: Surface, below: Walls, rests: Bools) -> Floats:
-    """(n,) the pull on each resting vertex of a pinched surface beyond what its wall can take, force.
+def excess_pull(surface: Surface, walls: Walls, resting: Bools) -> Floats:
+    """(n,) the pull on each resting vertex of a standing part beyond what its wall can take, force.
 
-    At rest there is none: a junction that is pulled harder stands off Π. Signed as the pull is.
+    Zero at equilibrium: a junction that is pulled harder stands off Π. Signed as the pull is.
     """
-    pull, capacity = pull_and_capacity(surface, below, rests)
+    pull, capacity = pull_and_capacity(surface, walls, resting)
     beyond = np.where(np.abs(pull) > capacity * (1.0 + SLACK), np.abs(pull) - capacity, 0.0)
     return np.copysign(beyond, pull)
 
 
-def crest_spacing(surface: Surface, below: Walls) -> Floats:
-    """(n,) the shorter crest edge at each crest vertex, length; infinite elsewhere."""
-    ends = surface.vertices[below.edges]
+def top_spacing(surface: Surface, walls: Walls) -> Floats:
+    """(n,) the shorter top edge at each vertex of one, length; infinite elsewhere."""
+    ends = surface.vertices[walls.top_edges]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     spacing = np.full(surface.n, np.inf)
-    np.minimum.at(spacing, below.edges[:, 0], lengths)
-    np.minimum.at(spacing, below.edges[:, 1], lengths)
+    np.minimum.at(spacing, walls.top_edges[:, 0], lengths)
+    np.minimum.at(spacing, walls.top_edges[:, 1], lengths)
     return spacing
 
 
-def lifted(surface: Surface, below: Walls, free: Bools, fraction: float | Floats) -> Surface:
-    """The full surface with the given resting vertices raised off Π by a fraction of their spacing.
+def lift(surface: Surface, walls: Walls, vertices: Bools, fraction: float | Floats) -> Surface:
+    """The whole surface with resting ``vertices`` raised off Π by a fraction of their spacing.
 
-    The fraction may be one for each vertex (n,). The wall below comes back hanging from them.
+    The fraction may be one for each vertex (n,). The wall rows below are placed anew.
     """
-    rise = fraction * np.where(free, crest_spacing(surface, below), 0.0) * below.side
+    rise = fraction * np.where(vertices, top_spacing(surface, walls), 0.0) * walls.side
     X = surface.vertices + rise[:, None] * np.array(surface.plane.normal)
-    back = free[below.ends].any(axis=1)
-    place = place_wall_rows(surface, below, X)
-    X[below.hanging[back]] = place[below.hanging[back]]
+    rows = walls.rows
+    below = rows.vertices[vertices[rows.top_ends].any(axis=1)]
+    X[below] = place_wall_rows(surface, walls, X)[below]
     return surface.moved(X)
 
 
-def settled(surface: Surface, below: Walls, rests: Bools, X: Floats) -> Floats:
-    """X (n,3) with the vertices of vanished walls brought to their place on the resting junction.
+def place_pinched_walls(surface: Surface, walls: Walls, resting: Bools, X: Floats) -> Floats:
+    """X (n,3) with the vertices of pinched walls moved to their places on the resting junction.
 
-    One of which a triangle still stands, as its lower corner, slides on Π and stays where it is.
+    A foot that still carries a triangle slides on Π and stays where it is.
     """
     stands = np.zeros(surface.n, dtype=bool)
-    stands[pinched(surface, below, rests).faces] = True
-    i, j = below.ends.T
-    gone = (rests | below.anchored)[below.ends].all(axis=1) & ~stands[below.hanging]
-    along = below.along[gone, None]
+    stands[remove_pinched_walls(surface, walls, resting).faces] = True
+    rows = walls.rows
+    gone = (resting | walls.corner)[rows.top_ends].all(axis=1) & ~stands[rows.vertices]
+    places = rows.top_places(X)
     X = X.copy()
-    X[below.hanging[gone]] = (1.0 - along) * X[i[gone]] + along * X[j[gone]]
-    return X[_merged(surface.n, below, rests)]
+    X[rows.vertices[gone]] = places[gone]
+    return X[_owners(surface.n, walls, resting)]
 
 
-def _merged(n: int, below: Walls, rests: Bools) -> Ints:
-    """(n,) the vertex each one coincides with: hanging straight below a resting one, or itself."""
-    group = np.arange(n, dtype=np.int32)
-    for end, at in ((0, 0.0), (1, 1.0)):
-        owner = below.ends[:, end]
-        straight = (below.along == at) & rests[owner]
-        group[below.hanging[straight]] = owner[straight]
-    return group
+def _owners(n: int, walls: Walls, resting: Bools) -> Ints:
+    """(n,) the vertex each one coincides with: the resting one straight above it, or itself."""
+    owner = np.arange(n, dtype=np.int32)
+    for end, fraction in ((0, 0.0), (1, 1.0)):
+        top = walls.rows.top_ends[:, end]
+        straight = (walls.rows.fraction == fraction) & resting[top]
+        owner[walls.rows.vertices[straight]] = top[straight]
+    return owner
 
 
-def _down(surface: Surface, below: Walls, rests: Bools) -> Bools:
-    """(n,) vertices that lie on Π: resting, in a corner, or hanging from such or by nothing."""
-    down = rests | below.anchored
-    i, j = below.ends.T
-    low_i, low_j = down[i] | (below.along == 1.0), down[j] | (below.along == 0.0)
-    down[below.hanging] = (low_i & low_j) | (below.share == 0.0)
+def _lie_on_plane(walls: Walls, resting: Bools) -> Bools:
+    """(n,) vertices on Π: resting ones, corners, feet, and wall vertices below such alone."""
+    down = resting | walls.corner
+    rows = walls.rows
+    i, j = rows.top_ends.T
+    low_i, low_j = down[i] | (rows.fraction == 1.0), down[j] | (rows.fraction == 0.0)
+    down[rows.vertices] = (low_i & low_j) | (rows.relative_height == 0.0)
     return down
 
 
-def _pushed(surface: Surface) -> Floats:
+def _pressure_push(surface: Surface) -> Floats:
     """(n,) force along Π's normal with which the pressure of the sheets pushes each vertex."""
-    corners = surface.vertices[surface.faces]
-    vector = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    force = (surface.pressures * ~surface.walls)[surface.patch_of_face] / 6.0
+    vector = area_vectors(surface.vertices[surface.faces])
+    force = (surface.pressures * ~surface.walls)[surface.patch_of_face] / 3.0
     push = force * (vector @ np.array(surface.plane.normal))
     return np.asarray(
         np.bincount(surface.faces.ravel(), np.repeat(push, 3), surface.n), dtype=float
     )
-
-
-def _of_walls(surface: Surface) -> Bools:
-    return surface.walls[surface.patch_of_face]

@@ -1,6 +1,8 @@
-"""How the vertices of a wall hang from its crest: where along it, and at what share of its height."""
+"""The rows of a wall: where its vertices lie below its top edge, so that they follow when it moves."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -10,92 +12,119 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Floats, Ints
 from ..surface import Surface
 
-SNAP = 1e-3  # of a crest edge: a vertex this near to hanging straight below a crest vertex does
-FLAT = 1e-9  # height of the crest, relative to the size, below which it tells no rows apart
-LEAN = 4.0  # crest heights that a wall vertex may stand off from straight below the crest
+SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
+FLAT = 1e-9  # of the size: with its top edge at most this high, a wall's heights show no rows
+MAX_OFFSET = (
+    4.0  # heights of the top edge that a wall vertex may be off the line below its place there
+)
 
 
-def crest_places(X: Floats, ends: Ints, along: Floats) -> Floats:
-    """(w,3) the places on the crest that wall vertices hang from."""
-    return (1.0 - along[:, None]) * X[ends[:, 0]] + along[:, None] * X[ends[:, 1]]
+@dataclass(frozen=True, eq=False)
+class WallRows:
+    """Wall vertices below the top edges of their walls.
+
+    With X_i, X_j the ends of a top edge, n the normal of Π and z the height over Π, the vertex is at
+
+        P + z(P) ((ρ - 1) n + o),   P = (1 - λ) X_i + λ X_j
+
+    Attributes
+    ----------
+    vertices : (w,) their indices.
+    top_ends : (w,2) the ends i, j of the top edge above each.
+    fraction : (w,) λ, how far P is from i to j.
+    relative_height : (w,) ρ, 0 on Π and 1 at the top.
+    offset : (w,3) o, how far a leaning or bulging wall is off the line below P, over the height there.
+    """
+
+    vertices: Ints
+    top_ends: Ints
+    fraction: Floats
+    relative_height: Floats
+    offset: Floats
+
+    def top_places(self, X: Floats) -> Floats:
+        """(w,3) the places P on the top edges, with the surface's vertices at X (n,3)."""
+        fraction = self.fraction[:, None]
+        return (1.0 - fraction) * X[self.top_ends[:, 0]] + fraction * X[self.top_ends[:, 1]]
+
+    def places(self, surface: Surface, X: Floats) -> Floats:
+        """(w,3) where the rows lie, with the top edges at X (n,3)."""
+        top = self.top_places(X)
+        return top + surface.plane.height(top)[:, None] * self.directions(surface)
+
+    def directions(self, surface: Surface) -> Floats:
+        """(w,3) from the place on the top edge to the vertex, over the height there: (ρ - 1) n + o."""
+        normal = np.array(surface.plane.normal)
+        return (self.relative_height[:, None] - 1.0) * normal + self.offset
 
 
-def places(
-    surface: Surface, X: Floats, ends: Ints, along: Floats, share: Floats, lean: Floats
-) -> Floats:
-    """(w,3) where wall vertices hang with the crest at X (n,3)."""
-    above = crest_places(X, ends, along)
-    height = surface.plane.height(above)[:, None]
-    return above + height * ((share[:, None] - 1.0) * np.array(surface.plane.normal) + lean)
+def wall_rows(surface: Surface, vertices: Ints, top_edges: Ints, wall_edges: Ints) -> WallRows:
+    """The rows of one wall: its ``vertices`` below the nearest of its ``top_edges`` (k,2), seen along n.
 
-
-def wall_rows(
-    surface: Surface, below: Ints, crest: Ints, sides: Ints
-) -> tuple[Ints, Floats, Floats, Floats]:
-    """Crest edge ends (w,2), λ, ρ and what wall vertices stand off, by nearness seen along Π's normal.
-
-    ``sides`` are the wall's edges. Where the crest lies on Π its height tells nothing, and ρ is that of
-    the vertex's row: steps along edges from the foot, over those from foot to crest.
+    Where the top edge lies on Π its height shows nothing. There ρ is that of the vertex's row: steps
+    along ``wall_edges`` from the foot, over those from foot to top.
     """
     X, height = surface.vertices, surface.plane.height(surface.vertices)
     flat = X - height[:, None] * np.array(surface.plane.normal)
-    ends, along = _nearest(flat, below, crest)
-    above = (1.0 - along) * height[ends[:, 0]] + along * height[ends[:, 1]]
-    stands = np.abs(above) > FLAT * surface.size
-    share = np.clip(np.divide(height[below], above, out=np.zeros(len(below)), where=stands), 0, 1)
+    ends, fraction = _nearest(flat, vertices, top_edges)
+    top = (1.0 - fraction) * height[ends[:, 0]] + fraction * height[ends[:, 1]]
+    stands = np.abs(top) > FLAT * surface.size
+    relative = np.divide(height[vertices], top, out=np.zeros(len(vertices)), where=stands)
+    relative = np.clip(relative, 0, 1)
     if not stands.all():
-        share = np.where(stands, share, _rows(surface, below, sides))
-    share[surface.on_plane[below]] = 0.0
-    straight = places(surface, X, ends, along, share, np.zeros((len(below), 3)))
-    lean = np.zeros((len(below), 3))
-    np.divide(X[below] - straight, above[:, None], out=lean, where=stands[:, None])
-    lean[np.linalg.norm(lean, axis=1) > LEAN] = 0.0
-    return ends, along, share, lean
+        relative = np.where(stands, relative, _heights_by_steps(surface, vertices, wall_edges))
+    relative[surface.on_plane[vertices]] = 0.0
+    offset = np.zeros((len(vertices), 3))
+    straight = WallRows(vertices, ends, fraction, relative, offset).places(surface, X)
+    np.divide(X[vertices] - straight, top[:, None], out=offset, where=stands[:, None])
+    offset[np.linalg.norm(offset, axis=1) > MAX_OFFSET] = 0.0
+    return WallRows(vertices, ends, fraction, relative, offset)
 
 
-def _nearest(flat: Floats, below: Ints, crest: Ints) -> tuple[Ints, Floats]:
-    """The crest edge (w,2) nearest to each wall vertex, seen along Π's normal, and λ there."""
-    start, side = flat[crest[:, 0]], flat[crest[:, 1]] - flat[crest[:, 0]]
+def join_rows(parts: list[WallRows]) -> WallRows:
+    """The rows of several walls as one; a vertex that two walls share belongs to the first."""
+    if not parts:
+        none = np.empty(0, dtype=int)
+        return WallRows(
+            none, np.empty((0, 2), dtype=int), np.empty(0), np.empty(0), np.empty((0, 3))
+        )
+    columns = {
+        column.name: np.concatenate([getattr(part, column.name) for part in parts])
+        for column in fields(WallRows)
+    }
+    first = np.unique(columns["vertices"], return_index=True)[1]
+    return WallRows(**{name: values[first] for name, values in columns.items()})
+
+
+def _nearest(flat: Floats, vertices: Ints, top_edges: Ints) -> tuple[Ints, Floats]:
+    """The top edge (w,2) nearest to each wall vertex, seen along Π's normal, and λ there."""
+    start, side = flat[top_edges[:, 0]], flat[top_edges[:, 1]] - flat[top_edges[:, 0]]
     length = np.einsum("ij,ij->i", side, side)
-    near = cKDTree(start + 0.5 * side).query(flat[below], k=min(4, len(crest)))[1]
-    near = near.reshape(len(below), -1)
-    along = np.einsum("wkj,wkj->wk", flat[below][:, None] - start[near], side[near])
-    along = np.clip(along / np.where(length > 0.0, length, 1.0)[near], 0.0, 1.0)
-    foot = start[near] + along[:, :, None] * side[near]
-    best = np.linalg.norm(flat[below][:, None] - foot, axis=2).argmin(axis=1)
-    row = np.arange(len(below))
-    along = along[row, best]
-    along = np.where(along < SNAP, 0.0, np.where(along > 1.0 - SNAP, 1.0, along))
-    return crest[near[row, best]], along
+    near = cKDTree(start + 0.5 * side).query(flat[vertices], k=min(4, len(top_edges)))[1]
+    near = near.reshape(len(vertices), -1)
+    fraction = np.einsum("wkj,wkj->wk", flat[vertices][:, None] - start[near], side[near])
+    fraction = np.clip(fraction / np.where(length > 0.0, length, 1.0)[near], 0.0, 1.0)
+    foot = start[near] + fraction[:, :, None] * side[near]
+    best = np.linalg.norm(flat[vertices][:, None] - foot, axis=2).argmin(axis=1)
+    row = np.arange(len(vertices))
+    fraction = fraction[row, best]
+    fraction = np.where(fraction < SNAP, 0.0, np.where(fraction > 1.0 - SNAP, 1.0, fraction))
+    return top_edges[near[row, best]], fraction
 
 
-def _rows(surface: Surface, below: Ints, sides: Ints) -> Floats:
-    """ρ (w,) by edges (k,2) of the wall: steps to the foot, over those to the foot and to the crest."""
+def _heights_by_steps(surface: Surface, vertices: Ints, wall_edges: Ints) -> Floats:
+    """ρ (w,) by edges (k,2) of the wall: steps to the foot, over those to the foot and to the top."""
     inner = np.zeros(surface.n, dtype=bool)
-    inner[below] = True
-    crest = np.unique(sides[~(inner | surface.fixed)[sides]])
-    foot = below[surface.on_plane[below]]
-    # no way leads through a corner, which is foot and crest at once
-    links = sides[(inner | np.isin(np.arange(surface.n), crest))[sides].all(axis=1)]
+    inner[vertices] = True
+    top = np.unique(wall_edges[~(inner | surface.fixed)[wall_edges]])
+    foot = vertices[surface.on_plane[vertices]]
+    # a corner is foot and top at once: no path may lead through it
+    links = wall_edges[(inner | np.isin(np.arange(surface.n), top))[wall_edges].all(axis=1)]
     graph = coo_array((np.ones(len(links)), links.T), shape=(surface.n, surface.n)).tocsr()
     steps = [
-        dijkstra(graph, directed=False, indices=of, unweighted=True, min_only=True)[below]
-        for of in (foot, crest)
+        dijkstra(graph, directed=False, indices=goal, unweighted=True, min_only=True)[vertices]
+        for goal in (foot, top)
     ]
     reached = np.isfinite(steps[0]) & np.isfinite(steps[1])
     total = np.where(reached, steps[0] + steps[1], 1.0)
     return np.where(reached, steps[0] / total, 0.5)
-
-
-def joined(
-    parts: list[tuple[Ints, Ints, Floats, Floats, Floats]],
-) -> tuple[Ints, Ints, Floats, Floats, Floats]:
-    """One list of hanging vertices; one that two walls share hangs from the first."""
-    if not parts:
-        none = np.empty(0, dtype=int)
-        return none, np.empty((0, 2), dtype=int), np.empty(0), np.empty(0), np.empty((0, 3))
-    vertex, ends, along, share, lean = (
-        np.concatenate(column) for column in zip(*parts, strict=True)
-    )
-    first = np.unique(vertex, return_index=True)[1]
-    return vertex[first], ends[first], along[first], share[first], lean[first]

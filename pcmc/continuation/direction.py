@@ -177,8 +177,7 @@ def _measured(
     surface: Surface, X: Floats, areas: Floats, volumes: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """A_i and V_i (k,) at X, and Σ areas_i ∇A_i - Σ volumes_i ∇V_i (n,3)."""
-    origin = surface.origin
-    return kernels.measure(X, surface.faces, surface.patch_of_face, origin, areas, volumes)
+    return kernels.measure(kernels.energy_mesh(surface, areas, volumes), X)
 
 
 def _rates(surface: Surface, weights: Mapping[str, float]) -> Floats:

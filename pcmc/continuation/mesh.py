@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..contact.pinching import excess, find_walls, place_wall_rows, settled, standing
+from ..contact.pinching import excess_pull, place_pinched_walls, place_wall_rows, standing_part
 from ..energy.motion_space import MotionSpace
 from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
-from ..meshing.quality import triangle_quality
+from ..meshing.quality import turns_over, worst_quality
 from ..meshing.redistribution import redistribute
 from ..solvers.smoother import HarmonicExtension
 from ..stability.factorisation import Factor, Factoriser, factoriser
@@ -38,9 +36,9 @@ class BranchMesh:
 
     def __init__(self, surface: Surface, line: ParameterLine, backend: str | None = None) -> None:
         self.full, self.line, self._backend = surface, line, backend
-        self._standing = contact = standing(surface)
-        self.surface, self.walls, self.resting = contact.surface, contact.walls, contact.rests
-        self.classes, self.quality_faces = contact.classes, contact.judged
+        self._part = part = standing_part(surface)
+        self.surface, self.walls, self.resting = part.surface, part.walls, part.resting
+        self.classes, self.quality_faces = part.classes, part.quality_faces
         self.loaded: Floats = (~surface.walls).astype(float)
         self._curves_move = bool(((self.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None
@@ -83,20 +81,19 @@ class BranchMesh:
 
     def flips(self, before: Floats, after: Floats) -> bool:
         """Whether the normal of a triangle turns by more than a right angle between two positions."""
-        first, second = (_normals(X, self.quality_faces) for X in (before, after))
-        return bool((np.einsum("ij,ij->i", first, second) <= 0.0).any())
+        return turns_over(before, after, self.quality_faces)
 
     def redistribute(self, X: Floats, min_quality: float) -> Floats | None:
         """X (n,3) redistributed along the shape until the worst triangle has this quality.
 
         The best of the sweeps; None where none is clearly better.
         """
-        best, worst = redistribute(self._standing, X, min_quality, slide=False)
+        best, worst = redistribute(self._part, X, min_quality, slide=False)
         return best if worst > CLEARLY_BETTER * self.quality(X) else None
 
     def quality(self, X: Floats) -> float:
         """Quality of the worst triangle outside walls that can pinch."""
-        return float(triangle_quality(X, self.quality_faces).min())
+        return worst_quality(X, self.quality_faces)
 
     # -- contact of walls with Π ---------------------------------------------------------------
 
@@ -104,7 +101,7 @@ class BranchMesh:
         """The surface with all its walls; those that vanish lie on Π."""
         if not self.resting.any():
             return self.full.moved(X)
-        return self.full.moved(settled(self.full, self.walls, self.resting, X))
+        return self.full.moved(place_pinched_walls(self.full, self.walls, self.resting, X))
 
     def surface_in_contact(self, X: Floats) -> Surface:
         """The full surface, with the vertices that came down to Π placed on it."""
@@ -115,17 +112,12 @@ class BranchMesh:
 
     def reaches_plane(self, X: Floats) -> Bools:
         """(n,) bool, junction vertices that stood off Π and are now on it or beyond."""
-        standing_off = self.walls.can_rest & ~self.resting
+        standing_off = self.walls.top_free & ~self.resting
         return standing_off & (self.walls.side * self.surface.plane.height(X) <= 0.0)
 
     def excess_pull(self, value: float, X: Floats) -> Floats:
         """(n,) the pull on resting junction vertices beyond what their walls can hold at λ, force."""
         if not self.resting.any():
             return np.zeros(self.full.n)
-        tension = find_walls(self.line.surface_at(self.full, value)).tension
         pulled = self.line.surface_at(self.surface, value).moved(X)
-        return excess(pulled, replace(self.walls, tension=tension), self.resting)
-
-
-def _normals(X: Floats, F: Ints) -> Floats:
-    return np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]])
+        return excess_pull(pulled, self.walls, self.resting)

@@ -15,7 +15,7 @@ from ..energy.functional import energy_and_gradient, energy_at, patch_volumes
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..surface import Surface
-from ..surface.geometry import area_vectors
+from ..surface.geometry import vertex_area_vectors
 from .direction import weighted_gradient
 from .mesh import BranchMesh
 
@@ -112,7 +112,7 @@ class State:
     @cached_property
     def area_weights(self) -> Floats:
         """(n,) the area around each vertex over all area, over size², 1/length²."""
-        area = area_vectors(self.X, self.mesh.classes.faces)[1]
+        area = vertex_area_vectors(self.X, self.mesh.classes.faces)[1]
         return area / (area.sum() * self.mesh.full.size**2)
 
     @property

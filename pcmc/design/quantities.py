@@ -17,6 +17,7 @@ from ..base.errors import OptionError
 from ..certificate.balance import held_lengths, reactions
 from ..energy import kernels
 from ..surface import Surface
+from ..surface.geometry import area_vectors, cross_2d, vertex_sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +66,7 @@ def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
     F = surface.faces[_faces_of(surface, None)]
     corner = surface.plane.to_local(surface.vertices)[F]
     flat = corner[:, :, :2] - np.array(point)
-    weight = np.stack([_cross(flat[:, c - 2], flat[:, c - 1]) for c in range(3)], axis=1)
+    weight = cross_2d(flat[:, [1, 2, 0]], flat[:, [2, 0, 1]])
     twice = weight.sum(axis=1)
     upright = np.abs(twice) <= 1e-14 * surface.size**2
     weight /= np.where(upright, 1.0, twice)[:, None]
@@ -78,15 +79,10 @@ def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
         )
     heights = np.einsum("fc,fc->f", weight[over], corner[over, :, 2])
     face = over[heights.argmax()]
-    side = surface.vertices[F[face, 1:]] - surface.vertices[F[face, 0]]
-    normal = np.cross(side[0], side[1])
+    normal = area_vectors(surface.vertices[F[face]])
     slope = np.zeros_like(surface.vertices)
     slope[F[face]] = weight[face][:, None] * (normal / (normal @ np.array(surface.plane.normal)))
     return Measurement(float(heights.max()), slope)
-
-
-def _cross(u: Floats, v: Floats) -> Floats:
-    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
 
 
 def _area(surface: Surface, of: str | None) -> Measurement:
@@ -102,10 +98,10 @@ def _volume(surface: Surface, of: str | None) -> Measurement:
     _, volumes, slope = _measured(surface, np.zeros_like(one), -one)
     X, F = surface.vertices, surface.faces[_faces_of(surface, of)]
     away = surface.origin - np.array(surface.plane.point)
-    vector = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]).sum(axis=0)
+    vector = area_vectors(X[F]).sum(axis=0)
     for c in range(3):
         np.add.at(slope, F[:, c], np.cross(X[F[:, c - 2]] - X[F[:, c - 1]], away) / 6.0)
-    return Measurement(float(one @ volumes + away @ vector / 6.0), slope)
+    return Measurement(float(one @ volumes + away @ vector / 3.0), slope)
 
 
 def _curvature(surface: Surface, of: str) -> Measurement:
@@ -161,23 +157,18 @@ def _pressure_forces(surface: Surface, pressure: Floats) -> Floats:
     Not ∇(p V): at a boundary that includes the sides of the cone whose volume V is, and they are no
     part of the surface.
     """
-    X, F = surface.vertices, surface.faces
-    vector = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]) / 6.0
-    vector *= pressure[surface.patch_of_face, None]
-    return np.stack(
-        [np.bincount(F.ravel(), np.repeat(part, 3), surface.n) for part in vector.T], axis=1
-    )
+    third = area_vectors(surface.vertices[surface.faces]) / 3.0
+    pushes = third * pressure[surface.patch_of_face, None]
+    return vertex_sums(pushes, surface.faces, surface.n)
 
 
 def _force_gradient(surface: Surface, v: int, pull: Floats) -> Floats:
     """(n,3) derivative of ⟨pull, f_v⟩, f_v = Σ α ∂A - ⅓ Σ p A_T ν_T at v."""
     around = np.flatnonzero((surface.faces == v).any(axis=1))
-    F = np.ascontiguousarray(surface.faces[around])
+    F, patch = surface.faces[around], surface.patch_of_face[around]
     blocks = np.empty((len(F), 3, 3, 3, 3))
-    kernels.hessian_blocks(
-        surface.vertices, F, np.ascontiguousarray(surface.patch_of_face[around]),
-        surface.origin, surface.tensions, 0.0 * surface.pressures, blocks,
-    )  # fmt: skip
+    mesh = kernels.energy_mesh(surface, pressure=0.0 * surface.pressures)
+    kernels.hessian_blocks(mesh._replace(faces=F, patch=patch), surface.vertices, blocks)
     slope = np.zeros_like(surface.vertices)
     row, corner = np.nonzero(np.equal(F, v))
     np.add.at(slope, F[row], np.einsum("fjab,a->fjb", blocks[row, corner], pull))
@@ -202,10 +193,7 @@ def _force_by_patch(surface: Surface, v: int) -> tuple[Floats, Floats]:
 
 def _measured(surface: Surface, tension: Floats, pressure: Floats) -> tuple[Floats, Floats, Floats]:
     """Areas, volumes (k,) and ∇(Σ αA - pV) (n,3) with these tensions and pressures."""
-    return kernels.measure(
-        surface.vertices, surface.faces, surface.patch_of_face, surface.origin,
-        tension, pressure,
-    )  # fmt: skip
+    return kernels.measure(kernels.energy_mesh(surface, tension, pressure), surface.vertices)
 
 
 def _chosen_patches(surface: Surface, of: str | None) -> Floats:

@@ -21,7 +21,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
-from ..contact.pinching import Standing, excess, place_wall_rows, standing
+from ..contact.pinching import StandingPart, excess_pull, place_wall_rows, standing_part
 from ..energy import kernels
 from ..energy.functional import energy_and_gradient
 from ..energy.jacobian import Linearisation, linearise
@@ -124,7 +124,7 @@ class _LinearResponse:
     ``walls_follow``: whether walls hang from a crest that moves.
     """
 
-    part: Standing
+    part: StandingPart
     walls_follow: bool
     space: MotionSpace
     jacobian: Linearisation
@@ -132,12 +132,12 @@ class _LinearResponse:
 
     @classmethod
     def of(cls, surface: Surface) -> _LinearResponse:
-        part = standing(surface)
-        shown, walls, resting, classes = part.surface, part.walls, part.rests, part.classes
+        part = standing_part(surface)
+        shown, walls, resting, classes = part.surface, part.walls, part.resting, part.classes
         X = shown.vertices
         space = motion_space(shown, classes, X)
         gradient = energy_and_gradient(shown, X)[1]
-        unheld = np.linalg.norm(excess(shown, walls, resting))
+        unheld = np.linalg.norm(excess_pull(shown, walls, resting))
         left = np.hypot(np.linalg.norm(space.to_coordinates(gradient)), unheld)
         residual = float(left) / force_scale(shown, classes, X)
         if residual > TOLERANCE:
@@ -153,7 +153,7 @@ class _LinearResponse:
             factor = factoriser(pattern).factor(assemble(shown, classes, space, pattern, X))
         except SingularMatrix:
             raise SurfaceError(AT_FOLD, what="surface") from None
-        walls_follow = bool((walls.can_rest & ~resting).any())
+        walls_follow = bool((walls.top_free & ~resting).any())
         jacobian = linearise(shown, classes, space, X, gradient)
         return cls(part, walls_follow, space, jacobian, factor)
 
@@ -187,9 +187,7 @@ class _LinearResponse:
         shown = self.part.surface
         one, zero = _patch_rates(shown, parameter, parameters), np.zeros(len(shown.patches))
         tension, pressure = (one, zero) if parameter.kind == "tension" else (zero, one)
-        return kernels.measure(
-            shown.vertices, shown.faces, shown.patch_of_face, shown.origin, tension, pressure,
-        )[2]  # fmt: skip
+        return kernels.measure(kernels.energy_mesh(shown, tension, pressure), shown.vertices)[2]
 
     def _vertex_motion(self, s: Floats) -> Floats:
         """B s (n,3); walls that hang from their crest follow it, as in the solver."""

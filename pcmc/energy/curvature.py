@@ -13,7 +13,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError, unknown
 from ..surface import Surface
-from ..surface.geometry import area_vectors
+from ..surface.geometry import vertex_area_vectors
 from . import kernels
 
 Method = Literal["cotangent", "variational"]
@@ -80,6 +80,6 @@ def _star(surface: Surface) -> tuple[Floats, Floats, Floats]:
     """Σ over each vertex's star: area gradient (n,3), area vector Σ A_T ν_T (n,3), area (n,)."""
     X, F = surface.vertices, surface.faces
     ones, zeros = np.ones(len(surface.patches)), np.zeros(len(surface.patches))
-    gradient = kernels.measure(X, F, surface.patch_of_face, np.zeros(3), ones, zeros)[2]
-    vector, area = area_vectors(X, F)
+    gradient = kernels.measure(kernels.energy_mesh(surface, ones, zeros), X)[2]
+    vector, area = vertex_area_vectors(X, F)
     return gradient, vector, area

@@ -43,10 +43,17 @@ def energy(surface: Surface) -> float:
 
 def energy_at(surface: Surface, X: Floats) -> float:
     """E of the surface with its vertices at X (n,3)."""
-    areas, volumes = kernels.areas_and_volumes(
-        X, surface.faces, surface.patch_of_face, surface.origin, len(surface.patches)
-    )
-    return float(surface.tensions @ areas - surface.pressures @ volumes)
+    areas, volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), X)
+    return total(surface.tensions, areas, surface.pressures, volumes)
+
+
+def total(tensions: Floats, areas: Floats, pressures: Floats, volumes: Floats) -> float:
+    """E of the patches' areas and volumes.
+
+    Sums, not dot products: BLAS rounds those differently on different processors, and the paper's
+    flow amplifies the last digit.
+    """
+    return float((tensions * areas).sum() - (pressures * volumes).sum())
 
 
 def energy_and_gradient(
@@ -57,12 +64,11 @@ def energy_and_gradient(
     ``supports=False`` leaves the forces at held vertices in: what the supports must carry.
     """
     areas, volumes, gradient = kernels.measure(
-        surface.vertices if X is None else X, surface.faces, surface.patch_of_face,
-        surface.origin, surface.tensions, surface.pressures, workers,
-    )  # fmt: skip
+        kernels.energy_mesh(surface), surface.vertices if X is None else X, workers
+    )
     if supports:
         apply_supports(surface, gradient)
-    return float(surface.tensions @ areas - surface.pressures @ volumes), gradient
+    return total(surface.tensions, areas, surface.pressures, volumes), gradient
 
 
 def gradient(surface: Surface) -> Floats:
@@ -102,10 +108,7 @@ def hessian(surface: Surface) -> csr_array:
     from scipy.sparse import coo_array, csr_array
 
     blocks = np.empty((surface.m, 3, 3, 3, 3))
-    kernels.hessian_blocks(
-        surface.vertices, surface.faces, surface.patch_of_face, surface.origin,
-        surface.tensions, surface.pressures, blocks,
-    )  # fmt: skip
+    kernels.hessian_blocks(kernels.energy_mesh(surface), surface.vertices, blocks)
     unknowns = 3 * surface.faces[:, :, None] + np.arange(3)
     rows = np.broadcast_to(unknowns[:, :, None, :, None], blocks.shape)
     columns = np.broadcast_to(unknowns[:, None, :, None, :], blocks.shape)
@@ -131,7 +134,4 @@ def volume(surface: Surface) -> float:
 
 
 def _areas_and_volumes(surface: Surface) -> tuple[Floats, Floats]:
-    return kernels.areas_and_volumes(
-        surface.vertices, surface.faces, surface.patch_of_face, surface.origin,
-        len(surface.patches),
-    )  # fmt: skip
+    return kernels.areas_and_volumes(kernels.energy_mesh(surface), surface.vertices)

@@ -1,4 +1,4 @@
-"""How the forces in the motion space change with the shape: the frames turn along with it.
+"""How the forces in the motion space change with the shape: its basis turns along with it.
 
 The forces that a P-CMC surface lacks are f = B Bᵀ ∇E, and along a motion d of the vertices
 
@@ -14,15 +14,28 @@ The second part counts off rest, and it is what makes Newton's method converge q
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..surface import Surface
-from ..surface.geometry import area_vectors
+from ..surface.geometry import (
+    accumulate,
+    add,
+    cross,
+    cross_sum,
+    divided,
+    dot,
+    norm,
+    point,
+    scaled,
+    sub,
+    vector,
+    vertex_area_vectors,
+)
 from ..surface.topology import SHEET
+from .kernels import Mesh
 from .motion_space import MotionSpace, VertexClasses, curve_chords
 
 
@@ -32,29 +45,27 @@ class Linearisation:
 
     Attributes
     ----------
-    sheets : (n,3) what the change of a vertex's area vector is multiplied with, else zero; pressure.
-    bends, pull : (b,) curve vertices, as numbers in ``classes.curve``, and -(t·∇E)/|c| there.
+    sheet_factor : (n,3) (∇E - n n·∇E) / |a| inside sheets, which Da is multiplied with; zero elsewhere.
+    curve_rows, curve_factor : (b,) numbers in ``classes.curve`` of the vertices whose curve may turn,
+        and -(t·∇E) / |c| there, which Dc is multiplied with.
     """
 
     surface: Surface
     classes: VertexClasses
     space: MotionSpace
     X: Floats
-    sheets: Floats
-    bends: Ints
-    pull: Floats
+    sheet_factor: Floats
+    curve_rows: Ints
+    curve_factor: Floats
 
     def times(self, d: Floats) -> Floats:
         """Bᵀ Df[d] (size,), for a motion d (n,3) of the vertices."""
         surface, classes, space = self.surface, self.classes, self.space
         change = np.zeros_like(self.X)
         turn = np.zeros(len(self.X))
-        _along(
-            self.X, d, classes.faces, classes.patch_of_face, surface.origin,
-            surface.tensions, surface.pressures, self.sheets, change, turn,
-        )  # fmt: skip
-        where = classes.curve[self.bends]
-        change[where] += self.pull[:, None] * curve_chords(surface, classes, d)[self.bends]
+        _add_times(classes.mesh(surface), self.X, d, self.sheet_factor, change, turn)
+        turned = curve_chords(surface, classes, d)[self.curve_rows]
+        change[classes.curve[self.curve_rows]] += self.curve_factor[:, None] * turned
         out = space.to_coordinates(change)
         single = (classes.kind == SHEET) & (space.dimension == 1)
         out[space.start[:-1][single]] += turn[single]
@@ -65,21 +76,21 @@ def linearise(
     surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
 ) -> Linearisation:
     """The derivative of the forces of ``surface`` at X, where ∇E is ``gradient`` (n,3)."""
-    bends, pull = _at_curves(surface, classes, space, X, gradient)
+    curves = _at_curves(surface, classes, space, X, gradient)
     sheets = _at_sheets(surface, classes, space, X, gradient)
-    return Linearisation(surface, classes, space, X, sheets, bends, pull)
+    return Linearisation(surface, classes, space, X, sheets, *curves)
 
 
 def _at_curves(
     surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
 ) -> tuple[Ints, Floats]:
     slides = surface.on_plane[classes.curve]
-    bends = np.flatnonzero(space.dimension[classes.curve] == np.where(slides, 1, 2))
-    chord = curve_chords(surface, classes, X)[bends]
-    chord[slides[bends]] = surface.plane.along(chord[slides[bends]])
+    rows = np.flatnonzero(space.dimension[classes.curve] == np.where(slides, 1, 2))
+    chord = curve_chords(surface, classes, X)[rows]
+    chord[slides[rows]] = surface.plane.along(chord[slides[rows]])
     square = np.einsum("ij,ij->i", chord, chord)
-    along = np.einsum("ij,ij->i", chord, gradient[classes.curve[bends]])
-    return bends, -along / square
+    along = np.einsum("ij,ij->i", chord, gradient[classes.curve[rows]])
+    return rows, -along / square
 
 
 def _at_sheets(
@@ -87,12 +98,12 @@ def _at_sheets(
 ) -> Floats:
     single = (classes.kind == SHEET) & (space.dimension == 1)
     out = np.zeros_like(X)
-    vector = area_vectors(X, classes.faces)[0]
-    _across_normals(vector, single, space.basis, gradient, out)
+    area_vector = vertex_area_vectors(X, classes.faces)[0]
+    _across_normals(area_vector, single, space.basis, gradient, out)
     sliding = np.flatnonzero(single & surface.on_plane)
     if len(sliding):
-        length = np.linalg.norm(vector[sliding], axis=1)
-        normal = vector[sliding] / length[:, None]
+        length = np.linalg.norm(area_vector[sliding], axis=1)
+        normal = area_vector[sliding] / length[:, None]
         shadow = np.linalg.norm(surface.plane.along(normal), axis=1)
         b, g = space.basis[sliding, 0], gradient[sliding]
         rest = surface.plane.along(g - np.einsum("ij,ij->i", g, b)[:, None] * b)
@@ -103,80 +114,51 @@ def _at_sheets(
 
 @compiled
 def _across_normals(
-    vector: Floats, chosen: Floats, basis: Floats, gradient: Floats, out: Floats
+    area_vector: Floats, chosen: Bools, basis: Floats, gradient: Floats, out: Floats
 ) -> None:
-    for v in range(len(vector)):
+    for v in range(len(area_vector)):
         if not chosen[v]:
             continue
-        n, g = basis[v, 0], gradient[v]
-        length = sqrt(vector[v, 0] ** 2 + vector[v, 1] ** 2 + vector[v, 2] ** 2)
-        along = n[0] * g[0] + n[1] * g[1] + n[2] * g[2]
-        for d in range(3):
-            out[v, d] = (g[d] - along * n[d]) / length
+        n, g = vector(basis[v, 0]), point(gradient, v)
+        across = sub(g, scaled(dot(n, g), n))
+        accumulate(out, v, divided(across, norm(point(area_vector, v))))
 
 
 @compiled
-def _along(
-    X: Floats, D: Floats, F: Ints, patch: Ints, origin: Floats, tension: Floats, pressure: Floats,
-    sheets: Floats, change: Floats, turn: Floats,
-) -> None:  # fmt: skip
-    """Add (∂²E) D to change (n,3), and the sheets' share of the turning to turn (n,)."""
-    ox, oy, oz = origin[0], origin[1], origin[2]
+def _add_times(
+    mesh: Mesh, X: Floats, D: Floats, sheet_factor: Floats, change: Floats, turn: Floats
+) -> None:
+    """Add (∂²E) D to change (n,3), and ⟨sheet_factor, Da⟩ to turn (n,), a the vertices' area vectors.
+
+    The force of a tension is ½ α ν × e, with ν = n / |n| and n = u × w of two edges; so it changes by
+    ½ α (Dν × e + ν × De), with Dν = (Dn - ν ⟨ν, Dn⟩) / |n| and Dn = Du × w + u × Dw.
+    """
+    F, origin = mesh.faces, vector(mesh.origin)
     for f in range(len(F)):
-        alpha, sixth = tension[patch[f]], pressure[patch[f]] / 6.0
+        alpha, sixth_p = mesh.tension[mesh.patch[f]], mesh.pressure[mesh.patch[f]] / 6.0
         i, j, k = F[f, 0], F[f, 1], F[f, 2]
-        # edges from corner a, and how they change
-        ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
-        wx, wy, wz = X[k, 0] - X[i, 0], X[k, 1] - X[i, 1], X[k, 2] - X[i, 2]
-        vx, vy, vz = D[j, 0] - D[i, 0], D[j, 1] - D[i, 1], D[j, 2] - D[i, 2]
-        zx, zy, zz = D[k, 0] - D[i, 0], D[k, 1] - D[i, 1], D[k, 2] - D[i, 2]
-        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-        mx = vy * wz - vz * wy + uy * zz - uz * zy
-        my = vz * wx - vx * wz + uz * zx - ux * zz
-        mz = vx * wy - vy * wx + ux * zy - uy * zx
-        for c in range(3):
-            v = F[f, c]
-            turn[v] += 0.5 * (sheets[v, 0] * mx + sheets[v, 1] * my + sheets[v, 2] * mz)
-        twice = sqrt(nx * nx + ny * ny + nz * nz)
-        s = 1.0 / twice if twice > 0.0 else 0.0
-        nx, ny, nz = s * nx, s * ny, s * nz
-        along = nx * mx + ny * my + nz * mz
-        s *= 0.5 * alpha
-        mx, my, mz = s * (mx - along * nx), s * (my - along * ny), s * (mz - along * nz)
-        h = 0.5 * alpha
-        nx, ny, nz = h * nx, h * ny, h * nz
-        # the corners seen from the point of Π, and how they move
-        ax, ay, az = X[i, 0] - ox, X[i, 1] - oy, X[i, 2] - oz
-        bx, by, bz = ax + ux, ay + uy, az + uz
-        cx, cy, cz = ax + wx, ay + wy, az + wz
-        px, py, pz = D[i, 0], D[i, 1], D[i, 2]
-        qx, qy, qz = D[j, 0], D[j, 1], D[j, 2]
-        rx, ry, rz = D[k, 0], D[k, 1], D[k, 2]
-        # edges opposite b and c, as a tension pulls them; the one opposite a balances these
-        jx, jy, jz = _sum_of_crosses(mx, my, mz, -wx, -wy, -wz, nx, ny, nz, -zx, -zy, -zz)
-        kx, ky, kz = _sum_of_crosses(mx, my, mz, ux, uy, uz, nx, ny, nz, vx, vy, vz)
-        lx, ly, lz = _sum_of_crosses(qx, qy, qz, cx, cy, cz, bx, by, bz, rx, ry, rz)
-        change[i, 0] -= jx + kx + sixth * lx
-        change[i, 1] -= jy + ky + sixth * ly
-        change[i, 2] -= jz + kz + sixth * lz
-        lx, ly, lz = _sum_of_crosses(rx, ry, rz, ax, ay, az, cx, cy, cz, px, py, pz)
-        change[j, 0] += jx - sixth * lx
-        change[j, 1] += jy - sixth * ly
-        change[j, 2] += jz - sixth * lz
-        lx, ly, lz = _sum_of_crosses(px, py, pz, bx, by, bz, ax, ay, az, qx, qy, qz)
-        change[k, 0] += kx - sixth * lx
-        change[k, 1] += ky - sixth * ly
-        change[k, 2] += kz - sixth * lz
-
-
-@compiled
-def _sum_of_crosses(
-    ax: float, ay: float, az: float, bx: float, by: float, bz: float,
-    cx: float, cy: float, cz: float, dx: float, dy: float, dz: float,
-) -> tuple[float, float, float]:  # fmt: skip
-    """a × b + c × d."""
-    return (
-        ay * bz - az * by + cy * dz - cz * dy,
-        az * bx - ax * bz + cz * dx - cx * dz,
-        ax * by - ay * bx + cx * dy - cy * dx,
-    )
+        Da, Db, Dc = point(D, i), point(D, j), point(D, k)
+        u, w = sub(point(X, j), point(X, i)), sub(point(X, k), point(X, i))
+        Du, Dw = sub(Db, Da), sub(Dc, Da)
+        n = cross(u, w)
+        Dn = cross_sum(Du, w, u, Dw)
+        for corner in range(3):
+            v = F[f, corner]
+            turn[v] += 0.5 * dot(point(sheet_factor, v), Dn)
+        length = norm(n)
+        scale = 1.0 / length if length > 0.0 else 0.0
+        nu = scaled(scale, n)
+        half_nu = scaled(0.5 * alpha, nu)
+        half_Dnu = scaled(scale * (0.5 * alpha), sub(Dn, scaled(dot(nu, Dn), nu)))
+        # tension: ν × u acts at c, -ν × w at b, and what balances both at a
+        along_u = cross_sum(half_Dnu, u, half_nu, Du)
+        along_w = cross_sum(half_Dnu, w, half_nu, Dw)
+        # pressure: the corners seen from the point of Π
+        a = sub(point(X, i), origin)
+        b, c = add(a, u), add(a, w)
+        at_a = scaled(sixth_p, cross_sum(Db, c, b, Dc))
+        at_b = scaled(sixth_p, cross_sum(Dc, a, c, Da))
+        at_c = scaled(sixth_p, cross_sum(Da, b, a, Db))
+        accumulate(change, i, sub(sub(along_w, along_u), at_a))
+        accumulate(change, j, scaled(-1.0, add(along_w, at_b)))
+        accumulate(change, k, sub(along_u, at_c))

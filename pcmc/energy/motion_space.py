@@ -14,14 +14,24 @@ A P-CMC surface is Bᵀ∇E = 0, with B the basis of this space.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..surface import Surface
-from ..surface.geometry import area_vectors
+from ..surface.geometry import (
+    accumulate,
+    divided,
+    dot,
+    norm,
+    point,
+    scaled,
+    sub,
+    vector,
+    vertex_area_vectors,
+)
 from ..surface.topology import (
     CURVE,
     POINT,
@@ -32,6 +42,7 @@ from ..surface.topology import (
     topology,
     vertex_kind,
 )
+from .kernels import Mesh, energy_mesh
 
 PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
 
@@ -62,24 +73,29 @@ class VertexClasses:
     idle: Bools
     level: Bools
 
+    def mesh(self, surface: Surface) -> Mesh:
+        """The active faces, with the tensions and pressures of a surface of these classes."""
+        return energy_mesh(surface)._replace(faces=self.faces, patch=self.patch_of_face)
 
-@dataclass(frozen=True, eq=False)
-class MotionSpace:
-    """Orthonormal basis of the motion space at each vertex.
+
+class MotionSpace(NamedTuple):
+    """Orthonormal basis of the motion space at each vertex; an unknown is a component along one vector.
 
     Attributes
     ----------
     basis : (n,3,3) float; basis[v, c] for c < dimension[v] are unit vectors, the rest zero.
     dimension : (n,) int, 0 to 3.
+    start : (n+1,) int, the first unknown of each vertex; the last entry is the number of unknowns.
     """
 
     basis: Floats
     dimension: Ints
+    start: Ints
 
-    @cached_property
-    def start(self) -> Ints:
-        """(n+1,) first unknown of each vertex; the last entry is their number."""
-        return np.concatenate([[0], np.cumsum(self.dimension)]).astype(np.int64)
+    @classmethod
+    def of(cls, basis: Floats, dimension: Ints) -> MotionSpace:
+        """The space of a basis, with its unknowns numbered vertex by vertex."""
+        return cls(basis, dimension, np.append(0, np.cumsum(dimension)).astype(np.int64))
 
     @property
     def size(self) -> int:
@@ -88,11 +104,11 @@ class MotionSpace:
 
     def to_coordinates(self, vectors: Floats) -> Floats:
         """Bᵀ v (size,): the components of vectors (n,3) along the basis."""
-        return _to_coordinates(self.basis, self.dimension, self.start, vectors)
+        return _to_coordinates(self, vectors)
 
     def to_vectors(self, components: Floats) -> Floats:
         """B s (n,3): the vectors that have these components (size,)."""
-        return _to_vectors(self.basis, self.dimension, self.start, components)
+        return _to_vectors(self, components)
 
     def project(self, vectors: Floats) -> Floats:
         """B Bᵀ v (n,3): the part of the vectors that changes the shape."""
@@ -157,7 +173,7 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     moving = ~(surface.fixed | classes.idle)
 
     sheet = moving & (classes.kind == SHEET)
-    _along_normals(area_vectors(X, classes.faces)[0], sheet, basis, dimension)
+    _along_normals(vertex_area_vectors(X, classes.faces)[0], sheet, basis, dimension)
 
     curve = np.flatnonzero(moving & (classes.kind == CURVE))
     tangent = np.zeros((n, 3))
@@ -177,7 +193,7 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     sliding = np.flatnonzero(moving & surface.on_plane)
     if len(sliding):
         _within_plane(np.array(surface.plane.normal), tangent, sliding, basis, dimension)
-    return MotionSpace(basis, dimension)
+    return MotionSpace.of(basis, dimension)
 
 
 def curve_chords(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
@@ -243,12 +259,12 @@ def _within_plane(
 
 
 @compiled
-def _along_normals(vector: Floats, chosen: Bools, basis: Floats, dimension: Ints) -> None:
-    for v in range(len(vector)):
-        a, b, c = vector[v, 0], vector[v, 1], vector[v, 2]
-        length = np.sqrt(a * a + b * b + c * c)
+def _along_normals(area_vector: Floats, chosen: Bools, basis: Floats, dimension: Ints) -> None:
+    for v in range(len(area_vector)):
+        a = point(area_vector, v)
+        length = norm(a)
         if chosen[v] and length > 0.0:
-            basis[v, 0, 0], basis[v, 0, 1], basis[v, 0, 2] = a / length, b / length, c / length
+            basis[v, 0, 0], basis[v, 0, 1], basis[v, 0, 2] = divided(a, length)
             dimension[v] = 1
 
 
@@ -258,28 +274,25 @@ def _square_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
     for f in range(len(F)):
         square = 0.0
         for i in range(3):
-            for d in range(3):
-                square += (X[F[f, i], d] - X[F[f, i - 1], d]) ** 2
+            edge = sub(point(X, F[f, i]), point(X, F[f, i - 1]))
+            square += dot(edge, edge)
         total += 0.25 * tension[f] ** 2 * square
     return total
 
 
 @compiled
-def _to_coordinates(basis: Floats, dimension: Ints, start: Ints, vectors: Floats) -> Floats:
-    out = np.empty(start[-1])
-    for v in range(len(dimension)):
-        for c in range(dimension[v]):
-            b = basis[v, c]
-            out[start[v] + c] = b[0] * vectors[v, 0] + b[1] * vectors[v, 1] + b[2] * vectors[v, 2]
+def _to_coordinates(space: MotionSpace, vectors: Floats) -> Floats:
+    out = np.empty(space.start[-1])
+    for v in range(len(space.dimension)):
+        for c in range(space.dimension[v]):
+            out[space.start[v] + c] = dot(vector(space.basis[v, c]), point(vectors, v))
     return out
 
 
 @compiled
-def _to_vectors(basis: Floats, dimension: Ints, start: Ints, components: Floats) -> Floats:
-    out = np.zeros((len(dimension), 3))
-    for v in range(len(dimension)):
-        for c in range(dimension[v]):
-            s = components[start[v] + c]
-            for d in range(3):
-                out[v, d] += s * basis[v, c, d]
+def _to_vectors(space: MotionSpace, components: Floats) -> Floats:
+    out = np.zeros((len(space.dimension), 3))
+    for v in range(len(space.dimension)):
+        for c in range(space.dimension[v]):
+            accumulate(out, v, scaled(components[space.start[v] + c], vector(space.basis[v, c])))
     return out

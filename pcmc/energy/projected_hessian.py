@@ -1,4 +1,4 @@
-"""The Hessian in motion-space unknowns, assembled straight into a kept sparsity pattern.
+"""The Hessian in motion-space unknowns, assembled straight into the sparsity pattern of its surface.
 
 With b_i, b_j basis vectors at corners i, j of a triangle of unit normal ν, area A and edges e opposite
 the corners, the entry of Bᵀ (∂²E) B is
@@ -11,8 +11,7 @@ Bᵀ (L_α ⊗ I) B, with L_α the cotangent Laplacian, has α (e_i·e_j)/(4A) (
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -20,11 +19,12 @@ from scipy.sparse import csr_array
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled
 from ..surface import Surface
+from ..surface.geometry import cross, divided, dot, norm, point, scaled, sub, vector
+from .kernels import Mesh
 from .motion_space import MotionSpace, VertexClasses
 
 
-@dataclass(frozen=True, eq=False)
-class Pattern:
+class Pattern(NamedTuple):
     """Upper triangle (CSR) of a symmetric matrix over motion-space unknowns, and the way into it.
 
     Attributes
@@ -51,13 +51,12 @@ class Pattern:
 def hessian_pattern(classes: VertexClasses, space: MotionSpace) -> Pattern:
     """Sparsity of Bᵀ (∂²E) B: it depends on the faces and on the dimensions of the motion space."""
     low, high = classes.topology.edges.T.astype(np.int64)
-    dimension, start = space.dimension, space.start
-    first = np.searchsorted(low, np.arange(len(dimension) + 1))
-    width = dimension[high]
+    first = np.searchsorted(low, np.arange(len(space.dimension) + 1))
+    width = space.dimension[high]
     before = np.concatenate([[0], np.cumsum(width)])
     edge_offset = before[:-1] - before[first[low]]
     beyond = before[first[1:]] - before[first[:-1]]
-    indptr, indices = _fill_pattern(dimension, start, first, high, beyond)
+    indptr, indices = _fill_pattern(space, first, high, beyond)
     # edge (i,j) opposite corner k: pairs (0,1), (1,2), (2,0) are opposite corners 2, 0, 1
     offset = edge_offset[classes.topology.edge_of_face[:, [2, 0, 1]]]
     return Pattern(indptr, indices, np.ascontiguousarray(offset.astype(np.int32)))
@@ -72,20 +71,15 @@ def assemble(
     hessian: float = 1.0,
     stiffness: float = 0.0,
 ) -> Floats:
-    """Values of hessian · Bᵀ(∂²E)B + stiffness · Bᵀ(L_α⊗I)B in the kept pattern."""
+    """Values of hessian · Bᵀ(∂²E)B + stiffness · Bᵀ(L_α⊗I)B in the pattern."""
     data = np.zeros(len(pattern.indices))
-    _assemble(
-        X, classes.faces, classes.patch_of_face, surface.origin, surface.tensions,
-        surface.pressures, space.basis, space.dimension, space.start, pattern.indptr, pattern.offset,
-        hessian, stiffness, data,
-    )  # fmt: skip
+    _assemble(classes.mesh(surface), X, space, pattern, hessian, stiffness, data)
     return data
 
 
 @compiled
-def _fill_pattern(
-    dimension: Ints, start: Ints, first: Ints, high: Ints, beyond: Ints
-) -> tuple[Ints, Ints]:
+def _fill_pattern(space: MotionSpace, first: Ints, high: Ints, beyond: Ints) -> tuple[Ints, Ints]:
+    dimension, start = space.dimension, space.start
     indptr = np.zeros(start[-1] + 1, dtype=np.int32)
     for v in range(len(dimension)):
         for r in range(dimension[v]):
@@ -108,68 +102,51 @@ def _fill_pattern(
 
 @compiled
 def _assemble(
-    X: Floats, F: Ints, patch: Ints, origin: Floats, tension: Floats, pressure: Floats,
-    basis: Floats, dimension: Ints, start: Ints, indptr: Ints, offset: Ints, hessian: float,
-    stiffness: float, data: Floats,
-) -> None:  # fmt: skip
-    x = np.empty((3, 3))
-    e = np.empty((3, 3))
-    nu = np.empty(3)
-    q = np.empty(3)
+    mesh: Mesh,
+    X: Floats,
+    space: MotionSpace,
+    pattern: Pattern,
+    hessian: float,
+    stiffness: float,
+    data: Floats,
+) -> None:
+    F, origin = mesh.faces, vector(mesh.origin)
+    basis, dimension, start = space.basis, space.dimension, space.start
+    indptr, offset = pattern.indptr, pattern.offset
     for f in range(len(F)):
-        alpha, p = tension[patch[f]], pressure[patch[f]]
+        alpha, p = mesh.tension[mesh.patch[f]], mesh.pressure[mesh.patch[f]]
+        a = sub(point(X, F[f, 0]), origin)
+        b = sub(point(X, F[f, 1]), origin)
+        c = sub(point(X, F[f, 2]), origin)
+        corner, edge = (a, b, c), (sub(c, b), sub(a, c), sub(b, a))
+        normal = cross(edge[1], edge[2])
+        twice_area = norm(normal)
+        scale = 1.0 / twice_area if twice_area > 0.0 else 0.0
+        nu = scaled(scale, normal)
         for i in range(3):
-            for d in range(3):
-                x[i, d] = X[F[f, i], d] - origin[d]
-        for i in range(3):
-            for d in range(3):
-                e[i, d] = x[(i + 2) % 3, d] - x[(i + 1) % 3, d]
-        nu[0] = e[1, 1] * e[2, 2] - e[1, 2] * e[2, 1]
-        nu[1] = e[1, 2] * e[2, 0] - e[1, 0] * e[2, 2]
-        nu[2] = e[1, 0] * e[2, 1] - e[1, 1] * e[2, 0]
-        twice = sqrt(nu[0] * nu[0] + nu[1] * nu[1] + nu[2] * nu[2])
-        scale = 1.0 / twice if twice > 0.0 else 0.0
-        for d in range(3):
-            nu[d] *= scale
-        for i in range(3):
-            v = F[f, i]
-            weight = 0.5 * alpha * scale * (e[i, 0] ** 2 + e[i, 1] ** 2 + e[i, 2] ** 2)
+            j, k = (i + 1) % 3, (i + 2) % 3
+            v, w = F[f, i], F[f, j]
+            weight = 0.5 * alpha * scale * dot(edge[i], edge[i])
             for r in range(dimension[v]):
+                b_r = vector(basis[v, r])
                 at = indptr[start[v] + r] - r
-                b = basis[v, r]
-                along = b[0] * nu[0] + b[1] * nu[1] + b[2] * nu[2]
-                for c in range(r, dimension[v]):
-                    a = basis[v, c]
-                    across = a[0] * nu[0] + a[1] * nu[1] + a[2] * nu[2]
-                    value = hessian * weight * along * across
-                    if c == r:
+                for s in range(r, dimension[v]):
+                    b_s = vector(basis[v, s])
+                    value = hessian * weight * dot(b_r, nu) * dot(b_s, nu)
+                    if r == s:
                         value += stiffness * weight
-                    data[at + c] += value
-            j = (i + 1) % 3
-            k = (i + 2) % 3
-            w = F[f, j]
-            if dimension[v] == 0 or dimension[w] == 0:
-                continue
-            weight = 0.5 * alpha * scale
-            weight *= e[i, 0] * e[j, 0] + e[i, 1] * e[j, 1] + e[i, 2] * e[j, 2]
-            for d in range(3):
-                q[d] = -0.5 * alpha * nu[d] + p * x[k, d] / 6.0
+                    data[at + s] += value
+            weight = 0.5 * alpha * scale * dot(edge[i], edge[j])
+            q = sub(divided(scaled(p, corner[k]), 6.0), scaled(0.5 * alpha, nu))
             for r in range(dimension[v]):
-                b = basis[v, r]
-                along = b[0] * nu[0] + b[1] * nu[1] + b[2] * nu[2]
-                for c in range(dimension[w]):
-                    a = basis[w, c]
-                    across = a[0] * nu[0] + a[1] * nu[1] + a[2] * nu[2]
-                    dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-                    # q · (a × b), the skew part
-                    skew = (
-                        q[0] * (a[1] * b[2] - a[2] * b[1])
-                        + q[1] * (a[2] * b[0] - a[0] * b[2])
-                        + q[2] * (a[0] * b[1] - a[1] * b[0])
-                    )
-                    value = hessian * (weight * along * across + skew) + stiffness * weight * dot
+                b_i = vector(basis[v, r])
+                for s in range(dimension[w]):
+                    b_j = vector(basis[w, s])
+                    bending = weight * dot(b_i, nu) * dot(b_j, nu)
+                    skew = dot(q, cross(b_j, b_i))
+                    value = hessian * (bending + skew) + stiffness * weight * dot(b_j, b_i)
                     if v < w:
-                        at = indptr[start[v] + r] + dimension[v] - r + offset[f, i] + c
+                        at = indptr[start[v] + r] + dimension[v] - r + offset[f, i] + s
                     else:
-                        at = indptr[start[w] + c] + dimension[w] - c + offset[f, i] + r
+                        at = indptr[start[w] + s] + dimension[w] - s + offset[f, i] + r
                     data[at] += value

@@ -1,4 +1,4 @@
-"""Vertices at one place become one, so that patches written apart share their junctions."""
+"""Merge vertices at one place, so that patches from separate meshes share their junctions."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
+from ..surface.geometry import bounding_size
 
 TOLERANCE = 1e-7  # of the size; single precision keeps this much
 
 
 def coincident(X: Floats, tolerance: float = TOLERANCE) -> tuple[Ints, Ints]:
-    """Which vertices to keep, and the place among them of every vertex.
+    """Which vertices to keep, and the index among them of every vertex.
 
-    Vertices closer than ``tolerance`` times the diagonal of the bounding box are one, the first of
-    them in order; where none coincide all are kept in their order.
+    Vertices closer than ``tolerance`` times the diagonal of the bounding box become one, the first of
+    them in order.
 
     >>> keep, place = coincident(np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1e-9], [0, 1, 0.0]]))
     >>> keep.tolist(), place.tolist()
     ([0, 1, 3], [0, 1, 0, 2])
     """
     n = len(X)
-    size = float(np.linalg.norm(np.ptp(X, axis=0)))
-    pairs = cKDTree(X).query_pairs(tolerance * size, output_type="ndarray")
+    pairs = cKDTree(X).query_pairs(tolerance * bounding_size(X), output_type="ndarray")
     if not len(pairs):
         return np.arange(n), np.arange(n)
     graph = coo_array((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), shape=(n, n))

@@ -5,24 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
+from ..surface.geometry import angles, area_vectors
 
 SWEEPS = 12
 MOST = 400  # vertices a sweep: this is for leftovers, not for whole meshes
 TURNS = 2.0 * np.pi * np.arange(8) / 8.0
 REACHES = (0.02, 0.06, 0.15)  # of the longest edge of the star
-
-
-def angles(X: Floats, F: Ints) -> Floats:
-    """(…,m,3) angles of triangles, degrees; X (n,2), (n,3), or a stack of them (…,n,3).
-
-    >>> angles(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])).round(9).tolist()
-    [[90.0, 45.0, 45.0]]
-    """
-    corner = X[..., F, :]
-    a, b = np.roll(corner, -1, axis=-2) - corner, np.roll(corner, 1, axis=-2) - corner
-    cosine = (a * b).sum(axis=-1)
-    both = (a * a).sum(axis=-1) * (b * b).sum(axis=-1)
-    return np.degrees(np.arctan2(np.sqrt(np.maximum(both - cosine**2, 0.0)), cosine))
 
 
 def improve_angles(X: Floats, F: Ints, movable: Bools, goal: float) -> Floats:
@@ -36,14 +24,14 @@ def improve_angles(X: Floats, F: Ints, movable: Bools, goal: float) -> Floats:
     >>> fan = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
     >>> free = np.array([False, False, False, False, True])
     >>> moved = improve_angles(square, fan, free, goal=40.0)
-    >>> bool(angles(moved, fan).min() > 38.0 > angles(square, fan).min())
+    >>> bool(angles(moved[fan]).min() > 38.0 > angles(square[fan]).min())
     True
     """
     X = X.copy()
     order = np.argsort(F.ravel(), kind="stable")
     first = np.searchsorted(F.ravel()[order], np.arange(len(X) + 1))
     for _ in range(SWEEPS):
-        smallest = angles(X, F).min(axis=1)
+        smallest = angles(X[F]).min(axis=1)
         bad = np.flatnonzero(smallest < goal)
         vertices = F[bad[np.argsort(smallest[bad], kind="stable")]].ravel()
         vertices = vertices[np.sort(np.unique(vertices, return_index=True)[1])]
@@ -59,7 +47,7 @@ def improve_angles(X: Floats, F: Ints, movable: Bools, goal: float) -> Floats:
 def _improve(X: Floats, star: Ints, v: int) -> bool:
     """Move vertex v to the best of the places around it; whether it moved."""
     corner = X[star]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]).sum(axis=0)
+    normal = area_vectors(corner).sum(axis=0)
     first = X[star[0][star[0] != v][0]] - X[v]
     first = first - (first @ normal) / (normal @ normal) * normal
     length = np.linalg.norm(first)
@@ -70,10 +58,8 @@ def _improve(X: Floats, star: Ints, v: int) -> bool:
     around = np.cos(TURNS)[:, None] * (first / length) + np.sin(TURNS)[:, None] * second
     places = X[v] + np.concatenate([np.zeros((1, 3)), *(reach * r * around for r in REACHES)])
     ring = np.where((star == v)[None, :, :, None], places[:, None, None, :], corner[None])
-    local = np.arange(3 * len(star)).reshape(-1, 3)
-    tried = ring.reshape(len(places), -1, 3)
-    upright = np.cross(ring[:, :, 1] - ring[:, :, 0], ring[:, :, 2] - ring[:, :, 0]) @ normal > 0.0
-    value = np.where(upright.all(axis=1), angles(tried, local).min(axis=(1, 2)), -1.0)
+    upright = area_vectors(ring) @ normal > 0.0
+    value = np.where(upright.all(axis=1), angles(ring).min(axis=(1, 2)), -1.0)
     best = int(np.argmax(value))
     if value[best] <= value[0] + 1e-6:
         return False

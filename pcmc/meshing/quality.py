@@ -7,9 +7,10 @@ from math import sqrt
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..base.compiled import compiled
+from ..base.compiled import compiled, inlined
 from ..energy.functional import apply_supports
 from ..surface import Surface
+from ..surface.geometry import angles, cross, dot, face_areas, norm, point, segment_lengths, sub
 from ..surface.topology import SHEET
 
 SQRT3 = sqrt(3.0)
@@ -21,9 +22,7 @@ def triangle_quality(X: Floats, F: Ints) -> Floats:
     >>> triangle_quality(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])).round(6)
     array([0.866025])
     """
-    sides = X[F[:, [1, 2, 0]]] - X[F]
-    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    return 4.0 * np.sqrt(3.0) * area / np.einsum("fij,fij->f", sides, sides)
+    return _qualities(X, F)
 
 
 def worst_quality(X: Floats, F: Ints) -> float:
@@ -33,26 +32,39 @@ def worst_quality(X: Floats, F: Ints) -> float:
 
 def compare(X: Floats, Y: Floats, F: Ints) -> tuple[bool, float, float]:
     """Whether a triangle turns over on the way from X to Y, and the worst quality at X and at Y."""
-    return bool(_turns(X, Y, F)), float(_worst(X, F)), float(_worst(Y, F))
+    return turns_over(X, Y, F), worst_quality(X, F), worst_quality(Y, F)
+
+
+def turns_over(X: Floats, Y: Floats, F: Ints) -> bool:
+    """Whether a triangle's normal turns by a right angle or more from X to Y."""
+    return bool(_turns(X, Y, F))
+
+
+@inlined
+def _area_and_edges(X: Floats, F: Ints, f: int) -> tuple[float, float]:
+    """4√3 area and Σ edge² of triangle f."""
+    a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+    u, w = sub(b, a), sub(c, a)
+    return norm(cross(u, w)) * 2.0 * SQRT3, 2.0 * (dot(u, u) + dot(w, w) - dot(u, w))
+
+
+@compiled
+def _qualities(X: Floats, F: Ints) -> Floats:
+    out = np.zeros(len(F))
+    for f in range(len(F)):
+        area, squared_edges = _area_and_edges(X, F, f)
+        if squared_edges != 0.0:
+            out[f] = area / squared_edges
+    return out
 
 
 @compiled
 def _worst(X: Floats, F: Ints) -> float:
     worst = 1.0
     for f in range(len(F)):
-        i, j, k = F[f, 0], F[f, 1], F[f, 2]
-        ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
-        wx, wy, wz = X[k, 0] - X[i, 0], X[k, 1] - X[i, 1], X[k, 2] - X[i, 2]
-        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-        uu, ww, uw = (
-            ux * ux + uy * uy + uz * uz,
-            wx * wx + wy * wy + wz * wz,
-            ux * wx + uy * wy + uz * wz,
-        )
-        squares = 2.0 * (uu + ww - uw)
-        twice = sqrt(nx * nx + ny * ny + nz * nz)
-        if twice * 2.0 * SQRT3 < worst * squares or squares == 0.0:
-            worst = twice * 2.0 * SQRT3 / squares if squares > 0.0 else 0.0
+        area, squared_edges = _area_and_edges(X, F, f)
+        if area < worst * squared_edges or squared_edges == 0.0:
+            worst = area / squared_edges if squared_edges > 0.0 else 0.0
     return worst
 
 
@@ -60,33 +72,21 @@ def _worst(X: Floats, F: Ints) -> float:
 def _turns(X: Floats, Y: Floats, F: Ints) -> bool:
     for f in range(len(F)):
         i, j, k = F[f, 0], F[f, 1], F[f, 2]
-        ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
-        wx, wy, wz = X[k, 0] - X[i, 0], X[k, 1] - X[i, 1], X[k, 2] - X[i, 2]
-        px, py, pz = Y[j, 0] - Y[i, 0], Y[j, 1] - Y[i, 1], Y[j, 2] - Y[i, 2]
-        qx, qy, qz = Y[k, 0] - Y[i, 0], Y[k, 1] - Y[i, 1], Y[k, 2] - Y[i, 2]
-        dot = (
-            (uy * wz - uz * wy) * (py * qz - pz * qy)
-            + (uz * wx - ux * wz) * (pz * qx - px * qz)
-            + (ux * wy - uy * wx) * (px * qy - py * qx)
-        )
-        if dot <= 0.0:
+        before = cross(sub(point(X, j), point(X, i)), sub(point(X, k), point(X, i)))
+        after = cross(sub(point(Y, j), point(Y, i)), sub(point(Y, k), point(Y, i)))
+        if dot(before, after) <= 0.0:
             return True
     return False
 
 
 def minimum_angle(surface: Surface) -> float:
     """The smallest angle of any triangle, degrees."""
-    X, F = surface.vertices, surface.faces
-    a, b = X[F[:, [1, 2, 0]]] - X[F], X[F[:, [2, 0, 1]]] - X[F]
-    cosine = np.einsum("fij,fij->fi", a, b)
-    sine = np.linalg.norm(np.cross(a, b), axis=2)
-    return float(np.degrees(np.arctan2(sine, cosine)).min())
+    return float(angles(surface.vertices[surface.faces]).min())
 
 
 def edge_lengths(surface: Surface) -> Floats:
     """(e,) length of each edge, in the order of ``surface.topology.edges``."""
-    start, end = surface.topology.edges.T
-    return np.linalg.norm(surface.vertices[end] - surface.vertices[start], axis=1)
+    return segment_lengths(surface.vertices, surface.topology.edges)
 
 
 def towards_star_centres(
@@ -100,9 +100,7 @@ def towards_star_centres(
     """
     F = surface.faces
     corners = X[F]
-    area = 0.5 * np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
+    area = face_areas(corners)
     centroid = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0
     corner = F.T.ravel()
     total = np.bincount(corner, np.tile(area, 3), len(X))[:, None]

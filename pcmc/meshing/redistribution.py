@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from ..base.arrays import Floats
-from ..contact.pinching import Standing, place_wall_rows
+from ..contact.pinching import StandingPart, place_wall_rows
 from ..energy.motion_space import motion_space
 from .quality import towards_star_centres, worst_quality
 
 SWEEPS = 20  # at most
 
 
-def redistribute(found: Standing, X: Floats, aim: float, *, slide: bool) -> tuple[Floats, float]:
+def redistribute(part: StandingPart, X: Floats, aim: float, *, slide: bool) -> tuple[Floats, float]:
     """The best of a few sweeps of redistribution, (n,3), and the quality of its worst triangle.
 
     Sweeps end where that is at least ``aim``. Each vertex moves towards the middle of its star, without
@@ -18,19 +18,19 @@ def redistribute(found: Standing, X: Floats, aim: float, *, slide: bool) -> tupl
 
     Parameters
     ----------
-    found : what stands of the surface; triangles of walls that may pinch are not judged.
+    part : the standing part of the surface; triangles of walls that can pinch do not count.
     X : (n,3) where its vertices are.
     slide : whether junction vertices at rest on Π may slide along their junction.
     """
-    surface, classes, judged = found.surface, found.classes, found.judged
-    best, worst = X, worst_quality(X, judged)
+    surface, classes, faces = part.surface, part.classes, part.quality_faces
+    best, worst = X, worst_quality(X, faces)
     for _ in range(SWEEPS):
         move = towards_star_centres(surface, X, classes.kind, classes.curve, classes.beside)
         if not slide:
-            move[found.rests] = 0.0
+            move[part.resting] = 0.0
         space = motion_space(surface, classes, X)
-        X = place_wall_rows(surface, found.walls, X + move - space.project(move), space)
-        quality = worst_quality(X, judged)
+        X = place_wall_rows(surface, part.walls, X + move - space.project(move), space)
+        quality = worst_quality(X, faces)
         if quality > worst:
             best, worst = X, quality
         if quality >= aim:

@@ -12,9 +12,10 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import MissingExtra, OptionError, SurfaceError
-from ..contact.pinching import find_walls, lifted, resting
+from ..contact.pinching import lift, standing_part
 from ..surface import Surface
-from .angles import angles, improve_angles
+from ..surface.geometry import angles, area_vectors, face_areas, segment_lengths
+from .angles import improve_angles
 from .quality import edge_lengths
 from .refinement import held_midpoints, refine
 
@@ -82,15 +83,15 @@ def remesh(
         mesh = _by_mmg(mesh, size, growth, CHORD * edge_length if chord is None else chord)
         mesh = replace(mesh, X=improve_angles(mesh.X, mesh.F, mesh.source < 0, GOOD_ANGLE))
         candidates.append(mesh)
-        if angles(mesh.X, mesh.F).min() >= GOOD_ANGLE:
+        if angles(mesh.X[mesh.F]).min() >= GOOD_ANGLE:
             break
     return _assembled(surface, old, candidates)
 
 
 def _raised(surface: Surface) -> Surface:
     """The surface with the walls standing again that had vanished below a junction at rest."""
-    below = find_walls(surface)
-    return lifted(surface, below, resting(surface, below), RAISED)
+    part = standing_part(surface)
+    return lift(surface, part.walls, part.resting, RAISED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +137,7 @@ def _above(least: float, value: Any) -> bool:
 
 def _check_count(surface: Surface, edge_length: float) -> None:
     """Refuse a slip in the edge length before it fills the memory."""
-    sides = surface.vertices[surface.faces[:, 1:]] - surface.vertices[surface.faces[:, :1]]
-    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum()
+    area = face_areas(surface.vertices[surface.faces]).sum()
     count = area / (math.sqrt(3.0) / 4.0 * edge_length**2)
     if count > MOST:
         raise OptionError(
@@ -193,7 +193,7 @@ def _refined_round(surface: Surface) -> Surface:
 def _edge_normals(surface: Surface, chosen: Ints) -> Floats:
     """(c,2,3) unit normals at the ends of edges inside sheets, of the edge's own sheet."""
     X, F, topo = surface.vertices, surface.faces, surface.topology
-    vector = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]])
+    vector = area_vectors(X[F])
     key, place = np.unique(
         (surface.patch_of_face[:, None].astype(np.int64) * surface.n + F).ravel(),
         return_inverse=True,
@@ -267,8 +267,7 @@ def _sizes(mesh: _Mesh, edge_length: float, growth: float) -> Floats:
     """(n,) the edge length wanted at each vertex: a curve's own next to it, growing away from it."""
     size = np.full(len(mesh.X), float(edge_length))
     if len(mesh.curves):
-        start, end = mesh.curves.T
-        length = np.linalg.norm(mesh.X[end] - mesh.X[start], axis=1)
+        length = segment_lengths(mesh.X, mesh.curves)
         spacing = np.zeros(len(mesh.X))
         np.maximum.at(spacing, mesh.curves, length[:, None])
         on_curve = np.flatnonzero(spacing)
@@ -326,7 +325,7 @@ def _corners_to_keep(mesh: _Mesh) -> Ints:
     on_curve = np.zeros(len(mesh.X), dtype=bool)
     on_curve[mesh.curves] = True
     between = np.flatnonzero(on_curve[mesh.F].all(axis=1))
-    _, second, largest = np.sort(angles(mesh.X, mesh.F[between]), axis=1).T
+    _, second, largest = np.sort(angles(mesh.X[mesh.F[between]]), axis=1).T
     return between[(second >= BLUNT) & (largest <= OBTUSE)]
 
 
@@ -375,5 +374,5 @@ def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Sur
 def _patch_angles(mesh: _Mesh, count: int) -> Floats:
     """(count,) the smallest angle in each patch, degrees."""
     smallest = np.full(count, 180.0)
-    np.minimum.at(smallest, mesh.patch, angles(mesh.X, mesh.F).min(axis=1))
+    np.minimum.at(smallest, mesh.patch, angles(mesh.X[mesh.F]).min(axis=1))
     return smallest

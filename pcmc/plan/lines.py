@@ -1,4 +1,4 @@
-"""The lines of a plan, drawn on Π: what each must be, and where two of them meet."""
+"""The lines of a plan in the plane Π: checks of each, and where two of them meet."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import shapely
 
 from ..base.arrays import Floats
 from ..base.errors import PlanError
+from ..surface.geometry import cross_2d
 from .curves import Curve
-from .planar import cross
 
-SNAP = 0.01  # of the edge length: lines that miss each other by less are taken to meet
+SNAP = 0.01  # of the edge length: lines nearer to each other than this meet
 
 
 class Kind(IntEnum):
-    """What a line is. Where lines meet, the first kind among them says where the point is."""
+    """Kinds of lines. Where lines meet, the one with the lowest kind gives the position of the point."""
 
     OUTLINE = 0
     HOLE = 1
@@ -29,7 +29,7 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A named curve of a plan, in the coordinates of Π (two along it, and the height)."""
+    """A named curve of a plan, in the coordinates of Π: two in the plane, and the height."""
 
     name: str
     kind: Kind
@@ -42,7 +42,7 @@ class Line:
 
 
 class Drawn:
-    """A line with its dense drawing on Π."""
+    """A line with its projection on Π as a dense polyline."""
 
     def __init__(self, line: Line) -> None:
         self.line, self.curve = line, line.curve
@@ -50,7 +50,7 @@ class Drawn:
         self.xy = self.curve.at(self.curve.dense)[:, :2]
         steps = np.linalg.norm(np.diff(self.xy, axis=0), axis=1)
         if not steps.any():
-            raise PlanError(f"{self.name} has no length on the plane")
+            raise PlanError(f"{self.name} has no length in plan", what=self.name)
         self.reach = np.concatenate([[0.0], np.cumsum(steps)])
         self.shape: Any = shapely.LineString(self.xy)
 
@@ -66,14 +66,19 @@ class Drawn:
         return t, float(distance[best])
 
 
-def spot(xy: Floats) -> str:
-    """A place, for messages."""
+def point_text(xy: Floats) -> str:
+    """A point, for messages."""
     return f"({xy[0]:.6g}, {xy[1]:.6g})"
 
 
 def overlap(one: Drawn, other: Drawn, where: str) -> PlanError:
-    """The error for two lines that coincide along a part."""
-    return PlanError(f"{one.name} runs along {other.name} {where}; leave that part out")
+    """The error for two lines that coincide along some length."""
+    return PlanError(
+        f"{one.name} runs along {other.name} {where}; leave that part out",
+        what=one.name,
+        where=where,
+        found=other.name,
+    )
 
 
 def check_line(one: Drawn) -> None:
@@ -81,14 +86,21 @@ def check_line(one: Drawn) -> None:
     if one.line.bounds and not one.curve.closed:
         gap = float(np.linalg.norm(one.xy[-1] - one.xy[0]))
         raise PlanError(
-            f"{one.name} is open: it starts at {spot(one.xy[0])} and ends at {spot(one.xy[-1])},"
-            f" {gap:.3g} apart; close it"
+            f"{one.name} is open: it starts at {point_text(one.xy[0])} and ends at {point_text(one.xy[-1])},"
+            f" {gap:.3g} apart; close it",
+            what=one.name,
+            found=gap,
         )
     if not one.shape.is_simple:
         pieces = shapely.get_parts(shapely.node(one.shape))
         ends = np.concatenate([np.array(p.coords)[[0, -1]] for p in pieces])
         where, count = np.unique(ends.round(9), axis=0, return_counts=True)
-        raise PlanError(f"{one.name} crosses itself at {spot(where[np.argmax(count)])}")
+        place = where[np.argmax(count)]
+        raise PlanError(
+            f"{one.name} crosses itself at {point_text(place)}",
+            what=one.name,
+            where=tuple(place.tolist()),
+        )
 
 
 def check_holes(drawn: Sequence[Drawn]) -> None:
@@ -98,14 +110,20 @@ def check_holes(drawn: Sequence[Drawn]) -> None:
     for place, (one, area) in enumerate(holes):
         if not outline.contains_properly(area):
             where = "crosses or touches" if outline.intersects(area) else "lies outside"
-            raise PlanError(f"{one.name} {where} the outline; a hole must lie inside it")
+            raise PlanError(
+                f"{one.name} {where} the outline; a hole must be inside the outline", what=one.name
+            )
         for other, other_area in holes[:place]:
             if area.intersects(other_area):
-                raise PlanError(f"{other.name} and {one.name} touch or overlap; join them into one")
+                raise PlanError(
+                    f"{other.name} and {one.name} touch or overlap; join them into one",
+                    what=other.name,
+                    found=one.name,
+                )
 
 
 def inside(drawn: Sequence[Drawn]) -> Callable[[Floats], bool]:
-    """Whether a point is inside the outline and outside all holes."""
+    """A function that tests whether a point is inside the outline and outside all holes."""
     area = shapely.Polygon(drawn[0].xy)
     for one in drawn:
         if one.kind is Kind.HOLE:
@@ -116,13 +134,13 @@ def inside(drawn: Sequence[Drawn]) -> Callable[[Floats], bool]:
 def lines_at(
     drawn: Sequence[Drawn], xy: Floats, snap: float, leave_out: int = -1
 ) -> list[tuple[int, float]]:
-    """Lines that pass a point, with the parameter there."""
+    """Lines that pass through a point, with their parameter there."""
     near = [(number, *one.nearest(xy)) for number, one in enumerate(drawn) if number != leave_out]
     return [(number, t) for number, t, distance in near if distance <= snap]
 
 
 def crossing(one: Drawn, s: float, two: Drawn, t: float) -> tuple[float, float]:
-    """The parameters at which two curves cross, by Newton's method from near there."""
+    """The parameters at which two curves cross, by Newton's method from initial guesses."""
 
     def apart(s: float, t: float) -> Floats:
         return (two.curve.at([t]) - one.curve.at([s]))[0, :2]
@@ -131,10 +149,13 @@ def crossing(one: Drawn, s: float, two: Drawn, t: float) -> tuple[float, float]:
     for _ in range(8):
         along_s = (apart(s - step, t) - apart(s + step, t)) / (2.0 * step)
         along_t = (apart(s, t + step) - apart(s, t - step)) / (2.0 * step)
-        turn = float(cross(along_s, along_t))
+        turn = float(cross_2d(along_s, along_t))
         if abs(turn) < 1e-9 * float(np.linalg.norm(along_s) * np.linalg.norm(along_t)):
             break
-        new_s, new_t = s + float(cross(gap, along_t)) / turn, t + float(cross(gap, along_s)) / turn
+        new_s, new_t = (
+            s + float(cross_2d(gap, along_t)) / turn,
+            t + float(cross_2d(gap, along_s)) / turn,
+        )
         new_s = min(max(new_s, 0.0), float(len(one.curve.pieces)))
         new_t = min(max(new_t, 0.0), float(len(two.curve.pieces)))
         new_gap = apart(new_s, new_t)

@@ -27,7 +27,7 @@ def paint(
     ``scale`` is pixels per unit of length, ``size`` (w, h) in pixels.
     """
     if renderer not in RENDERERS:
-        raise OptionError(unknown("renderer", renderer, RENDERERS))
+        raise OptionError(unknown("renderer", renderer, RENDERERS), what="renderer", found=renderer)
     if renderer == "pyvista" or (renderer == "auto" and opengl()):
         return _with_pyvista(scene, low, scale, size)
     return _with_matplotlib(scene, low, scale, size)

@@ -16,6 +16,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, unknown
 from ..surface import Surface
 from ..surface.colours import patch_colors, rgb
+from ..surface.geometry import area_vectors
 
 NO_VALUE = "#D9D9D9"
 FIXED_DOT, SLIDING_DOT = "#C8102E", "#1F4FBF"
@@ -49,7 +50,7 @@ def view_of(surface: Surface, view: str | tuple[float, float]) -> View:
     """
     if isinstance(view, str):
         if view not in VIEWS:
-            raise OptionError(unknown("view", view, VIEWS))
+            raise OptionError(unknown("view", view, VIEWS), what="view", found=view)
         view = VIEWS[view]
     azimuth, elevation = (math.radians(a) for a in view)
     up = np.array(surface.plane.normal)
@@ -159,7 +160,7 @@ def _light(normals: Floats, view: View, strength: float) -> Floats:
 def _normals(surface: Surface, smooth: bool) -> Floats:
     """(m,3,3) unit normals at the corners: the face's, or the mean at the vertex in its patch."""
     X, F = surface.vertices, surface.faces
-    area = np.cross(X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]])
+    area = area_vectors(X[F])
     if smooth:
         key = surface.patch_of_face[:, None].astype(np.int64) * surface.n + F
         corner, inverse = np.unique(key, return_inverse=True)

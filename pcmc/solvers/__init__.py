@@ -1,25 +1,74 @@
-"""One call for every solver."""
+"""The solvers: one file per method, one options class each, one result type, and ``solve`` for all.
+
+Gives ``solve``, ``find_method`` and ``METHODS`` to the rooms above. Imports ``certificate`` and below.
+"""
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..base import validate
 from ..base.errors import OptionError, SurfaceError, unknown
-from ..base.validate import build
 from ..surface import Surface
 
 if TYPE_CHECKING:
     from .result import Callback, Result
 
-# A method's module holds a function of its name and its options; imported when asked for.
-METHODS = {"newton": "NewtonOptions", "nesterov": "NesterovOptions", "lbfgs": "LbfgsOptions"}
+
+class Method(NamedTuple):
+    """A solver, called with a surface, its options and a callback; and the class of its options."""
+
+    solve: Callable[..., Result]
+    options: type[Any]
+
+
+# Imported when first used: scipy's solvers take as long to import as all else.
+def _newton() -> Method:
+    from .newton import NewtonOptions, newton
+
+    return Method(newton, NewtonOptions)
+
+
+def _nesterov() -> Method:
+    from .nesterov import NesterovOptions, nesterov
+
+    return Method(nesterov, NesterovOptions)
+
+
+def _lbfgs() -> Method:
+    from .lbfgs import LbfgsOptions, lbfgs
+
+    return Method(lbfgs, LbfgsOptions)
+
+
+METHODS: Mapping[str, Callable[[], Method]] = {
+    "newton": _newton,
+    "nesterov": _nesterov,
+    "lbfgs": _lbfgs,
+}
+
+
+def find_method(name: str) -> Method:
+    """The solver of this name and the class of its options.
+
+    >>> find_method("lbfgs").options().memory
+    10
+
+    Raises
+    ------
+    OptionError : there is none, with the nearest name.
+    """
+    if name not in METHODS:
+        message = unknown("method", name, METHODS)
+        raise OptionError(message, what="method", found=name, expected=tuple(METHODS))
+    return METHODS[name]()
 
 
 def solve(
     surface: Surface, method: str = "newton", callback: Callback | None = None, **options: Any
 ) -> Result:
-    """Seek an equilibrium from where the surface stands.
+    """Find an equilibrium, starting from the given surface.
 
     Parameters
     ----------
@@ -34,14 +83,14 @@ def solve(
     Returns
     -------
     Result
-        Not converging is a status there, never an exception.
+        Not converging is a status there, never an exception. Ctrl-C stops as StopIteration does.
 
     Raises
     ------
     OptionError
-        For an unknown method or option, with the nearest known one, or a value it may not have.
+        For an unknown method or option, with the nearest known one, or a value out of range.
     SurfaceError
-        For what is no Surface, or one whose vertices are all at one point.
+        If ``surface`` is no Surface, or all of its vertices are at one point.
 
     Examples
     --------
@@ -57,14 +106,17 @@ def solve(
     pcmc.base.errors.OptionError: unknown method 'nestrov'; did you mean 'nesterov'? Known: newton, ...
     """
     if not isinstance(surface, Surface):
-        raise SurfaceError(f"solve: expected a Surface, found {type(surface).__name__}")
-    if method not in METHODS:
-        raise OptionError(unknown("method", method, METHODS))
+        kind = type(surface).__name__
+        message = f"solve: expected a Surface, found {kind}"
+        raise SurfaceError(message, what="surface", found=kind, expected="Surface")
+    solver = find_method(method)
     if callback is not None and not callable(callback):
-        raise OptionError(f"callback: expected a function of a Progress, found {callback!r}")
+        message = f"callback: expected a function of a Progress, found {callback!r}"
+        raise OptionError(message, what="callback", found=callback, expected="a function")
     if surface.size == 0.0:
-        raise SurfaceError("solve: all vertices are at one point; there is no shape to start from")
-    module = import_module(f".{method}", __package__)
-    chosen = build(getattr(module, METHODS[method]), method, options)
-    result: Result = getattr(module, method)(surface, chosen, callback)
+        message = "solve: all vertices are at one point; start from a surface that has a size"
+        raise SurfaceError(message, what="vertices")
+    result: Result = solver.solve(
+        surface, validate.build(solver.options, method, options), callback
+    )
     return result

@@ -1,4 +1,4 @@
-"""NLopt's L-BFGS on the same energy and supports: a standard to set the paper's flow against."""
+"""NLopt's L-BFGS on the same energy and supports, to compare with the paper's flow."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..surface import Surface
-from .evaluate import Evaluator, Point, extent
-from .result import Callback, Progress, Result, Status
+from ..surface.geometry import bounding_size
+from .evaluate import Evaluator, Point
+from .result import Callback, Progress, Result, Status, until_stopped
 
 COLUMNS = ("evaluation", "energy", "gradient_squared")
 NOISE = 1e-13  # of the energy: two energies closer than this are equal in floats
@@ -22,13 +23,13 @@ NOISE = 1e-13  # of the energy: two energies closer than this are equal in float
 
 @dataclass(frozen=True)
 class LbfgsOptions:
-    """What L-BFGS may be told.
+    """Options of L-BFGS.
 
     Parameters
     ----------
     tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 or None to go on until no step helps.
     evaluations : the most evaluations of E and ∇E; NLopt counts no iterations.
-    memory : how many pairs of moves and gradient changes the Hessian is guessed from; 0 lets NLopt
+    memory : number of pairs of moves and gradient changes that approximate the Hessian; 0 lets NLopt
         choose.
     inflation : diverged when the bounding box is more than this many times its first diagonal.
     """
@@ -74,7 +75,7 @@ class Coordinates:
         X = self.start.copy()
         moves = self.unit * s
         cut = 3 * len(self.free)
-        with np.errstate(all="ignore"):  # beyond the floats: the energy will say so
+        with np.errstate(all="ignore"):  # after an overflow the energy is not finite
             X[self.free] += moves[:cut].reshape(-1, 3)
             X[self.sliding] += moves[cut:].reshape(-1, 2) @ self.basis
         return X
@@ -86,7 +87,16 @@ class Coordinates:
 
 
 class Objective:
-    """What NLopt calls: measures, records, and keeps the best point for the end."""
+    """The function that NLopt calls. It measures, records, and remembers the best point.
+
+    Attributes
+    ----------
+    rows : of the history, as tuples of ``COLUMNS``.
+    best : the point of least energy; the converged one if there is one.
+    status : why the last point ends the run, or None.
+    raised : an exception of the callback or Ctrl-C, to be raised once NLopt has returned.
+    halt : makes NLopt stop.
+    """
 
     def __init__(self, surface: Surface, options: LbfgsOptions, callback: Callback | None) -> None:
         self.surface, self.options, self.callback = surface, options, callback
@@ -101,13 +111,11 @@ class Objective:
     def __call__(self, s: Floats, out: Floats) -> float:
         """E at s, ∂E/∂s into ``out``.
 
-        NLopt may call again after it was told to stop, and must not see an exception then.
+        NLopt may call again after ``halt``, and must not see an exception at any time.
         """
         if self.status is None and self.raised is None:
             try:
                 point = self.visit(self.coordinates.positions(s))
-            except (StopIteration, KeyboardInterrupt):
-                self.status = self.status or Status.STOPPED
             except BaseException as error:
                 self.raised = error
         if self.status is not None or self.raised is not None:
@@ -129,7 +137,7 @@ class Objective:
             self.status = Status.NON_FINITE
         elif converged:
             self.status = Status.CONVERGED
-        elif extent(X) > self.options.inflation * self.surface.size:
+        elif bounding_size(X) > self.options.inflation * self.surface.size:
             self.status = Status.DIVERGED
         elif self.evaluate.count >= self.options.evaluations:  # NLopt's own limit waits for a step
             self.status = Status.ITERATION_LIMIT
@@ -144,16 +152,16 @@ def lbfgs(
 ) -> Result:
     """Minimise E over the free coordinates with NLopt's LD_LBFGS (Nocedal 1980; Luksan's code).
 
-    The same energy and supports as the paper's flow. NLopt shows its evaluations only, not which of
-    them end an iteration, so the history has a row for each, the line search's trials among them.
+    The same energy and supports as in the paper's flow. NLopt shows only its evaluations, not which of
+    them end an iteration, so the history has a row for each, including trials of the line search.
 
     Returns
     -------
     Result
         The surface of least energy seen. ``history``: ``evaluation``, ``energy``,
         ``gradient_squared``; its last row is the returned surface, measured once more where the
-        last trial was not the best. Status STALLED when NLopt's line search finds no step, which
-        it reports as an error without words.
+        last trial was not the best. Status STALLED when NLopt's line search finds no step (NLopt
+        reports this as an error with an empty message).
 
     Examples
     --------
@@ -165,14 +173,14 @@ def lbfgs(
     'lbfgs: converged: the residual is below its tolerance'
     """
     objective = Objective(surface, options or LbfgsOptions(), callback)
-    status = _run(objective)
+    status = until_stopped(lambda: _optimize(objective))
     best, rows = objective.best, objective.rows
     if best is None or rows[-1][1:] != (best.energy, best.squared):
         best = objective.evaluate(surface.vertices if best is None else best.X)
         rows.append((objective.evaluate.count, best.energy, best.squared))
     return Result(
         surface=surface.moved(best.X),
-        status=status,
+        status=objective.status or status,
         method="lbfgs",
         energy=best.energy,
         iterations=len(rows),
@@ -181,8 +189,8 @@ def lbfgs(
     )
 
 
-def _run(objective: Objective) -> Status:
-    """Hand the objective to NLopt; why it stopped, in our words."""
+def _optimize(objective: Objective) -> Status:
+    """Minimise the objective with NLopt; why it stopped."""
     unknowns = objective.coordinates.count
     if unknowns == 0:
         return Status.CONVERGED
@@ -192,13 +200,12 @@ def _run(objective: Objective) -> Status:
     objective.halt = optimizer.force_stop
     try:
         optimizer.optimize(np.zeros(unknowns))
-    except KeyboardInterrupt:
-        return Status.STOPPED
-    except Exception:  # NLopt's failures are not of one family and have no words; its code decides
+    except Exception:  # NLopt's exceptions have no common base and no message: use its result code
         if objective.status is objective.raised is None and optimizer.last_optimize_result() > 0:
             raise
     finally:
-        # NLopt holds the objective where no garbage collector looks: leave no way back to it.
+        # NLopt holds a reference to the objective that the garbage collector does not see:
+        # remove the objective's references to NLopt and to the exception's frames
         objective.halt = lambda: None
         raised, objective.raised = objective.raised, None
     if raised is not None:
@@ -207,7 +214,7 @@ def _run(objective: Objective) -> Status:
 
 
 def _better(new: Point, best: Point) -> bool:
-    """Less energy, or as much within the noise of floats and less force."""
+    """Whether it has less energy, or the same to rounding and less force."""
     noise = NOISE * abs(best.energy)
     if abs(new.energy - best.energy) > noise:
         return new.energy < best.energy

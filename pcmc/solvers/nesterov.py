@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,28 +11,27 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..surface import Surface
-from .evaluate import Evaluator, Point, extent
-from .result import Callback, Progress, Result, Status
-
-COLUMNS = ("iteration", "evaluation", "energy", "gradient_squared", "t", "armijo_held")
+from ..surface.geometry import bounding_size
+from .evaluate import Evaluator, Point
+from .result import Callback, Progress, Result, Status, until_stopped
 
 
 @dataclass(frozen=True)
 class NesterovOptions:
-    """What the flow may be told; the paper's values are the defaults.
+    """Options of the flow; the paper's values are the defaults.
 
     Parameters
     ----------
     t0 : first and largest step t of each line search, length/force; the paper uses 0.005 to 0.05.
-    gamma : γ in [0, 1), the part of the last move that is kept (24a).
+    gamma : γ in [0, 1), the part of the last move that is added to the next (24a).
     xi : ξ ≥ 0 of the Armijo test (25).
     tau : τ in (0, 1), each trial step is τ times the last.
-    floor_power : the smallest trial step is t0 τ^floor_power; it is taken whether or not it passes.
+    floor_power : the smallest trial step is t0 τ^floor_power; it is taken even if it fails the test.
     momentum : False for plain descent (23), γ = 0.
-    line_search : False to take t0 always; the history still says whether it would have passed.
-    armijo : ``"printed"``, Eq. (25) as it stands, E(Q) ≤ E(Y) + ξ t ‖∇E(Q)‖², which lets E rise; or
-        ``"sufficient"``, the standard test of the source it cites, E(Q) ≤ E(Y) - ξ t ‖∇E(Y)‖². Here
-        Y = P + γ d and Q = Y - t ∇E(Y).
+    line_search : False to take t0 always; the history still shows whether it passes the test.
+    armijo : ``"printed"``, Eq. (25) as printed, E(Q) ≤ E(Y) + ξ t ‖∇E(Q)‖², which lets E rise; or
+        ``"sufficient"``, the standard test of the source cited there, E(Q) ≤ E(Y) - ξ t ‖∇E(Y)‖².
+        Here Y = P + γ d and Q = Y - t ∇E(Y).
     tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 or None to run all iterations.
     iterations : the most iterations.
     inflation : diverged when the bounding box is more than this many times its first diagonal.
@@ -65,19 +65,19 @@ class NesterovOptions:
 
 
 class Move(NamedTuple):
-    """Where the flow stands after ``iteration`` moves: the last move d, its step t, its test."""
+    """The flow after ``iteration`` moves: the point, the last move d, its step t, whether t passed (25)."""
 
     iteration: int
     point: Point
     d: Floats
     t: float
-    held: bool
+    passed: bool
 
 
 def nesterov(
     surface: Surface, options: NesterovOptions | None = None, callback: Callback | None = None
 ) -> Result:
-    """Follow the paper's flow from where the surface stands.
+    """Follow the paper's flow from the given surface.
 
         d ← γ d - t ∇E(P + γ d)                                       (24a)
         P ← P + d                                                     (24b)
@@ -103,35 +103,69 @@ def nesterov(
     >>> result.converged, result.surface.vertices[4].round(6).tolist()  # 4 h / √(1 + h²) = 4 / 3
     (True, [0.0, 0.0, 0.353553])
     """
-    options = options or NesterovOptions()
-    evaluate = Evaluator(surface)
-    start = evaluate(surface.vertices)
-    move = Move(0, start, np.zeros_like(start.X), np.nan, True)
-    rows = [_row(move, evaluate)]
-    status = _status(move.point, options, surface.size)
-    try:
-        while status is None and move.iteration < options.iterations:
-            new = _iterate(move, evaluate, options)
-            if not new.point.finite:
-                status = Status.NON_FINITE
-                break
-            rows.append(_row(new, evaluate))
-            move = new
-            status = _status(move.point, options, surface.size)
-            if callback is not None:
-                callback(_progress(surface, move, rows[-1]))
-    except (StopIteration, KeyboardInterrupt):
-        status = status or Status.STOPPED
+    flow = _Flow(surface, options or NesterovOptions(), callback)
+    status = until_stopped(flow.run)
+    move = flow.move
     return Result(
         surface=surface.moved(move.point.X),
-        status=status or Status.ITERATION_LIMIT,
+        status=flow.ending() or status,
         method="nesterov",
         energy=move.point.energy,
         iterations=move.iteration,
-        evaluations=evaluate.count,
-        # An interrupt may have come between a row and its move: what is returned ends the history.
-        rows=[dict(zip(COLUMNS, row, strict=True)) for row in rows[: move.iteration + 1]],
+        evaluations=flow.evaluate.count,
+        # Ctrl-C may come between a row and its move; the history ends with the surface returned
+        rows=flow.rows[: move.iteration + 1],
     )
+
+
+class _Flow:
+    """The flow from one surface: the last move, and the history up to it."""
+
+    def __init__(
+        self, surface: Surface, options: NesterovOptions, callback: Callback | None
+    ) -> None:
+        self.surface, self.options, self.callback = surface, options, callback
+        self.evaluate = Evaluator(surface)
+        start = self.evaluate(surface.vertices)
+        self.move = Move(0, start, np.zeros_like(start.X), np.nan, True)
+        self.rows = [self.row(self.move)]
+
+    def run(self) -> Status:
+        """Move until the flow ends."""
+        while (status := self.ending()) is None:
+            if self.move.iteration >= self.options.iterations:
+                return Status.ITERATION_LIMIT
+            new = _iterate(self.move, self.evaluate, self.options)
+            if not new.point.finite:
+                return Status.NON_FINITE
+            self.rows.append(self.row(new))
+            self.move = new
+            if self.callback is not None:
+                surface = partial(self.surface.moved, new.point.X)
+                self.callback(Progress(new.iteration, surface, self.rows[-1]))
+        return status
+
+    def ending(self) -> Status | None:
+        """Why to stop at the point reached, or None."""
+        point = self.move.point
+        if not point.finite:
+            return Status.NON_FINITE
+        if point.squared <= (self.options.tolerance or 0.0):
+            return Status.CONVERGED
+        if bounding_size(point.X) > self.options.inflation * self.surface.size:
+            return Status.DIVERGED
+        return None
+
+    def row(self, move: Move) -> dict[str, Any]:
+        """The row of the history for a move."""
+        return {
+            "iteration": move.iteration,
+            "evaluation": self.evaluate.count,
+            "energy": move.point.energy,
+            "gradient_squared": move.point.squared,
+            "t": move.t,
+            "armijo_held": move.passed,
+        }
 
 
 def _iterate(move: Move, evaluate: Evaluator, options: NesterovOptions) -> Move:
@@ -142,35 +176,14 @@ def _iterate(move: Move, evaluate: Evaluator, options: NesterovOptions) -> Move:
         ahead = evaluate(move.point.X + drift)
     for power in range(options.floor_power + 1):
         t = options.t0 * options.tau**power
-        with np.errstate(all="ignore"):  # a move beyond the floats ends as a status, not a warning
+        with np.errstate(all="ignore"):  # an overflow becomes a status, not a warning
             d = drift - t * ahead.gradient
             new = evaluate(move.point.X + d)
         if options.armijo == "printed":
             bound = ahead.energy + options.xi * t * new.squared
         else:
             bound = ahead.energy - options.xi * t * ahead.squared
-        held = new.energy <= bound
-        if held or not options.line_search:
+        passed = new.energy <= bound
+        if passed or not options.line_search:
             break
-    return Move(move.iteration + 1, new, d, t, held)
-
-
-def _status(point: Point, options: NesterovOptions, size: float) -> Status | None:
-    """Why to stop here, or None."""
-    if not point.finite:
-        return Status.NON_FINITE
-    if point.squared <= (options.tolerance or 0.0):
-        return Status.CONVERGED
-    if extent(point.X) > options.inflation * size:
-        return Status.DIVERGED
-    return None
-
-
-def _row(move: Move, evaluate: Evaluator) -> tuple[Any, ...]:
-    point = move.point
-    return move.iteration, evaluate.count, point.energy, point.squared, move.t, move.held
-
-
-def _progress(surface: Surface, move: Move, row: tuple[Any, ...]) -> Progress:
-    named = dict(zip(COLUMNS, row, strict=True))
-    return Progress(move.iteration, lambda: surface.moved(move.point.X), named)
+    return Move(move.iteration + 1, new, d, t, passed)

@@ -1,4 +1,4 @@
-"""What every solver returns, and what a solver may be told to do while it runs."""
+"""What every solver returns, what it shows while it runs, and how it is stopped."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..surface import Surface
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..certificate.certificate import Certificate
+    from ..certificate import Certificate
 
 
 class Status(Enum):
@@ -29,20 +29,19 @@ class Status(Enum):
         " largest forces, or remesh"
     )
     DIVERGED = (
-        "diverged: the surface inflates without bound, which happens when no equilibrium exists or"
-        " the step is too long; raise the tensions, lower the pressure or take a smaller step"
+        "diverged: the surface inflates without bound; either there is no equilibrium, or the step is"
+        " too long; raise the tensions, lower the pressure or take a smaller step"
     )
     VANISHED = (
-        "stopped because the surface shrinks to nothing: nothing holds it against its tension"
+        "stopped because the surface shrinks to nothing under its tension; hold it with fixed= or"
+        " on_plane=, or raise the pressure"
     )
     NON_FINITE = (
-        "stopped at a number that is not finite; the returned surface is the last finite one; use a"
+        "stopped at a number that is not finite; the surface returned is the last finite one; use a"
         " smaller step"
     )
-    DEGENERATE = (
-        "stopped because triangles collapse; remesh, or let the certificate name where they do"
-    )
-    STOPPED = "stopped on request; the returned surface is the best so far"
+    DEGENERATE = "stopped because triangles collapse; remesh; the certificate names the place"
+    STOPPED = "stopped on request; the surface returned is the best so far"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +59,7 @@ class Result:
     rows : the rows of ``history``, each a mapping of its columns.
     history : a row per iteration (per evaluation for ``"lbfgs"``) with at least ``evaluation``,
         ``energy`` and ``gradient_squared`` (‖∇E‖², the paper's squared sum).
-    note : what else the solver found on its way, for the message.
+    note : a further finding of the solver, shown in the message.
     """
 
     surface: Surface
@@ -77,14 +76,27 @@ class Result:
         """Whether the solver met its tolerance."""
         return self.status is Status.CONVERGED
 
+    def certify(self, *, modes: int = 1, tolerance: float | None = None) -> Certificate:
+        """The certificate of ``surface``, which also takes into account how the solver ended.
+
+        Parameters as for ``pcmc.certify``.
+        """
+        # imported here, as they take long to import; so does pandas below
+        from ..certificate import Evidence, certify
+        from ..certificate.certificate import TOLERANCE
+
+        evidence = {
+            Status.DIVERGED: Evidence.INFLATED,
+            Status.VANISHED: Evidence.VANISHED,
+            Status.DEGENERATE: Evidence.COLLAPSED,
+        }.get(self.status)
+        tolerance = TOLERANCE if tolerance is None else tolerance
+        return certify(self.surface, modes=modes, tolerance=tolerance, evidence=evidence)
+
     @cached_property
     def certificate(self) -> Certificate:
-        """What the surface reached is: residual, curvature error, stability, verdict."""
-        from ..certificate.certificate import (
-            certify,  # here, as pandas below: both take long to import
-        )
-
-        return certify(self.surface, status=self.status.name)
+        """``certify()``: residual, curvature error, stability, verdict. Computed when first asked for."""
+        return self.certify()
 
     @cached_property
     def history(self) -> pd.DataFrame:
@@ -101,7 +113,14 @@ class Result:
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """What a callback is shown after each iteration. ``row`` is the history row just written."""
+    """What a callback gets after each iteration.
+
+    Attributes
+    ----------
+    iteration : its number; 0 is the start.
+    surface : call it for the surface reached.
+    row : the row just added to the history.
+    """
 
     iteration: int
     surface: Callable[[], Surface]
@@ -111,3 +130,17 @@ class Progress:
 Callback = Callable[[Progress], None]
 """Called after each iteration. Raise StopIteration to stop with the best surface so far; any other
 exception passes through to the caller of ``solve``."""
+
+
+def until_stopped(run: Callable[[], Status]) -> Status:
+    """The status that ``run`` returns; STOPPED where StopIteration or Ctrl-C ends it.
+
+    All solvers run within this call: a request to stop becomes a status here and nowhere else.
+
+    >>> until_stopped(lambda: Status.CONVERGED).name
+    'CONVERGED'
+    """
+    try:
+        return run()
+    except (StopIteration, KeyboardInterrupt):
+        return Status.STOPPED

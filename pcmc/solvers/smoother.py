@@ -1,10 +1,10 @@
-"""A smooth way down: the energy gradient seen through the α-weighted cotangent Laplacian.
+"""Smooth descent: the energy gradient in the metric of the α-weighted cotangent Laplacian.
 
     L_α d = - B Bᵀ ∇E
 
-A step of length 1 along d lowers the residual by about the same factor on every mesh, and moves the
-mesh as one: a junction that travels takes the sheets around it along. (Pinkall and Polthier 1993 minimise
-area this way; d is the gradient of E in the H¹ metric.)
+d is the gradient of E in the H¹ metric (Pinkall and Polthier 1993 minimise area this way). A step of length
+1 along d lowers the residual by about the same factor on every mesh, and moves neighbours together: the
+sheets around a junction follow it.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from ..stability.factorisation import Factor, Factoriser, factoriser
 from ..surface import Surface
 from ..surface.topology import SHEET
 
-FLOOR = 1e-2  # tension, relative to the largest, that walls without tension get in L_α
-PIN = 1e8  # weight, relative to its stiffness, that holds a vertex to its given motion
-SHIFT = 1e-9  # of the diagonal, so that a surface that nothing holds has a Laplacian to solve with
+FLOOR = 1e-2  # of the largest tension: the least tension of any patch in L_α
+PIN = 1e8  # of a vertex's stiffness: the weight that makes it follow its prescribed motion
+SHIFT = 1e-9  # of the diagonal, added so that L_α is regular without supports, too
 
 
 class Smoother:
-    """Solves with L_α at one shape, for any right-hand side.
+    """L_α at one shape, factorised.
 
-    The coordinates along Π are held at fixed vertices only, the one normal to Π also where vertices
-    slide; each of the two sets has a factorisation of its own.
+    Fixed vertices hold all coordinates, sliding ones only that normal to Π; so the coordinates along Π
+    have one factorisation, the normal one another.
     """
 
     def __init__(
@@ -38,29 +38,31 @@ class Smoother:
         floor = FLOOR * float(surface.tensions.max())
         tensions = {p.name: max(p.tension, floor) for p in surface.patches}
         self._surface = surface.retensioned(tensions, dict.fromkeys(tensions, 0.0))
-        self._frame = replace(
-            classes, active=np.ones(surface.m, dtype=bool), faces=surface.faces,
-            patch_of_face=surface.patch_of_face, topology=surface.topology,
-        )  # fmt: skip
+        self._classes = replace(
+            classes,
+            active=np.ones(surface.m, dtype=bool),
+            faces=surface.faces,
+            patch_of_face=surface.patch_of_face,
+            topology=surface.topology,
+        )
         used = np.bincount(surface.faces.ravel(), minlength=surface.n) > 0
         normal = np.array(surface.plane.normal)
         first, second = perpendicular(normal[None])
         self._axes = np.stack([first[0], second[0], normal])
         along = used & ~surface.fixed
         across = along & ~surface.on_plane
-        self._along = _Coordinate(self._surface, self._frame, along, backend)
-        same = bool((along == across).all())
-        self._across = self._along if same else _Coordinate(
-            self._surface, self._frame, across, backend
-        )  # fmt: skip
+        self._along = _Coordinate(self._surface, self._classes, along, backend)
+        self._across = self._along
+        if (along != across).any():
+            self._across = _Coordinate(self._surface, self._classes, across, backend)
 
     @property
     def factorisations(self) -> int:
-        """Matrices factorised for each ``refresh``."""
+        """Number of matrices that each ``refresh`` factorises."""
         return 1 if self._across is self._along else 2
 
     def refresh(self, X: Floats) -> None:
-        """Take L_α at the shape X (n,3)."""
+        """Compute L_α at the positions X (n,3) and factorise it."""
         self._along.refresh(X)
         if self._across is not self._along:
             self._across.refresh(X)
@@ -82,15 +84,15 @@ class _Coordinate:
     ) -> None:
         basis = np.zeros((surface.n, 3, 3))
         basis[:, 0, 0] = 1.0
-        self._space = MotionSpace(basis, free.astype(np.int64))
-        self._surface, self._frame, self._free = surface, classes, free
+        self._space = MotionSpace.of(basis, free.astype(np.int64))
+        self._surface, self._classes, self._free = surface, classes, free
         self._pattern: Pattern = hessian_pattern(classes, self._space)
         self._factoriser: Factoriser = factoriser(self._pattern, backend)
         self._factor: Factor | None = None
 
     def refresh(self, X: Floats) -> None:
         data = assemble(
-            self._surface, self._frame, self._space, self._pattern, X, hessian=0.0, stiffness=1.0
+            self._surface, self._classes, self._space, self._pattern, X, hessian=0.0, stiffness=1.0
         )
         data[self._pattern.indptr[:-1]] *= 1.0 + SHIFT
         self._factor = self._factoriser.factor(data)
@@ -103,10 +105,10 @@ class _Coordinate:
 
 
 class HarmonicExtension:
-    """Carries the inside of the sheets along with their curves.
+    """Lets the inside of the sheets follow the motion of their curves.
 
-    The motion of curves and points is extended harmonically into the sheets (L_α w = 0 there, w given on
-    the curves); of w each sheet vertex takes the part along its sheet, so the shape is not touched.
+    The motion of curves and points is extended harmonically into the sheets: L_α w = 0 inside, w given on
+    the curves. Each sheet vertex takes the part of w along its sheet, which does not change the shape.
     """
 
     def __init__(
@@ -115,26 +117,26 @@ class HarmonicExtension:
         used = ~classes.idle
         basis = np.zeros((surface.n, 3, 3))
         basis[:, 0, 0] = 1.0
-        space = MotionSpace(basis, used.astype(np.int64))
+        space = MotionSpace.of(basis, used.astype(np.int64))
         equal = surface.retensioned({p.name: 1.0 for p in surface.patches})
         pattern = hessian_pattern(classes, space)
         data = assemble(equal, classes, space, pattern, X, hessian=0.0, stiffness=1.0)
         diagonal = pattern.indptr[:-1]
         data[diagonal] *= 1.0 + SHIFT
         self._used = used
-        self._led = (classes.kind != SHEET) | surface.fixed
-        self._weight = np.where(self._led[used], PIN * data[diagonal], 0.0)
+        self._prescribed = (classes.kind != SHEET) | surface.fixed
+        self._weight = np.where(self._prescribed[used], PIN * data[diagonal], 0.0)
         data[diagonal] += self._weight
-        # to a diagonal of ones: beside held vertices of thin triangles no pivot then looks like zero
+        # scaled to a diagonal of ones, so that no pivot beside a prescribed vertex looks like zero
         self._scale = 1.0 / np.sqrt(data[diagonal])
         data *= np.repeat(self._scale, np.diff(pattern.indptr)) * self._scale[pattern.indices]
         self._factor = factoriser(pattern, backend).factor(data)
 
     def extend(self, space: MotionSpace, motion: Floats) -> Floats:
-        """The motion (n,3) with the sheets' vertices carried along."""
-        lead = np.where(self._led[:, None], motion, 0.0)[self._used]
-        follow = np.zeros_like(motion)
-        pull = (self._scale * self._weight)[:, None] * lead
-        follow[self._used] = self._scale[:, None] * self._factor.solve(pull)
-        follow[self._led] = 0.0
-        return motion + follow - space.project(follow)
+        """The motion (n,3) with the sheets' vertices following the curves."""
+        given = np.where(self._prescribed[:, None], motion, 0.0)[self._used]
+        w = np.zeros_like(motion)
+        right = (self._scale * self._weight)[:, None] * given
+        w[self._used] = self._scale[:, None] * self._factor.solve(right)
+        w[self._prescribed] = 0.0
+        return motion + w - space.project(w)

@@ -1,4 +1,4 @@
-"""Where the geometric solver stands on one mesh: shape, frames, residual, and what rests on Π."""
+"""The state of the geometric solver on one mesh: positions, frames, residual, and what rests on Π."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import (
+    StandingPart,
     Walls,
-    crest_spacing,
-    excess,
+    excess_pull,
     find_walls,
-    lifted,
+    lift,
+    place_pinched_walls,
     place_wall_rows,
-    resting,
-    settled,
-    standing,
+    standing_part,
+    top_spacing,
 )
 from ..energy.functional import energy_and_gradient, energy_at
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
@@ -24,26 +24,29 @@ from ..meshing.quality import compare, worst_quality
 from ..meshing.redistribution import redistribute
 from ..surface import Surface
 
-LOW = 5e-3  # height, in spacings along the crest, at which a sinking junction is set to rest
-LIFT = 5e-2  # height, in the same, to which one that rests is lifted at first
-CAUTION = 0.25  # by which both are multiplied each time that a vertex is lifted again
-POOR = 2 / 3  # of the quality that is cared for: once spreading has failed, what is left to mend
-CARES = 60  # times that the vertices are spread at most
-RELEASES = 30  # times that resting junctions are lifted at most
+LOW = 5e-3  # height, in spacings along the junction, at which a sinking vertex is set to rest
+LIFT = 5e-2  # height, in the same, to which a resting vertex is lifted the first time
+DAMPING = 0.25  # factor on both, each time that the vertex is lifted again
+POOR = (
+    2 / 3
+)  # of the quality aimed at: below this redistribution is tried again after it has failed
+REDISTRIBUTIONS = 60  # the most of them
+RELEASES = 30  # the most times that resting junctions are lifted or walls are updated
 
 
 class State:
-    """One mesh: the surface as it stands, and how it may move.
+    """One mesh with the positions reached, and how it may move.
 
     Attributes
     ----------
-    full, surface : all of the mesh as it last was; the part of it that stands (see ``contact``).
-    standing : that part with its walls, and what lies on what.
+    full : the whole surface when its walls were last pinched or lifted.
+    part, surface, walls, resting, classes : its standing part; see ``StandingPart``.
+    quality_faces : (k,3) the faces whose quality counts.
     size : of the mesh at the start.
-    X : (n,3) where the standing surface is now.
-    rests : (n,) junction vertices at rest on Π.
-    classes, space : what each vertex lies on, and the basis of its motion there.
-    energy, gradient, residual, norm, scale : E, ∇E, Bᵀ∇E, its norm and the forces it compares with.
+    X : (n,3) the positions reached.
+    space : the motion space there.
+    energy, gradient, residual, norm, scale : E, ∇E, Bᵀ∇E, its norm, and the norm of the single
+        triangles' forces to compare with.
     version : changes whenever the faces or the number of unknowns do.
     evaluations : passes over the triangles so far: E, ∇E or its derivative along a motion.
     """
@@ -51,29 +54,29 @@ class State:
     def __init__(self, surface: Surface, min_quality: float) -> None:
         self.full = surface
         self.min_quality, self.size = min_quality, surface.size
-        self.walls: Walls = find_walls(surface)
-        self.spacing = crest_spacing(surface, self.walls)
+        part = standing_part(surface)
+        self.spacing = top_spacing(surface, part.walls)
         self.evaluations = 0
         self.version = 0
-        self.cares, self.releases = CARES, RELEASES
-        self.caution: Floats = np.ones(surface.n)  # less where a vertex has been lifted in vain
-        self._care_from, self._care_below = (
-            min_quality,
-            np.inf,
-        )  # quality and residual that ask for it
-        self._pinch(resting(surface, self.walls))
+        self._redistributions_left, self._releases_left = REDISTRIBUTIONS, RELEASES
+        self._damping: Floats = np.ones(surface.n)  # smaller where a vertex has been lifted in vain
+        # vertices are redistributed where quality and residual are below these
+        self._poor_quality, self._small_residual = min_quality, np.inf
+        self._take(part)
 
-    def _pinch(self, rests: Bools) -> None:
-        self.standing = found = standing(self.full, self.walls, rests)
-        self.rests, self.surface, self.classes = rests, found.surface, found.classes
-        self.judged: Ints = found.judged
+    def _take(self, part: StandingPart) -> None:
+        """Go on with this standing part of ``full``."""
+        self.part, self.surface = part, part.surface
+        self.walls: Walls = part.walls
+        self.resting, self.classes = part.resting, part.classes
+        self.quality_faces: Ints = part.quality_faces
         self.X: Floats = self.surface.vertices.copy()
         self.version += 1
         self.space: MotionSpace = motion_space(self.surface, self.classes, self.X)
         self.measure()
 
     def measure(self) -> None:
-        """Energy, gradient, frames and residual where the surface stands."""
+        """Compute energy, gradient, frames and residual at X."""
         self.energy, self.gradient = energy_and_gradient(self.surface, self.X)
         self.evaluations += 1
         before = self.space.dimension
@@ -95,103 +98,105 @@ class State:
         return self.norm / self.scale
 
     @property
-    def worst(self) -> float:
-        """Quality of the worst triangle outside walls that may pinch."""
-        return worst_quality(self.X, self.judged)
+    def quality(self) -> float:
+        """Quality of the worst triangle outside walls that can pinch."""
+        return worst_quality(self.X, self.quality_faces)
 
     def result_surface(self) -> Surface:
-        """The whole surface as it stands, vanished walls on the junction that rests."""
-        if not self.rests.any():
+        """The whole surface at X, with pinched walls placed on their resting junctions."""
+        if not self.resting.any():
             return self.full.moved(self.X)
-        return self.full.moved(settled(self.full, self.walls, self.rests, self.X))
+        X = place_pinched_walls(self.full, self.walls, self.resting, self.X)
+        return self.full.moved(X)
 
     def move(self, X: Floats, down: Bools) -> None:
-        """Go to X; crests that came ``down`` rest from now on."""
+        """Go to X; the junction vertices ``down`` rest from now on."""
         self.X = X
         if down.any():
             self.full = self.result_surface()
-            self._pinch(self.rests | down)
+            self._take(StandingPart.of(self.full, self.walls, self.resting | down))
         else:
             self.measure()
 
     def go_back(self, X: Floats, version: int) -> None:
-        """Stand at X again, where that belongs to the present mesh; all else is measured anew."""
+        """Go back to X if it belongs to the present version, and measure."""
         if version == self.version:
             self.X = X
         self.measure()
 
-    def moved_by(self, d: Floats) -> tuple[Floats, Bools]:
-        """X + d and the crests it brings down to Π, which it leaves there.
+    def displaced(self, d: Floats) -> tuple[Floats, Bools]:
+        """X + d, and the junction vertices that this brings down to Π, where they are placed.
 
-        The rows of a wall follow its crest in proportion to its height.
+        The rows of a wall follow its junction.
         """
         X = self.X + d
-        standing = self.walls.can_rest & ~self.rests
+        standing = self.walls.top_free & ~self.resting
         if not standing.any():
             return X, standing
         height = self.surface.plane.height(X)
         above = self.walls.side * height
         sinks = above < self.walls.side * self.surface.plane.height(self.X)
-        low = LOW * self.caution * self.spacing
+        low = LOW * self._damping * self.spacing
         down = standing & ((above <= 0.0) | (sinks & (above <= low)))
         X[down] -= height[down, None] * np.array(self.surface.plane.normal)
         X = place_wall_rows(self.surface, self.walls, X, self.space)
         return X, down
 
-    def spoils(self, X: Floats) -> bool:
+    def spoils_triangles(self, X: Floats) -> bool:
         """Whether the move to X turns a triangle over or makes the worst one much worse.
 
-        The triangles of walls that may pinch are not judged: there a vanishing height is the answer.
+        Triangles of walls that can pinch do not count: their height may vanish.
         """
-        turned, before, after = compare(self.X, X, self.judged)
+        turned, before, after = compare(self.X, X, self.quality_faces)
         return turned or after < 0.7 * min(before, self.min_quality)
 
     def maintain_mesh(self) -> bool:
-        """Spread the vertices along the shape while triangles are poor; True if they moved."""
-        start = self.worst
-        if self.cares <= 0 or start >= self._care_from:
+        """Redistribute the vertices along the shape while triangles are poor; True if they moved."""
+        start = self.quality
+        if self._redistributions_left <= 0 or start >= self._poor_quality:
             return False
-        if not 1e-7 <= self.relative < self._care_below:
+        if not 1e-7 <= self.relative < self._small_residual:
             return False
-        self.cares -= 1
-        best, worst = redistribute(self.standing, self.X, self.min_quality, slide=True)
-        if worst <= 1.02 * start:
-            self._care_from = POOR * self.min_quality
-            self._care_below = 0.1 * self.relative
+        self._redistributions_left -= 1
+        X, quality = redistribute(self.part, self.X, self.min_quality, slide=True)
+        if quality <= 1.02 * start:
+            self._poor_quality = POOR * self.min_quality
+            self._small_residual = 0.1 * self.relative
             return False
-        self.X = best
+        self.X = X
         self.measure()
         return True
 
-    def overpull(self) -> Floats:
-        """(n,) the pull on resting vertices beyond what the wall can hold, force; see ``excess``."""
-        return excess(self.surface.moved(self.X), self.walls, self.rests)
+    def excess_pull(self) -> Floats:
+        """(n,) the pull on resting vertices beyond what their walls can take, force."""
+        return excess_pull(self.surface.moved(self.X), self.walls, self.resting)
 
-    def seen_anew(self) -> bool:
-        """Whether what stands, seen from the positions reached, is other than what was solved for.
+    def update_walls(self) -> bool:
+        """Find the walls and the standing part anew at X; False if its faces are the same.
 
-        A foot that has come below its crest is one with it from then on.
+        A wall's foot that has come straight below a resting vertex coincides with it from then on.
         """
         full = self.result_surface()
-        anew = replace(find_walls(full), side=self.walls.side)
-        same = np.array_equal(standing(full, anew, self.rests).surface.faces, self.surface.faces)
-        if same or self.releases <= 0:
+        walls = replace(find_walls(full), side=self.walls.side)
+        part = StandingPart.of(full, walls, self.resting)
+        same = np.array_equal(part.surface.faces, self.surface.faces)
+        if same or self._releases_left <= 0:
             return False
-        self.releases -= 1
-        self.full, self.walls = full, anew
-        self._pinch(self.rests)
+        self._releases_left -= 1
+        self.full = full
+        self._take(part)
         return True
 
-    def release(self) -> bool:
-        """Lift the resting vertices that the sheets pull harder than the wall can hold, to their side."""
-        beyond = self.overpull()
-        free = beyond != 0.0
-        if self.releases <= 0 or not free.any():
+    def lift_overpulled(self) -> bool:
+        """Lift resting vertices that are pulled harder than their walls can take, to the side of the pull."""
+        excess = self.excess_pull()
+        lifted = excess != 0.0
+        if self._releases_left <= 0 or not lifted.any():
             return False
-        self.releases -= 1
-        side = np.where(beyond < 0.0, -self.walls.side, self.walls.side)
-        self.walls = replace(self.walls, side=side)
-        self.full = lifted(self.result_surface(), self.walls, free, LIFT * self.caution)
-        self.caution[free] *= CAUTION
-        self._pinch(self.rests & ~free)
+        self._releases_left -= 1
+        side = np.where(excess < 0.0, -self.walls.side, self.walls.side)
+        walls = replace(self.walls, side=side)
+        self.full = lift(self.result_surface(), walls, lifted, LIFT * self._damping)
+        self._damping[lifted] *= DAMPING
+        self._take(StandingPart.of(self.full, walls, self.resting & ~lifted))
         return True

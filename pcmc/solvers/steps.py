@@ -1,4 +1,4 @@
-"""The steps of the geometric solver: Newton on a kept factor, smooth descent, leaving a saddle."""
+"""The steps of the geometric solver: Newton with a reused factor, smooth descent, leaving a saddle."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import edge_lengths
 from ..stability.factorisation import Factor, Factoriser, SingularMatrix, factoriser
 from ..stability.modes import SOFT, full_matrix, lowest, negatives_without, stiffness
-from ..surface.geometry import area_vectors
+from ..surface.geometry import vertex_area_vectors
 from .smoother import HarmonicExtension, Smoother
 from .state import State
 
 SHIFTS = (0.0, 0.25, 1.0, 4.0)  # of the stiffness, tried in turn until the matrix is positive
 LENGTHS = (1.0, 0.5, 0.25, 0.125)  # of a Newton step, tried in turn
 REFRESH = 6  # descent steps between two factorisations of the Laplacian
-DRIFT = 0.1  # of an edge: how far a step drifts at most along a rigid motion that nothing resists
+DRIFT = 0.1  # of an edge: the most that a step moves along a rigid motion that no support resists
 ROUNDING = 1e3 * float(np.finfo(float).eps)
 
 
 class Stepper:
-    """Takes steps on a State, keeping factorisations while they serve.
+    """Takes steps on a State, and reuses factorisations while they contract.
 
     Attributes
     ----------
@@ -40,52 +40,52 @@ class Stepper:
         self.state, self.minimum, self.backend = state, minimum, backend
         self.kind = "start"
         self.factorisations = 0
-        self._shifted = 0
-        self._owing = False
+        self._shifted_steps = 0  # in a row
+        self._residual_raised = False  # by the last step, which was allowed to
         self._version = -1
-        self._space: MotionSpace = state.space
-        self._forget()
+        self._factor_space: MotionSpace = state.space
+        self._drop_outdated()
 
-    def _forget(self) -> None:
-        """Drop what belongs to other faces or unknowns."""
+    def _drop_outdated(self) -> None:
+        """Drop everything that belongs to other faces or unknowns than the present ones."""
         if self._version == self.state.version:
             return
         self._version = self.state.version
         self._pattern: Pattern | None = None
         self._factoriser: Factoriser | None = None
         self._factor: Factor | None = None
-        self._soft: csr_array | None = None
+        self._added: csr_array | None = None  # stiffness of a singular matrix
         self._smoother: Smoother | None = None
         self._extension: HarmonicExtension | None = None
         self._motions = rigid_motions(self.state.surface)
-        self._age = REFRESH
+        self._smoother_age = REFRESH
 
     def drop_factor(self) -> None:
-        """Factorise anew at the next Newton step."""
+        """Make the next Newton step factorise anew."""
         self._factor = None
 
     def newton(self) -> bool:
-        """A Newton step, shortened if need be; False, and nothing moved, where none helps."""
-        self._forget()
+        """A Newton step, shortened if necessary; False, with nothing moved, if none helps."""
+        self._drop_outdated()
         state = self.state
         fresh = self._factor is None
-        if not self._positive():
+        if not self._factorise_definite():
             return False
         d = self._direction() if self._shift == 0.0 else self._shifted_direction()
         start, energy, norm = state.X, state.energy, state.norm
         slope = float((state.gradient * d).sum())
         for t in LENGTHS if fresh else LENGTHS[:1]:
-            X, down = state.moved_by(t * d)
-            if state.spoils(X):
-                X, down = state.moved_by(t * self._carried(d))
-            if state.spoils(X):
+            X, down = state.displaced(t * d)
+            if state.spoils_triangles(X):
+                X, down = state.displaced(t * self._with_sheets(d))
+            if state.spoils_triangles(X):
                 continue
             state.move(X, down)
             if down.any():
                 self.kind = "contact"
                 return True
-            if self._helps(t, slope, energy, norm):
-                if state.norm > 0.1 * norm or self._inner > 8:
+            if self._improved(t, slope, energy, norm):
+                if state.norm > 0.1 * norm or self._gmres_steps > 8:
                     self._factor = None
                 self.kind = "newton" if self._shift == 0.0 else "shifted"
                 return True
@@ -96,24 +96,24 @@ class Stepper:
         return not fresh
 
     def descend(self) -> bool:
-        """One smooth step down with backtracking; False where E does not fall."""
-        self._forget()
+        """One smooth descent step with backtracking; False if E does not fall."""
+        self._drop_outdated()
         state = self.state
         if self._smoother is None:
             self._smoother = Smoother(state.surface, state.classes, self.backend)
-        if self._age >= REFRESH:
+        if self._smoother_age >= REFRESH:
             try:
                 self._smoother.refresh(state.X)
             except SingularMatrix:
                 return False
             self.factorisations += self._smoother.factorisations
-            self._age = 0
-        self._age += 1
+            self._smoother_age = 0
+        self._smoother_age += 1
         forces = state.space.to_vectors(state.residual)
         d = -self._smoother.solve(forces)
         slope = float((forces * d).sum())
         for t in 0.5 ** np.arange(12):
-            X, down = state.moved_by(t * d)
+            X, down = state.displaced(t * d)
             value = state.energy_at(X)
             if np.isfinite(value) and value < state.energy + 1e-3 * t * slope:
                 state.move(X, down)
@@ -123,14 +123,14 @@ class Stepper:
         return False
 
     def saddle_near(self) -> bool:
-        """Whether Newton steps have had to be shifted for a while."""
-        self._shifted = self._shifted + 1 if self.kind == "shifted" else 0
-        return self._shifted > 0 and self._shifted % 4 == 0
+        """Whether several Newton steps in a row had to be shifted; True at every fourth."""
+        self._shifted_steps = self._shifted_steps + 1 if self.kind == "shifted" else 0
+        return self._shifted_steps > 0 and self._shifted_steps % 4 == 0
 
     def leave_saddle(self) -> bool:
-        """Move along the lowest mode as far as E keeps falling; False where no mode lowers it."""
+        """Move along the lowest mode as far as E keeps falling; False if no mode lowers it."""
         state = self.state
-        self._forget()
+        self._drop_outdated()
         rigid = rigid_modes(state.space, self._motions, state.X)
         try:
             system = stiffness(
@@ -144,10 +144,10 @@ class Stepper:
         modes = lowest(system, 1)[1]
         if not len(modes):
             return False
-        normals, area = area_vectors(state.X, state.classes.faces)
+        normals, area = vertex_area_vectors(state.X, state.classes.faces)
         unit = modes[0] * (np.sqrt(area.sum() / 3.0) / np.linalg.norm(modes[0], axis=1).max())
         if (unit * normals).sum() < 0.0:
-            unit = -unit  # first where it swells: no matter how the surface is turned
+            unit = -unit  # outwards first, whichever way the surface is turned
         X = self._downhill(unit)
         if X is None:
             X = self._downhill(-unit)
@@ -160,21 +160,21 @@ class Stepper:
         return True
 
     def _downhill(self, unit: Floats) -> Floats | None:
-        """The farthest doubling along a motion, as long as the surface, on which E keeps falling."""
+        """X farthest along a motion of unit length, in doubling steps on which E keeps falling; or None."""
         state = self.state
         best, lowest_energy = None, state.energy
         t = 1e-3
         while t < 0.1:
-            X, down = state.moved_by(t * unit)
+            X, down = state.displaced(t * unit)
             value = state.energy_at(X)
-            if not value < lowest_energy or down.any() or state.spoils(X):
+            if not value < lowest_energy or down.any() or state.spoils_triangles(X):
                 break
             best, lowest_energy = X, value
             t *= 2.0
         return best
 
-    def _positive(self) -> bool:
-        """Factorise; where a minimum is sought, shift until no negative eigenvalue is left."""
+    def _factorise_definite(self) -> bool:
+        """Factorise; where a minimum is sought, with shifts until no eigenvalue is negative."""
         for shift in SHIFTS if self.minimum else SHIFTS[:1]:
             if self._factorise(shift) and (self.negative == 0 or not self.minimum):
                 return True
@@ -182,7 +182,7 @@ class Stepper:
         return False
 
     def _factorise(self, shift: float) -> bool:
-        """Factorise BᵀHB + shift BᵀLB here, unless a factor is kept; False where it is singular."""
+        """Factorise BᵀHB + shift BᵀLB at X, unless there is a factor; False if it is singular."""
         if self._factor is not None:
             return True
         state = self.state
@@ -200,13 +200,13 @@ class Stepper:
             except SingularMatrix:
                 continue
             self.factorisations += 1
-            self._factor, self._shift, self._space = factor, shift, state.space
-            self._soft = None if weight == shift else self._softness()
+            self._factor, self._shift, self._factor_space = factor, shift, state.space
+            self._added = None if weight == shift else self._added_stiffness()
             return True
         return False
 
-    def _softness(self) -> csr_array:
-        """The little stiffness that a singular matrix was given."""
+    def _added_stiffness(self) -> csr_array:
+        """The little stiffness that was added to a singular matrix."""
         state = self.state
         assert self._pattern is not None
         data = assemble(
@@ -214,20 +214,20 @@ class Stepper:
         )
         return full_matrix(self._pattern, data)
 
-    def _as_kept(self, action: Callable[[Floats], Floats], s: Floats) -> Floats:
-        """What belongs to the kept factor acts in the basis of its time: s in the present one."""
-        now, then = self.state.space, self._space
+    def _in_factor_basis(self, action: Callable[[Floats], Floats], s: Floats) -> Floats:
+        """Apply an action in the basis that the factor was made in to s, given in the present one."""
+        now, then = self.state.space, self._factor_space
         if now is then:
             return action(s)
         return now.to_coordinates(then.to_vectors(action(then.to_coordinates(now.to_vectors(s)))))
 
     def _direction(self) -> Floats:
-        """-B J⁻¹ r with J the derivative of r itself, by GMRES on the kept factor.
+        """-B J⁻¹ r with J the derivative of r itself, by GMRES preconditioned with the factor.
 
-        Where the factor has been given stiffness J has it too: a motion that costs nothing would
-        otherwise take all of the accuracy.
+        Stiffness added to the factor is added to J, too: otherwise motions that cost no energy would
+        use up the accuracy.
         """
-        state, factor, soft = self.state, self._factor, self._soft
+        state, factor, added = self.state, self._factor, self._added
         assert factor is not None
         residual = state.residual
         size = (len(residual), len(residual))
@@ -235,22 +235,27 @@ class Stepper:
 
         def times(s: Floats) -> Floats:
             change = here.times(state.space.to_vectors(s))
-            return change if soft is None else change + self._as_kept(soft.__matmul__, s)
+            return change if added is None else change + self._in_factor_basis(added.__matmul__, s)
 
         norms: list[float] = []
         s, _ = gmres(
-            LinearOperator(size, times, dtype=float), -residual,
-            M=LinearOperator(size, lambda r: self._as_kept(factor.solve, r), dtype=float),
-            rtol=1e-3, restart=12, maxiter=1, callback=norms.append, callback_type="pr_norm",
-        )  # fmt: skip
-        self._inner = len(norms)
+            LinearOperator(size, times, dtype=float),
+            -residual,
+            M=LinearOperator(size, lambda r: self._in_factor_basis(factor.solve, r), dtype=float),
+            rtol=1e-3,
+            restart=12,
+            maxiter=1,
+            callback=norms.append,
+            callback_type="pr_norm",
+        )
+        self._gmres_steps = len(norms)
         state.evaluations += len(norms)
-        return state.space.to_vectors(self._held_back(s) if len(self._motions) else s)
+        return state.space.to_vectors(self._limit_drift(s) if len(self._motions) else s)
 
-    def _held_back(self, s: Floats) -> Floats:
-        """s with its rigid part short: all it does is slide the mesh along the surface.
+    def _limit_drift(self, s: Floats) -> Floats:
+        """s with its rigid part shortened, which only slides the mesh along the surface.
 
-        While it is held back, a step may raise the residual; the next ones pay for it.
+        A shortened step may raise the residual; the next ones lower it again.
         """
         state = self.state
         rigid = rigid_modes(state.space, self._motions, state.X)
@@ -259,16 +264,18 @@ class Stepper:
         room = DRIFT * float(np.median(edge_lengths(state.surface.moved(state.X))))
         if far <= room:
             return s
-        self._owing = False
+        self._residual_raised = False
         return s - (1.0 - room / far) * drift
 
     def _shifted_direction(self) -> Floats:
-        self._inner = 0
+        self._gmres_steps = 0
         assert self._factor is not None
-        return -self.state.space.to_vectors(self._as_kept(self._factor.solve, self.state.residual))
+        return -self.state.space.to_vectors(
+            self._in_factor_basis(self._factor.solve, self.state.residual)
+        )
 
-    def _carried(self, d: Floats) -> Floats:
-        """The motion d with the insides of the sheets carried along."""
+    def _with_sheets(self, d: Floats) -> Floats:
+        """The motion d with the insides of the sheets following their curves."""
         if self._extension is None:
             state = self.state
             try:
@@ -280,16 +287,16 @@ class Stepper:
             self.factorisations += 1
         return self._extension.extend(self.state.space, d)
 
-    def _helps(self, t: float, slope: float, energy: float, norm: float) -> bool:
+    def _improved(self, t: float, slope: float, energy: float, norm: float) -> bool:
         """Whether the step just taken lowers the residual enough or, towards a minimum, E.
 
-        Where nothing resists some rigid motion, every other step may raise the residual.
+        Where no support resists some rigid motion, every other step may raise the residual.
         """
         if self.state.norm < (1.0 - 0.3 * t) * norm:
-            self._owing = False
+            self._residual_raised = False
             return True
-        if len(self._motions) and not self._owing and self.state.norm < 2.0 * norm:
-            self._owing = True
+        if len(self._motions) and not self._residual_raised and self.state.norm < 2.0 * norm:
+            self._residual_raised = True
             return True
         falls = self.state.energy <= energy + 1e-2 * t * slope and slope < 0.0
         return falls and self.minimum

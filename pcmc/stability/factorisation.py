@@ -1,8 +1,8 @@
 """Sparse symmetric factorisation with inertia, behind one small interface.
 
-A matrix is given by the upper triangle of a fixed pattern (``assemble.Pattern``). The symbolic work is
-done once per pattern; ``factor`` then takes new values. Backends, fastest first: ``"pardiso"`` (MKL, extra
-``fast``) and ``"superlu"`` (scipy, everywhere).
+A matrix is the upper triangle of a fixed pattern (``projected_hessian.Pattern``) with values. A factoriser
+does the symbolic work once per pattern; ``factor`` then takes new values. Backends, fastest first:
+``"pardiso"`` (MKL, extra ``fast``) and ``"superlu"`` (scipy, everywhere).
 """
 
 from __future__ import annotations
@@ -33,7 +33,19 @@ from ..energy.projected_hessian import Pattern
 BACKENDS = ("pardiso", "superlu")
 ZERO = 1e-13  # of the largest entry: a pivot below is zero to rounding
 TINY = float(np.finfo(float).tiny)
-ALONE = 10_000  # rows; up to here MKL's threads wait for each other longer than they work
+ONE_THREAD = 10_000  # rows; up to here MKL is fastest with one thread
+
+
+IPARM = {  # MKL's parameters by their numbers from 1
+    1: 1,  # the values below instead of the defaults
+    2: 2,  # fill-in reduced by METIS
+    8: 0,  # steps of iterative refinement: at most two, where a pivot was replaced
+    10: round(-math.log10(ZERO)),  # pivots below 10 to minus this are replaced
+    11: 0,  # no scaling
+    13: 0,  # no weighted matching
+    21: 1,  # pivots of one and two rows: Bunch and Kaufman
+    24: 1,  # two-level parallel factorisation
+}
 
 
 class SingularMatrix(ArithmeticError):
@@ -60,14 +72,20 @@ class Factoriser(Protocol):
 
 @cache
 def available() -> tuple[str, ...]:
-    """Backends that can be used here, fastest first."""
-    found = importlib.util.find_spec("pypardiso") is not None
-    return BACKENDS if found else ("superlu",)
+    """Backends that are installed here, fastest first."""
+    return BACKENDS if importlib.util.find_spec("pypardiso") is not None else ("superlu",)
 
 
 def factoriser(pattern: Pattern, backend: str | None = None) -> Factoriser:
-    """A factoriser for the pattern: the fastest backend available, or the one named.
+    """A factoriser for the pattern, by the fastest backend installed or the one named.
 
+    Raises
+    ------
+    OptionError : there is no such backend.
+    MissingExtra : it is not installed.
+
+    Examples
+    --------
     >>> import numpy as np
     >>> from scipy.sparse import csr_array
     >>> pattern = Pattern(np.array([0, 2, 3]), np.array([0, 1, 1]), np.empty((0, 3)))
@@ -77,7 +95,8 @@ def factoriser(pattern: Pattern, backend: str | None = None) -> Factoriser:
     """
     chosen = backend or available()[0]
     if chosen not in BACKENDS:
-        raise OptionError(unknown("factorisation backend", chosen, BACKENDS))
+        message = unknown("factorisation backend", chosen, BACKENDS)
+        raise OptionError(message, what="backend", found=chosen, expected=BACKENDS)
     if chosen not in available():
         raise MissingExtra("pypardiso", "fast")
     # MKL refuses a matrix without rows
@@ -90,11 +109,11 @@ def _finite(data: Floats) -> None:
 
 
 class _SuperLU:
-    """scipy's SuperLU, kept symmetric: no pivoting off the diagonal.
+    """scipy's SuperLU in symmetric mode: pivots stay on the diagonal.
 
-    Its minimum-degree ordering takes several times as long as the factorisation where the numbers of
-    neighbours are far apart, as after refinement. So it is given the Cuthill-McKee order, and is
-    asked once; later matrices come in the order it found.
+    After refinement neighbours have numbers far apart, and the minimum-degree ordering then takes
+    several times as long as the factorisation. Rows in Cuthill-McKee order avoid this. The ordering is
+    computed for the first matrix and used for all later ones.
     """
 
     def __init__(self, pattern: Pattern) -> None:
@@ -125,16 +144,19 @@ class _SuperLU:
         matrix = csc_array((data[self._source], self._indices, self._indptr), self._full.shape)
         try:
             lu = splu(
-                matrix, permc_spec=self._ordering, diag_pivot_thresh=0.0, panel_size=4,
+                matrix,
+                permc_spec=self._ordering,
+                diag_pivot_thresh=0.0,
+                panel_size=4,
                 options={"SymmetricMode": True},
-            )  # fmt: skip
+            )
         except RuntimeError as error:
             raise SingularMatrix(str(error)) from None
-        found = _SuperLUFactor(matrix, lu, self._order)
+        factor = _SuperLUFactor(matrix, lu, self._order)
         if self._ordering != "NATURAL":
             self._ordering = "NATURAL"
             self._arrange(self._order[np.argsort(lu.perm_c)])
-        return found
+        return factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,11 +170,10 @@ class _SuperLUFactor:
         if not np.array_equal(self.lu.perm_r, self.lu.perm_c):
             raise SingularMatrix("a zero pivot forced a row exchange, so the inertia is unknown")
         pivots = self.lu.U.diagonal()
-        lost = int(
-            np.count_nonzero(np.abs(pivots) < ZERO * np.abs(self.matrix.data).max(initial=0.0))
-        )
-        if lost:
-            raise SingularMatrix(f"{lost} pivots are zero to rounding")
+        largest = np.abs(self.matrix.data).max(initial=0.0)
+        zero = int(np.count_nonzero(np.abs(pivots) < ZERO * largest))
+        if zero:
+            raise SingularMatrix(f"{zero} pivots are zero to rounding")
         return int(np.count_nonzero(pivots < 0.0))
 
     def solve(self, right: Floats) -> Floats:
@@ -167,9 +188,9 @@ class _Pardiso:
     """MKL PARDISO on the upper triangle: mtype -2, real symmetric indefinite."""
 
     def __init__(self, pattern: Pattern) -> None:
-        # pypardiso looks for MKL in the whole prefix, 0.2 s each time, unless it is told where
-        if known := _mkl():
-            os.environ.setdefault("PYPARDISO_MKL_RT", known)
+        # without this variable pypardiso searches the whole prefix for MKL, 0.2 s each time
+        if path := _mkl_path():
+            os.environ.setdefault("PYPARDISO_MKL_RT", path)
         import pypardiso
 
         self._pattern = pattern
@@ -177,22 +198,13 @@ class _Pardiso:
         os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
         self._error = pypardiso.pardiso_wrapper.PyPardisoError
         self._lock = threading.Lock()
-        for place, value in (
-            (1, 1),
-            (2, 2),
-            (8, 0),
-            (10, round(-math.log10(ZERO))),
-            (11, 0),
-            (13, 0),
-            (21, 1),
-            (24, 1),
-        ):
-            self._solver.set_iparm(place, value)
+        for number, value in IPARM.items():
+            self._solver.set_iparm(number, value)
         self._analysed = False
 
     def factor(self, data: Floats) -> Factor:
         _finite(data)
-        # what MKL holds a pivot against does not depend on the units of the matrix
+        # scaled to entries below 1: MKL compares pivots with a fixed number
         unit = 0.5 ** math.frexp(np.abs(data).max(initial=TINY))[1]
         matrix = self._pattern.matrix(unit * data)
         nothing = np.zeros((self._pattern.size, 1), order="F")
@@ -200,13 +212,13 @@ class _Pardiso:
             if not self._analysed:
                 self.run(11, matrix, nothing)
                 self._analysed = True
-                # MKL keeps the factor outside Python: free it with this object, not at exit.
+                # the factor is memory of MKL's: freed with this object, not at exit
                 weakref.finalize(self, _release, self._solver, self._pattern).atexit = False
             self.run(22, matrix, nothing)
         except self._error as error:
             raise SingularMatrix(str(error)) from None
         iparm = self._solver.iparm
-        if iparm[13]:  # MKL replaces such a pivot and goes on
+        if iparm[13]:  # the number of pivots that MKL has replaced
             raise SingularMatrix(f"{iparm[13]} pivots are zero to rounding")
         return _PardisoFactor(self, matrix, unit, int(iparm[22]))
 
@@ -217,21 +229,21 @@ class _Pardiso:
 
     @contextmanager
     def _threads(self) -> Iterator[None]:
-        """A single one within the block where the matrix is small."""
-        if self._pattern.size > ALONE:
+        """MKL uses one thread within the block if the matrix is small."""
+        if self._pattern.size > ONE_THREAD:
             yield
             return
-        choose = self._solver.libmkl.MKL_Set_Num_Threads_Local
-        before = choose(1)
+        set_threads = self._solver.libmkl.MKL_Set_Num_Threads_Local
+        before = set_threads(1)
         try:
             yield
         finally:
-            choose(before)
+            set_threads(before)
 
 
 @cache
-def _mkl() -> str:
-    """Where MKL's own list of files says that it is; empty without one."""
+def _mkl_path() -> str:
+    """The path of MKL by its package's list of files; empty if there is none."""
     with suppress(metadata.PackageNotFoundError):
         for file in metadata.files("mkl") or ():
             if re.fullmatch(r"(lib)?mkl_rt[.\d]*\.(so[.\d]*|dll)", file.name):

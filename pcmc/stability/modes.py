@@ -14,10 +14,12 @@ from scipy.sparse import csr_array, diags_array, triu
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from ..base.arrays import Floats
-from ..energy.motion_space import MotionSpace, VertexClasses
+from ..contact.pinching import standing_part
+from ..energy.motion_space import MotionSpace, VertexClasses, motion_space
 from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
+from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..surface import Surface
-from ..surface.geometry import area_vectors
+from ..surface.geometry import vertex_area_vectors
 from .factorisation import Factor, SingularMatrix, factoriser
 
 SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
@@ -29,9 +31,12 @@ class Stiffness:
 
     Attributes
     ----------
-    matrix : sparse symmetric (N,N).
+    space : the motion space that B is the basis of.
+    matrix : (N,N) sparse symmetric Bᵀ(∂²E)B.
     mass : (N,) lumped area, length².
-    negative : negative eigenvalues, rigid motions not counted.
+    factor : its factorisation.
+    rigid : (N,k) orthonormal rigid motions that no support resists.
+    negative : number of negative eigenvalues, rigid motions not counted.
     """
 
     space: MotionSpace
@@ -43,14 +48,14 @@ class Stiffness:
 
 
 def full_matrix(pattern: Pattern, data: Floats) -> csr_array:
-    """The symmetric matrix (N,N) of which the pattern holds the upper triangle."""
+    """The symmetric matrix (N,N) whose upper triangle has these values in the pattern."""
     upper = pattern.matrix(data)
     return csr_array(upper + triu(upper, k=1).T)
 
 
 def lumped_mass(space: MotionSpace, classes: VertexClasses, X: Floats) -> Floats:
     """(N,) a third of the area of the active triangles around each unknown's vertex, length²."""
-    return np.repeat(area_vectors(X, classes.faces)[1] / 3.0, space.dimension)
+    return np.repeat(vertex_area_vectors(X, classes.faces)[1] / 3.0, space.dimension)
 
 
 def negatives_without(factor: Factor, rigid: Floats) -> int:
@@ -74,10 +79,14 @@ def stiffness(
     rigid: Floats,
     backend: str | None = None,
 ) -> Stiffness:
-    """Assemble and factorise Bᵀ(∂²E)B where the surface stands.
+    """Assemble and factorise Bᵀ(∂²E)B at the positions of the surface.
 
-    Motions that cost nothing at all, like a vertex's inside a flat part that rests on Π, get a
-    little of the stiffness BᵀLB: they are no way down.
+    Motions that cost no energy at all make it singular, such as sliding a vertex inside a flat part
+    that rests on Π. Then a little of the stiffness BᵀLB is added: such motions do not lower the energy.
+
+    Raises
+    ------
+    SingularMatrix : it is singular with that stiffness, too.
     """
     X = surface.vertices
     pattern = hessian_pattern(classes, space)
@@ -94,11 +103,41 @@ def stiffness(
     return Stiffness(space, full_matrix(pattern, data), mass, factor, rigid, negative)
 
 
+def surface_stiffness(surface: Surface) -> Stiffness:
+    """The stiffness of the part of a surface that stands; errors as of ``stiffness``."""
+    part = standing_part(surface)
+    X = part.surface.vertices
+    space = motion_space(part.surface, part.classes, X)
+    rigid = rigid_modes(space, rigid_motions(part.surface), X)
+    return stiffness(part.surface, part.classes, space, rigid)
+
+
+def morse_index(surface: Surface) -> int:
+    """Number of independent motions that lower the energy of a surface at rest to second order.
+
+    Counted in the motion space, by inertia; rigid motions that no support resists are left out.
+
+    Raises
+    ------
+    SingularMatrix : the second variation has no inertia that can be counted.
+
+    Examples
+    --------
+    >>> from pcmc import Patch
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
+    >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("roof", 1.0)], fixed=range(4))
+    >>> morse_index(roof)
+    0
+    """
+    return surface_stiffness(surface).negative
+
+
 def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, ascending, and their modes (k,n,3).
 
-    The negative ones are among those sought, so the first is the lowest of all. Modes have unit
-    mass: Σ M |v|² = 1. Rigid motions are left out.
+    The search takes in all negative ones, so the first is the lowest of all. Modes have unit mass:
+    Σ M |v|² = 1. Rigid motions are left out.
     """
     size = len(system.mass)
     k = min(max(count, system.negative + 2), size - 1)
@@ -114,7 +153,7 @@ def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
 
     scaled = diags_array(1.0 / root) @ system.matrix @ diags_array(1.0 / root)
     operator = LinearOperator((size, size), inverse, dtype=float)
-    start = inverse(np.cos(np.arange(size) * 1.618))  # fixed, so that runs repeat
+    start = inverse(np.cos(np.arange(size) * 1.618))  # always the same, so that runs repeat
     while True:
         try:
             vectors = eigsh(operator, k=k, which="LM", v0=start)[1]
@@ -123,7 +162,7 @@ def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
         values = np.einsum("ik,ik->k", vectors, scaled @ vectors)
         if np.count_nonzero(values < 0.0) >= system.negative or 2 * k >= size:
             break
-        k *= 2  # a strongly negative one is farther from zero than some positive ones
+        k *= 2  # a strongly negative one may be farther from zero than positive ones
     order = np.argsort(values)[:count]
     fields = [system.space.to_vectors(vectors[:, i] / root) for i in order]
     return values[order], np.array(fields).reshape(len(order), len(system.space.dimension), 3)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import SurfaceError
+from .geometry import Vector, bounding_size, edge_vectors, face_areas
 from .topology import Topology
 
 ZERO_AREA = 1e-14  # of the squared longest edge: below this a triangle has no direction in floats
@@ -18,7 +19,7 @@ RESTING = 1e-12  # height, relative to the size, at which a vertex counts as lyi
 ROUNDED = 8.0 * float(np.finfo(float).eps)  # the same, relative to the coordinates
 
 
-def finite_vector(value: Any, what: str) -> tuple[float, float, float]:
+def finite_vector(value: Any, what: str) -> Vector:
     """Three finite numbers, or an error that says ``what`` they were to be."""
     try:
         vector = tuple(float(c) for c in value)
@@ -128,10 +129,8 @@ def mesh(
             f"vertex {unused[0]} belongs to no face ({len(unused)} such vertices); remove it and"
             " renumber the faces"
         )
-    sides = X[F[:, [1, 2, 0]]] - X[F]
-    twice = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    longest = (sides**2).sum(axis=2).max(axis=1)
-    flat = twice <= ZERO_AREA * longest
+    longest = (edge_vectors(X[F]) ** 2).sum(axis=2).max(axis=1)
+    flat = 2.0 * face_areas(X[F]) <= ZERO_AREA * longest
     if flat.any():
         low = lying(height, X)
         flat &= ~_vanished(F, patch, patches, held, low)
@@ -168,8 +167,9 @@ def _vanished(F: Ints, patch: Ints, patches: Sequence[Any], held: Bools, low: Bo
 
 def lying(height: Floats, X: Floats) -> Bools:
     """(n,) whether vertices at these heights over Π lie on it, to rounding of their coordinates."""
-    size = float(np.linalg.norm(np.ptp(X, axis=0)))
-    return np.abs(height) <= max(RESTING * size, ROUNDED * float(np.abs(X).max(initial=0.0)))
+    return np.abs(height) <= max(
+        RESTING * bounding_size(X), ROUNDED * float(np.abs(X).max(initial=0.0))
+    )
 
 
 def on_plane(height: Floats, sliding: Bools, X: Floats, size: float) -> None:

@@ -1,4 +1,15 @@
-"""Triangles: the one place where their edges, area vectors, areas and volumes are written down."""
+"""Triangles: the one place where their edges, area vectors, areas, angles and sizes are written down.
+
+A triangle has corners a, b, c, counter-clockwise seen from its positive side. Edge k is opposite corner
+k: c - b, a - c, b - a. Its area vector is A ν = ½ (b - a) × (c - a), of length A along the normal ν.
+
+Two layers say the same. Compiled loops take three-vectors as tuples of floats: ``point``, ``cross``,
+``dot`` and the others are inlined. Elsewhere whole arrays are taken at once: functions of ``P``
+(…,m,3,3) take the corners of m triangles, ``X[F]`` for vertices X (n,3) and faces F (m,3).
+
+Numba caches each loop with the file that holds it: after a change of this file's compiled functions,
+delete the cached loops of the others (``__pycache__/*.nb?``).
+"""
 
 from __future__ import annotations
 
@@ -6,25 +17,166 @@ from math import sqrt
 
 import numpy as np
 
-from ..base.compiled import compiled
+from ..base.arrays import Floats, Ints
+from ..base.compiled import compiled, inlined
+
+Vector = tuple[float, float, float]
+
+
+@inlined
+def point(X: Floats, i: int) -> Vector:
+    """Row i of X (n,3)."""
+    return X[i, 0], X[i, 1], X[i, 2]
+
+
+@inlined
+def vector(a: Floats) -> Vector:
+    """An array (3,) as a three-vector."""
+    return a[0], a[1], a[2]
+
+
+@inlined
+def add(a: Vector, b: Vector) -> Vector:
+    """a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inlined
+def sub(a: Vector, b: Vector) -> Vector:
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@inlined
+def scaled(s: float, a: Vector) -> Vector:
+    """s a."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+@inlined
+def divided(a: Vector, s: float) -> Vector:
+    """a / s."""
+    return a[0] / s, a[1] / s, a[2] / s
+
+
+@inlined
+def dot(a: Vector, b: Vector) -> float:
+    """⟨a, b⟩."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def cross(a: Vector, b: Vector) -> Vector:
+    """a × b.
+
+    >>> cross((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    (0.0, 0.0, 1.0)
+    """
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inlined
+def cross_sum(a: Vector, b: Vector, c: Vector, d: Vector) -> Vector:
+    """a × b + c × d, as the product rule has it."""
+    return (
+        a[1] * b[2] - a[2] * b[1] + c[1] * d[2] - c[2] * d[1],
+        a[2] * b[0] - a[0] * b[2] + c[2] * d[0] - c[0] * d[2],
+        a[0] * b[1] - a[1] * b[0] + c[0] * d[1] - c[1] * d[0],
+    )
+
+
+@inlined
+def norm(a: Vector) -> float:
+    """|a|."""
+    return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+@inlined
+def accumulate(out: Floats, i: int, a: Vector) -> None:
+    """Add a to row i of out (n,3)."""
+    out[i, 0] += a[0]
+    out[i, 1] += a[1]
+    out[i, 2] += a[2]
 
 
 @compiled
-def area_vectors(X, F):
+def vertex_area_vectors(X: Floats, F: Ints) -> tuple[Floats, Floats]:
     """Σ A_T ν_T (n,3) and Σ A_T (n,) over the triangles around each vertex."""
-    vector, area = np.zeros(X.shape), np.zeros(len(X))
+    total, area = np.zeros(X.shape), np.zeros(len(X))
     for f in range(len(F)):
-        i, j, k = F[f, 0], F[f, 1], F[f, 2]
-        ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
-        wx, wy, wz = X[k, 0] - X[i, 0], X[k, 1] - X[i, 1], X[k, 2] - X[i, 2]
-        nx = 0.5 * (uy * wz - uz * wy)
-        ny = 0.5 * (uz * wx - ux * wz)
-        nz = 0.5 * (ux * wy - uy * wx)
-        a = sqrt(nx * nx + ny * ny + nz * nz)
-        for c in range(3):
-            v = F[f, c]
-            vector[v, 0] += nx
-            vector[v, 1] += ny
-            vector[v, 2] += nz
-            area[v] += a
-    return vector, area
+        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+        area_vector = scaled(0.5, cross(sub(b, a), sub(c, a)))
+        face_area = norm(area_vector)
+        for k in range(3):
+            accumulate(total, F[f, k], area_vector)
+            area[F[f, k]] += face_area
+    return total, area
+
+
+@compiled
+def bounding_size(X: Floats) -> float:
+    """Diagonal of the bounding box of points (n,d), length; 0 for none.
+
+    >>> bounding_size(np.array([[0.0, 0.0, 1.0], [3.0, 4.0, 1.0]]))
+    5.0
+    """
+    total = 0.0
+    for d in range(X.shape[1] if len(X) else 0):
+        low = high = X[0, d]
+        for v in range(len(X)):
+            low, high = min(low, X[v, d]), max(high, X[v, d])
+        total += (high - low) ** 2
+    return sqrt(total)
+
+
+def segment_lengths(X: Floats, ends: Ints) -> Floats:
+    """(e,) lengths of the segments between vertices ``ends`` (e,2)."""
+    return np.asarray(np.linalg.norm(X[ends[:, 1]] - X[ends[:, 0]], axis=1))
+
+
+def edge_vectors(P: Floats) -> Floats:
+    """(…,m,3,3) edges of triangles; edge k is opposite corner k.
+
+    >>> edge_vectors(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])).tolist()
+    [[-1.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]]
+    """
+    return np.roll(P, 1, axis=-2) - np.roll(P, -1, axis=-2)
+
+
+def area_vectors(P: Floats) -> Floats:
+    """(…,m,3) A ν of triangles: the area along the normal, length².
+
+    >>> area_vectors(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])).tolist()
+    [0.0, 0.0, 0.5]
+    """
+    a, b, c = P[..., 0, :], P[..., 1, :], P[..., 2, :]
+    return np.asarray(0.5 * np.cross(b - a, c - a))
+
+
+def face_areas(P: Floats) -> Floats:
+    """(…,m) areas of triangles, length²."""
+    return np.asarray(np.linalg.norm(area_vectors(P), axis=-1))
+
+
+def angles(P: Floats) -> Floats:
+    """(…,m,3) angles of triangles at their corners, degrees, to 1e-6; P (…,m,3,2) or (…,m,3,3).
+
+    >>> angles(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])).round(9).tolist()
+    [90.0, 45.0, 45.0]
+    """
+    a, b = np.roll(P, -1, axis=-2) - P, np.roll(P, 1, axis=-2) - P
+    cosine = (a * b).sum(axis=-1)
+    both = (a * a).sum(axis=-1) * (b * b).sum(axis=-1)
+    return np.degrees(np.arctan2(np.sqrt(np.maximum(both - cosine**2, 0.0)), cosine))
+
+
+def vertex_sums(values: Floats, F: Ints, n: int) -> Floats:
+    """(n,3) at each vertex the sum of the values (m,3) of the faces around it."""
+    return np.stack(
+        [np.bincount(F.ravel(), np.repeat(column, 3), n) for column in values.T], axis=1
+    )
+
+
+def cross_2d(u: Floats, v: Floats) -> Floats:
+    """(…) u × v of plane vectors (…,2): the area of their parallelogram, positive counter-clockwise."""
+    return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])

@@ -15,9 +15,8 @@ import numpy.typing as npt
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FreeSurfaceWarning, OptionError, SurfaceError, unknown
 from . import checks
+from .geometry import Vector, bounding_size
 from .topology import Topology, topology
-
-Vector = tuple[float, float, float]
 
 FAR = 30.0  # sizes from the point of Π: farther, volumes seen from it lose over three digits
 
@@ -216,7 +215,7 @@ class Surface:
     @cached_property
     def size(self) -> float:
         """Diagonal of the bounding box, length: the scale of every relative tolerance."""
-        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+        return bounding_size(self.vertices)
 
     @cached_property
     def topology(self) -> Topology:

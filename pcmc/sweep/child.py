@@ -28,6 +28,7 @@ from typing import Any, BinaryIO
 WORDS = ("status", "verdict", "message")  # keys of a case's answer that hold text about the case
 OUTPUT = 4000  # characters kept of what a failed case says
 LONGEST = 1024  # bits of a whole number, the range of floats; far longer ones have no decimal text
+DISTRIBUTIONS = {"pcmc": "pcmc-surfaces"}  # where a package is installed under another name
 ORPHANED = 1.0  # seconds between looks whether the parent lives
 
 
@@ -149,7 +150,7 @@ def provenance() -> dict[str, Any]:
 def version(package: str) -> str:
     """The installed version of a package, or ``"not installed"``."""
     try:
-        return importlib.metadata.version(package)
+        return importlib.metadata.version(DISTRIBUTIONS.get(package, package))
     except importlib.metadata.PackageNotFoundError:
         return "not installed"
 

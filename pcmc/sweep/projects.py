@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from .. import project as projects
-from ..base.errors import FileError, OptionError, unknown
-from ..solvers import METHODS
+from ..base.errors import FileError
+from ..solvers import find_method
 from .grid import Sweep
 from .solving import row
 
@@ -43,8 +43,8 @@ def project_sweep(
     (3, 'notebooks/roof.toml')
     """
     fixed = dict(fixed or {})
-    if method is not None and method not in METHODS:
-        raise OptionError(unknown("method", method, METHODS))
+    if method is not None:
+        find_method(method)
     about = {"project": Path(path).as_posix(), "project_digest": projects.digest(path)}
     if method is not None:
         about["method"] = method
@@ -81,6 +81,6 @@ def solve_project(
     design, start = projects.varied(project, values)
     if method not in (None, design.method):
         design = replace(design, method=method, options={})
-    outcome = projects.settle(design, start)
+    outcome = projects.solve_project(design, start)
     told = row(outcome.result, ("project", "project_digest", "method", *values))
     return told if outcome.design is None else told | {"targets_met": outcome.design.met}

@@ -5,12 +5,11 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import fields
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import OptionError, unknown
 from ..energy.functional import gradient
-from ..solvers import METHODS, solve
+from ..solvers import find_method, solve
 from ..solvers.result import Result
 from .child import resolve
 from .grid import checked
@@ -31,9 +30,7 @@ def _split(generator: str, method: str, arguments: Mapping[str, Any]) -> Parts:
             f"the generator {generator!r} cannot be found ({error}); expected 'generators:two_caps'"
             " or 'package.module:function'"
         ) from error
-    if method not in METHODS:
-        raise OptionError(unknown("method", method, METHODS))
-    options = getattr(import_module(f"pcmc.solvers.{method}"), METHODS[method])
+    options = find_method(method).options
     known = [f.name for f in fields(options)]
     for name in arguments:
         if name not in own and name not in known:

@@ -1,0 +1,179 @@
+"""The verdict: an ordered table of rules over the findings about a surface. The first match decides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+
+from ..base.arrays import Bools, Floats
+from ..surface import Surface
+from .balance import coarseness, hardly_balanced, unbalanced
+from .collapse import where_collapsed
+
+NEUTRAL = 1e-2  # |λ| size²/α below which a mode counts as neutral
+SMALL = 1e3  # tolerances of its own forces that a patch may lack where stronger ones hide it
+COLLAPSED = 1e-3  # triangle quality up to which a mesh counts as degenerate
+
+
+class Verdict(Enum):
+    """What kind of equilibrium a surface is, or why it is none. The value is a sentence."""
+
+    STABLE = "stable: at rest, and every small change of shape raises the energy"
+    NEUTRAL = "neutral: at rest, and some change of shape costs almost no energy"
+    SADDLE = "saddle: at rest, but some change of shape lowers the energy"
+    NOT_CONVERGED = "not converged: the forces do not balance yet; solve further"
+    NO_EQUILIBRIUM = "no equilibrium: tension and pressure cannot balance; change the tensions"
+    DEGENERATE = "degenerate mesh: triangles have collapsed; remesh, or start from another shape"
+
+
+class Evidence(Enum):
+    """What happened to a surface while it was solved; its shape alone may not show it."""
+
+    INFLATED = "it grew without bound"
+    VANISHED = "it shrank to nothing"
+    COLLAPSED = "its triangles collapsed"
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What the verdict about a surface depends on.
+
+    Attributes
+    ----------
+    surface : the whole surface.
+    pinchable : (patches,) bool, its walls that can pinch.
+    residual, tolerance : forces left, relative; the most at which a surface counts as at rest.
+    quality : smallest triangle quality outside walls that can pinch.
+    index : Morse index; None where it is not known.
+    own_residuals : (patches,) each patch's forces left, relative to its own.
+    softest : lowest eigenvalue in units of α/size²; infinite where none is known.
+    load_ratio : pressure over the most that the boundary's tension could carry.
+    evidence : what happened on the way, if a solver was there to see it.
+    """
+
+    surface: Surface
+    pinchable: Bools
+    residual: float
+    tolerance: float
+    quality: float
+    index: int | None
+    own_residuals: Floats
+    softest: float
+    load_ratio: float
+    evidence: Evidence | None = None
+
+    @property
+    def moving(self) -> bool:
+        """Whether forces are left."""
+        return self.residual > self.tolerance
+
+    @cached_property
+    def unbalanced(self) -> str:
+        """Names a junction whose tensions cannot balance, while forces are left; else empty."""
+        return unbalanced(self.surface, self.pinchable) if self.moving else ""
+
+    @cached_property
+    def hardly_balanced(self) -> str:
+        """Names a junction whose tensions can hardly balance, while forces are left; else empty."""
+        return hardly_balanced(self.surface, self.pinchable) if self.moving else ""
+
+    @property
+    def overloaded(self) -> bool:
+        """Whether the pressure is more than the boundary can carry, beyond what the mesh leaves open.
+
+        Where a solver saw the surface inflate or collapse, the mesh leaves nothing open.
+        """
+        if not self.moving:
+            return False
+        settled = self.evidence in (Evidence.INFLATED, Evidence.COLLAPSED)
+        return self.load_ratio > 1.0 + (0.0 if settled else coarseness(self.surface))
+
+    @property
+    def collapsed(self) -> bool:
+        """Whether triangles have collapsed."""
+        return self.evidence is Evidence.COLLAPSED or self.quality <= COLLAPSED
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A verdict, when it applies, and the sentence that gives the reason (empty for none)."""
+
+    verdict: Verdict
+    applies: Callable[[Findings], bool]
+    reason: Callable[[Findings], str]
+
+
+def judge(findings: Findings) -> tuple[Verdict, str]:
+    """The verdict on the findings and its reason, by the first of ``RULES`` that applies."""
+    rule = next(rule for rule in RULES if rule.applies(findings))
+    return rule.verdict, rule.reason(findings)
+
+
+def _overload(f: Findings) -> str:
+    digits = ".3f" if f.load_ratio < 1.1 else ".2f" if f.load_ratio < 1e4 else ".3g"
+    return f"the pressure is {f.load_ratio:{digits}} times what the boundary's tension could carry"
+
+
+def _collapse(f: Findings) -> str:
+    return "; ".join(filter(None, (f.hardly_balanced, where_collapsed(f.surface, f.pinchable))))
+
+
+def _forces_left(f: Findings) -> str:
+    reason = f"relative residual {f.residual:.1e}, tolerance {f.tolerance:.0e}"
+    if f.hardly_balanced:
+        reason += f"; {f.hardly_balanced}"
+    if f.load_ratio > 1.0:
+        reason += (
+            f"; the pressure is {f.load_ratio:.3f} times what the boundary's tension could carry:"
+            " only a mesh as coarse as this may come to rest, a finer one cannot"
+        )
+    return reason
+
+
+def _weak_patch(f: Findings) -> str:
+    name = f.surface.patches[int(f.own_residuals.argmax())].name
+    return (
+        f"the forces left in patch {name!r} are {f.own_residuals.max():.1e} of its own, which are small"
+        " beside those of other patches; solve with a smaller tolerance"
+    )
+
+
+def _ways_down(f: Findings) -> str:
+    return f"index {f.index}: {'1 way' if f.index == 1 else f'{f.index} ways'} down"
+
+
+RULES = (
+    Rule(
+        Verdict.NEUTRAL,
+        lambda f: not f.surface.tensions.any(),
+        lambda f: "no patch has a tension: every shape is at rest",
+    ),
+    Rule(Verdict.NO_EQUILIBRIUM, lambda f: bool(f.unbalanced), lambda f: f.unbalanced),
+    Rule(Verdict.NO_EQUILIBRIUM, lambda f: f.overloaded, _overload),
+    Rule(
+        Verdict.NO_EQUILIBRIUM,
+        lambda f: f.moving and f.evidence is Evidence.INFLATED,
+        lambda f: "the surface inflates without bound (from this start; others may differ)",
+    ),
+    Rule(
+        Verdict.NO_EQUILIBRIUM,
+        lambda f: f.moving and f.evidence is Evidence.VANISHED,
+        lambda f: "nothing holds the surface, and it shrinks to nothing",
+    ),
+    Rule(Verdict.DEGENERATE, lambda f: f.collapsed, _collapse),
+    Rule(Verdict.NOT_CONVERGED, lambda f: f.moving or f.index is None, _forces_left),
+    Rule(
+        Verdict.NOT_CONVERGED,
+        lambda f: bool(f.own_residuals.max() > SMALL * f.tolerance),
+        _weak_patch,
+    ),
+    Rule(Verdict.SADDLE, lambda f: f.index != 0, _ways_down),
+    Rule(
+        Verdict.NEUTRAL,
+        lambda f: abs(f.softest) < NEUTRAL,
+        lambda f: f"softest mode {f.softest:.1e} in units of α/size²",
+    ),
+    Rule(Verdict.STABLE, lambda f: True, lambda f: ""),
+)

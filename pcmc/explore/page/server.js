@@ -1,0 +1,42 @@
+// Requests to the server. An answer is one run of bytes: a JSON header and the arrays that it names.
+
+/** Header and arrays of a message; see pcmc/explore/messages.py. */
+export function unpack(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  const arrays = {};
+  let start = 4 + length;
+  for (const [name, kind, count] of header.arrays) {
+    arrays[name] = kind === "f"
+      ? new Float32Array(buffer, start, count) : new Uint32Array(buffer, start, count);
+    start += 4 * count;
+  }
+  return { header, arrays };
+}
+
+async function request(path, options) {
+  let response;
+  try {
+    response = await fetch(path, options);
+  } catch {
+    throw new Error("The program behind this page has stopped. Start it again and reload the page.");
+  }
+  if (!response.ok) {
+    const answer = await response.json().catch(() => ({}));
+    throw new Error(answer.error || `The server answered ${response.status}.`);
+  }
+  return response;
+}
+
+/** POST a JSON body; returns the unpacked answer. */
+export async function ask(path, body = {}) {
+  const response = await request(path, {
+    method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body),
+  });
+  return unpack(await response.arrayBuffer());
+}
+
+/** GET a file; returns its body. */
+export async function fetchFile(path) {
+  return (await request(path)).blob();
+}

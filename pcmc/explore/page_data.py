@@ -1,0 +1,96 @@
+"""The data that the page draws: sheets, lines and supports once, fields at every change."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.arrays import Bools, Floats
+from ..certificate.balance import reactions_per_length
+from ..certificate.certificate import Certificate
+from ..energy.curvature import curvature_error, mean_curvature
+from ..energy.functional import patch_areas
+from ..surface import Surface
+from ..surface.colours import patch_colors
+
+Arrays = dict[str, npt.NDArray[Any]]
+
+
+def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
+    """Everything that stays the same while the surface moves.
+
+    A vertex where sheets meet is drawn once for each sheet, so that colours and shading break there:
+    ``sheet_faces`` (m,3) index these corners; ``sheet_vertex`` and ``sheet_patch`` are their vertex
+    and patch.
+    """
+    corner = surface.patch_of_face[:, None].astype(np.int64) * surface.n + surface.faces
+    corners, faces = np.unique(corner, return_inverse=True)
+    topo = surface.topology
+    header = {
+        "patches": [
+            {"name": p.name, "wall": p.auxiliary, "color": color}
+            for p, color in zip(surface.patches, patch_colors(surface).tolist(), strict=True)
+        ],
+        "vertices": surface.n,
+        "triangles": surface.m,
+        "size": surface.size,
+        "up": surface.plane.normal,
+        "ground": float(surface.plane.height(centre(surface))),
+    }
+    inner, curves = ~topo.curve_edge, topo.curve_edge
+    of_wall = _walls_alone(surface)
+    return header, {
+        "sheet_faces": faces.reshape(-1, 3),
+        "sheet_vertex": corners % surface.n,
+        "sheet_patch": corners // surface.n,
+        "edges": topo.edges[inner],
+        "edge_wall": of_wall[inner],
+        "curves": topo.edges[curves],
+        "curve_wall": of_wall[curves],
+        "fixed": np.flatnonzero(surface.fixed),
+        "sliding": np.flatnonzero(surface.on_plane),
+    }
+
+
+def _walls_alone(surface: Surface) -> Bools:
+    """(e,) edges all of whose triangles belong to walls."""
+    alone = np.ones(len(surface.topology.edges), dtype=bool)
+    roof = ~surface.walls[surface.patch_of_face]
+    alone[surface.topology.edge_of_face[roof]] = False
+    return alone
+
+
+def centre(surface: Surface) -> Floats:
+    """(3,) middle of the bounding box: the page's origin, near which single precision is best."""
+    X = surface.vertices
+    return 0.5 * (X.min(axis=0) + X.max(axis=0))
+
+
+def fields(surface: Surface, certificate: Certificate, origin: Floats) -> Arrays:
+    """Vertices relative to the origin, and the values that colours may show."""
+    arrays: Arrays = {
+        "vertices": surface.vertices - origin,
+        "curvature": mean_curvature(surface, "variational"),
+        "error": curvature_error(surface, "cotangent"),
+        "reactions": reactions_per_length(surface, certificate.reactions),
+    }
+    if len(certificate.modes):
+        arrays["mode"] = certificate.modes[0] / (np.abs(certificate.modes[0]).max() or 1.0)
+    return arrays
+
+
+def findings(surface: Surface, certificate: Certificate) -> dict[str, Any]:
+    """Numbers of the surface and its certificate, for the page's table."""
+    height = surface.plane.height(surface.vertices)
+    roof = ~surface.walls
+    return {
+        **certificate.numbers(),
+        "height": float(height.max()),
+        "area": float(patch_areas(surface)[roof].sum()),
+        "patches": [
+            {"name": row["patch"], "mean_H": row["mean_H"], "area": row["area"]}
+            for row in certificate.patches.to_dict(orient="records")
+        ],
+    }

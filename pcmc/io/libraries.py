@@ -1,0 +1,31 @@
+"""Libraries that read and write formats: imported on demand, their errors translated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+from ..base.errors import FileError, MissingExtra, PcmcError
+
+
+def load_library(name: str, extra: str = "files") -> Any:
+    """The module of that name, or MissingExtra."""
+    try:
+        return import_module(name)
+    except ImportError:
+        raise MissingExtra(name, extra) from None
+
+
+@contextmanager
+def translated_errors(kind: str) -> Iterator[None]:
+    """Turn whatever a library raises on a bad file into a FileError of one line."""
+    try:
+        yield
+    except (PcmcError, OSError, MissingExtra, MemoryError):
+        raise
+    except Exception as error:  # libraries raise anything, from KeyError to struct.error
+        text = " ".join(str(error).split())[:120]
+        reason = f"{type(error).__name__}: {text}" if text else type(error).__name__
+        raise FileError(f"not a readable {kind} file, or cut off ({reason})") from None

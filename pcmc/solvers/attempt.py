@@ -1,0 +1,177 @@
+"""One attempt of the geometric solver on one mesh: which step comes next, and when to end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..meshing.quality import worst_quality
+from ..surface import Surface
+from .result import Callback, Progress, Status, until_stopped
+from .state import State
+from .steps import Stepper
+
+if TYPE_CHECKING:
+    from .newton import NewtonOptions
+
+DESCENTS = 5  # smooth steps after a Newton step that did not help
+PATIENCE = 8  # steps without halving the residual, once it is that small
+ROUNDED = 1e-10  # relative residual that counts as zero where rounding lets no step lower it
+COLLAPSED = 1e-3  # triangle quality below which the attempt ends
+POOR = 0.15  # triangle quality that explains why no step helps
+SHRUNK = 5e-2  # of its first size: a surface that nothing holds has vanished
+
+
+@dataclass
+class History:
+    """The rows of all levels and attempts, and the counts of the finished ones.
+
+    Attributes
+    ----------
+    callback : called with each new row.
+    rows : the history of the result.
+    evaluations, factorisations : made by finished attempts.
+    note : a further finding, for the result's message.
+    """
+
+    callback: Callback | None
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    evaluations: int = 0
+    factorisations: int = 0
+    note: str = ""
+
+    def add(self, state: State, stepper: Stepper, level: int) -> None:
+        """A row for the state reached."""
+        row = {
+            "iteration": len(self.rows),
+            "level": level,
+            "step": stepper.kind,
+            "evaluation": self.evaluations + state.evaluations,
+            "factorisation": self.factorisations + stepper.factorisations,
+            "energy": state.energy,
+            "gradient_squared": float((state.gradient**2).sum()),
+            "residual": state.relative,
+            "quality": worst_quality(state.X, state.surface.faces),
+            "resting": int(state.resting.sum()),
+        }
+        self.rows.append(row)
+        if self.callback is not None:
+            self.callback(Progress(len(self.rows) - 1, state.result_surface, row))
+
+
+class Attempt:
+    """One run of steps on one mesh.
+
+    Attributes
+    ----------
+    state : the surface reached. stepper : what moves it.
+    status : why the run ended.
+    smooth_steps : descent steps to take before the next Newton step.
+    stuck : whether the last step failed: none lowers the residual or the energy.
+    best, steps_since_best : the least residual, and steps taken since it was last halved.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        options: NewtonOptions,
+        history: History,
+        level: int,
+        smooth_steps: int = 0,
+    ) -> None:
+        self.options, self.history, self.level = options, history, level
+        self.state = State(surface, options.min_quality)
+        self.stepper = Stepper(self.state, options.target == "minimum", options.backend)
+        self.status = Status.ITERATION_LIMIT
+        self.first_quality = self.state.quality
+        self._shown = self.state.X, self.state.version  # as in the last row
+        self.restart(smooth_steps)
+
+    def restart(self, smooth_steps: int = 0) -> None:
+        """Measure progress from here."""
+        self.smooth_steps, self.stuck = smooth_steps, False
+        self.best, self.steps_since_best = self.state.relative, 0
+
+    def run(self) -> Attempt:
+        """Step until the end; ``status`` then gives the reason."""
+        self.status = until_stopped(self._iterate)
+        if self.status is Status.STOPPED:  # perhaps in the middle of a step
+            self.state.go_back(*self._shown)
+        self.history.evaluations += self.state.evaluations
+        self.history.factorisations += self.stepper.factorisations
+        return self
+
+    def _iterate(self) -> Status:
+        state = self.state
+        for step in range(self.options.iterations + 1):
+            self._shown = state.X, state.version
+            self.history.add(state, self.stepper, self.level)
+            if self._at_rest():
+                if not self._leave_rest():
+                    return Status.STALLED if state.excess_pull().any() else Status.CONVERGED
+                self.restart()
+            elif self.stuck:
+                return self._given_up(Status.STALLED)
+            elif step == self.options.iterations:
+                return self._given_up(Status.ITERATION_LIMIT)
+            else:
+                if state.maintain_mesh():
+                    self.stepper.drop_factor()
+                self._step()
+            if (status := self._ended()) is not None:
+                self.history.add(state, self.stepper, self.level)
+                return status
+        return Status.ITERATION_LIMIT
+
+    def _step(self) -> None:
+        """One step: along the lowest mode of a saddle that is near, or Newton's, or a smooth one."""
+        stepper = self.stepper
+        if stepper.saddle_near() and stepper.leave_saddle():
+            self.smooth_steps = 0
+        elif self.smooth_steps == 0 and stepper.newton():
+            pass
+        elif stepper.descend():
+            self.smooth_steps = (self.smooth_steps or DESCENTS) - 1
+        elif self.smooth_steps > 0 and stepper.newton():
+            self.smooth_steps = 0
+        else:
+            self.stuck = True
+        self.steps_since_best += 1
+        if self.state.relative < 0.5 * self.best:
+            self.best, self.steps_since_best = self.state.relative, 0
+
+    def _at_rest(self) -> bool:
+        """Whether the residual is below the tolerance, or as low as rounding lets it become."""
+        residual = self.state.relative
+        no_progress = self.stuck or self.steps_since_best > PATIENCE
+        return residual <= self.options.tolerance or (residual <= ROUNDED and no_progress)
+
+    def _leave_rest(self) -> bool:
+        """Leave a saddle if a minimum is sought, or lift a resting junction; False if neither is due."""
+        if self.options.target == "minimum" and self.stepper.leave_saddle():
+            return True
+        if self.state.resting.any() and (self.state.lift_overpulled() or self.state.update_walls()):
+            self.stepper.kind = "release"
+            return True
+        return False
+
+    def _ended(self) -> Status | None:
+        """Why no further step makes sense, or None."""
+        state, inflation = self.state, self.options.inflation
+        if not np.isfinite(state.energy):
+            return Status.NON_FINITE
+        collapsed = state.quality < COLLAPSED
+        extent = np.linalg.norm(np.ptp(state.X, axis=0)) / state.size
+        # triangles of a surface that inflates may collapse on the way
+        if extent > inflation or (collapsed and extent > np.sqrt(inflation)):
+            return Status.DIVERGED
+        if extent < SHRUNK:
+            return Status.VANISHED
+        return Status.DEGENERATE if collapsed else None
+
+    def _given_up(self, status: Status) -> Status:
+        """The status, or DEGENERATE where the quality of triangles explains it."""
+        poor = min(POOR, 0.5 * self.first_quality)
+        return Status.DEGENERATE if self.state.quality < poor else status
