@@ -83,7 +83,7 @@ def bezier_hall(
     >>> [round(float(side), 2) for side in np.ptp(surface.vertices, axis=0)]
     [190.22, 101.56, 29.17]
     """
-    edge_length = validate.number("edge_length", edge_length, above=0.0)
+    edge_length = validate.positive("edge_length", edge_length)
     mesh = Builder()
     outline, arches, hole = _curves(mesh, edge_length)
     curves = mesh.positions(np.arange(1 + hole[-1]))

@@ -42,7 +42,7 @@ def double_bubble(
     >>> bool(double_bubble_exact().distance(surface).max() < 1e-12)
     True
     """
-    edge_length = validate.number("edge_length", edge_length, above=0.0)
+    edge_length = validate.positive("edge_length", edge_length)
     offsets, rim_radius = _offsets(alpha_left, alpha_right, alpha_aux)
     count = int(even_segments(np.array([rim_radius]), edge_length)[0])
     around = 2.0 * np.pi * np.arange(count) / count
@@ -99,9 +99,9 @@ def _offsets(
     alpha_left: float, alpha_right: float, alpha_aux: float
 ) -> tuple[tuple[float, float], float]:
     """Distance of each centre from the disc, and the disc's radius."""
-    left = validate.number("alpha_left", alpha_left, above=0.0)
-    right = validate.number("alpha_right", alpha_right, above=0.0)
-    wall = validate.number("alpha_aux", alpha_aux, above=0.0)
+    left = validate.positive("alpha_left", alpha_left)
+    right = validate.positive("alpha_right", alpha_right)
+    wall = validate.positive("alpha_aux", alpha_aux)
     offsets, square = balanced_offsets(left, right, wall)
     if square <= 0.0:
         raise OptionError(

@@ -123,8 +123,8 @@ def _fans(
     a fan to π/2 at the next; a cone for bulge 0.
     """
     rings = validate.integer("rings", rings, least=2)
-    radius = validate.number("radius", radius, above=0.0)
-    height = validate.number("height", height, above=0.0)
+    radius = validate.positive("radius", radius)
+    height = validate.positive("height", height)
     if bulge is not None:
         validate.number("bulge", bulge)
     validate.choice("mesh", mesh, MESHES)

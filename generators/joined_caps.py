@@ -40,7 +40,7 @@ def joined_caps(
     >>> bool(joined_caps_exact().distance(surface).max() < 1e-12)
     True
     """
-    edge_length = validate.number("edge_length", edge_length, above=0.0)
+    edge_length = validate.positive("edge_length", edge_length)
     left, right = _spheres(alpha_left, alpha_right, alpha_aux, depth)
     mesh, fixed, sliding = build_pair(left, right, edge_length, upright=True)
     patches = [
@@ -88,10 +88,10 @@ def _spheres(
     alpha_left: float, alpha_right: float, alpha_aux: float, depth: float
 ) -> tuple[Sphere, Sphere]:
     """The spheres of both caps; the wall is at x = 0."""
-    validate.number("depth", depth, above=0.0)
-    validate.number("alpha_left", alpha_left, above=0.0)
-    validate.number("alpha_right", alpha_right, above=0.0)
-    validate.number("alpha_aux", alpha_aux, above=0.0)
+    validate.positive("depth", depth)
+    validate.positive("alpha_left", alpha_left)
+    validate.positive("alpha_right", alpha_right)
+    validate.positive("alpha_aux", alpha_aux)
     (left, right), square = balanced_offsets(alpha_left, alpha_right, alpha_aux)
     if square <= depth**2:
         raise OptionError(

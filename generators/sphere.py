@@ -30,9 +30,9 @@ def sphere(edge_length: float = 0.4, *, alpha: float = 1.0, exact: bool = False)
     >>> bool(sphere_exact().distance(surface).max() < 1e-12), surface.free.all()
     (True, np.True_)
     """
-    radius = 2.0 * validate.number("alpha", alpha, above=0.0)
+    radius = 2.0 * validate.positive("alpha", alpha)
     icosahedron_edge = 2.0 / np.hypot(1.0, _GOLDEN)
-    edge_length = validate.number("edge_length", edge_length, above=0.0)
+    edge_length = validate.positive("edge_length", edge_length)
     frequency = max(1, round(icosahedron_edge * radius / edge_length))
     directions, faces = geodesic(frequency)
     mesh = Builder()
@@ -48,7 +48,7 @@ def sphere_exact(*, alpha: float = 1.0) -> ExactSolution:
     >>> round(ball.energy / np.pi, 12), ball.height
     (5.333333333333, 4.0)
     """
-    radius = 2.0 * validate.number("alpha", alpha, above=0.0)
+    radius = 2.0 * validate.positive("alpha", alpha)
     area, volume = 4.0 * np.pi * radius**2, 4.0 / 3.0 * np.pi * radius**3
     shapes = {"bubble": Sphere((0.0, 0.0, 0.0), radius)}
     return ExactSolution(alpha * area - volume, area, volume, 2.0 * radius, shapes)

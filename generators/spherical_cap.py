@@ -42,11 +42,11 @@ def spherical_cap(
     >>> bool(abs(surface.vertices[0, 2] - spherical_cap_exact().height) < 1e-12)
     True
     """
-    edge_length = validate.number("edge_length", edge_length, above=0.0)
-    radius = validate.number("radius", radius, above=0.0)
+    edge_length = validate.positive("edge_length", edge_length)
+    radius = validate.positive("radius", radius)
     if exact:
         height = spherical_cap_exact(radius=radius, alpha=alpha).height
-    dome = 0.3 * radius if height is None else validate.number("height", height, above=0.0)
+    dome = 0.3 * radius if height is None else validate.positive("height", height)
     ball = (radius**2 + dome**2) / (2.0 * dome)
     opening = 2.0 * np.arctan2(dome, radius)  # from the pole to the rim, seen from the centre
     rings = max(2, round(radius / edge_length))
@@ -68,8 +68,8 @@ def spherical_cap_exact(*, radius: float = 1.0, alpha: float = 0.6) -> ExactSolu
     >>> round(cap.energy, 10), round(cap.height, 10)
     (1.5039191689, 0.5366750419)
     """
-    radius = validate.number("radius", radius, above=0.0)
-    alpha = validate.number("alpha", alpha, above=0.0)
+    radius = validate.positive("radius", radius)
+    alpha = validate.positive("alpha", alpha)
     if 2.0 * alpha < radius:
         raise OptionError(
             f"alpha must be at least radius/2 = {radius / 2:g}, found {alpha:g}: below the"

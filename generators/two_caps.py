@@ -46,7 +46,7 @@ def two_caps(
     >>> [p.name for p in surface.patches], float(surface.vertices[:, 2].max().round(1))
     (['large', 'small', 'wall'], 1.0)
     """
-    edge_length = validate.number("edge_length", edge_length, above=0.0)
+    edge_length = validate.positive("edge_length", edge_length)
     validate.choice("wall", wall, WALLS)
     mesh, fixed, sliding = build_pair(LARGE, SMALL, edge_length, upright=wall == "upright")
     patches = (

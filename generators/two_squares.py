@@ -47,8 +47,8 @@ def two_squares(
     (48, 70, 1.0)
     """
     n = validate.integer("n", n, least=2)
-    side = validate.number("side", side, above=0.0)
-    height = validate.number("height", height, above=0.0)
+    side = validate.positive("side", side)
+    height = validate.positive("height", height)
     validate.choice("diagonals", diagonals, DIAGONALS)
     mesh = Builder()
     number = mesh.add_points(_roof(n, side, height)).reshape(2 * n + 1, n + 1)

@@ -66,7 +66,11 @@ def _paint(axes: Any, surface: Surface, faces: Ints, axis: int) -> None:
     edge = np.where(np.sort(walls)[:, None], 0.1, 0.35 * np.ones(3))
     axes.add_collection(
         PolyCollection(
-            list(seen), facecolors=colors, edgecolors=edge, clip_on=False, joinstyle="round",
+            list(seen),
+            facecolors=colors,
+            edgecolors=edge,
+            clip_on=False,
+            joinstyle="round",
             linewidths=np.where(np.sort(walls), 0.9, 0.35),
         )
-    )  # fmt: skip
+    )

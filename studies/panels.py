@@ -26,7 +26,7 @@ def curve_panels(
 ) -> None:
     """Curves y(x) by label in panels by title, logarithmic axes, one scale, one legend below.
 
-    Where curves lie on each other, all of them are seen.
+    Curves that lie on each other all stay visible.
     """
     from pcmc.plot.figure import CURVES, INK, SMALL, TEXT, finish, grid, new, overlap_style, style
 
@@ -78,7 +78,7 @@ def category_panels(
     """Tables (len(y), len(x)) of category names as coloured squares, with marks on some.
 
     ``categories`` has the colour of each, in the legend's order; ``marks`` by meaning the symbol and
-    where it stands.
+    its cells.
     """
     from matplotlib.colors import ListedColormap
 
@@ -130,6 +130,12 @@ def _legend(
     drawn += [Line2D([], [], label=label, **look) for label, look in (lines or {}).items()]
     figure.legend(
         handles=drawn,
-        loc="outside lower center", ncols=columns, fontsize=size, frameon=False, labelcolor=INK,
-        handlelength=3.0 if lines else 1.2, handleheight=0.8, borderaxespad=0.4,
-    )  # fmt: skip
+        loc="outside lower center",
+        ncols=columns,
+        fontsize=size,
+        frameon=False,
+        labelcolor=INK,
+        handlelength=3.0 if lines else 1.2,
+        handleheight=0.8,
+        borderaxespad=0.4,
+    )

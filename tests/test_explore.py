@@ -170,7 +170,7 @@ def test_the_least_recently_used_session_expires(client, monkeypatch):
     ("path", "body", "status", "line"),
     [
         ("/api/NAME/follow", '{"tensions": {"lefft": 3}}', 400, "did you mean 'left'"),
-        ("/api/NAME/follow", '{"tensions": {"left": -3}}', 400, "must be a finite number"),
+        ("/api/NAME/follow", '{"tensions": {"left": -3}}', 400, "expected a finite number"),
         (
             "/api/NAME/follow",
             '{"tensions": {"left": "a"}}',
@@ -199,9 +199,16 @@ def test_bad_requests_are_answered_in_one_line(client, path, body, status, line)
 
 @pytest.mark.parametrize(
     "path",
-    ["/page/../server.py", "/page/..%2fserver.py", "/page/none.js", "/page/__init__.py", "/x",
-     "/api/nobody/export?suffix=.obj", "/page/"],
-)  # fmt: skip
+    [
+        "/page/../server.py",
+        "/page/..%2fserver.py",
+        "/page/none.js",
+        "/page/__init__.py",
+        "/x",
+        "/api/nobody/export?suffix=.obj",
+        "/page/",
+    ],
+)
 def test_only_the_pages_own_files_are_served(client, path):
     answer, body = client.raw("GET", path)
     assert answer.status in (404, 410)

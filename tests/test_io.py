@@ -107,9 +107,14 @@ def test_single_precision_is_enough_in_a_survey_s_coordinates(tmp_path, suffix):
     near = tent()
     shift = np.array([5e5, 5e6, 0.0])
     far = pcmc.Surface(
-        near.vertices + shift, near.faces, near.patch_of_face, near.patches, fixed=near.fixed,
-        on_plane=near.on_plane, plane=pcmc.Plane(near.plane.point + shift, near.plane.normal),
-    )  # fmt: skip
+        near.vertices + shift,
+        near.faces,
+        near.patch_of_face,
+        near.patches,
+        fixed=near.fixed,
+        on_plane=near.on_plane,
+        plane=pcmc.Plane(near.plane.point + shift, near.plane.normal),
+    )
     pcmc.write(tmp_path / f"far{suffix}", far)
     back = pcmc.read(tmp_path / f"far{suffix}")
     assert back.n == far.n

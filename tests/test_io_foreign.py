@@ -65,8 +65,11 @@ def test_trimesh_scenes(tmp_path, suffix):
             )
         )
     else:
-        path.write_bytes(trimesh.util.decode_text(scene.export(file_type=suffix[1:])).encode()
-                         if suffix == ".obj" else scene.export(file_type="glb"))  # fmt: skip
+        path.write_bytes(
+            trimesh.util.decode_text(scene.export(file_type=suffix[1:])).encode()
+            if suffix == ".obj"
+            else scene.export(file_type="glb")
+        )
     check(pcmc.read(path))
 
 
@@ -267,8 +270,22 @@ def test_polygons_are_cut_well():
     faces, origin, notes = triangulate(hexagon, corners, np.array([3, 6]))
     assert origin.tolist() == [0, 1, 1, 1, 1]
     assert notes == ("1 polygons were cut into triangles",)
-    comb = np.array([[0, 0], [5, 0], [5, 3], [4, 3], [4, 1], [3, 1], [3, 3], [2, 3], [2, 1], [1, 1],
-                     [1, 3], [0, 3]])  # fmt: skip
+    comb = np.array(
+        [
+            [0, 0],
+            [5, 0],
+            [5, 3],
+            [4, 3],
+            [4, 1],
+            [3, 1],
+            [3, 3],
+            [2, 3],
+            [2, 1],
+            [1, 1],
+            [1, 3],
+            [0, 3],
+        ]
+    )
     with refused(FileError, where=0, found=12):
         triangulate(np.pad(1.0 * comb, ((0, 0), (0, 1))), np.arange(12), np.array([12]))
 

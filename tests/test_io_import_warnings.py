@@ -93,8 +93,14 @@ def surveyed():
     near = tent(tilted=False)
     plane = pcmc.Plane(tuple(FAR))
     return near, pcmc.Surface(
-        near.vertices + FAR, near.faces, near.patch_of_face, near.patches, near.fixed, near.on_plane, plane
-    )  # fmt: skip
+        near.vertices + FAR,
+        near.faces,
+        near.patch_of_face,
+        near.patches,
+        near.fixed,
+        near.on_plane,
+        plane,
+    )
 
 
 def test_stl_far_from_the_origin_is_written_about_its_middle_and_says_so(tmp_path):

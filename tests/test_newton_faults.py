@@ -267,7 +267,7 @@ def test_a_mesh_that_cannot_be_mended_is_named(backend, target):
 
 def test_zero_area_is_refused_with_the_face(backend):
     X = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]]
-    with pytest.raises(SurfaceError, match=r"face 0 = \[0, 1, 2\] of patch 'roof' has zero area"):
+    with pytest.raises(SurfaceError, match=r"faces\[0\] = \[0, 1, 2\] of patch 'roof' has zero"):
         solve(
             Surface(X, [[0, 1, 2], [0, 2, 3]], [0, 0], [Patch("roof", 1.0)], fixed=[0]),
             backend=backend,

@@ -94,9 +94,13 @@ def test_what_is_behind_is_hidden(renderer):
 def test_light_falls_on_both_sides_alike():
     surface = two_squares(4)
     under = pcmc.Surface(
-        surface.vertices, surface.faces[:, ::-1], surface.patch_of_face, surface.patches,
-        surface.fixed, surface.on_plane,
-    )  # fmt: skip
+        surface.vertices,
+        surface.faces[:, ::-1],
+        surface.patch_of_face,
+        surface.patches,
+        surface.fixed,
+        surface.on_plane,
+    )
     np.testing.assert_array_equal(plot.draw(surface), plot.draw(under))
 
 
@@ -114,8 +118,9 @@ def test_each_surface_may_show_patches_of_its_own():
     assert (left[:, 210:] == 255).all()
     assert (right[:, 210:390] < 250).any()
     assert (left[:, :190] == right[:, :190]).all()
-    larger = plot.panel([surface] * 2, views="plan", patches=[["left"], None], width=800,
-                        one_scale=False)  # fmt: skip
+    larger = plot.panel(
+        [surface] * 2, views="plan", patches=[["left"], None], width=800, one_scale=False
+    )
     assert (larger[:, 210:390] < 250).any()
 
 
@@ -306,8 +311,14 @@ def test_a_heatmap_shows_values_marks_and_gaps(tmp_path):
     grey = near(plain, rgb("#D9D9D9"), 0.01)
     rows, columns = np.flatnonzero(grey.any(axis=1)), np.flatnonzero(grey.any(axis=0))
     wide = np.ptp(columns) / 3
-    at = [(rows.min() + (2 * r + 1) * np.ptp(rows) // 4, columns.min() + (2 * c + 1) * np.ptp(columns) // 6)
-          for r in range(2) for c in range(3)]  # fmt: skip
+    at = [
+        (
+            rows.min() + (2 * r + 1) * np.ptp(rows) // 4,
+            columns.min() + (2 * c + 1) * np.ptp(columns) // 6,
+        )
+        for r in range(2)
+        for c in range(3)
+    ]
     assert [bool(grey[place]) for place in at] == [True, False, False, False, False, True]
     y, x = np.nonzero((plain != marked).any(axis=2))
     assert abs(x.mean() - at[2][1]) < 0.1 * wide

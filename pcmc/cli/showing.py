@@ -124,7 +124,7 @@ def explore(
 
 def _example(name: str, parameters: dict[str, Any]) -> Surface:
     """The surface of a generator, found by its name when it is asked for."""
-    from ..sweep.child import resolve
+    from ..sweep.case_script import resolve
 
     try:
         if ":" not in name:

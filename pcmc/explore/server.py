@@ -60,8 +60,10 @@ class Explorer:
         if not isinstance(surface, Surface):
             raise SurfaceError(
                 f"explore: expected a Surface, found {type(surface).__name__}",
-                what="surface", found=type(surface).__name__, expected="Surface",
-            )  # fmt: skip
+                what="surface",
+                found=type(surface).__name__,
+                expected="Surface",
+            )
         self._server = _listen(host, port)
         self._server.explorer = self
         self.title = title
@@ -173,8 +175,9 @@ def _listen(host: str, port: int) -> _Server:
         reason = getattr(error, "strerror", None) or error
         raise OptionError(
             f"cannot listen on {host!r}, port {port}: {reason}; with port 0 pcmc takes a free one",
-            what="port" if host in LOOPBACK else "host", found=(host, port),
-        ) from None  # fmt: skip
+            what="port" if host in LOOPBACK else "host",
+            found=(host, port),
+        ) from None
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -294,8 +297,12 @@ class _Handler(BaseHTTPRequestHandler):
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the page says which formats carry the numbers
             path = Path(folder) / f"surface{suffix}"
-            write(path, state.surface, scalars=written_fields(state.surface, state.certificate),
-                  certificate=plain(state.certificate.numbers()))  # fmt: skip
+            write(
+                path,
+                state.surface,
+                scalars=written_fields(state.surface, state.certificate),
+                certificate=plain(state.certificate.numbers()),
+            )
             body = path.read_bytes()
         self._send(body, "application/octet-stream", f'attachment; filename="surface{suffix}"')
 

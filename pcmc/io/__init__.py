@@ -190,8 +190,10 @@ def write(
         if "\n" in patch.name or "\r" in patch.name:
             raise FileError(
                 f"{path}: the patch name {patch.name!r} contains a line break; rename the patch",
-                what=str(path), where="patches", found=patch.name,
-            )  # fmt: skip
+                what=str(path),
+                where="patches",
+                found=patch.name,
+            )
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
     lost = [name for name, scalar in scalars.items() if not form.holds(scalar, surface.n)]
     if certificate is not None and not form.certificate:
@@ -230,8 +232,11 @@ def _in_file(path: str | os.PathLike[str], error: PcmcError, kind: type[PcmcErro
     what = os.fspath(path) if kind is FileError else error.what
     return kind(
         f"{os.fspath(path)}: {error}",
-        what=what, where=error.where, found=error.found, expected=error.expected,
-    )  # fmt: skip
+        what=what,
+        where=error.where,
+        found=error.found,
+        expected=error.expected,
+    )
 
 
 def _format(path: Path) -> Format:
@@ -239,8 +244,10 @@ def _format(path: Path) -> Format:
     if suffix not in FORMATS:
         raise FileError(
             f"{path}: {unknown('suffix', suffix, FORMATS)}",
-            what=str(path), found=suffix, expected=list(FORMATS),
-        )  # fmt: skip
+            what=str(path),
+            found=suffix,
+            expected=list(FORMATS),
+        )
     return FORMATS[suffix]
 
 
@@ -255,8 +262,10 @@ def _values(certificate: Any) -> Mapping[str, Any]:
     if not is_dataclass(certificate):
         raise FileError(
             f"certificate: expected a Certificate, found {type(certificate).__name__}",
-            what="certificate", found=type(certificate).__name__, expected="Certificate",
-        )  # fmt: skip
+            what="certificate",
+            found=type(certificate).__name__,
+            expected="Certificate",
+        )
     shown = [f.name for f in fields(certificate) if f.repr and not f.name.startswith("_")]
     return {name: getattr(certificate, name) for name in shown}
 
@@ -267,6 +276,8 @@ def _scalar(surface: Surface, name: str, value: npt.ArrayLike) -> Floats:
         raise FileError(
             f"scalars[{name!r}]: expected shape ({surface.n},) for vertices or ({surface.m},) for"
             f" faces, found {array.shape}",
-            what="scalars", where=name, found=array.shape,
-        )  # fmt: skip
+            what="scalars",
+            where=name,
+            found=array.shape,
+        )
     return array

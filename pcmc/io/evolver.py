@@ -199,9 +199,16 @@ def _open(path: Path) -> _File:
 
 
 UNREADABLE = (
-    "string", "quadratic", "lagrange", "simplex_representation", "torus", "torus_filled",
-    "symmetry_group", "#include", "#define",
-)  # fmt: skip
+    "string",
+    "quadratic",
+    "lagrange",
+    "simplex_representation",
+    "torus",
+    "torus_filled",
+    "symmetry_group",
+    "#include",
+    "#define",
+)
 
 
 def _parameters(top: _Section) -> dict[str, float]:

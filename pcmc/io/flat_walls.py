@@ -1,4 +1,4 @@
-"""Walls without height, for formats with a mesh per patch: kept as text beside the meshes.
+"""Walls without height, for formats with a mesh per patch: written as text beside the meshes.
 
 Below a junction on Π the triangles of a wall have no area, and its vertices lie on the junction. Meshes for
 other programs cannot hold such triangles, and a reader that joins patches by position would merge them. So

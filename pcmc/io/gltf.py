@@ -55,9 +55,12 @@ def write(
         mesh = trimesh.Trimesh(turned[used], local.reshape(-1, 3), process=False)
         mesh.vertex_attributes.update({key: values[used] for key, values in data.items()})
         material = trimesh.visual.material.PBRMaterial(
-            name=patch.name, baseColorFactor=[*color, 1.0], metallicFactor=0.0,
-            roughnessFactor=0.9, doubleSided=True,
-        )  # fmt: skip
+            name=patch.name,
+            baseColorFactor=[*color, 1.0],
+            metallicFactor=0.0,
+            roughnessFactor=0.9,
+            doubleSided=True,
+        )
         mesh.visual = trimesh.visual.TextureVisuals(material=material)
         scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name, transform=place)
     scene.metadata["pcmc"] = metadata_text(surface)
@@ -90,7 +93,9 @@ def read(path: Path) -> MeshData:
     scalars = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_") and k != SUPPORT}
     support = mesh.scalars.get(SUPPORT)
     return replace(
-        mesh, vertices=X, scalars=scalars,
+        mesh,
+        vertices=X,
+        scalars=scalars,
         support=None if support is None else np.round(support).astype(np.int8),
         walls=scene.metadata.get(KEY),
-    )  # fmt: skip
+    )

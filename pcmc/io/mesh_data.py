@@ -90,9 +90,12 @@ def merged(data: MeshData) -> MeshData:
     n = len(data.vertices)
     scalars = {k: v[keep] if len(v) == n else v for k, v in data.scalars.items()}
     return replace(
-        data, vertices=data.vertices[keep], faces=place[data.faces], support=support,
+        data,
+        vertices=data.vertices[keep],
+        faces=place[data.faces],
+        support=support,
         scalars=scalars,
-    )  # fmt: skip
+    )
 
 
 def to_surface(
@@ -123,9 +126,14 @@ def to_surface(
     patches = _changed(data.patches, "tension", tensions)
     plane = plane or data.plane or Plane()
     return Surface(
-        _on(plane, data.vertices, sliding & ~held), data.faces, data.patch_of_face,
-        _changed(patches, "pressure", pressures), held, sliding, plane,
-    )  # fmt: skip
+        _on(plane, data.vertices, sliding & ~held),
+        data.faces,
+        data.patch_of_face,
+        _changed(patches, "pressure", pressures),
+        held,
+        sliding,
+        plane,
+    )
 
 
 def _on(plane: Plane, X: Floats, sliding: Bools) -> Floats:

@@ -29,8 +29,12 @@ FORMAT = "pcmc surface"
 
 
 def write(
-    path: Path, surface: Surface, scalars: Mapping[str, Floats], certificate: Mapping[str, Any], **_: Any,
-) -> None:  # fmt: skip
+    path: Path,
+    surface: Surface,
+    scalars: Mapping[str, Floats],
+    certificate: Mapping[str, Any],
+    **_: Any,
+) -> None:
     """The archive; the same surface gives the same bytes."""
     tables = {
         k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object
@@ -45,10 +49,14 @@ def write(
     arrays |= {f"certificate {name}": value for name, value in tables.items()}
     with path.open("wb") as file:
         np.savez_compressed(
-            file, meta=np.array(json.dumps(meta, default=_plain)), vertices=surface.vertices,
-            faces=surface.faces, patch_of_face=surface.patch_of_face,
-            support=support_of(surface), **arrays,
-        )  # fmt: skip
+            file,
+            meta=np.array(json.dumps(meta, default=_plain)),
+            vertices=surface.vertices,
+            faces=surface.faces,
+            patch_of_face=surface.patch_of_face,
+            support=support_of(surface),
+            **arrays,
+        )
 
 
 def read(path: Path) -> MeshData:
@@ -63,21 +71,29 @@ def read(path: Path) -> MeshData:
         if meta["format"] != FORMAT:
             raise FileError(
                 f"expected the format {FORMAT!r}, found {meta['format']!r}",
-                where="format", found=meta["format"], expected=FORMAT,
-            )  # fmt: skip
+                where="format",
+                found=meta["format"],
+                expected=FORMAT,
+            )
         if meta["version"] > VERSION:
             raise FileError(
                 f"written by a newer pcmc (format {meta['version']}, this one reads up to"
                 f" {VERSION}); update pcmc",
-                where="version", found=meta["version"], expected=VERSION,
-            )  # fmt: skip
+                where="version",
+                found=meta["version"],
+                expected=VERSION,
+            )
         metadata = parse_metadata(meta["description"])
         return MeshData(
-            arrays.pop("vertices"), arrays.pop("faces"), arrays.pop("patch_of_face"),
-            tuple(metadata.patches.values()), arrays.pop("support"), metadata.plane,
+            arrays.pop("vertices"),
+            arrays.pop("faces"),
+            arrays.pop("patch_of_face"),
+            tuple(metadata.patches.values()),
+            arrays.pop("support"),
+            metadata.plane,
             scalars=_under("scalar ", arrays),
             certificate={**meta["certificate"], **_under("certificate ", arrays)},
-        )  # fmt: skip
+        )
 
 
 def _under(prefix: str, arrays: Mapping[str, Any]) -> dict[str, Any]:
@@ -94,5 +110,6 @@ def _plain(value: Any) -> Any:
         return value.to_dict(orient="records")
     raise FileError(
         f"certificate: cannot write a {type(value).__name__}; use numbers, texts, arrays and tables",
-        where="certificate", found=type(value).__name__,
-    )  # fmt: skip
+        where="certificate",
+        found=type(value).__name__,
+    )

@@ -69,9 +69,15 @@ def read(path: Path) -> MeshData:
     metadata.check_counts(len(X), len(F))
     known = comment is not None or bool(support.any())
     return MeshData(
-        X, F, np.concatenate(groups)[source], metadata.named(names), support if known else None,
-        metadata.plane, notes=notes, joined=metadata.counts is not None,
-    )  # fmt: skip
+        X,
+        F,
+        np.concatenate(groups)[source],
+        metadata.named(names),
+        support if known else None,
+        metadata.plane,
+        notes=notes,
+        joined=metadata.counts is not None,
+    )
 
 
 def _vertices(text: str) -> Floats:

@@ -43,15 +43,21 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any)
         if key in RESERVED:
             raise FileError(
                 f"scalars: .ply files use the name {name!r} themselves; rename the scalar",
-                where=name, found=name,
-            )  # fmt: skip
+                where=name,
+                found=name,
+            )
         (vertex if len(values) == surface.n else face)[key] = np.asarray(values, dtype="<f8")
     header = [
-        "ply", "format binary_little_endian 1.0", f"{MARK}{metadata_text(surface)}",
-        f"element vertex {surface.n}", *_announced(vertex),
-        f"element face {surface.m}", "property list uchar int vertex_indices", *_announced(face),
+        "ply",
+        "format binary_little_endian 1.0",
+        f"{MARK}{metadata_text(surface)}",
+        f"element vertex {surface.n}",
+        *_announced(vertex),
+        f"element face {surface.m}",
+        "property list uchar int vertex_indices",
+        *_announced(face),
         "end_header\n",
-    ]  # fmt: skip
+    ]
     three = {"corners": np.full(surface.m, 3, dtype="u1")}
     corners = {f"corner {k}": surface.faces[:, k].astype("<i4") for k in range(3)}
     with path.open("wb") as file:
@@ -171,8 +177,9 @@ def _elements(header: str, order: str) -> list[_Element]:
     if "vertex" not in names or "face" not in names[names.index("vertex") :]:
         raise FileError(
             f"its header must list vertices, then faces; found {', '.join(names) or 'none'}",
-            where="header", found=names,
-        )  # fmt: skip
+            where="header",
+            found=names,
+        )
     missing = set("xyz") - {name for name, _ in elements[names.index("vertex")].before}
     if missing:
         raise FileError(f"its vertices have no property {min(missing)}", where="vertex")
@@ -258,5 +265,6 @@ def _enough(element: _Element, data: bytes, end: int) -> None:
     if end > len(data):
         raise FileError(
             f"cut off: the file ends before its {element.size} {element.name} elements do",
-            where=element.name, expected=element.size,
-        )  # fmt: skip
+            where=element.name,
+            expected=element.size,
+        )

@@ -136,10 +136,16 @@ def from_polygons(
         },
     }
     return MeshData(
-        X, F, patch[source], metadata.named(names),
+        X,
+        F,
+        patch[source],
+        metadata.named(names),
         None if support is None else np.asarray(support).ravel().astype(np.int8),
-        metadata.plane, scalars, notes=notes, joined=metadata.counts is not None,
-    )  # fmt: skip
+        metadata.plane,
+        scalars,
+        notes=notes,
+        joined=metadata.counts is not None,
+    )
 
 
 def _one(values: Any, size: int) -> bool:

@@ -118,8 +118,9 @@ def read(path: Path) -> MeshData:
     if not X:
         raise FileError(
             f"the file has no meshes ({others} other objects); mesh the surfaces in Rhino",
-            where="meshes", found=0,
-        )  # fmt: skip
+            where="meshes",
+            found=0,
+        )
     points = np.concatenate(X)
     F, source, notes = triangulate(points, np.concatenate(corners), np.concatenate(counts))
     if others:

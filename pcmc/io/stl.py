@@ -69,13 +69,17 @@ def _complete(path: Path) -> None:
             line = data.rstrip().count(b"\n") + 1
             raise FileError(
                 f"line {line}: cut off before 'endsolid', found {last[:40].decode()!r}",
-                where=line, found=last[:40].decode(), expected="endsolid",
-            )  # fmt: skip
+                where=line,
+                found=last[:40].decode(),
+                expected="endsolid",
+            )
         return
     count = int.from_bytes(data[80:84], "little")
     if len(data) < 84 or len(data) < 84 + 50 * count:
         raise FileError(
             f"not an STL file, or cut off: {count} triangles need {84 + 50 * count} bytes, found"
             f" {len(data)}",
-            where=count, found=len(data), expected=84 + 50 * count,
-        )  # fmt: skip
+            where=count,
+            found=len(data),
+            expected=84 + 50 * count,
+        )

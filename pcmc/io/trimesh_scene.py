@@ -38,6 +38,10 @@ def from_meshes(scene: Any, default: str, metadata: Metadata | None = None) -> M
         raise FileError("the file has no triangles", where="faces", found=0)
     scalars = {k: np.concatenate(v) for k, v in data.items() if sum(map(len, v)) == start}
     return MeshData(
-        np.concatenate(X), np.concatenate(F), np.concatenate(patch), metadata.named(names),
-        plane=metadata.plane, scalars=scalars,
-    )  # fmt: skip
+        np.concatenate(X),
+        np.concatenate(F),
+        np.concatenate(patch),
+        metadata.named(names),
+        plane=metadata.plane,
+        scalars=scalars,
+    )

@@ -36,8 +36,9 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any)
         if name in RESERVED:
             raise FileError(
                 f"scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar",
-                where=name, found=name,
-            )  # fmt: skip
+                where=name,
+                found=name,
+            )
         (mesh.point_data if len(values) == surface.n else mesh.cell_data)[name] = values
     mesh.field_data["pcmc"] = [metadata_text(surface)]
     if path.suffix.lower() == ".vtu":
@@ -84,8 +85,10 @@ def _cells(mesh: Any) -> tuple[Ints, Ints, Ints]:
         raise FileError(
             f"cell {solid[0]} is of VTK's type {mesh.celltypes[solid[0]]}; pcmc reads triangles, quads"
             " and polygons",
-            where=int(solid[0]), found=int(mesh.celltypes[solid[0]]), expected=FLAT,
-        )  # fmt: skip
+            where=int(solid[0]),
+            found=int(mesh.celltypes[solid[0]]),
+            expected=FLAT,
+        )
     chosen = np.flatnonzero(np.isin(mesh.celltypes, FLAT))
     offsets = np.asarray(mesh.cell_offsets)
     counts = np.diff(offsets)[chosen]

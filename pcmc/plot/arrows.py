@@ -68,9 +68,12 @@ def vectors(
     (frame,) = frames_of([np.concatenate([at, tips])], 1, width)
     spacing = mean_edge(surface) * frame.scale
     painted = scene(
-        surface, seen, None, supports=supports and spacing >= DOTS_FROM,
+        surface,
+        seen,
+        None,
+        supports=supports and spacing >= DOTS_FROM,
         edges=spacing >= EDGES_FROM if edges is None else edges,
-    )  # fmt: skip
+    )
     figure, (axes,) = frame_axes([frame], 1, width)
     axes.set_title(title, fontsize=TEXT, color=INK, pad=5.0)
     if label:
@@ -80,16 +83,31 @@ def vectors(
     if longest > 0.0:
         chosen = _thinned(at, np.linalg.norm(arrows, axis=1), most)
         quiver = axes.quiver(
-            *at[chosen].T, *(tips - at)[chosen].T, angles="xy", scale_units="xy", scale=1.0,
-            color=ARROW, width=2.2 / width, headwidth=4.0, headlength=5.0, headaxislength=4.5,
-        )  # fmt: skip
+            *at[chosen].T,
+            *(tips - at)[chosen].T,
+            angles="xy",
+            scale_units="xy",
+            scale=1.0,
+            color=ARROW,
+            width=2.2 / width,
+            headwidth=4.0,
+            headlength=5.0,
+            headaxislength=4.5,
+        )
         if label:
             unit = float(f"{longest:.1g}")
             middle = 0.5 * axes.get_position().y0
             axes.quiverkey(
-                quiver, 0.5, middle, unit * stretch, f"{unit:g} {label}", coordinates="figure",
-                labelpos="E", fontproperties={"size": SMALL}, labelcolor=INK,
-            )  # fmt: skip
+                quiver,
+                0.5,
+                middle,
+                unit * stretch,
+                f"{unit:g} {label}",
+                coordinates="figure",
+                labelpos="E",
+                fontproperties={"size": SMALL},
+                labelcolor=INK,
+            )
     return finish(figure, path)
 
 

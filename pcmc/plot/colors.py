@@ -1,4 +1,4 @@
-"""Numbers as colours, and the scale that says which."""
+"""Numbers as colours, and the scale that explains them."""
 
 from __future__ import annotations
 

@@ -52,9 +52,9 @@ def lines(
 ) -> Image:
     """Curves y(x) by label, each a pair of arrays; values that are not finite leave a gap.
 
-    On a "log" axis values ≤ 0 leave a gap too. ``x``, ``y`` are the axes' labels. ``dashes`` draws
-    curves which lie on each other so that all are seen; ``levels`` are values of y by label, such as
-    bounds, drawn across.
+    On a "log" axis values ≤ 0 leave a gap too. ``x``, ``y`` are the axes' labels. With ``dashes``
+    curves that lie on each other all stay visible; ``levels`` are values of y by label, such as
+    bounds, drawn as horizontal lines.
     """
     for scale in (xscale, yscale):
         if scale not in SCALES:
@@ -64,15 +64,22 @@ def lines(
     axes.set_yscale(yscale)
     for k, (label, (xs, ys)) in enumerate(curves.items()):
         px, py = _curve(label, xs, ys, xscale, yscale)
-        turn = k // len(CURVES)  # how often the colours have been gone through
+        turn = k // len(CURVES)  # how many times all colours are used already
         look = (
             overlap_style(k, len(curves))
             if dashes
             else {"linewidth": 1.1, "linestyle": ("-", "--")[turn % 2]}
         )
         marker = MARKERS[(k + turn) % len(MARKERS)] if markers else None
-        axes.plot(px, py, color=CURVES[k % len(CURVES)], marker=marker, markersize=2.8, label=label,
-                  **look)  # fmt: skip
+        axes.plot(
+            px,
+            py,
+            color=CURVES[k % len(CURVES)],
+            marker=marker,
+            markersize=2.8,
+            label=label,
+            **look,
+        )
     for label, level in (levels or {}).items():
         axes.axhline(
             level, color=INK, linewidth=0.9, linestyle=(0, (5, 3)), label=label, zorder=1.5
@@ -84,7 +91,7 @@ def lines(
 
 
 def _plain_ticks(axis: Any) -> None:
-    """On a logarithmic axis shorter than a decade and a half: round numbers, written out."""
+    """On a logarithmic axis shorter than a decade and a half: round numbers in plain notation."""
     low, high = axis.get_view_interval()
     if not 0.0 < low < high < 30.0 * low:
         return
@@ -129,10 +136,16 @@ def histories(
         curves[name] = (xs, frame[y].to_numpy())
     positive = all((np.asarray(v)[np.isfinite(v)] > 0.0).all() for _, v in curves.values())
     return lines(
-        curves, path, x=(x or "iteration").replace("_", " "), y=label or y.replace("_", " "),
-        title=title, yscale=yscale or ("log" if positive and y != "energy" else "linear"),
-        dashes=dashes, width=width, height=height,
-    )  # fmt: skip
+        curves,
+        path,
+        x=(x or "iteration").replace("_", " "),
+        y=label or y.replace("_", " "),
+        title=title,
+        yscale=yscale or ("log" if positive and y != "energy" else "linear"),
+        dashes=dashes,
+        width=width,
+        height=height,
+    )
 
 
 def convergence(
@@ -159,8 +172,15 @@ def convergence(
             ends = np.array([px[known].min(), px[known].max()])
             axes.plot(ends, np.exp(height_at_1) * ends**slope, color=color, linewidth=0.8)
             label = f"{name}: slope {slope:.2f}"
-        axes.plot(px, py, color=color, linestyle="none", marker=MARKERS[k % len(MARKERS)],
-                  markersize=3.2, label=label)  # fmt: skip
+        axes.plot(
+            px,
+            py,
+            color=color,
+            linestyle="none",
+            marker=MARKERS[k % len(MARKERS)],
+            markersize=3.2,
+            label=label,
+        )
     every = np.unique(np.concatenate([np.asarray(xs, dtype=float) for xs, _ in curves.values()]))
     every = every[np.isfinite(every) & (every > 0.0)]
     if len(every) <= 8:
@@ -249,8 +269,15 @@ def add_legend(axes: Any, count: int) -> None:
             loc="outside right upper",
         )
     elif count > 1 or axes.get_legend_handles_labels()[1] not in ([], [""]):
-        axes.legend(fontsize=SMALL, labelcolor=INK, handlelength=3.2, facecolor="white",
-                    framealpha=0.8, edgecolor="none", borderpad=0.2)  # fmt: skip
+        axes.legend(
+            fontsize=SMALL,
+            labelcolor=INK,
+            handlelength=3.2,
+            facecolor="white",
+            framealpha=0.8,
+            edgecolor="none",
+            borderpad=0.2,
+        )
 
 
 def table_ticks(

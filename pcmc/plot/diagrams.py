@@ -50,14 +50,23 @@ def diagram(
         color = CURVES[k % len(CURVES)]
         named = label
         for stable, (px, py) in _pieces(branch, x, y):
-            axes.plot(px, py, color=color, linewidth=1.1, linestyle="-" if stable else "--",
-                      label=named)  # fmt: skip
+            axes.plot(
+                px, py, color=color, linewidth=1.1, linestyle="-" if stable else "--", label=named
+            )
             named = ""
         for kind, rows in branch.events.groupby("kind", sort=False):
             text = "" if kind in marked else MEANINGS[str(kind)]
             marked.add(str(kind))
-            axes.plot(rows[x], rows[y], MARKERS[str(kind)], color=color, markersize=3.6,
-                      markerfacecolor="white", markeredgewidth=0.8, label=text)  # fmt: skip
+            axes.plot(
+                rows[x],
+                rows[y],
+                MARKERS[str(kind)],
+                color=color,
+                markersize=3.6,
+                markerfacecolor="white",
+                markeredgewidth=0.8,
+                label=text,
+            )
     add_legend(axes, len(branches) + len(marked))
     return finish(figure, path)
 

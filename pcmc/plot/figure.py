@@ -1,4 +1,4 @@
-"""One look for every figure: fonts, sizes, and how it becomes a file."""
+"""The common style of all figures, their layout, and their PNG files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Image = npt.NDArray[np.uint8]
 def new(width: float, height: float, pad: float = 4.0) -> Any:
     """A figure of the given size in pixels, drawn by Agg; no global state.
 
-    Matplotlib's constrained layout places what is in it, ``pad`` pixels apart.
+    Matplotlib's constrained layout places its parts, ``pad`` pixels apart.
     """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -97,8 +97,8 @@ def overlap_style(k: int, count: int) -> dict[str, Any]:
 def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
     """The figure as an (h,w,3) image, written as a PNG if there is a path.
 
-    The file says nothing of when and by what it was made: the same figure gives the same bytes.
-    Above 145 kB it is written again in 256 colours.
+    The file has no date and no program's name: the same figure gives the same bytes.
+    Above 145 kB it has 256 colours only.
     """
     from PIL import Image as Pillow
 

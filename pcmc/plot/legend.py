@@ -61,7 +61,14 @@ def add_legend(figure: Any, pictures: Iterable[Shown]) -> None:
     ]
     if handles:
         figure.legend(
-            handles=handles, loc="outside lower center", ncols=min(len(handles), IN_A_LINE),
-            fontsize=SMALL, frameon=False, labelcolor=INK, handlelength=1.2, handleheight=1.0,
-            borderaxespad=0.3, borderpad=0.9,
-        )  # fmt: skip
+            handles=handles,
+            loc="outside lower center",
+            ncols=min(len(handles), IN_A_LINE),
+            fontsize=SMALL,
+            frameon=False,
+            labelcolor=INK,
+            handlelength=1.2,
+            handleheight=1.0,
+            borderaxespad=0.3,
+            borderpad=0.9,
+        )

@@ -60,7 +60,7 @@ def draw(
     limits : range of the scale; by default that of the values, symmetric if they have both signs.
     cmap : a matplotlib colour map; by default "viridis", or "RdBu_r" if the values have both signs.
     supports : dots, red at fixed vertices and blue at sliding ones.
-    edges : the mesh's edges; by default where they are long enough to be told apart.
+    edges : the mesh's edges; by default if they are long enough to be distinguished.
     numbers : (n,) values printed at the vertices that face the viewer, NaN not.
     form : the format of the numbers.
     legend : explain the colours of patches, supports, and places without a value.
@@ -78,11 +78,23 @@ def draw(
     MissingExtra : when pyvista or matplotlib is not installed.
     """
     return panel(
-        [surface], path, views=[view], scalars=None if scalars is None else [scalars], label=label,
-        limits=limits, cmap=cmap, supports=supports, edges=edges, patches=patches,
-        numbers=None if numbers is None else [numbers], form=form, legend=legend,
-        titles=[title] if title else (), width=width, renderer=renderer,
-    )  # fmt: skip
+        [surface],
+        path,
+        views=[view],
+        scalars=None if scalars is None else [scalars],
+        label=label,
+        limits=limits,
+        cmap=cmap,
+        supports=supports,
+        edges=edges,
+        patches=patches,
+        numbers=None if numbers is None else [numbers],
+        form=form,
+        legend=legend,
+        titles=[title] if title else (),
+        width=width,
+        renderer=renderer,
+    )
 
 
 def panel(
@@ -134,11 +146,13 @@ def panel(
     fit_frames(figure, axes, frames, columns)
     for k, drawing in enumerate(drawings):
         painted = scene(
-            drawing.surface, drawing.view,
+            drawing.surface,
+            drawing.view,
             None if colors is None or drawing.values is None else colors.rgb(drawing.values),
-            supports=dotted[k], edges=edge[k] >= EDGES_FROM if edges is None else edges,
+            supports=dotted[k],
+            edges=edge[k] >= EDGES_FROM if edges is None else edges,
             patches=drawing.patches,
-        )  # fmt: skip
+        )
         frames[k].show(
             axes[k], paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer)
         )
@@ -262,9 +276,15 @@ def _print_numbers(axes: Any, surface: Surface, view: View, numbers: Floats, for
     shown = np.flatnonzero(np.isfinite(numbers) & _facing(surface, view))
     for (x, y), number in zip(view.project(surface.vertices[shown]), numbers[shown], strict=True):
         axes.text(
-            x, y, format(number, form), fontsize=SMALL, color=INK, ha="center", va="center",
+            x,
+            y,
+            format(number, form),
+            fontsize=SMALL,
+            color=INK,
+            ha="center",
+            va="center",
             path_effects=[withStroke(linewidth=1.4, foreground="white")],
-        )  # fmt: skip
+        )
 
 
 def _facing(surface: Surface, view: View) -> Bools:
