@@ -1,7 +1,7 @@
-"""Nearly equilateral triangles inside plane outlines with given vertices.
+"""Nearly equilateral triangles inside plane outlines; the vertices of the outlines do not move.
 
-The paper's examples are meshed here and not by ``pcmc.plan``: the flow depends on the mesh, and a better
-mesher for plans must not change the reproduced numbers.
+The examples of the paper use these meshes and not those of ``pcmc.plan``: the result of a flow depends on
+its mesh, and changes to the mesher of plans must not change the reproduced numbers.
 """
 
 from __future__ import annotations
@@ -17,18 +17,17 @@ from pcmc.base.arrays import Bools, Floats, Ints
 from pcmc.base.errors import OptionError
 from pcmc.surface.geometry import cross_2d
 
-CLEARANCE = 0.65  # of the spacing: where the lattice ends before an outline
-SWEEPS, RELAXATIONS = 4, 5  # triangulations, and steps on each; more gain nothing
-LONG = 1.05  # of the spacing: longer edges push no vertices
-STEP = 0.1  # part of an edge's missing length that each of its triangles adds: 0.2 oscillates
+CLEARANCE = 0.65  # of the spacing: distance of the lattice from the outlines
+SWEEPS, RELAXATIONS = 4, 5  # triangulations, and steps on each; more do not improve the mesh
+REACH = 1.05  # of the spacing: shorter edges push their ends apart
+STEP = 0.1  # of the length that an edge lacks, for each of its triangles; 0.2 oscillates
 
 
 def fill(outlines: Sequence[Floats], spacing: float) -> tuple[Floats, Ints]:
     """Interior points and faces of the region inside ``outlines``.
 
-    A triangular lattice fills the region up to a clearance from the outlines; then, in a few
-    sweeps, edges that are too short push their ends apart and the points are triangulated anew
-    (Delaunay).
+    A triangular lattice fills the region at some distance from the outlines. In each of a few
+    sweeps, short edges push their ends apart, and a new Delaunay triangulation connects the points.
 
     Parameters
     ----------
@@ -45,8 +44,8 @@ def fill(outlines: Sequence[Floats], spacing: float) -> tuple[Floats, Ints]:
     Raises
     ------
     OptionError
-        A side of an outline is not an edge of the triangulation: its segments are too long where it
-        comes near itself or another outline.
+        If a side of an outline is not an edge of the triangulation: the segments are too long where
+        outlines are close to each other.
 
     >>> square = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [2, 2], [1, 2], [0, 2], [0, 1.0]])
     >>> points, faces = fill([square], 1.0)
@@ -62,7 +61,7 @@ def fill(outlines: Sequence[Floats], spacing: float) -> tuple[Floats, Ints]:
     for _ in range(SWEEPS):
         points = _relaxed(rim, points, region.triangulate(points), spacing)
     faces = region.triangulate(points)
-    _check_sides(faces, sides, rim)
+    _require_sides(faces, sides, rim)
     return points, faces
 
 
@@ -108,7 +107,7 @@ def _lattice(rim: Floats, spacing: float) -> Floats:
 
 
 def _ray_crossings(points: Floats, rim: Floats, sides: Ints) -> Ints:
-    """How many sides a ray to the right from each point meets: odd inside."""
+    """Number of sides that a ray to the right of each point crosses; odd inside."""
     counts = np.zeros(len(points), dtype=np.int64)
     for part in np.array_split(np.arange(len(points)), 1 + len(points) * len(sides) // 10**7):
         x, y = points[part].T[:, :, None]
@@ -135,7 +134,7 @@ def _distance(points: Floats, rim: Floats, sides: Ints) -> Floats:
 
 
 def _relaxed(rim: Floats, points: Floats, faces: Ints, spacing: float) -> Floats:
-    """The interior points after short edges have pushed their ends apart; the rim stays."""
+    """The interior points after short edges have pushed their ends apart; the rim does not move."""
     both = np.concatenate([rim, points])
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     side = np.tile(np.arange(len(sides)), 2)
@@ -144,12 +143,12 @@ def _relaxed(rim: Floats, points: Floats, faces: Ints, spacing: float) -> Floats
     for _ in range(RELAXATIONS):
         apart = both[sides[:, 0]] - both[sides[:, 1]]
         length = np.linalg.norm(apart, axis=1)
-        short = np.maximum(LONG * spacing - length, 0.0)
+        short = np.maximum(REACH * spacing - length, 0.0)
         both[len(rim) :] += (ends @ (apart * (short / length)[:, None]))[len(rim) :]
     return both[len(rim) :]
 
 
-def _check_sides(faces: Ints, sides: Ints, rim: Floats) -> None:
+def _require_sides(faces: Ints, sides: Ints, rim: Floats) -> None:
     n = int(faces.max()) + 1
     pairs = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     wanted = np.sort(sides, axis=1)
@@ -157,10 +156,8 @@ def _check_sides(faces: Ints, sides: Ints, rim: Floats) -> None:
     if len(lost):
         point = rim[sides[lost[0], 0]].round(6).tolist()
         raise OptionError(
-            f"the outline's side at {point} is not an edge of the triangulation ({len(lost)}"
-            " such sides): its segments are too long there; use a smaller edge length",
+            f"the side of the outline at {point} is not an edge of the triangulation ({len(lost)} such"
+            " sides): its segments are too long there; use a smaller edge length",
             what="outlines",
-            where=int(lost[0]),
-            found=len(lost),
-            expected=0,
+            where=tuple(point),
         )

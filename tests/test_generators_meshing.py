@@ -72,9 +72,8 @@ def test_fill_wants_outlines_as_fine_as_its_spacing():
     left = [[0, 0], [4, 0], [4, 4], [4, 8], [0, 8], [0, 4]]
     right = [[4.1, 8], [8, 8], [8, 0], [4, -2], [0, -2]]
     slit = np.array([[4.1, 2.0], *right, *left, [4.1, 6.0]][::-1])
-    with refused(OptionError, what="outlines", expected=0) as caught:
+    with refused(OptionError, what="outlines"):
         fill([slit], 1.0)
-    assert caught.value.found > 0
 
 
 @pytest.mark.parametrize("mirrored", [False, True])

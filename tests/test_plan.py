@@ -187,9 +187,11 @@ def test_dividers_that_cross_share_a_line():
 def test_points_curves_and_edges_as_supports():
     beam = bezier([[5, 8, 1], [10, 10, 4], [15, 8, 1]])
     plan = Plan(
-        BOX, edge="free", tension=10.0,
+        BOX,
+        edge="free",
+        tension=10.0,
         supports=[[[0, 0], [6, 0]], [[20, 6], [20, 12], [14, 12]], [0, 12], [10, 4, 2.0], beam],
-    )  # fmt: skip
+    )
     with pytest.warns(PlanWarning, match="nothing holds the outline at .* has nothing to pull"):
         surface = plan.surface()
     X = surface.vertices[surface.fixed]

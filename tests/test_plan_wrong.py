@@ -81,14 +81,11 @@ def test_a_divider_that_ends_inside_a_patch_names_the_nearest_line():
     ("changes", "fields"),
     [
         ({"outlin": BOX}, {"what": "plan", "where": "outlin"}),
-        ({"edge": "hinged"}, {"what": "outline: edge", "found": "hinged"}),
         ({"supports": [[np.nan, 2.0]]}, {"what": "support 1"}),
         ({"tension": None}, {"what": "tension"}),
         ({"plane": {"normals": [0, 0, 1]}}, {"what": "plane", "where": "normals"}),
         ({"dividers": [{"curve": WALL, "botom": "held"}]}, {"what": "divider 1", "where": "botom"}),
-        ({"dividers": [{"curve": WALL, "bottom": "hold"}]}, {"what": "divider 1: bottom"}),
         ({"dividers": [[[0, 0]]]}, {"what": "divider 1"}),
-        ({"holes": [{**COURT, "edge": "fix"}]}, {"what": "hole 1: edge", "found": "fix"}),
         ({"holes": [5]}, {"what": "hole 1"}),
         ({"supports": [[[0, 0], [np.inf, 0]]]}, {"what": "support 1", "where": 1}),
         ({"patches": {"a": {"tensions": 1.0}}}, {"what": "patch 'a'", "where": "tensions"}),
@@ -102,6 +99,22 @@ def test_a_divider_that_ends_inside_a_patch_names_the_nearest_line():
 def test_wrong_values_are_refused_at_once(changes, fields):
     with refused(OptionError, **fields):
         plan_from({"outline": BOX, **tension(changes), **changes})
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"edge": "hinged"}, "unknown edge of the outline 'hinged'"),
+        ({"dividers": [{"curve": WALL, "bottom": "hold"}]}, "unknown bottom of divider 1 'hold'"),
+        (
+            {"holes": [{**COURT, "edge": "fix"}]},
+            "unknown edge of hole 1 'fix'; did you mean 'fixed'",
+        ),
+    ],
+)
+def test_supports_are_named(changes, message):
+    with pytest.raises(OptionError, match=message):
+        plan_from({"outline": BOX, "tension": 5.0, **changes})
 
 
 @pytest.mark.parametrize(

@@ -90,11 +90,10 @@ def arrange(
         check_line(one)
     check_holes(drawn)
     meetings = _Meetings()
-    for number, one in enumerate(drawn):
-        last = float(len(one.curve.pieces))
-        ends = [] if one.curve.closed else [0.0, last]
+    for k, one in enumerate(drawn):
+        ends = [] if one.curve.closed else [0.0, float(len(one.curve.pieces))]
         for t in [*ends, *one.curve.corners.tolist()]:
-            meetings.add([(number, t)])
+            meetings.add([(k, t)])
     _find_crossings(drawn, meetings)
     _find_ends(drawn, meetings, snap)
     spots = np.zeros((0, 3)) if spots is None else spots
@@ -109,20 +108,14 @@ def arrange(
             )
     for xy in np.zeros((0, 2)) if stops is None else stops:
         meetings.add(lines_at(drawn, xy, snap))
-    first_spot = len(meetings.line)
-    alone = [number for number, places in enumerate(passing) if not places]
-    for places in passing:
-        meetings.add(places)
+    number = np.array([meetings.add(places) for places in passing], dtype=np.int64)
+    alone = np.array([not places for places in passing], dtype=bool)
     node, points, heights = _nodes(drawn, meetings, snap)
     chains, points, heights = _chains(drawn, meetings, node, points, heights, edge_length)
     chains = _inside_plan(drawn, chains, points, edge_length)
     vertex = np.empty(len(spots), dtype=np.int64)
-    vertex[alone] = len(points) + np.arange(len(alone))
-    cursor = first_spot
-    for number, places in enumerate(passing):
-        if places:
-            vertex[number] = node[cursor]
-            cursor += len(places)
+    vertex[~alone] = node[number[~alone]]
+    vertex[alone] = len(points) + np.arange(alone.sum())
     points = np.concatenate([points, spots[alone, :2]])
     heights = np.concatenate([heights, spots[alone, 2]])
     return _compact(Arrangement(points, heights, tuple(chains), vertex))
@@ -147,12 +140,14 @@ class _Meetings:
     t: list[float] = field(default_factory=list)
     same: list[tuple[int, int]] = field(default_factory=list)
 
-    def add(self, places: Sequence[tuple[int, float]]) -> None:
+    def add(self, places: Sequence[tuple[int, float]]) -> int:
+        """Add places that are one vertex; returns the number of the first."""
         first = len(self.line)
         for line, t in places:
             self.same.append((first, len(self.line)))
             self.line.append(line)
             self.t.append(t)
+        return first
 
 
 def _find_crossings(drawn: Sequence[Drawn], meetings: _Meetings) -> None:
@@ -183,13 +178,11 @@ def _find_ends(drawn: Sequence[Drawn], meetings: _Meetings, snap: float) -> None
             if one.kind is Kind.DIVIDER and not passing and contains(xy):
                 gaps = [(other.nearest(xy)[1], other) for other in drawn if other is not one]
                 gap, other = min(gaps, key=lambda pair: pair[0])
-                raise PlanError(
-                    f"{one.name} ends at {point_text(xy)} without reaching another line; {other.name} is"
-                    f" nearest, {gap:.3g} away: extend the divider to it",
-                    what=one.name,
-                    where=tuple(xy.tolist()),
-                    found=gap,
+                problem = (
+                    f"ends at {point_text(xy)} without reaching another line; {other.name} is nearest,"
+                    f" {gap:.3g} away: extend the divider to it"
                 )
+                raise one.error(problem, tuple(xy.tolist()), gap)
             meetings.add([(number, t), *passing])
 
 
@@ -288,8 +281,7 @@ def _inside_plan(
         kept.append(chain)
     gone = set(range(len(drawn))) - {chain.line for chain in kept}
     if gone:
-        name = drawn[min(gone)].name
-        raise PlanError(f"{name} is outside the plan or in a hole", what=name)
+        raise drawn[min(gone)].error("is outside the plan or in a hole")
     _check_chords(drawn, kept, points, edge_length)
     return kept
 

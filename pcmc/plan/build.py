@@ -77,35 +77,27 @@ def _meshed(plan: PlanData, drawn: Arrangement, holes: Sequence[Sequence[float]]
 
 def _check_size(plan: PlanData) -> None:
     """Refuse lengths that are probably mistakes, before they fill the memory."""
+
+    def error(key: str, problem: str) -> PlanError:
+        value = getattr(plan, key)
+        return PlanError(f"{key}={value:g} {problem}", what=key, found=value)
+
     x, y = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2].T
     area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
     count = area / (np.sqrt(0.1875) * plan.edge_length**2)
-    if count > MAX_TRIANGLES:
-        raise PlanError(
-            f"edge_length={plan.edge_length:g} would make about {count:.2g} triangles; at most"
-            f" {MAX_TRIANGLES} are allowed",
-            what="edge_length",
-            found=plan.edge_length,
-        )
     size = float(np.hypot(np.ptp(x), np.ptp(y)))
+    if count > MAX_TRIANGLES:
+        limit = f"at most {MAX_TRIANGLES} are allowed"
+        raise error("edge_length", f"would make about {count:.2g} triangles; {limit}")
     if plan.edge_length > size:
-        raise PlanError(
-            f"edge_length={plan.edge_length:g} is longer than the plan, {size:.4g} from corner to"
-            " corner; use a smaller one",
-            what="edge_length",
-            found=plan.edge_length,
-        )
+        problem = f"is longer than the plan, {size:.4g} from corner to corner; use a smaller one"
+        raise error("edge_length", problem)
     if plan.rise is not None and plan.rise > MAX_RISE * size:
-        raise PlanError(
-            f"rise={plan.rise:g} is more than {MAX_RISE:g} times the plan's size, {size:.4g}; use a"
-            " smaller one",
-            what="rise",
-            found=plan.rise,
-        )
+        limit = f"{MAX_RISE:g} times the plan's size, {size:.4g}"
+        raise error("rise", f"is more than {limit}; use a smaller one")
     for hole in plan.holes:
-        extent = float(
-            np.ptp(hole.curve.local(plan.plane).at(hole.curve.dense)[:, :2], axis=0).max()
-        )
+        xy = hole.curve.local(plan.plane).at(hole.curve.dense)[:, :2]
+        extent = float(np.ptp(xy, axis=0).max())
         if extent <= SNAP * plan.edge_length:
             raise PlanError(
                 f"{hole.name} is only {extent:g} wide, too little for edges of length"
@@ -170,8 +162,8 @@ def _warn_of_free_edges(drawn: Arrangement, lines: Sequence[Line], held: Bools) 
             place = drawn.points[free[0]].round(4).tolist()
             text = (
                 f"nothing holds {line.name} at {place} ({len(free)} such vertices): the tension has"
-                " nothing to pull against there, and the roof will hardly come to rest; hold the edge,"
-                " along a curve in space if it is to be above the plane"
+                " nothing to pull against there, and there is probably no equilibrium; fix the edge,"
+                " along a curve in space if it should be above the plane"
             )
             warnings.warn(text, PlanWarning, stacklevel=4)
 

@@ -9,7 +9,7 @@ from typing import Any
 from ..base import validate
 from ..base.errors import OptionError
 from ..surface import Plane
-from .parts import EDGES, areas_of, check_choice, curve_of, divider_of, hole_of, support_of
+from .parts import EDGES, areas_of, curve_of, divider_of, hole_of, support_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class PlanData:
         }
         for key, value in parsed.items():
             object.__setattr__(self, key, value)
-        check_choice("outline: edge", self.edge, EDGES)
+        validate.choice("edge of the outline", self.edge, EDGES)
         validate.number("edge_length", self.edge_length, above=0.0)
         if self.rise is not None:
             validate.number("rise", self.rise, above=0.0)

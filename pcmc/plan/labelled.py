@@ -63,10 +63,7 @@ def surface_from_labels(
     >>> [p.name for p in s.patches], s.faces.tolist()
     (['a', 'b'], [[0, 1, 2], [2, 3, 0]])
     """
-    if boundary not in EDGES:
-        raise OptionError(
-            unknown("boundary", boundary, EDGES), what="boundary", found=boundary, expected=EDGES
-        )
+    validate.choice("boundary", boundary, EDGES)
     plane = Plane() if plane is None else plane
     X = checks.positions(vertices)
     F: Ints = checks.face_array(faces, len(X)).astype(np.int64)

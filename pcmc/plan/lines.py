@@ -50,9 +50,13 @@ class Drawn:
         self.xy = self.curve.at(self.curve.dense)[:, :2]
         steps = np.linalg.norm(np.diff(self.xy, axis=0), axis=1)
         if not steps.any():
-            raise PlanError(f"{self.name} has no length in plan", what=self.name)
+            raise self.error("has no length in plan")
         self.reach = np.concatenate([[0.0], np.cumsum(steps)])
         self.shape: Any = shapely.LineString(self.xy)
+
+    def error(self, problem: str, where: object = None, found: object = None) -> PlanError:
+        """The error about this line: its name, and what is wrong with it."""
+        return PlanError(f"{self.name} {problem}", what=self.name, where=where, found=found)
 
     def nearest(self, xy: Floats) -> tuple[float, float]:
         """The parameter of the curve's point nearest to xy, and its distance."""
@@ -73,34 +77,21 @@ def point_text(xy: Floats) -> str:
 
 def overlap(one: Drawn, other: Drawn, where: str) -> PlanError:
     """The error for two lines that coincide along some length."""
-    return PlanError(
-        f"{one.name} runs along {other.name} {where}; leave that part out",
-        what=one.name,
-        where=where,
-        found=other.name,
-    )
+    return one.error(f"runs along {other.name} {where}; leave that part out", where, other.name)
 
 
 def check_line(one: Drawn) -> None:
     """Boundaries are closed, and no line crosses itself."""
     if one.line.bounds and not one.curve.closed:
         gap = float(np.linalg.norm(one.xy[-1] - one.xy[0]))
-        raise PlanError(
-            f"{one.name} is open: it starts at {point_text(one.xy[0])} and ends at {point_text(one.xy[-1])},"
-            f" {gap:.3g} apart; close it",
-            what=one.name,
-            found=gap,
-        )
+        ends = f"it starts at {point_text(one.xy[0])} and ends at {point_text(one.xy[-1])}"
+        raise one.error(f"is open: {ends}, {gap:.3g} apart; close it", found=gap)
     if not one.shape.is_simple:
         pieces = shapely.get_parts(shapely.node(one.shape))
-        ends = np.concatenate([np.array(p.coords)[[0, -1]] for p in pieces])
-        where, count = np.unique(ends.round(9), axis=0, return_counts=True)
-        place = where[np.argmax(count)]
-        raise PlanError(
-            f"{one.name} crosses itself at {point_text(place)}",
-            what=one.name,
-            where=tuple(place.tolist()),
-        )
+        joints = np.concatenate([np.array(p.coords)[[0, -1]] for p in pieces])
+        places, count = np.unique(joints.round(9), axis=0, return_counts=True)
+        place = places[np.argmax(count)]
+        raise one.error(f"crosses itself at {point_text(place)}", tuple(place.tolist()))
 
 
 def check_holes(drawn: Sequence[Drawn]) -> None:
@@ -110,24 +101,16 @@ def check_holes(drawn: Sequence[Drawn]) -> None:
     for place, (one, area) in enumerate(holes):
         if not outline.contains_properly(area):
             where = "crosses or touches" if outline.intersects(area) else "lies outside"
-            raise PlanError(
-                f"{one.name} {where} the outline; a hole must be inside the outline", what=one.name
-            )
+            raise one.error(f"{where} the outline; a hole must be inside the outline")
         for other, other_area in holes[:place]:
             if area.intersects(other_area):
-                raise PlanError(
-                    f"{other.name} and {one.name} touch or overlap; join them into one",
-                    what=other.name,
-                    found=one.name,
-                )
+                problem = f"and {one.name} touch or overlap; join them into one"
+                raise other.error(problem, found=one.name)
 
 
 def inside(drawn: Sequence[Drawn]) -> Callable[[Floats], bool]:
     """A function that tests whether a point is inside the outline and outside all holes."""
-    area = shapely.Polygon(drawn[0].xy)
-    for one in drawn:
-        if one.kind is Kind.HOLE:
-            area = area.difference(shapely.Polygon(one.xy))
+    area = shapely.Polygon(drawn[0].xy, [one.xy for one in drawn if one.kind is Kind.HOLE])
     return lambda xy: bool(shapely.contains_xy(area, *xy))
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base import validate
 from ..base.errors import OptionError, unknown
 from .curves import Curve, curve
 
@@ -109,7 +110,7 @@ def divider_of(spec: Any, number: int) -> Divider:
     """A Divider from a mapping of its attributes or a curve; ``number`` counts from 1."""
     what = f"divider {number}"
     part = _part_of(Divider, spec, what)
-    check_choice(f"{what}: bottom", part.bottom, BOTTOMS)
+    validate.choice(f"bottom of {what}", part.bottom, BOTTOMS)
     return Divider(
         curve_of(part.curve, what), part.wall, part.name or f"wall {number}", part.bottom
     )
@@ -119,7 +120,7 @@ def hole_of(spec: Any, number: int) -> Hole:
     """A Hole from a mapping of its attributes or a curve; ``number`` counts from 1."""
     what = f"hole {number}"
     part = _part_of(Hole, spec, what)
-    check_choice(f"{what}: edge", part.edge, EDGES)
+    validate.choice(f"edge of {what}", part.edge, EDGES)
     name = f"hole {part.name!r}" if part.name else what
     return Hole(curve_of(part.curve, what, closed=True), part.edge, name)
 
@@ -170,11 +171,3 @@ def check_keys(values: Any, kind: Any, what: str) -> None:
             raise OptionError(
                 unknown(f"{what} key", key, known), what=what, where=key, found=key, expected=known
             )
-
-
-def check_choice(what: str, value: str, known: tuple[str, ...]) -> None:
-    """Refuse a value that is not one of the known ones."""
-    if value not in known:
-        raise OptionError(
-            f"{what}: {unknown('value', value, known)}", what=what, found=value, expected=known
-        )

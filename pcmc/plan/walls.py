@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError, unknown
 from ..meshing.quality import edge_lengths
@@ -78,10 +79,7 @@ def add_walls(
     >>> [p.name for p in add_walls(bare).patches]
     ['patch 1', 'patch 2', 'wall-patch 1-patch 2']
     """
-    if bottom not in BOTTOMS:
-        raise OptionError(
-            unknown("bottom", bottom, BOTTOMS), what="bottom", found=bottom, expected=BOTTOMS
-        )
+    validate.choice("bottom", bottom, BOTTOMS)
     names = [p.name for p in surface.patches]
     borders = [c for c in surface.topology.junctions if len(set(c.sheets)) == len(c.sheets) == 2]
     pair_of = [(names[c.sheets[0]], names[c.sheets[1]]) for c in borders]

@@ -92,11 +92,7 @@ def _error(
     at = place if at is None else at
     line = line_of(text, at[:-1], at[-1], found) if at else 1
     return FileError(
-        f"line {line}: {message}",
-        what=".".join(place),
-        where=line,
-        found=found,
-        expected=expected,
+        f"line {line}: {message}", what=".".join(place), where=line, found=found, expected=expected
     )
 
 

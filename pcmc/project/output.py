@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import io
+from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, OptionError, PcmcError, unknown
 from ..base.files import atomic_writes
@@ -127,10 +128,10 @@ def check_picture(view: Any, colour: str) -> None:
     """Refuse a view or colour that ``paint`` does not know."""
     from ..plot.scene import VIEWS
 
-    for what, value, known in (("colour", colour, COLOURS), ("view", view, tuple(VIEWS))):
-        if isinstance(value, str) and value not in known:
-            raise OptionError(unknown(what, value, known), what=what, found=value, expected=known)
-    if not isinstance(view, str) and not (
+    validate.choice("colour", colour, COLOURS)
+    if isinstance(view, str):
+        validate.choice("view", view, tuple(VIEWS))
+    elif not (
         isinstance(view, Sequence)
         and len(view) == 2
         and all(isinstance(angle, int | float) and math.isfinite(angle) for angle in view)

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ..base.errors import OptionError, unknown
+from ..base import validate
+from ..base.errors import OptionError
 from ..meshing.remeshing import check_lengths
 
 WHEN = ("before", "after")
@@ -33,10 +34,7 @@ class Remeshing:
     when: str = "after"
 
     def __post_init__(self) -> None:
-        if self.when not in WHEN:
-            raise OptionError(
-                unknown("when", self.when, WHEN), what="when", found=self.when, expected=WHEN
-            )
+        validate.choice("when", self.when, WHEN)
         check_lengths(**self.options)
 
     @property
