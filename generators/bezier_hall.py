@@ -60,13 +60,13 @@ def bezier_hall(
     """Three bays, a wall under each arch between them, and a hole in the middle one.
 
     The paper gives the box, 190.22 by 101.56 by 29.17, the tensions and the kinds of boundary; the
-    curves are this package's own. Outline, hole and the walls' sloping feet are fixed in all
-    directions. The initial roof is a membrane under an even load over outline, hole and arches.
+    curves are this package's own. Outline, hole and the walls' sloping feet are fixed. The initial
+    roof is a membrane under an even load, held at outline, hole and arches.
 
-    The curves were drawn, and the edge length chosen, so that the start and the paper's flow come
-    near what is printed: ‖∇E‖² is 2.663e5 (printed 2.678e5) at the start and 0.66 (0.596) after 500
-    iterations; the largest error is least, 0.80 % (0.73 %), at iteration 211 (225). There is an
-    equilibrium down to α = 26 at least.
+    Curves and edge length are chosen so that the initial shape and the paper's flow come near the
+    printed values: ‖∇E‖² is 2.663e5 (printed 2.678e5) at the start and 0.66 (0.596) after 500
+    iterations; the largest error is least, 0.80 % (0.73 %), at iteration 211 (225).
+    Equilibria exist at least down to α = 26.
 
     Parameters
     ----------
@@ -86,21 +86,21 @@ def bezier_hall(
     edge_length = validate.positive("edge_length", edge_length)
     mesh = Builder()
     outline, arches, hole = _curves(mesh, edge_length)
-    held = mesh.positions(np.arange(1 + hole[-1]))
+    curves = mesh.positions(np.arange(1 + hole[-1]))
     bays = _bays(outline, arches, hole)
-    pieces = [fill([held[loop, :2] for loop in bay], edge_length) for bay in bays]
-    faces, count = [], len(held)
+    pieces = [fill([curves[loop, :2] for loop in bay], edge_length) for bay in bays]
+    faces, count = [], len(curves)
     for bay, (inner, local) in zip(bays, pieces, strict=True):
         faces.append(np.concatenate([*bay, count + np.arange(len(inner))])[local])
         count += len(inner)
-    plan = np.concatenate([held[:, :2], *(inner for inner, _ in pieces)])
-    given = np.arange(count) < len(held)
-    z = membrane(plan, np.concatenate(faces), given, np.resize(held[:, 2], count), HEIGHT)
-    mesh.add_points(np.column_stack([plan, z])[~given])
+    plan = np.concatenate([curves[:, :2], *(inner for inner, _ in pieces)])
+    held = np.arange(count) < len(curves)
+    z = membrane(plan, np.concatenate(faces), held, np.resize(curves[:, 2], count), HEIGHT)
+    mesh.add_points(np.column_stack([plan, z])[~held])
     for patch, part in zip((LEFT, MIDDLE, RIGHT), faces, strict=True):
         mesh.add_faces(part, patch)
     feet = [
-        mesh.add_wall(wall, arch, _slope(held[arch]), edge_length)
+        mesh.add_wall(wall, arch, _slope(curves[arch]), edge_length)
         for wall, arch in zip((LEFT_WALL, RIGHT_WALL), arches, strict=True)
     ]
     patches = [Patch(name, alpha) for name in ("left", "middle", "right")]

@@ -39,7 +39,7 @@ class Builder:
         return np.arange(self._count - len(positions), self._count)
 
     def add_faces(self, faces: Any, patch: int) -> None:
-        """Add faces (f,3) of number_within_groups points to a patch."""
+        """Add faces (f,3) of numbered points to a patch."""
         faces = np.asarray(faces, dtype=np.int64)
         self._faces.append(faces)
         self._patch.append(np.full(len(faces), patch))

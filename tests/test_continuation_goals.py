@@ -137,7 +137,10 @@ def test_mesh_that_collapses_ends_the_branch_with_that_reason():
     ("arguments", "fields"),
     [
         ({"tensions": [1.0]}, {"what": "Direction.tensions", "found": [1.0]}),
-        ({"tensions": {"roof": 0.0}}, {"what": "Direction.tensions['roof']", "found": 0.0}),
+        (
+            {"tensions": {"roof": 0.0}},
+            {"what": "Direction.tensions", "where": "roof", "found": 0.0},
+        ),
         ({}, {"what": "Direction"}),
     ],
 )
@@ -148,9 +151,7 @@ def test_directions_that_name_nothing_are_refused(arguments, fields):
 
 @pytest.mark.parametrize("weight", [np.nan, "1", True])
 def test_weights_that_are_not_finite_numbers_are_refused(weight):
-    with pytest.raises(
-        OptionError, match=r"^Direction\.pressures\['roof'\]: expected a finite num"
-    ):
+    with refused(OptionError, what="Direction.pressures", where="roof"):
         Direction(pressures={"roof": weight})
 
 
@@ -162,12 +163,24 @@ def test_weights_that_are_not_finite_numbers_are_refused(weight):
             {"parameter": Direction({"roof": 1.0}, {"roof": 2.0})},
             {"what": "parameter", "where": "pressure of 'roof'", "found": 0.5, "expected": 1.0},
         ),
-        ({"until": {"hight": 1.0}}, {"what": "until", "found": "hight", "expected": QUANTITIES}),
+        (
+            {"until": {"hight": 1.0}},
+            {"what": "column in until", "found": "hight", "expected": QUANTITIES},
+        ),
         ({"until": ["height"]}, {"what": "until", "found": ["height"]}),
         ({"until": "height"}, {"what": "until", "found": "height"}),
         ({"stop": 0.9, "until": {"parameter": 1.1}}, {"what": "until"}),
         ({"callback": 3}, {"what": "callback", "found": 3}),
         ({"step": 0.0}, {"what": "step", "found": 0.0}),
+        ({"until": {"height": np.inf}}, {"what": "until['height']", "found": np.inf}),
+        ({"stop": "1"}, {"what": "stop", "found": "1"}),
+        ({"smallest": 0.1, "largest": 0.01}, {"what": "largest", "found": 0.01}),
+        ({"steps": -1}, {"what": "steps", "found": -1}),
+        ({"tolerance": 0.0}, {"what": "tolerance", "found": 0.0}),
+        ({"folds": 0}, {"what": "folds", "found": 0}),
+        ({"min_quality": 1.0}, {"what": "min_quality", "found": 1.0}),
+        ({"keep": 0}, {"what": "keep", "found": 0}),
+        ({"remesh": -1.0}, {"what": "remesh", "found": -1.0}),
     ],
 )
 def test_arguments_that_are_refused(arguments, fields):
@@ -181,19 +194,10 @@ def test_arguments_that_are_refused(arguments, fields):
         ({"parameter": "rof"}, "unknown patch 'rof'; did you mean 'roof'"),
         ({"stepp": 1.0}, "unknown option of method 'follow' 'stepp'; did you mean 'step'"),
         ({"control": "volum"}, "unknown control 'volum'; did you mean 'volume'"),
-        ({"until": {"height": np.inf}}, r"^until\['height'\]: .* finite"),
-        ({"stop": "1"}, "^stop: .* found '1'"),
-        ({"smallest": 0.1, "largest": 0.01}, "^largest: .* ≥ 0.1"),
-        ({"steps": -1}, "^steps: .* ≥ 0"),
-        ({"tolerance": 0.0}, "^tolerance: .* > 0"),
-        ({"folds": 0}, "^folds: .* ≥ 1"),
-        ({"min_quality": 1.0}, "^min_quality: .* < 1"),
-        ({"keep": 0}, "^keep: .* ≥ 1"),
-        ({"remesh": -1.0}, "^remesh: .* > 0"),
     ],
     ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
 )
-def test_options_outside_their_range_are_refused_by_name(arguments, message):
+def test_unknown_names_are_refused_with_the_nearest_one(arguments, message):
     with pytest.raises(OptionError, match=message):
         follow(pyramid(height=AT_REST), **{"parameter": "roof"} | arguments)
 

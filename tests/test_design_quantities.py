@@ -160,10 +160,14 @@ def test_points_are_in_the_coordinates_of_a_tilted_plane():
     normal = frame[:, 2] * np.sign(np.linalg.det(frame))
     plane = pcmc.Plane(point=(1, 2, 3), normal=tuple(normal))
     base = pyramid()
-    from pcmc.plan.coordinates import to_space
-
     tilted = pcmc.Surface(
-        to_space(base.vertices, plane), base.faces, [0] * 4, base.patches, range(4), (), plane
+        base.vertices @ plane.axes + plane.point,
+        base.faces,
+        [0] * 4,
+        base.patches,
+        range(4),
+        (),
+        plane,
     )
     for point in ((0.0, 0.0), (0.25, -0.1), (-0.6, 0.3)):
         here, there = (measure(s, Target("height", point)).value for s in (base, tilted))

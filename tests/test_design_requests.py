@@ -47,12 +47,17 @@ TARGET, PARAMETER = "a Target", "a Parameter or the name of a patch"
         (lambda: meet(pyramid(), Target("height", (9, 9), 1.0), "roof"), {"found": (9.0, 9.0)}),
         (
             lambda: meet(pyramid(), APEX, Parameter("roof", low=3, high=2)),
-            {"what": "tension of roof", "where": "low", "found": 3, "expected": 2},
+            {"what": "high", "where": "tension of roof", "found": 2},
         ),
         (
             lambda: meet(pyramid(), APEX, Parameter("roof", low=0)),
-            {"what": "tension of roof", "where": "low", "found": 0, "expected": "> 0"},
+            {"what": "low", "where": "tension of roof", "found": 0},
         ),
+        (lambda: Target("height", (1.0, np.nan)), {"what": "height: y"}),
+        (lambda: Target("apex", "a", "high"), {"what": "value", "where": "apex of a"}),
+        (lambda: Parameter("a", low=np.inf), {"what": "low", "where": "tension of a"}),
+        (lambda: meet(pyramid(), APEX, "roof", solves=0), {"what": "solves", "found": 0}),
+        (lambda: meet(pyramid(), APEX, "roof", tolerance=0), {"what": "tolerance", "found": 0}),
         (lambda: sensitivities(pyramid(), 3, "roof"), {"found": 3, "expected": TARGET}),
         (lambda: sensitivities(pyramid(), APEX, ()), {"found": [], "expected": PARAMETER}),
     ],
@@ -71,14 +76,9 @@ def test_bad_requests_are_refused_in_one_line(make, fields):
         (lambda: meet(pyramid(), Target("apex", "rof", 1.0), "roof"), "did you mean 'roof'"),
         (lambda: meet(pyramid(), APEX, "rof"), "did you mean 'roof'"),
         (lambda: meet(pyramid(), APEX, "roof", iteratons=9), "did you mean 'iterations'"),
-        (lambda: Target("height", (1.0, np.nan)), "^height: y: .* finite"),
-        (lambda: Target("apex", "a", "high"), "^apex of a: value: .* finite"),
-        (lambda: Parameter("a", low=np.inf), "^tension of a: low: .* finite"),
-        (lambda: meet(pyramid(), APEX, "roof", solves=0), "^solves: .* ≥ 1"),
-        (lambda: meet(pyramid(), APEX, "roof", tolerance=0), "^tolerance: .* > 0"),
     ],
 )
-def test_bad_requests_name_the_argument_or_the_nearest_name(make, message):
+def test_unknown_names_are_refused_with_the_nearest_one(make, message):
     with pytest.raises(OptionError, match=message):
         make()
 
@@ -99,7 +99,7 @@ def test_parameters_and_walls_of_no_tension():
         meet(surface, [Target("apex", "left", 1.0)], ["wall"])
     with refused(OptionError, what="of", found="wall"):
         measure(surface, Target("curvature", "wall"))
-    with refused(OptionError, what="tension of wall", where="low", found=-1.0, expected="≥ 0"):
+    with refused(OptionError, what="low", where="tension of wall", found=-1.0):
         Parameter("wall", low=-1.0, high=1.0).bounds(surface)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from ..base import validate
-from ..base.errors import MissingExtra, OptionError, SurfaceError, unknown
+from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..design import Parameter
 from ..solvers.result import Callback
 from ..surface import Surface
@@ -122,16 +122,9 @@ def follow(
     (1.0, 0)
     """
     if not isinstance(surface, Surface):
-        found = type(surface).__name__
-        raise SurfaceError(
-            f"follow: expected a Surface, found {found}", what="surface", found=found
-        )
+        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
     if callback is not None and not callable(callback):
-        raise OptionError(
-            f"callback: expected a function of a Progress, found {callback!r}",
-            what="callback",
-            found=callback,
-        )
+        validate.refuse("callback", callback, "a function of a Progress")
     chosen = validate.build(FollowOptions, "follow", options)
     if chosen.remesh is not None and find_spec("mmgpy") is None:
         raise MissingExtra("mmgpy", "remesh")
@@ -155,33 +148,19 @@ def _direction(parameter: object) -> Direction:
     if isinstance(parameter, Parameter):
         weights = {parameter.patch: 1.0}
         return Direction(weights) if parameter.kind == "tension" else Direction(pressures=weights)
-    raise OptionError(
-        f"parameter: expected the name of a patch, a Parameter or a Direction, found {parameter!r}",
-        what="parameter",
-        found=parameter,
-    )
+    validate.refuse("parameter", parameter, "the name of a patch, a Parameter or a Direction")
 
 
 def _goals(stop: float | None, until: Mapping[str, float] | None) -> dict[str, float]:
     if not isinstance(until, Mapping | None):
-        raise OptionError(
-            f"until: expected a value by column, such as {{'height': 1.0}}, found {until!r}",
-            what="until",
-            found=until,
-        )
+        validate.refuse("until", until, "a value by column, such as {'height': 1.0}")
     goals = dict(until or {})
     if stop is not None and "parameter" in goals:
         raise OptionError(
             "stop and until['parameter'] are the same goal; give one of them", what="until"
         )
     for name, value in goals.items():
-        if name not in QUANTITIES:
-            raise OptionError(
-                unknown("column in until", name, QUANTITIES),
-                what="until",
-                found=name,
-                expected=QUANTITIES,
-            )
+        validate.choice("column in until", name, QUANTITIES)
         validate.number(f"until[{name!r}]", value)
     if stop is not None:
         goals["parameter"] = validate.number("stop", stop)

@@ -52,18 +52,11 @@ class Direction:
         for key in ("tensions", "pressures"):
             weights = getattr(self, key)
             if not isinstance(weights, Mapping):
-                raise OptionError(
-                    f"Direction.{key}: expected weights by patch name, such as {{'roof': 1.0}},"
-                    f" found {weights!r}",
-                    what=f"Direction.{key}",
-                    found=weights,
-                )
+                expected = "weights by patch name, such as {'roof': 1.0}"
+                validate.refuse(f"Direction.{key}", weights, expected)
             for name, weight in weights.items():
-                option = f"Direction.{key}[{name!r}]"
-                if validate.number(option, weight) == 0.0:
-                    raise OptionError(
-                        f"{option}: expected a weight other than 0", what=option, found=0.0
-                    )
+                if validate.number(f"Direction.{key}", weight, where=name) == 0.0:
+                    validate.refuse(f"Direction.{key}", weight, "a weight other than 0", name)
         if not self.tensions and not self.pressures:
             raise OptionError(
                 "Direction: name at least one patch whose tension or pressure varies",

@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..contact.pinching import (
-    excess_pull,
-    place_pinched_walls,
-    place_wall_rows,
-    standing_part,
-)
+from ..contact.pinching import excess_pull, place_pinched_walls, place_wall_rows, standing_part
 from ..energy.motion_space import MotionSpace
 from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
 from ..meshing.quality import turns_over, worst_quality

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from enum import Enum
 
 from ..base import validate
-from ..base.errors import OptionError
 
 CONTROLS = ("arclength", "parameter", "volume", "height")
 
@@ -60,18 +59,15 @@ class FollowOptions:
     def __post_init__(self) -> None:
         validate.choice("control", self.control, CONTROLS)
         if validate.number("step", self.step) == 0.0:
-            raise OptionError(
-                "step: expected a number other than 0; its sign is that of the first change of λ",
-                what="step",
-                found=self.step,
-            )
-        validate.number("smallest", self.smallest, above=0.0)
+            hint = "its sign is that of the first change of λ"
+            validate.refuse("step", self.step, "a number other than 0", hint=hint)
+        validate.positive("smallest", self.smallest)
         validate.number("largest", self.largest, least=self.smallest)
         validate.integer("steps", self.steps)
-        validate.number("tolerance", self.tolerance, above=0.0)
+        validate.positive("tolerance", self.tolerance)
         if self.folds is not None:
             validate.integer("folds", self.folds, least=1)
         validate.number("min_quality", self.min_quality, least=0.0, below=1.0)
         if self.remesh is not None:
-            validate.number("remesh", self.remesh, above=0.0)
+            validate.positive("remesh", self.remesh)
         validate.integer("keep", self.keep, least=1)

@@ -62,19 +62,14 @@ def meet(
     (True, 0.555556)
     """
     if not isinstance(surface, Surface):
-        found = type(surface).__name__
-        raise SurfaceError(f"meet: expected a Surface, found {found}", what="surface", found=found)
+        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
     aims, parameters = as_targets(targets), as_parameters(vary)
     for target in aims:
         if not target.limits:
             raise OptionError(f"{target.label}: give value, at_most or at_least", what=target.label)
         measure(surface, target)
     if callback is not None and not callable(callback):
-        raise OptionError(
-            f"callback: expected a function of a row, found {callback!r}",
-            what="callback",
-            found=callback,
-        )
-    validate.number("tolerance", tolerance, above=0.0)
+        validate.refuse("callback", callback, "a function of a row")
+    validate.positive("tolerance", tolerance)
     validate.integer("solves", solves, least=1)
     return Search(surface, aims, parameters, tolerance, solves, callback, options).run()

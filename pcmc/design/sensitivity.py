@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
@@ -77,10 +78,7 @@ def sensitivities(
     curvature of roof        -0.500000
     """
     if not isinstance(surface, Surface):
-        found = type(surface).__name__
-        raise SurfaceError(
-            f"sensitivities: expected a Surface, found {found}", what="surface", found=found
-        )
+        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
     targets, parameters = as_targets(of), as_parameters(to)
     for parameter in parameters:
         surface.patch_index(parameter.patch)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..base import validate
-from ..base.errors import OptionError, unknown
+from ..base.errors import OptionError
 from ..surface import Surface
 from .quantities import QUANTITIES, Measurement
 
@@ -48,13 +48,7 @@ class Target:
     at_least: float | None = None
 
     def __post_init__(self) -> None:
-        if self.quantity not in QUANTITIES:
-            raise OptionError(
-                unknown("quantity", self.quantity, QUANTITIES),
-                what="quantity",
-                found=self.quantity,
-                expected=tuple(QUANTITIES),
-            )
+        validate.choice("quantity", self.quantity, tuple(QUANTITIES))
         if self.quantity == "height":
             object.__setattr__(self, "of", _point(self.of))
         elif not (isinstance(self.of, str) or (self.of is None and self.quantity != "curvature")):
@@ -65,7 +59,7 @@ class Target:
             )
         for key in ("value", "at_most", "at_least"):
             if getattr(self, key) is not None:
-                validate.number(f"{self.label}: {key}", getattr(self, key))
+                validate.number(key, getattr(self, key), where=self.label)
         if self.value is not None and (self.at_most, self.at_least) != (None, None):
             raise OptionError(f"{self.label}: give a value or limits, not both", what="value")
         least, most = self.at_least, self.at_most
@@ -124,15 +118,11 @@ class Parameter:
 
     def __post_init__(self) -> None:
         if not isinstance(self.patch, str):
-            raise OptionError(
-                f"Parameter: expected the name of a patch, found {self.patch!r}",
-                what="patch",
-                found=self.patch,
-            )
+            validate.refuse("patch", self.patch, "the name of a patch")
         validate.choice("kind of parameter", self.kind, KINDS)
         for key in ("low", "high"):
             if getattr(self, key) is not None:
-                validate.number(f"{self.label}: {key}", getattr(self, key))
+                validate.number(key, getattr(self, key), where=self.label)
 
     @property
     def label(self) -> str:
@@ -159,24 +149,11 @@ class Parameter:
         ends = sorted((present / FACTOR, present * FACTOR))
         low = ends[0] if self.low is None else self.low
         high = ends[1] if self.high is None else self.high
-        if not low < high:
-            raise OptionError(
-                f"{self.label}: low {low:g} must be less than high {high:g}",
-                what=self.label,
-                where="low",
-                found=low,
-                expected=high,
-            )
-        loaded = self.tension_under_pressure(surface)
-        if self.kind == "tension" and (low < 0.0 or (loaded and low == 0.0)):
-            least = "> 0" if loaded else "≥ 0"
-            raise OptionError(
-                f"{self.label}: low must be {least}, found {low:g}",
-                what=self.label,
-                where="low",
-                found=low,
-                expected=least,
-            )
+        validate.number("high", high, above=low, where=self.label)
+        if self.tension_under_pressure(surface):
+            validate.number("low", low, above=0.0, where=self.label)
+        elif self.kind == "tension":
+            validate.number("low", low, least=0.0, where=self.label)
         return low, high
 
 
