@@ -62,10 +62,8 @@ def test_what_a_case_may_answer():
     assert "'numbers' of a case's answer: expected a number" in result.loc[2, "message"]
     assert "may not call a number 'what'" in result.loc[3, "message"]
     assert np.isnan(result.loc[4, "n"])
-    assert (
-        "'n' of a case's answer: expected a number, found a whole one" in result.loc[5, "message"]
-    )
-    assert "'s' of a case's answer: expected a text of whole" in result.loc[6, "message"]
+    assert "'n' of a case's answer: expected a number in the range" in result.loc[5, "message"]
+    assert "'s' of a case's answer: expected a text without lone" in result.loc[6, "message"]
 
 
 def test_values_come_to_the_case_as_declared(tmp_path):
