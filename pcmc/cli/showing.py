@@ -77,8 +77,10 @@ def plot(
     if picture.suffix.lower() != ".png":
         raise FileError(
             f"{picture}: a picture is written as .png; change the suffix",
-            what=str(picture), found=picture.suffix, expected=".png",
-        )  # fmt: skip
+            what=str(picture),
+            found=picture.suffix,
+            expected=".png",
+        )
     seen = view_of(view)
     projects.check_picture(seen, colour)
     projects.check_outputs([picture])

@@ -69,9 +69,11 @@ def solve_(
     project = replace(project, method=method or project.method, options=options)
     with working() as say:
         outcome = projects.carry_out(
-            project, say, anyway=anyway,
+            project,
+            say,
+            anyway=anyway,
             changed=partial(retensioned, tension=tension, pressure=pressure),
-        )  # fmt: skip
+        )
     print(f"{outcome.surface.m} triangles; {outcome.result.message}")
     if outcome.design is not None:
         print(f"targets {outcome.design.message}")
@@ -101,9 +103,7 @@ def _project(
     if file.suffix.lower() != TOML:
         return projects.Project(file, files=output or (), picture=picture, folder=folder)
     project = projects.load(file).in_folder(file.parent if folder is None else folder)
-    return replace(
-        project, files=output or project.files, picture=picture or project.picture
-    )  # fmt: skip
+    return replace(project, files=output or project.files, picture=picture or project.picture)
 
 
 def certify_(file: Input, tension: Settings = None, pressure: Pressures = None) -> int:

@@ -91,9 +91,14 @@ def sweep(
     with sweeping() as draw:
         cases = _cases(what, grid, fixed, method)
         table = run(
-            cases, store, scheduler=scheduler, workers=workers, time_limit=time_limit,
-            retry_failed=retry_failed, on_record=draw,
-        )  # fmt: skip
+            cases,
+            store,
+            scheduler=scheduler,
+            workers=workers,
+            time_limit=time_limit,
+            retry_failed=retry_failed,
+            on_record=draw,
+        )
     if table.empty:
         return INTERRUPTED
     if csv is not None:

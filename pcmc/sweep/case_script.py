@@ -143,8 +143,11 @@ def provenance() -> dict[str, Any]:
     """Host, process and versions."""
     packages = {name: version(name) for name in ("pcmc", "numpy", "scipy", "numba")}
     return {
-        "host": platform.node(), "pid": os.getpid(), "python": platform.python_version(), **packages
-    }  # fmt: skip
+        "host": platform.node(),
+        "pid": os.getpid(),
+        "python": platform.python_version(),
+        **packages,
+    }
 
 
 def version(package: str) -> str:
