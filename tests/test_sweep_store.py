@@ -144,7 +144,7 @@ def test_a_cut_store_is_refused_and_kept(part, stored):
     [
         (
             Sweep(SWEEP.case, {"rate": [3.7], "seed": [0.1], "pause": [0.0]}),
-            {"where": "pause", "found": "nothing", "expected": "varied"},
+            {"where": "pause", "found": "missing", "expected": "varied"},
         ),
         (Sweep(SWEEP.case, {"rate": [3.7]}, {"seed": 0.1}), {"where": "seed", "found": "varied"}),
         (Sweep(SWEEP.case, SWEEP.grid, {"pause": 0.1}), {"where": "pause", "expected": 0.1}),

@@ -18,7 +18,7 @@ import time
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from warnings import warn
@@ -268,11 +268,11 @@ def _check_declaration(path: Path, stored: dict[str, Any], sweep: Sweep) -> None
         where, was, now = part, old, wanted
         if part != "case":
             where = next(name for name in [*old, *wanted] if old.get(name) != wanted.get(name))
-            was, now = old.get(where, "nothing"), wanted.get(where, "nothing")
-        place = "case is " if part == "case" else f"{part} has {where}="
+            was, now = old.get(where, "missing"), wanted.get(where, "missing")
+        place = part if part == where else f"{part} {where!r}"
         raise FileError(
-            f"{path}: written for another sweep (its {place}{was!r:.60}, this one's {now!r:.60}); name a new"
-            " file, or delete this one",
+            f"{path}: written for another sweep (its {place} is {was!r:.60}, this one's is {now!r:.60});"
+            " name a new file, or delete this one",
             what=str(path),
             where=where,
             found=was,
@@ -286,7 +286,7 @@ def _key(parameters: Mapping[str, Any]) -> str:
 
 def _row(record: Record) -> tuple[str, str, int]:
     """Parameters, the rest of the record, and the checksum of both: SQLite has none."""
-    fields = asdict(record)
+    fields = dict(vars(record))
     del fields["case"]
     key = _key(fields.pop("parameters"))
     text = json.dumps(fields)
