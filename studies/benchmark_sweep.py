@@ -44,15 +44,20 @@ def _rows(mesh: Path, quick: bool) -> list[Row]:
         rows += [
             Row(f"{what}, 1 worker", one, "s", size),
             Row(f"{what}, 2 workers", two, "s", size, most=None if quick else most),
-            Row(f"{what}, 2 workers over 1", one / two, "times", size,
-                least=None if quick else RATIO),
-        ]  # fmt: skip
+            Row(
+                f"{what}, 2 workers over 1",
+                one / two,
+                "times",
+                size,
+                least=None if quick else RATIO,
+            ),
+        ]
     start = sweep_seconds(flow_sweep(mesh, 1, tensions[:1]), 1)
     return [*rows, Row("start of a worker, with a case of one iteration", start, "s")]
 
 
 def alternating(sweep: Sweep, repeats: int) -> tuple[float, float]:
-    """Median seconds on one and on two workers, in turn, so that the machine's load meets both."""
+    """Median seconds on one and on two workers, in turn, so that the machine's load affects both."""
     times = [[sweep_seconds(sweep, workers) for workers in (1, 2)] for _ in range(repeats)]
     return median(one for one, _ in times), median(two for _, two in times)
 

@@ -24,29 +24,34 @@ def run_sweep(
 ) -> pd.DataFrame:
     """A row per case, in the grid's order. Times go to ``name_times``.
 
-    While it runs, the cases are stored in the study's folder ``build``, which no commit takes in. A
-    run that was stopped goes on from there; one that ends takes the store and the ``scratch`` files of its
-    cases away.
+    While the sweep runs, its store is in the study's folder ``build``, which git ignores. A run that was
+    stopped goes on from there. At the end the store and the ``scratch`` files of the cases are removed.
 
     Raises
     ------
-    SweepError : the run was stopped (Ctrl-C), and is not complete; or a case raised, was killed or
-        timed out: a table would have holes. The study's next run tries it again.
+    SweepError : the run was stopped by Ctrl-C; or a case raised, was killed or timed out, so that the table
+        would have gaps. The next run of the study runs these cases again.
     """
     store = folder.path / "build" / f"{name}-{sweep.fingerprint[:8]}.sqlite"
     store.parent.mkdir(parents=True, exist_ok=True)
     table = run(sweep, store, workers=workers, time_limit=limit, retry_failed=True)
     if len(table) < len(sweep):
         raise SweepError(
-            f"{name}: {len(table)} of {len(sweep)} cases are done and kept in {store}; run the"
-            " study again to go on from there"
+            f"{name}: {len(table)} of {len(sweep)} cases are done and stored in {store}; run the"
+            " study again to go on from there",
+            what=name,
+            found=len(table),
+            expected=len(sweep),
         )
     records = read_store(store)
     if failed := [record for record in records if record.failed]:
         first = failed[0]
         raise SweepError(
             f"{name}: {len(failed)} of {len(sweep)} cases failed; case {first.case} {first.status}:"
-            f" {first.message}; the output of all is kept in {store}"
+            f" {first.message}; the output of all is in {store}",
+            what=name,
+            where=first.case,
+            found=first.status,
         )
     times = provenance(records)[["wall_time"]].round(3)
     folder.write_table(f"{name}_times", times.reset_index())

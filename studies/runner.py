@@ -17,7 +17,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from .study import STEPS, Study
 
-# One thread a worker: two workers share two cores, and sums come out in the same order every time.
+# One thread per worker: two workers share two cores, and sums have the same order in every run.
 THREADS = (
     "PCMC_THREADS",
     "NUMBA_NUM_THREADS",
@@ -31,7 +31,7 @@ WORKER = (sys.executable, "-m", "studies.worker")
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a study ended: ``error`` is empty when all went well, or its last words."""
+    """How a study ended: ``error`` is empty, or the last line that it printed to stderr."""
 
     study: str
     seconds: float
@@ -50,8 +50,8 @@ def run_all(
 ) -> list[Outcome]:
     """Run the studies, longest first, ``workers`` at a time; the outcomes in the order given.
 
-    A study that fails is an outcome with an error, and the others go on. Ctrl-C ends the processes
-    under way and comes out as KeyboardInterrupt; whole files only are left behind.
+    A study that fails is an outcome with an error, and the others go on. Ctrl-C ends the running processes
+    and raises KeyboardInterrupt; every file that is left is complete.
     """
     extra = ["--results", str(results), "--steps", *steps, *(["--short"] if short else [])]
     outcomes: dict[str, Outcome] = {}
@@ -76,7 +76,7 @@ def run_all(
 
 @dataclass
 class Crew:
-    """The processes under way, and the bar that shows what they do."""
+    """The running processes, and the bar that shows their steps."""
 
     progress: Progress
     steps: Sequence[str]
@@ -106,14 +106,14 @@ class Crew:
                 for line in process.stdout:
                     self.show(name, line.strip())
             words.seek(0)
-            error = "" if process.returncode == 0 else _last_words(words.read(), process.returncode)
+            error = "" if process.returncode == 0 else _last_line(words.read(), process.returncode)
         self.processes.discard(process)
         self.finished += 1
         self.show(name, None)
         return Outcome(name, time.perf_counter() - start, error)
 
     def show(self, name: str, step: str | None) -> None:
-        """Tell the bar that a study has come to a step, or to its end."""
+        """Show that a study has begun a step; None: that it has ended."""
         if step is None:
             self.doing.pop(name, None)
         elif step in self.steps:
@@ -127,7 +127,7 @@ class Crew:
         )
 
     def stop(self) -> None:
-        """End every process under way."""
+        """End every running process."""
         self.stopped = True
         for process in list(self.processes):
             process.terminate()
@@ -135,12 +135,15 @@ class Crew:
 
 def _progress(console: Console) -> Progress:
     return Progress(
-        BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}"),
         console=console,
-    )  # fmt: skip
+    )
 
 
-def _last_words(text: str, code: int) -> str:
-    """What a failed process said at its end."""
+def _last_line(text: str, code: int) -> str:
+    """The last line that a failed process printed."""
     lines = [line for line in text.splitlines() if line.strip()]
-    return lines[-1] if lines else f"it ended with code {code} and said nothing"
+    return lines[-1] if lines else f"exit code {code}, without a message"

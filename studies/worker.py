@@ -1,7 +1,7 @@
 """One study in a process of its own: ``python -m studies.worker NAME --results FOLDER``.
 
-It prints the name of each step before it takes it, and nothing else, so that whoever started it can
-show how far it is. A crash, even of a library's, ends this process only.
+It prints the name of each step before it begins it, and nothing else, so that its parent can show the
+progress. A crash, also one in a library, ends this process only.
 """
 
 from __future__ import annotations
@@ -16,20 +16,23 @@ from .registry import chosen
 from .study import STEPS, perform
 
 
-def main(words: list[str] | None = None) -> int:
-    """Run it; 0 when every step was taken."""
+def main(arguments: list[str] | None = None) -> int:
+    """Run the study; the exit code, 0 if every step succeeded."""
     parser = argparse.ArgumentParser(prog="python -m studies.worker")
     parser.add_argument("name")
     parser.add_argument("--results", type=Path, required=True)
     parser.add_argument("--steps", nargs="+", choices=STEPS, default=list(STEPS))
     parser.add_argument("--short", action="store_true")
-    asked = parser.parse_args(words)
+    options = parser.parse_args(arguments)
     try:
-        (study,) = chosen([asked.name])
+        (study,) = chosen([options.name])
         perform(
-            study, asked.results, short=asked.short, steps=asked.steps,
+            study,
+            options.results,
+            short=options.short,
+            steps=options.steps,
             announce=lambda step: print(step, flush=True),
-        )  # fmt: skip
+        )
     except (PcmcError, MissingExtra) as error:
         print(error, file=sys.stderr)
         return 1

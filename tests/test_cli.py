@@ -256,9 +256,12 @@ def test_letters_that_the_terminal_lacks_are_written_otherwise(folder, encoding)
             *(["-o", "ō.obj"] * (command == "solve")),
         ]
         done = subprocess.run(
-            run, capture_output=True, timeout=120, check=False,
+            run,
+            capture_output=True,
+            timeout=120,
+            check=False,
             env=os.environ | {"PYTHONIOENCODING": encoding},
-        )  # fmt: skip
+        )
         assert (done.stderr, done.returncode) == (b"", 0 if command == "solve" else 1)
         assert name in done.stdout.decode(encoding)
     assert pcmc.read("ō.obj").patches[0].name == "größe, ō"

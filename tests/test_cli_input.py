@@ -60,7 +60,7 @@ def test_a_new_mesh_that_is_not_certified_is_not_written_and_that_is_said(folder
     low = SMALL.replace("tension = 2.0", "tension = 0.2")
     (folder / "low.toml").write_text(low, encoding="utf-8")
     assert cli.main(["remesh", "low.toml", "--edge-length", "0.9", "-o", "x.obj"]) == 1
-    assert "nothing written (--no-solve writes" in capsys.readouterr().out
+    assert "nothing written (use --no-solve" in capsys.readouterr().out
     assert not (folder / "x.obj").exists()
 
 

@@ -202,7 +202,7 @@ def test_the_store_of_another_project_is_refused_and_kept(roof, capsys):
     capsys.readouterr()
     assert cli.main(given) == 2
     err = capsys.readouterr().err
-    assert "s.sqlite: written for another sweep (its fixed has project_digest=" in err
+    assert "s.sqlite: written for another sweep (its fixed 'project_digest' is " in err
     assert (roof.parent / "s.sqlite").read_bytes() == kept
 
 

@@ -144,7 +144,7 @@ def test_a_cut_store_is_refused_and_kept(part, stored):
     [
         (
             Sweep(SWEEP.case, {"rate": [3.7], "seed": [0.1], "pause": [0.0]}),
-            {"where": "pause", "found": "nothing", "expected": "varied"},
+            {"where": "pause", "found": "missing", "expected": "varied"},
         ),
         (Sweep(SWEEP.case, {"rate": [3.7]}, {"seed": 0.1}), {"where": "seed", "found": "varied"}),
         (Sweep(SWEEP.case, SWEEP.grid, {"pause": 0.1}), {"where": "pause", "expected": 0.1}),
@@ -259,17 +259,20 @@ def test_two_sweeps_cannot_write_to_one_store(tmp_path):
 
 def test_no_second_sweep_slips_in_between_two_transactions(tmp_path):
     """The lock is free for an instant after each of them."""
-    path, script = tmp_path / "s.sqlite", (
-        "import sys; from pcmc.sweep.store import open_store\n"
-        "from pcmc.base.errors import FileError\n"
-        "from test_sweep_store import SWEEP\n"
-        "print('ready', flush=True)\n"
-        "for _ in range(300):\n"
-        "    try:\n"
-        "        with open_store(sys.argv[1], SWEEP): print('in', flush=True)\n"
-        "    except FileError: pass\n"
-        "print('done', flush=True)\n"
-    )  # fmt: skip
+    path, script = (
+        tmp_path / "s.sqlite",
+        (
+            "import sys; from pcmc.sweep.store import open_store\n"
+            "from pcmc.base.errors import FileError\n"
+            "from test_sweep_store import SWEEP\n"
+            "print('ready', flush=True)\n"
+            "for _ in range(300):\n"
+            "    try:\n"
+            "        with open_store(sys.argv[1], SWEEP): print('in', flush=True)\n"
+            "    except FileError: pass\n"
+            "print('done', flush=True)\n"
+        ),
+    )
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-c", script, str(path)]
     with (

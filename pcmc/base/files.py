@@ -1,4 +1,4 @@
-"""Files appear whole or not at all, one or several together."""
+"""Write files atomically: one or several together are complete, or unchanged."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .interrupts import defer_interrupts
 
 @contextmanager
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A path beside ``path`` to write to, which takes its place when the block ends without error.
+    """A temporary path beside ``path``. It replaces ``path`` when the block ends without error.
 
     >>> import tempfile
     >>> folder = Path(tempfile.mkdtemp())
@@ -29,35 +29,35 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 @contextmanager
 def atomic_writes(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path]]:
-    """Paths beside ``paths`` to write to, which take their places together when the block ends.
+    """Temporary paths beside ``paths``. They replace ``paths`` together when the block ends.
 
-    No file system replaces several files at once. So each is written first, then each takes its place,
-    and where one cannot (it is open in another program, say), those before it are put back as they were.
+    No file system replaces several files at once. So all are written first, and then replaced one by one. If
+    one cannot be replaced (because another program has it open, say), those before it are restored.
     """
     wanted = [Path(path) for path in paths]
     written = [_beside(path) for path in wanted]
-    kept = [_beside(path) for path in wanted]
+    backups = [_beside(path) for path in wanted]
     try:
         yield written
         with defer_interrupts():
-            for path, old in zip(wanted, kept, strict=True):
-                _keep(path, old)
-            _replace(wanted, written, kept)
+            for path, old in zip(wanted, backups, strict=True):
+                _back_up(path, old)
+            _replace(wanted, written, backups)
     finally:
-        for path in (*written, *kept):
+        for path in (*written, *backups):
             path.unlink(missing_ok=True)
 
 
 @contextmanager
 def folder(path: Path) -> Iterator[None]:
-    """A folder, made with those above it if it is missing; gone again if the block ends in an error."""
+    """Make a folder and those above it if they are missing; remove them if the block raises."""
     missing = [p for p in (path, *path.parents) if not p.exists()]
     try:
         path.mkdir(parents=True, exist_ok=True)
         yield
     except BaseException:
         for made in missing:
-            with suppress(OSError):  # it holds something by now
+            with suppress(OSError):  # it is not empty
                 made.rmdir()
         raise
 
@@ -67,8 +67,8 @@ def _beside(path: Path) -> Path:
     return path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")
 
 
-def _keep(path: Path, old: Path) -> None:
-    """A second name for what is at ``path`` now, if anything is."""
+def _back_up(path: Path, old: Path) -> None:
+    """Give the file at ``path``, if there is one, a second name."""
     if not path.is_file():
         return
     try:
@@ -77,14 +77,14 @@ def _keep(path: Path, old: Path) -> None:
         shutil.copy2(path, old)
 
 
-def _replace(wanted: list[Path], written: list[Path], kept: list[Path]) -> None:
+def _replace(wanted: list[Path], written: list[Path], backups: list[Path]) -> None:
     done = 0
     try:
         for new, path in zip(written, wanted, strict=True):
-            done += 1  # before it: what Ctrl-C cuts short counts as begun
+            done += 1  # before it: a move that Ctrl-C interrupts counts too
             os.replace(new, path)
     except BaseException:
-        for new, path, old in zip(written[:done], wanted, kept, strict=False):
+        for new, path, old in zip(written[:done], wanted, backups, strict=False):
             if new.exists():
                 continue  # it was never moved
             if old.exists():

@@ -1,4 +1,4 @@
-"""Ctrl-C at a time that suits: libraries written in C lose it, report it as something else, or crash."""
+"""When Ctrl-C takes effect: libraries written in C may lose it, misreport it, or crash."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP")  # the last is not on every system
 
 @contextmanager
 def defer_interrupts() -> Iterator[None]:
-    """Ctrl-C within the block is answered when it ends.
+    """Ctrl-C within the block raises KeyboardInterrupt when the block ends.
 
     >>> try:
     ...     with defer_interrupts():
@@ -33,22 +33,21 @@ def defer_interrupts() -> Iterator[None]:
 
 @contextmanager
 def termination_as_interrupt() -> Iterator[None]:
-    """Within the block the program is ended like by Ctrl-C where its terminal is closed or it is told to
-    end: files begun are cleared away."""
+    """Treat SIGTERM and SIGHUP like Ctrl-C within the block, so that temporary files are removed."""
     with _handled(signal.default_int_handler, instead_of=signal.SIG_DFL):
         yield
 
 
 @contextmanager
 def _handled(handler: Any, instead_of: Any) -> Iterator[None]:
-    """A handler in place of another, where that one is set; only the main thread may set any."""
+    """Replace a handler by another in the block. Only the main thread may set handlers."""
     main = threading.current_thread() is threading.main_thread()
     known = [getattr(signal, name) for name in ENDINGS if hasattr(signal, name)]
-    mine = [number for number in known if main and signal.getsignal(number) == instead_of]
-    for number in mine:
+    replaced = [number for number in known if main and signal.getsignal(number) == instead_of]
+    for number in replaced:
         signal.signal(number, handler)
     try:
         yield
     finally:
-        for number in mine:
+        for number in replaced:
             signal.signal(number, instead_of)

@@ -1,4 +1,4 @@
-"""The command line: which commands there are."""
+"""The list of commands."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     help="""Roofs of patches in equilibrium: solve, certify, remesh, convert, draw, sweep, explore.
 
-    Exit codes: 0 certified (or done, of a command that certifies nothing), 1 not certified, 2 bad input,
-    130 stopped by Ctrl-C.
+    Exit codes: 0 the result is certified (or the command has done its work and certifies nothing), 1 the
+    result is not certified, 2 bad input, 130 stopped by Ctrl-C.
     """,
 )
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _show_version(wanted: bool) -> None:
+    if wanted:
         print("pcmc", version("pcmc-surfaces"))
         raise typer.Exit
 
@@ -35,19 +35,21 @@ def _version(asked: bool) -> None:
 def _options(
     version: Annotated[
         bool,
-        typer.Option("--version", callback=_version, is_eager=True, help="Say it and leave."),
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
+        ),
     ] = False,
 ) -> None:
     pass
 
 
-for name, act, what in (
+for name, command, summary in (
     ("solve", solve_, "Solve a surface or a project, certify and write it."),
-    ("certify", certify_, "Say what a finished surface is."),
-    ("remesh", remesh_, "Other triangles, then solve and certify again."),
+    ("certify", certify_, "Check a surface: forces, curvature, stability."),
+    ("remesh", remesh_, "Change the triangle size, solve and certify again."),
     ("convert", convert, "Write a surface in another format."),
     ("plot", plot, "Draw a surface."),
-    ("sweep", sweep, "Solve every combination of some values, as a table."),
-    ("explore", explore, "Move tensions and pressures by sliders, in the browser."),
+    ("sweep", sweep, "Solve every combination of some values; write a table."),
+    ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
 ):
-    app.command(name, short_help=what)(act)
+    app.command(name, short_help=summary)(command)

@@ -1,4 +1,4 @@
-"""What the commands are given: files, NAME=VALUE, views."""
+"""Arguments that several commands have: files, NAME=VALUE, views."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Settings = Annotated[
     typer.Option(
         "--tension",
         metavar="NAME=VALUE",
-        help="Tension of a patch; VALUE alone: of all under pressure.",
+        help="Tension of a patch. A bare VALUE applies to every patch under pressure.",
     ),
 ]
 Pressures = Annotated[
@@ -31,7 +31,8 @@ Pressures = Annotated[
     typer.Option(
         "--pressure",
         metavar="NAME=VALUE",
-        help="Pressure on a patch; VALUE alone: on all under pressure. Walls follow.",
+        help="Pressure on a patch. A bare VALUE applies to every patch under pressure; wall pressures are"
+        " updated.",
     ),
 ]
 ViewName = Annotated[
@@ -49,15 +50,15 @@ Colour = Annotated[
 
 
 def number(text: str | float) -> float:
-    """A number as an option has it; what else is found there is said, which typer's own parser hides."""
+    """The number in an option. The error shows the text, which typer's own parser does not."""
     try:
         return float(text)
     except ValueError:
         raise typer.BadParameter(f"expected a number, found {text!r}") from None
 
 
-def whole(text: str | int) -> int:
-    """A whole number as an option has it; see ``number``."""
+def integer(text: str | int) -> int:
+    """The whole number in an option; see ``number``."""
     try:
         return int(text)
     except ValueError:
@@ -65,19 +66,25 @@ def whole(text: str | int) -> int:
 
 
 def surface_in(file: Path) -> Surface:
-    """A surface from its file, or the one that a project starts from."""
+    """The surface in a file, or the start surface of a project."""
     check_input(file)
     return projects.build(file) if file.suffix.lower() == TOML else read_bare(file)
 
 
 def check_input(file: Path) -> None:
-    """Refuse a file that is neither a project nor a surface by its name."""
+    """Refuse a file whose suffix is neither a project's nor a surface's."""
     suffix = file.suffix.lower()
     if suffix not in (TOML, *FORMATS):
-        raise FileError(f"{file}: {unknown('suffix', suffix, [TOML, *FORMATS])}")
+        raise FileError(
+            f"{file}: {unknown('suffix', suffix, [TOML, *FORMATS])}",
+            what=str(file),
+            found=suffix,
+            expected=(TOML, *FORMATS),
+        )
 
 
 def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str] | None) -> Surface:
+    """The surface with the tensions and pressures of the command line."""
     loaded = [patch.name for patch in surface.patches if not patch.auxiliary]
     tensions, pressures = (
         _by_name(loaded, tension, "--tension"),
@@ -87,8 +94,8 @@ def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str]
 
 
 def _by_name(names: list[str], given: list[str] | None, option: str) -> dict[str, float]:
-    """Values by patch from NAME=VALUE, and VALUE for those named; the later ones win."""
-    found: dict[str, float] = {}
+    """Value by patch, from NAME=VALUE, or VALUE for all ``names``. A later one replaces an earlier one."""
+    values: dict[str, float] = {}
     for text in given or ():
         name, sign, value = text.rpartition("=")
         try:
@@ -96,9 +103,11 @@ def _by_name(names: list[str], given: list[str] | None, option: str) -> dict[str
         except ValueError:
             amount = math.nan
         if (sign and not name) or math.isnan(amount):
-            raise OptionError(f"{option}: expected NAME=NUMBER or NUMBER, found {text!r}")
-        found |= {name: amount} if name else dict.fromkeys(names, amount)
-    return found
+            raise OptionError(
+                f"{option}: expected NAME=NUMBER or NUMBER, found {text!r}", what=option, found=text
+            )
+        values |= {name: amount} if name else dict.fromkeys(names, amount)
+    return values
 
 
 def values_of(text: str) -> tuple[str, list[Any]]:
@@ -109,7 +118,10 @@ def values_of(text: str) -> tuple[str, list[Any]]:
     """
     name, sign, values = text.partition("=")
     if not (name and sign and all(values.split(","))):
-        raise OptionError(f"expected NAME=VALUE or NAME=V1,V2, found {text!r}")
+        expected = "NAME=VALUE or NAME=V1,V2"
+        raise OptionError(
+            f"expected {expected}, found {text!r}", what="values", found=text, expected=expected
+        )
     return name, [_value(one) for one in values.split(",")]
 
 

@@ -1,4 +1,4 @@
-"""What the command returns, and says, when it ends."""
+"""Exit codes, and the last lines that a command prints."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from ..certificate.certificate import Certificate
 OK, NOT_CERTIFIED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
-def code(found: Certificate) -> int:
+def code(certificate: Certificate) -> int:
     """The exit code for a certificate."""
-    return OK if found.certified else NOT_CERTIFIED
+    return OK if certificate.certified else NOT_CERTIFIED
 
 
-def report(found: Certificate, written: list[Path]) -> None:
+def report(certificate: Certificate, written: list[Path]) -> None:
     """Print the verdict, and the files written."""
-    print(*filter(None, (found.verdict.value, found.detail)), sep="\n")
+    print(*filter(None, (certificate.verdict.value, certificate.detail)), sep="\n")
     if written:
         print(f"written: {names(written)}")
 
 
 def names(paths: list[Path]) -> str:
-    """The names of files in a line."""
+    """The names of files, with commas."""
     return ", ".join(str(path) for path in paths)

@@ -1,4 +1,4 @@
-"""Progress on stderr, where that is a terminal that can redraw a line."""
+"""Progress on stderr, if that is a terminal that can redraw a line."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import Any
 
 @contextmanager
 def working() -> Iterator[Callable[[str], None]]:
-    """A function that shows what is being done."""
+    """A function that shows the name of the current step."""
     if not _live():
-        yield lambda words: None
+        yield lambda step: None
         return
     from rich import progress
     from rich.console import Console
@@ -25,12 +25,12 @@ def working() -> Iterator[Callable[[str], None]]:
     )
     with progress.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
-        yield lambda words: bar.update(task, description=words)
+        yield lambda step: bar.update(task, description=step)
 
 
 @contextmanager
 def sweeping() -> Iterator[Any]:
-    """The bar of a sweep; None where there is no terminal."""
+    """The progress bar of a sweep; None if there is no terminal."""
     from ..sweep.bar import bar
 
     if not _live():

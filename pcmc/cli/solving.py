@@ -1,4 +1,4 @@
-"""solve, certify, remesh: what ends in a certificate. Each function returns the exit code."""
+"""The commands solve, certify and remesh. Each returns the exit code."""
 
 from __future__ import annotations
 
@@ -34,26 +34,28 @@ def solve_(
     file: Input,
     output: Annotated[
         list[Path] | None,
-        typer.Option("-o", "--output", metavar="FILE", help="To write; may be repeated."),
+        typer.Option("-o", "--output", metavar="FILE", help="File to write; may be repeated."),
     ] = None,
-    picture: Annotated[Path | None, typer.Option(metavar="PNG", help="To draw.")] = None,
+    picture: Annotated[Path | None, typer.Option(metavar="PNG", help="Picture to draw.")] = None,
     method: Annotated[
         str | None, typer.Option(metavar="NAME", help="newton, nesterov or lbfgs.")
     ] = None,
     target: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="minimum, or stationary for saddles too (newton)."),
+        typer.Option(
+            metavar="NAME", help="minimum, or stationary to accept saddles too (newton only)."
+        ),
     ] = None,
     tension: Settings = None,
     pressure: Pressures = None,
     folder: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Where a project's output goes.")
+        Path | None, typer.Option(metavar="FOLDER", help="Folder for a project's output.")
     ] = None,
     anyway: Annotated[
         bool, typer.Option("--anyway", help="Write the output even if it is not certified.")
     ] = False,
 ) -> int:
-    """Solve a surface or a project, certify it, and write it: all files, or none.
+    """Solve a surface or a project, certify it, and write all files, or none.
 
     \b
     Examples:
@@ -67,9 +69,11 @@ def solve_(
     project = replace(project, method=method or project.method, options=options)
     with working() as say:
         outcome = projects.run_project(
-            project, say, anyway=anyway,
+            project,
+            say,
+            anyway=anyway,
             changed=partial(retensioned, tension=tension, pressure=pressure),
-        )  # fmt: skip
+        )
     print(f"{outcome.surface.m} triangles; {outcome.result.message}")
     if outcome.design is not None:
         print(f"targets {outcome.design.message}")
@@ -77,35 +81,33 @@ def solve_(
             print(_with(outcome.design))
     report(outcome.certificate, list(outcome.files))
     if project.outputs and not outcome.files:
-        print("nothing written (--anyway writes it all the same)")
+        print("nothing written (use --anyway to write it)")
     return OK if outcome.good else NOT_CERTIFIED
 
 
 def _with(design: Design) -> str:
-    """What the search found: the targets' quantities, and the parameters that give them.
+    """The targets' quantities, and the parameters that give them.
 
-    A sentence of ``design.message`` has them where a target is missed.
+    If a target is missed, ``design.message`` has them.
     """
-    found = (f"{label} {value:.6g}" for label, value in design.targets["value"].items())
+    reached = (f"{label} {value:.6g}" for label, value in design.targets["value"].items())
     values = (f"{label} {value:.6g}" for label, value in design.parameters["value"].items())
-    return f"{', '.join(found)}, with {', '.join(values)}"
+    return f"{', '.join(reached)}, with {', '.join(values)}"
 
 
 def _project(
     file: Path, folder: Path | None, output: list[Path] | None, picture: Path | None
 ) -> projects.Project:
-    """The project, with the output asked for in place of its own."""
+    """The project, with the output files of the command line if there are any."""
     check_input(file)
     if file.suffix.lower() != TOML:
         return projects.Project(file, files=output or (), picture=picture, folder=folder)
     project = projects.load(file).in_folder(file.parent if folder is None else folder)
-    return replace(
-        project, files=output or project.files, picture=picture or project.picture
-    )  # fmt: skip
+    return replace(project, files=output or project.files, picture=picture or project.picture)
 
 
 def certify_(file: Input, tension: Settings = None, pressure: Pressures = None) -> int:
-    """Say what a surface is: forces left, curvature errors, stability, reactions.
+    """Check a surface: residual forces, curvature errors, stability, reactions.
 
     \b
     Example:
@@ -113,19 +115,19 @@ def certify_(file: Input, tension: Settings = None, pressure: Pressures = None) 
     """
     with working() as say:
         say("certifying")
-        found = certify(retensioned(surface_in(file), tension, pressure))
-    print(found)
-    return code(found)
+        certificate = certify(retensioned(surface_in(file), tension, pressure))
+    print(certificate)
+    return code(certificate)
 
 
 def remesh_(
     file: Input,
     edge_length: Annotated[
-        float, typer.Option(parser=number, metavar="LENGTH", help="Of the triangles.")
+        float, typer.Option(parser=number, metavar="LENGTH", help="Edge length of the triangles.")
     ],
     output: Annotated[
         list[Path],
-        typer.Option("-o", "--output", metavar="FILE", help="To write; may be repeated."),
+        typer.Option("-o", "--output", metavar="FILE", help="File to write; may be repeated."),
     ],
     near_curves: Annotated[
         float | None,
@@ -138,14 +140,14 @@ def remesh_(
         typer.Option(
             parser=number,
             metavar="LENGTH",
-            help="Largest distance to the smooth surface: finer where it curves.",
+            help="Largest distance to the smooth surface; triangles are smaller where it curves more.",
         ),
     ] = None,
     solved: Annotated[
         bool, typer.Option("--solve/--no-solve", help="Solve and certify the new mesh.")
     ] = True,
 ) -> int:
-    """Remesh a surface to an edge length, keeping patches and supports; solve and certify it again.
+    """Remesh a surface to an edge length, then solve and certify it. Patches and supports stay.
 
     \b
     Example:
@@ -168,5 +170,5 @@ def remesh_(
     report(outcome.certificate, list(outcome.files))
     if outcome.files:
         return OK
-    print("nothing written (--no-solve writes the new mesh as it is)")
+    print("nothing written (use --no-solve to write the new mesh)")
     return NOT_CERTIFIED

@@ -1,4 +1,4 @@
-"""sweep: every combination of some numbers of a project, a surface or a generator."""
+"""The command sweep: every combination of some numbers of a project, a surface or a generator."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import typer
 
 from ..base.errors import FileError, MissingExtra, OptionError
 from ..io import FORMATS
-from .arguments import TOML, number, values_of, whole
+from .arguments import TOML, integer, number, values_of
 from .codes import INTERRUPTED, NOT_CERTIFIED, OK
 from .progress import sweeping
 
@@ -27,36 +27,41 @@ def sweep(
     values: Annotated[list[str], typer.Argument(metavar="NAME=V1,V2,...")],
     method: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="newton, nesterov or lbfgs, instead of the project's."),
+        typer.Option(metavar="NAME", help="newton, nesterov or lbfgs; default: the project's."),
     ] = None,
     store: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Keeps finished cases; run again to go on from there."),
+        typer.Option(
+            metavar="FILE",
+            help="File for finished cases. The same command again runs only the missing ones.",
+        ),
     ] = None,
     csv: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Table to write (.csv or .parquet).")
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(parser=whole, metavar="NUMBER", help="Local processes; default: all."),
+        typer.Option(
+            parser=integer, metavar="NUMBER", help="Local processes; default: one per processor."
+        ),
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, tcp://HOST:8786.")
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler to use: tcp://HOST:8786.")
     ] = None,
     time_limit: Annotated[
         float,
-        typer.Option(parser=number, metavar="SECONDS", help="After so long a case is stopped."),
+        typer.Option(parser=number, metavar="SECONDS", help="Time limit per case, in seconds."),
     ] = 600.0,
     retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Run stored cases that failed once more.")
+        bool, typer.Option("--retry-failed", help="Run the stored cases that failed again.")
     ] = False,
 ) -> int:
-    """Solve for every combination of the values; exit code 0 if all are certified.
+    """Solve every combination of the values; exit code 0 if all are certified.
 
-    Of a project or a surface, NAME is PATCH.tension or PATCH.pressure of a patch or wall; of a project
-    also any number that stands in the file, by its keys: plan.edge_length, plan.outline.3.1 (the first
-    coordinate of the third corner). Of a generator it is a parameter, or an option of the method. A store
-    belongs to the values and to the file as it is: when the file has changed, name a new store.
+    For a project or a surface, NAME is PATCH.tension or PATCH.pressure of a patch or wall. For a project it
+    may also be the keys of a number in the file: plan.edge_length, plan.outline.3.1 (the first coordinate of
+    the third corner). For a generator it is one of its parameters, or an option of the method. With a store,
+    values may be added later: only new cases are run. If the project file has changed, name a new store.
 
     \b
     Examples:
@@ -69,29 +74,38 @@ def sweep(
     for path, suffixes in ((csv, (".csv", ".parquet")), (store, ())):
         _check_place(path, suffixes)
     if csv is not None and store is not None and csv.resolve() == store.resolve():
-        raise OptionError(f"{csv} cannot be both the store and the table; name two files")
+        raise OptionError(
+            f"{csv} cannot be both the store and the table; name two files", what="--store"
+        )
     if csv is not None and csv.suffix == ".parquet" and find_spec("pyarrow") is None:
         raise MissingExtra("pyarrow", "files")
     given: dict[str, list[Any]] = {}
-    for name, found in map(values_of, values):
+    for name, listed in map(values_of, values):
         if name in given:
-            raise OptionError(f"{name} is given twice; list its values with commas: {name}=1,2")
-        given[name] = found
-    grid = {name: found for name, found in given.items() if len(found) > 1}
-    fixed = {name: found[0] for name, found in given.items() if len(found) == 1}
+            raise OptionError(
+                f"{name} is given twice; list its values with commas: {name}=1,2", what=name
+            )
+        given[name] = listed
+    grid = {name: listed for name, listed in given.items() if len(listed) > 1}
+    fixed = {name: listed[0] for name, listed in given.items() if len(listed) == 1}
     with sweeping() as draw:
         cases = _cases(what, grid, fixed, method)
         table = run(
-            cases, store, scheduler=scheduler, workers=workers, time_limit=time_limit,
-            retry_failed=retry_failed, on_record=draw,
-        )  # fmt: skip
+            cases,
+            store,
+            scheduler=scheduler,
+            workers=workers,
+            time_limit=time_limit,
+            retry_failed=retry_failed,
+            on_record=draw,
+        )
     if table.empty:
         return INTERRUPTED
     if csv is not None:
         write_table(csv, table)
     columns = [c for c in (*grid, "status", "verdict", "targets_met") if c in table]
     print(table[columns].to_string())
-    _say_failures(table[table["status"].isin(FAILED)])
+    _print_failures(table[table["status"].isin(FAILED)])
     if len(table) < len(cases):
         return INTERRUPTED
     good = table["verdict"].isin(["stable", "neutral"]) & table.get("targets_met", True)
@@ -107,27 +121,36 @@ def _cases(what: str, grid: dict[str, Any], fixed: dict[str, Any], method: str |
     if ":" not in what:
         raise OptionError(
             f"{what}: expected a project (.toml), a surface ({' '.join(FORMATS)}), or a generator such"
-            " as generators:two_caps"
+            " as generators:two_caps",
+            what="WHAT",
+            found=what,
         )
     return Sweep(solve_case, grid, {"generator": what, "method": method or "newton", **fixed})
 
 
-def _say_failures(failed: Any) -> None:
-    """Why cases failed, each reason once."""
+def _print_failures(failed: Any) -> None:
+    """Print why cases failed, each reason once."""
     for message, cases in failed.groupby("message", sort=False):
         others = f" and {len(cases) - 1} more" if len(cases) > 1 else ""
         print(f"case {cases.index[0]}{others}: {cases['status'].iloc[0]}: {message}")
 
 
 def _check_place(path: Path | None, suffixes: tuple[str, ...]) -> None:
-    """Refuse a file that cannot be written, before any case is run."""
+    """Refuse a file that cannot be written, before any case runs."""
     if path is None:
         return
     if suffixes and path.suffix not in suffixes:
-        raise FileError(f"{path}: a table is written as {' or '.join(suffixes)}; name it so")
+        raise FileError(
+            f"{path}: a table is written as {' or '.join(suffixes)}; change the suffix",
+            what=str(path),
+            found=path.suffix,
+            expected=suffixes,
+        )
     if path.is_dir():
-        raise FileError(f"{path}: is a folder; give the name of a file")
+        raise FileError(f"{path}: is a folder; give the name of a file", what=str(path))
     if not path.parent.is_dir():
-        raise FileError(f"{path}: there is no folder {path.parent}; make it first")
+        raise FileError(f"{path}: there is no folder {path.parent}; make it first", what=str(path))
     if not os.access(path.parent, os.W_OK):
-        raise FileError(f"{path}: cannot be written (the folder {path.parent} is read-only)")
+        raise FileError(
+            f"{path}: cannot be written (the folder {path.parent} is read-only)", what=str(path)
+        )

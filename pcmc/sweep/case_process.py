@@ -67,8 +67,9 @@ class CaseProcess:
             raise SweepError(
                 f"a worker on {platform.node()} cannot load the case {case!r};"
                 f" install its package where the workers run:\n{text.strip()}",
-                what=case, where=platform.node(),
-            )  # fmt: skip
+                what=case,
+                where=platform.node(),
+            )
 
     def run(self, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
         """Run one case; the fields of its record from ``status`` on."""

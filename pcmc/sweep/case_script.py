@@ -1,7 +1,7 @@
-"""The process a case runs in: takes cases from its standard input, answers on its standard output.
+"""The script of a case process: it reads cases from standard input and writes outcomes to standard output.
 
-``isolate`` starts this file as a script. It needs the standard library alone, so that a worker is
-ready in some hundredths of a second and its death costs no more; ``grid`` borrows its helpers.
+``case_process`` starts this file as a script. It imports the standard library alone, so that a process starts
+in some hundredths of a second.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from typing import Any, BinaryIO
 
-WORDS = ("status", "verdict", "message")  # keys of a case's answer that hold text about the case
-OUTPUT = 4000  # characters kept of what a failed case says
-LONGEST = 1024  # bits of a whole number, the range of floats; far longer ones have no decimal text
+WORDS = ("status", "verdict", "message")  # keys of a case's answer that are not numbers
+OUTPUT = 4000  # characters of a failed case's output that are stored
+LONGEST = 1024  # bits of an integer, the range of floats; far longer ones have no decimal text
 DISTRIBUTIONS = {"pcmc": "pcmc-surfaces"}  # where a package is installed under another name
-ORPHANED = 1.0  # seconds between looks whether the parent lives
+ORPHANED = 1.0  # seconds between two checks that the parent is alive
 
 
 def resolve(case: str) -> Callable[..., Any]:
@@ -39,14 +39,14 @@ def resolve(case: str) -> Callable[..., Any]:
     5.0
     """
     module, _, name = case.partition(":")
-    found: Callable[..., Any] = operator.attrgetter(name)(importlib.import_module(module))
-    return found
+    function: Callable[..., Any] = operator.attrgetter(name)(importlib.import_module(module))
+    return function
 
 
 def scalar(value: object) -> bool | int | float | str | None:
-    """The plain Python value of a number, text, truth value or None; a TypeError for all else.
+    """The plain Python value of a number, text, truth value or None; a TypeError for anything else.
 
-    All else includes what no file can hold: texts with half a character, whole numbers beyond floats.
+    Also for values that no file can hold: texts with lone surrogates, integers beyond the range of floats.
 
     >>> import numpy as np
     >>> scalar(np.float64(0.1)), scalar(np.int32(3)), scalar(np.bool_(True))
@@ -58,19 +58,21 @@ def scalar(value: object) -> bool | int | float | str | None:
     if value is None or isinstance(value, bool):
         return value
     if isinstance(value, int) and value.bit_length() > LONGEST:
-        raise TypeError(f"expected a number, found a whole one of {value.bit_length()} bits")
-    if isinstance(value, str) and value != whole_text(value):
-        raise TypeError(f"expected a text of whole characters, found {value!r:.80}")
+        raise TypeError(
+            f"expected a number in the range of floats, found {value.bit_length()} bits"
+        )
+    if isinstance(value, str) and value != escape_surrogates(value):
+        raise TypeError(f"expected a text without lone surrogates, found {value!r:.80}")
     for kind in (int, float, str):
         if isinstance(value, kind):
             return kind(value)  # subclasses print themselves in ways of their own
     raise TypeError(f"expected a number, a text, a truth value or None, found {value!r:.80}")
 
 
-def whole_text(text: str) -> str:
-    r"""The text with halves of characters, which no file can hold, spelt out.
+def escape_surrogates(text: str) -> str:
+    r"""The text with lone surrogates, which no file can hold, as escapes.
 
-    >>> whole_text("half: \ud800")
+    >>> escape_surrogates("half: \ud800")
     'half: \\ud800'
     """
     return text.encode("utf-8", "backslashreplace").decode()
@@ -106,17 +108,17 @@ def run(
     started, begin, extra = datetime.now(UTC), time.perf_counter(), {}
     process = os.getpid()
     if time_limit is not None:
-        # a watchdog of C: it works while compiled code holds the interpreter or the parent is dead
+        # written in C: it works while compiled code holds the interpreter, and if the parent is dead
         faulthandler.dump_traceback_later(time_limit, exit=True)
     try:
         fields = answer(function(**parameters), parameters)
-    except BaseException as error:  # nobody but the case can have raised it: Ctrl-C goes elsewhere
-        text = whole_text("".join(traceback.format_exception_only(error)).strip()[:OUTPUT])
+    except BaseException as error:  # Ctrl-C does not reach this process, so the case has raised it
+        text = escape_surrogates("".join(traceback.format_exception_only(error)).strip()[:OUTPUT])
         fields = {"status": "raised", "verdict": "", "message": text, "numbers": {}}
-        extra = {"output": whole_text(traceback.format_exc()[-OUTPUT:])}
+        extra = {"output": escape_surrogates(traceback.format_exc()[-OUTPUT:])}
     finally:
         if os.getpid() != process:
-            os._exit(0)  # a fork that the case has made; the case itself answers
+            os._exit(0)  # this is a fork that the case has made; only the case itself answers
         faulthandler.cancel_dump_traceback_later()
     fields["wall_time"] = time.perf_counter() - begin
     fields["provenance"] = {"started": started.isoformat(timespec="milliseconds"), **extra}
@@ -124,27 +126,29 @@ def run(
 
 
 def postpone(name: str) -> None:
-    """Have a module of an imported package run when something in it is used, not when it is named."""
+    """Import a module of an imported package when something in it is used, not before."""
     package, _, last = name.rpartition(".")
     if package not in sys.modules or name in sys.modules:
         return
-    found = importlib.util.find_spec(name)
-    if found is None or found.loader is None:
+    spec = importlib.util.find_spec(name)
+    if spec is None or spec.loader is None:
         return
-    found.loader = importlib.util.LazyLoader(found.loader)
-    module = importlib.util.module_from_spec(found)
+    spec.loader = importlib.util.LazyLoader(spec.loader)
+    module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    found.loader.exec_module(module)
+    spec.loader.exec_module(module)
     setattr(sys.modules[package], last, module)
 
 
 def provenance() -> dict[str, Any]:
-    """Where this process runs and with what."""
-    told: dict[str, Any] = {"host": platform.node(), "pid": os.getpid()}
-    told["python"] = platform.python_version()
-    for package in ("pcmc", "numpy", "scipy", "numba"):
-        told[package] = version(package)
-    return told
+    """Host, process and versions."""
+    packages = {name: version(name) for name in ("pcmc", "numpy", "scipy", "numba")}
+    return {
+        "host": platform.node(),
+        "pid": os.getpid(),
+        "python": platform.python_version(),
+        **packages,
+    }
 
 
 def version(package: str) -> str:
@@ -156,14 +160,14 @@ def version(package: str) -> str:
 
 
 def _forget_output() -> None:
-    """Empty the file that keeps what a case prints before it dies."""
+    """Empty the file that holds the output of a case."""
     sys.stdout.flush()
     os.lseek(2, 0, os.SEEK_SET)
     os.ftruncate(2, 0)
 
 
 def _cut_forks_off(*pipes: BinaryIO) -> None:
-    """Take the pipes from every process that a case forks: it must neither answer nor hold them open."""
+    """Close the pipes in every process that a case forks: it must neither answer nor hold them open."""
     nothing = os.open(os.devnull, os.O_RDWR)
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(
@@ -172,8 +176,8 @@ def _cut_forks_off(*pipes: BinaryIO) -> None:
 
 
 def _outlive(parent: int) -> None:
-    """End this process and what it started soon after its parent, in the middle of a case too."""
-    while os.getppid() == parent:  # for ever on Windows, where the case is run to its end
+    """End this process and all that it started soon after its parent, also in the middle of a case."""
+    while os.getppid() == parent:  # always true on Windows, where the case runs to its end
         time.sleep(ORPHANED)
     os.killpg(0, signal.SIGKILL)
 
@@ -197,9 +201,9 @@ def main() -> None:
         path, case = pickle.load(requests)
         sys.path[:] = path
         try:
-            gc.disable()  # looking for garbage takes a fifth of the time of large imports
+            gc.disable()  # garbage collection takes a fifth of the time of large imports
             function = resolve(case)
-            # scipy names all that numpy has; these tables take long to make and no case needs them
+            # scipy imports all of numpy; this part takes long and no case needs it
             postpone("numpy.f2py")
         except Exception:
             _reply(answers, ("failed", traceback.format_exc(limit=-3)))
@@ -216,7 +220,7 @@ def main() -> None:
                 gc.freeze()
                 gc.enable()
     except (EOFError, BrokenPipeError):
-        os._exit(0)  # nobody is left to answer to
+        os._exit(0)  # the sweep has ended
 
 
 if __name__ == "__main__":

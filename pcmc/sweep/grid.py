@@ -61,17 +61,21 @@ class Sweep:
         for what, values in (("grid", grid), ("fixed", fixed or {})):
             if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
                 raise OptionError(
-                    f"{what}: expected a dict by parameter names, found {values!r:.60}"
+                    f"{what}: expected a dict by parameter names, found {values!r:.60}",
+                    what=what,
+                    found=values,
                 )
         object.__setattr__(self, "case", case if isinstance(case, str) else _path(case))
         object.__setattr__(self, "grid", {name: _axis(name, grid[name]) for name in grid})
         fixed = {name: _plain(value, name) for name, value in (fixed or {}).items()}
         object.__setattr__(self, "fixed", fixed)
         if not self.grid:
-            raise OptionError("the grid is empty; give at least one parameter a list of values")
+            text = "the grid is empty; give at least one parameter a list of values"
+            raise OptionError(text, what="grid")
         for name in self.grid:
             if name in fixed:
-                raise OptionError(f"{name!r} is in the grid and among the fixed; keep one")
+                text = f"{name!r} is in the grid and among the fixed; keep one"
+                raise OptionError(text, what="fixed", where=name)
         self._check_against(_function(self.case))
 
     def _check_against(self, function: Callable[..., Any]) -> None:
@@ -79,20 +83,24 @@ class Sweep:
         names = [*self.grid, *self.fixed]
         for name in names:
             if name == "case" or name in WORDS:
-                raise OptionError(f"a parameter may not be called {name!r}: a column has that name")
+                text = f"a parameter may not be called {name!r}: a column has that name"
+                raise OptionError(text, what=name)
         try:
             taken = inspect.signature(function).parameters
         except (TypeError, ValueError):
-            raise OptionError(f"{self.case!r} does not say which parameters it takes") from None
+            text = f"{self.case!r} has no signature, so its parameters are unknown; wrap it in a function"
+            raise OptionError(text, what="case", found=self.case) from None
         kinds = {p.kind for p in taken.values()}
         named = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
         keywords = [name for name, p in taken.items() if p.kind in named]
         for name in names:
             if name not in keywords and inspect.Parameter.VAR_KEYWORD not in kinds:
-                raise OptionError(f"{unknown('parameter', name, keywords)} (of {self.case})")
+                text = f"{unknown('parameter', name, keywords)} (of {self.case})"
+                raise OptionError(text, what=name, found=name, expected=tuple(keywords))
         for name in keywords:
             if taken[name].default is inspect.Parameter.empty and name not in names:
-                raise OptionError(f"{self.case} needs the parameter {name!r}, which has no value")
+                text = f"{self.case} needs the parameter {name!r}, which has no value"
+                raise OptionError(text, what=name)
         check = getattr(function, "check", None)
         if check is not None:
             for parameters in self:
@@ -121,7 +129,7 @@ def cases(grid: Mapping[str, Sequence[Any]], fixed: Mapping[str, Any]) -> Iterat
 def checked(check: Callable[..., object]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Decorator: ``check(**parameters)`` refuses a bad case of the function before any case is run.
 
-    For functions whose own signature does not tell which parameters are good, as ``**arguments``.
+    For functions whose signature does not list their parameters, because it has ``**arguments``.
     """
 
     def mark(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -136,10 +144,13 @@ def _function(case: str) -> Callable[..., Any]:
         function = resolve(case)
     except (ImportError, AttributeError, ValueError) as error:
         raise OptionError(
-            f"the case {case!r} cannot be found ({error}); expected 'package.module:function'"
+            f"the case {case!r} cannot be found ({error}); expected 'package.module:function'",
+            what="case",
+            found=case,
         ) from error
     if not callable(function):
-        raise OptionError(f"the case {case!r} is not a function but {function!r:.60}")
+        text = f"the case {case!r} is not a function but {function!r:.60}"
+        raise OptionError(text, what="case", found=case)
     return function
 
 
@@ -149,7 +160,9 @@ def _path(function: Callable[..., Any]) -> str:
     if module in (None, "__main__") or "<" in name:
         raise OptionError(
             f"the case function {name!r} cannot be imported by a worker; put it at the top level of"
-            " a module (a file of its own) and import it from there"
+            " a module (a file of its own) and import it from there",
+            what="case",
+            found=name,
         )
     return f"{module}:{name}"
 
@@ -158,16 +171,21 @@ def _axis(name: str, values: object) -> list[Any]:
     if isinstance(values, str | bytes | Mapping | Set) or not np.iterable(values):
         raise OptionError(
             f"grid[{name!r}] must be a list of values, found {values!r:.60}; a single value belongs"
-            " to fixed"
+            " to fixed",
+            what="grid",
+            where=name,
+            found=values,
         )
     axis = [_plain(value, f"{name}[{i}]") for i, value in enumerate(values)]
     if not axis:
-        raise OptionError(f"grid[{name!r}] is empty; give it at least one value")
+        text = f"grid[{name!r}] is empty; give it at least one value"
+        raise OptionError(text, what="grid", where=name)
     seen: dict[str, int] = {}
     for i, value in enumerate(axis):
         first = seen.setdefault(json.dumps(value, sort_keys=True), i)
         if first != i:
-            raise OptionError(f"grid[{name!r}] has the value {value!r} twice, at {first} and {i}")
+            text = f"grid[{name!r}] has the value {value!r} twice, at {first} and {i}"
+            raise OptionError(text, what="grid", where=(name, i), found=value)
     return axis
 
 
@@ -175,11 +193,12 @@ def _plain(value: object, where: str) -> Any:
     """The value as plain lists, dicts and scalars, which a file gives back unchanged."""
     if isinstance(value, Mapping):
         if not all(isinstance(key, str) for key in value):
-            raise OptionError(f"parameter {where}: keys must be texts, found {list(value)!r:.60}")
+            text = f"parameter {where}: keys must be texts, found {list(value)!r:.60}"
+            raise OptionError(text, what=where, found=value)
         return {key: _plain(item, f"{where}[{key!r}]") for key, item in value.items()}
     if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim):
         return [_plain(item, f"{where}[{i}]") for i, item in enumerate(value)]
     try:
         return scalar(value)
     except TypeError as error:
-        raise OptionError(f"parameter {where}: {error}") from None
+        raise OptionError(f"parameter {where}: {error}", what=where, found=value) from None

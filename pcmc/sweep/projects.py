@@ -26,15 +26,15 @@ def project_sweep(
 
     Parameters
     ----------
-    path : of a project (``.toml``) or a surface; as given, it must lead there from every worker too.
+    path : of a project (``.toml``) or a surface; every worker must be able to open it by this path.
     grid, fixed : as of ``Sweep``, by the names of ``pcmc.project.varied``: ``NAME.tension`` and
         ``NAME.pressure`` of patches, and the numbers of the file, such as ``plan.edge_length``.
-    method : in place of the project's, whose options are left out then.
+    method : replaces the project's method and its options.
 
     Raises
     ------
-    OptionError, FileError, PlanError : for a project that cannot be read or meshed, an unknown name
-        (with the nearest one), a value that cannot be; before any case is run.
+    OptionError, FileError, PlanError : before any case runs: for a project that cannot be read or meshed, an
+        unknown name (with the nearest known one), or a value that is not allowed.
 
     Examples
     --------
@@ -56,31 +56,34 @@ def project_sweep(
 def solve_project(
     project: str, project_digest: str, method: str | None = None, **values: Any
 ) -> dict[str, Any]:
-    """Build, solve, remesh a project and meet its targets, with some of its numbers replaced; no output.
+    """Build and solve a project, with its remeshing and targets and some of its numbers replaced.
 
     Parameters
     ----------
-    project : its file. project_digest : ``pcmc.project.digest`` of it when the sweep was declared, so
-        that a case, and the store it is kept in, belongs to one state of the project.
-    method : in place of the project's. values : as of ``pcmc.project.varied``.
+    project : its file. project_digest : ``pcmc.project.digest`` of it when the sweep was declared: a case and
+        its store belong to one state of the project.
+    method : replaces the project's. values : as of ``pcmc.project.varied``.
 
     Returns
     -------
-    dict : as of ``solve_case``; and ``targets_met``, where the project has targets.
+    dict : as of ``solve_case``; and ``targets_met``, if the project has targets.
 
     Raises
     ------
-    FileError : the file is another one by now.
+    FileError : the file has changed.
     """
-    found = projects.digest(project)
-    if found != project_digest:
+    digest = projects.digest(project)
+    if digest != project_digest:
         raise FileError(
-            f"{project}: has changed since the sweep was begun (it had the digest {project_digest:.12}…, now"
-            f" {found:.12}…); take the change back, or sweep anew with a new store"
+            f"{project}: has changed since the sweep was begun (its digest was {project_digest:.12}…, now"
+            f" it is {digest:.12}…); undo the change, or begin a new sweep with a new store",
+            what=project,
+            found=digest,
+            expected=project_digest,
         )
     design, start = projects.varied(project, values)
     if method not in (None, design.method):
         design = replace(design, method=method, options={})
     outcome = projects.solve_project(design, start)
-    told = row(outcome.result, ("project", "project_digest", "method", *values))
-    return told if outcome.design is None else told | {"targets_met": outcome.design.met}
+    answer = row(outcome.result, ("project", "project_digest", "method", *values))
+    return answer if outcome.design is None else answer | {"targets_met": outcome.design.met}

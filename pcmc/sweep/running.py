@@ -248,8 +248,9 @@ def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any]:
         raise SweepError(
             f"the executor failed ({text}); the cases stored so far are safe: run the same sweep"
             " again to go on from there",
-            what="executor", found=text,
-        ) from error  # fmt: skip
+            what="executor",
+            found=text,
+        ) from error
 
 
 def _of_this_version(outcome: dict[str, Any]) -> dict[str, Any]:
@@ -260,8 +261,11 @@ def _of_this_version(outcome: dict[str, Any]) -> dict[str, Any]:
         raise SweepError(
             f"a worker on {about['host']} has pcmc {found}, this is pcmc {OWN_VERSION}; install the"
             " same version there and run the same sweep again to go on from the cases stored",
-            what="pcmc", where=about["host"], found=found, expected=OWN_VERSION,
-        )  # fmt: skip
+            what="pcmc",
+            where=about["host"],
+            found=found,
+            expected=OWN_VERSION,
+        )
     return outcome
 
 

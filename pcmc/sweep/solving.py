@@ -28,14 +28,16 @@ def _split(generator: str, method: str, arguments: Mapping[str, Any]) -> Parts:
     except (ImportError, AttributeError, ValueError, TypeError) as error:
         raise OptionError(
             f"the generator {generator!r} cannot be found ({error}); expected 'generators:two_caps'"
-            " or 'package.module:function'"
+            " or 'package.module:function'",
+            what="generator",
+            found=generator,
         ) from error
     options = find_method(method).options
     known = [f.name for f in fields(options)]
     for name in arguments:
         if name not in own and name not in known:
             of = f"{generator} or of method {method!r}"
-            raise OptionError(unknown(f"parameter of {of}:", name, [*own, *known]))
+            raise OptionError(unknown(f"parameter of {of}:", name, [*own, *known]), what=name)
     shape = {name: value for name, value in arguments.items() if name in own}
     solver = {name: value for name, value in arguments.items() if name not in own}
     options(**solver)  # refuses bad values
@@ -78,9 +80,9 @@ def solve_case(generator: str, method: str = "newton", **arguments: Any) -> dict
 
 
 def row(result: Result, names: Container[str]) -> dict[str, Any]:
-    """What a case says about a result: see ``solve_case``. ``names`` are those of its parameters."""
+    """The answer of a case: see ``solve_case``. ``names`` are the names of its parameters."""
     certificate = result.certificate
-    found = {
+    numbers = {
         "iterations_taken": result.iterations,
         "evaluations_made": result.evaluations,
         "triangles": result.surface.m,
@@ -92,10 +94,10 @@ def row(result: Result, names: Container[str]) -> dict[str, Any]:
     }
     words = {
         "status": result.status.name.lower().replace("_", " "),
-        "verdict": found.pop("verdict").replace("_", " "),
+        "verdict": numbers.pop("verdict").replace("_", " "),
         "message": result.message,
     }
-    return words | {f"{n}_reached" if n in names else n: v for n, v in found.items()}
+    return words | {f"{n}_reached" if n in names else n: v for n, v in numbers.items()}
 
 
 def _cells(frame: pd.DataFrame, names: Iterable[str]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ import time
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from warnings import warn
@@ -90,8 +90,9 @@ class Store:
             raise FileError(
                 f"{self.path}: a record could not be written ({error}); the {len(self.records)} cases"
                 " stored before it are safe; make room and run the same sweep again to go on from there",
-                what=str(self.path), found=len(self.records),
-            ) from error  # fmt: skip
+                what=str(self.path),
+                found=len(self.records),
+            ) from error
         self.records |= new
 
 
@@ -189,8 +190,10 @@ def _check_file(path: Path) -> None:
     if start.startswith(LINES):
         raise FileError(
             f"{path}: is a store of an older pcmc, in lines of JSON; name a new file",
-            what=str(path), found=1, expected=FORMAT,
-        )  # fmt: skip
+            what=str(path),
+            found=1,
+            expected=FORMAT,
+        )
     if start not in (b"", SQLITE):
         raise FileError(f"{path}: is not the store of a sweep; name another file", what=str(path))
 
@@ -237,8 +240,10 @@ def _declaration(path: Path, database: sqlite3.Connection) -> dict[str, Any]:
         raise FileError(
             f"{path}: written in store format {found}, this is format {FORMAT}; read it with pcmc"
             f" {written_by}",
-            what=str(path), found=found, expected=FORMAT,
-        )  # fmt: skip
+            what=str(path),
+            found=found,
+            expected=FORMAT,
+        )
     return {"version": written_by, **json.loads(text)}
 
 
@@ -248,8 +253,11 @@ def _check_declaration(path: Path, stored: dict[str, Any], sweep: Sweep) -> None
         raise FileError(
             f"{path}: written by pcmc {stored['version']}, this is pcmc {version('pcmc')}; numbers of"
             " two versions do not mix: name a new file, or delete this one",
-            what=str(path), where="version", found=stored["version"], expected=version("pcmc"),
-        )  # fmt: skip
+            what=str(path),
+            where="version",
+            found=stored["version"],
+            expected=version("pcmc"),
+        )
     new = _declared(sweep)
     for part in ("case", "grid", "fixed"):
         old, wanted = stored[part], new[part]
@@ -260,13 +268,16 @@ def _check_declaration(path: Path, stored: dict[str, Any], sweep: Sweep) -> None
         where, was, now = part, old, wanted
         if part != "case":
             where = next(name for name in [*old, *wanted] if old.get(name) != wanted.get(name))
-            was, now = old.get(where, "nothing"), wanted.get(where, "nothing")
-        place = "case is " if part == "case" else f"{part} has {where}="
+            was, now = old.get(where, "missing"), wanted.get(where, "missing")
+        place = part if part == where else f"{part} {where!r}"
         raise FileError(
-            f"{path}: written for another sweep (its {place}{was!r:.60}, this one's {now!r:.60}); name a new"
-            " file, or delete this one",
-            what=str(path), where=where, found=was, expected=now,
-        )  # fmt: skip
+            f"{path}: written for another sweep (its {place} is {was!r:.60}, this one's is {now!r:.60});"
+            " name a new file, or delete this one",
+            what=str(path),
+            where=where,
+            found=was,
+            expected=now,
+        )
 
 
 def _key(parameters: Mapping[str, Any]) -> str:
@@ -275,7 +286,7 @@ def _key(parameters: Mapping[str, Any]) -> str:
 
 def _row(record: Record) -> tuple[str, str, int]:
     """Parameters, the rest of the record, and the checksum of both: SQLite has none."""
-    fields = asdict(record)
+    fields = dict(vars(record))
     del fields["case"]
     key = _key(fields.pop("parameters"))
     text = json.dumps(fields)
@@ -298,6 +309,8 @@ def _records(
         else:
             warn(
                 f"{path}: the record of case {number} is damaged; the next sweep on this store runs the"
-                " case again", FileWarning, stacklevel=4,
-            )  # fmt: skip
+                " case again",
+                FileWarning,
+                stacklevel=4,
+            )
     return records

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 def table(records: Iterable[Record]) -> pd.DataFrame:
     """One row per case, in their order: parameters, status, verdict, message, numbers.
 
-    The same cases give the same table, whichever finished first and wherever they ran. Wall times,
-    which never repeat, are in ``provenance``. A number that a case did not return is missing.
+    The same cases give the same table, in whatever order and wherever they ran. Wall times, which differ
+    from run to run, are in ``provenance``. A number that a case did not return is missing.
     """
     return _frame(
         {"case": r.case}
@@ -36,14 +36,14 @@ def provenance(records: Iterable[Record]) -> pd.DataFrame:
 
 
 def _frame(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
-    import pandas as pd  # here: the workers of a sweep start before it, or never need it
+    import pandas as pd  # here: the processes of a sweep do not need it
 
     ordered = sorted(rows, key=lambda row: int(row["case"]))
     return pd.DataFrame(ordered, columns=None if ordered else ["case"]).set_index("case")
 
 
 def write_table(path: str | os.PathLike[str], frame: pd.DataFrame) -> None:
-    """Write a table to ``.csv`` or ``.parquet``; the file is written whole or not at all.
+    """Write a table to ``.csv`` or ``.parquet``; the file is complete or not there at all.
 
     Floats are written with the digits that give the same float back. In Parquet, which has one
     type per column, a column of mixed types is written as text.
@@ -55,7 +55,8 @@ def write_table(path: str | os.PathLike[str], frame: pd.DataFrame) -> None:
     """
     path = Path(path)
     if path.suffix not in (".csv", ".parquet"):
-        raise FileError(f"{path}: a table is written as .csv or .parquet; name it so")
+        text = f"{path}: a table is written as .csv or .parquet; change the suffix"
+        raise FileError(text, what=str(path), found=path.suffix, expected=(".csv", ".parquet"))
     try:
         with atomic_write(path) as temporary:
             if path.suffix == ".csv":
@@ -63,7 +64,8 @@ def write_table(path: str | os.PathLike[str], frame: pd.DataFrame) -> None:
             else:
                 _to_parquet(temporary, frame)
     except OSError as error:
-        raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
+        text = f"{path}: cannot be written ({error.strerror or error})"
+        raise FileError(text, what=str(path)) from error
 
 
 def _to_parquet(path: Path, frame: pd.DataFrame) -> None:

@@ -49,8 +49,10 @@ def _cluster(team: str, address: str) -> Iterator[Executor]:
     if not re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^/]+:\d+/?", address):
         raise OptionError(
             f"scheduler: expected 'tcp://host:8786', found {address!r}",
-            what="scheduler", found=address, expected="tcp://host:8786",
-        )  # fmt: skip
+            what="scheduler",
+            found=address,
+            expected="tcp://host:8786",
+        )
     try:
         from distributed import Client
     except ImportError:
