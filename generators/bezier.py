@@ -43,7 +43,5 @@ def chain(knots_and_controls: Floats, edge_length: float) -> Floats:
     5
     """
     controls = np.asarray(knots_and_controls, dtype=float)
-    pieces = [
-        equally_spaced(controls[i : i + 4], edge_length) for i in range(0, len(controls) - 1, 3)
-    ]
+    pieces = [equally_spaced(controls[i : i + 4], edge_length) for i in range(0, len(controls) - 1, 3)]
     return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])

@@ -51,11 +51,7 @@ HOLE = [
 
 
 def bezier_hall(
-    edge_length: float = 3.5,
-    *,
-    alpha: float = 30.0,
-    alpha_left: float = 10.0,
-    alpha_right: float = 15.0,
+    edge_length: float = 3.5, *, alpha: float = 30.0, alpha_left: float = 10.0, alpha_right: float = 15.0
 ) -> Surface:
     """Three bays, a wall under each arch between them, and a hole in the middle one.
 

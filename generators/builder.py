@@ -49,12 +49,7 @@ class Builder:
         return np.concatenate(self._points)[numbers]
 
     def add_wall(
-        self,
-        patch: int,
-        top: Ints,
-        bottom_points: Floats,
-        spacing: float | Floats,
-        side: Ints | None = None,
+        self, patch: int, top: Ints, bottom_points: Floats, spacing: float | Floats, side: Ints | None = None
     ) -> Ints:
         """Add a wall of columns from the vertices of a curve to points below; returns its foot (c,).
 

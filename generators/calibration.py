@@ -64,9 +64,7 @@ def candidates(examples: Iterable[str] = tuple(PRINTED)) -> Iterator[Candidate]:
             for resolution in resolutions:
                 surface = build(resolution)
                 squared = float((gradient(surface) ** 2).sum())
-                yield Candidate(
-                    example, family, parameter, resolution, surface.m, squared, PRINTED[example]
-                )
+                yield Candidate(example, family, parameter, resolution, surface.m, squared, PRINTED[example])
 
 
 def nearest(tried: Iterable[Candidate]) -> list[Candidate]:

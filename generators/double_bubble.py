@@ -58,11 +58,7 @@ def double_bubble(
     net = ring_mesh(_segments(rim_radius * np.arange(1, rings + 1) / rings, count, edge_length))
     disc = rim_radius * disc_points(net)
     _glue(mesh, np.column_stack([0.0 * net.angle, disc]), net.faces, rim, WALL)
-    patches = [
-        Patch("left", alpha_left),
-        Patch("right", alpha_right),
-        Patch("wall", alpha_aux, pressure=0.0),
-    ]
+    patches = [Patch("left", alpha_left), Patch("right", alpha_right), Patch("wall", alpha_aux, pressure=0.0)]
     surface = mesh.closed_surface(patches)
     return surface if exact else surface.moved(surface.vertices * STRETCH)
 
@@ -95,9 +91,7 @@ def double_bubble_exact(
     return ExactSolution(energy, float(areas.sum() + wall), volume, 2.0 * widest, shapes)
 
 
-def _offsets(
-    alpha_left: float, alpha_right: float, alpha_aux: float
-) -> tuple[tuple[float, float], float]:
+def _offsets(alpha_left: float, alpha_right: float, alpha_aux: float) -> tuple[tuple[float, float], float]:
     """Distance of each centre from the disc, and the disc's radius."""
     left = validate.positive("alpha_left", alpha_left)
     right = validate.positive("alpha_right", alpha_right)

@@ -203,9 +203,7 @@ def _lattice_fan(angle: float, rings: int, segments: int) -> tuple[Floats, Ints,
 def _edges(rings: int, angle: float) -> Floats:
     """(1 + 2 rings, 2) the tip and both ridges of the unit fan."""
     share = np.arange(1, rings + 1)[:, None] / rings
-    return np.concatenate(
-        [np.zeros((1, 2)), share * [1.0, 0.0], share * [np.cos(angle), np.sin(angle)]]
-    )
+    return np.concatenate([np.zeros((1, 2)), share * [1.0, 0.0], share * [np.cos(angle), np.sin(angle)]])
 
 
 def _directions(theta: Floats) -> Floats:

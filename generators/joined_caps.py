@@ -43,21 +43,13 @@ def joined_caps(
     edge_length = validate.positive("edge_length", edge_length)
     left, right = _spheres(alpha_left, alpha_right, alpha_aux, depth)
     mesh, fixed, sliding = build_pair(left, right, edge_length, upright=True)
-    patches = [
-        Patch("left", alpha_left),
-        Patch("right", alpha_right),
-        Patch("wall", alpha_aux, pressure=0.0),
-    ]
+    patches = [Patch("left", alpha_left), Patch("right", alpha_right), Patch("wall", alpha_aux, pressure=0.0)]
     surface = mesh.surface(patches, fixed=fixed, on_plane=sliding)
     return surface if exact else surface.moved(surface.vertices * [1.0, 1.0, RISE])
 
 
 def joined_caps_exact(
-    *,
-    alpha_left: float = 4.0,
-    alpha_right: float = 3.0,
-    alpha_aux: float = 3.0,
-    depth: float = 4.5,
+    *, alpha_left: float = 4.0, alpha_right: float = 3.0, alpha_aux: float = 3.0, depth: float = 4.5
 ) -> ExactSolution:
     """Energy, area, volume and height of the two joined caps, and their spheres.
 
@@ -84,9 +76,7 @@ def joined_caps_exact(
     return ExactSolution(energy, left + right + wall, volume, height, shapes)
 
 
-def _spheres(
-    alpha_left: float, alpha_right: float, alpha_aux: float, depth: float
-) -> tuple[Sphere, Sphere]:
+def _spheres(alpha_left: float, alpha_right: float, alpha_aux: float, depth: float) -> tuple[Sphere, Sphere]:
     """The spheres of both caps; the wall is at x = 0."""
     validate.positive("depth", depth)
     validate.positive("alpha_left", alpha_left)
@@ -102,10 +92,7 @@ def _spheres(
             found=depth,
             expected=float(np.sqrt(max(square, 0.0))),
         )
-    return (
-        Sphere((-left, 0.0, -depth), 2.0 * alpha_left),
-        Sphere((right, 0.0, -depth), 2.0 * alpha_right),
-    )
+    return (Sphere((-left, 0.0, -depth), 2.0 * alpha_left), Sphere((right, 0.0, -depth), 2.0 * alpha_right))
 
 
 def _part(radius: float, offset: float, depth: float) -> tuple[float, float]:
@@ -130,6 +117,4 @@ def _part(radius: float, offset: float, depth: float) -> tuple[float, float]:
 
 def _segment(radius: float, distance: float) -> float:
     """Area of the part of a disc beyond a chord at a signed distance from its middle, length²."""
-    return float(
-        radius**2 * np.arccos(distance / radius) - distance * np.sqrt(radius**2 - distance**2)
-    )
+    return float(radius**2 * np.arccos(distance / radius) - distance * np.sqrt(radius**2 - distance**2))

@@ -54,9 +54,7 @@ def soap_film(plan: Floats, faces: Ints, held: Bools, heights: Floats) -> Floats
     for _ in range(ITERATIONS):
         stiffness, _ = _stiffness(film, faces)
         film[:, 2] = z
-        film[free, 2] = splu(csc_array(stiffness[free][:, free])).solve(
-            -stiffness[free][:, held] @ z[held]
-        )
+        film[free, 2] = splu(csc_array(stiffness[free][:, free])).solve(-stiffness[free][:, held] @ z[held])
         if np.abs(film[:, 2] - z).max() <= 1e-12 * np.ptp(z[held]):
             break
         z = film[:, 2].copy()

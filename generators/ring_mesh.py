@@ -61,6 +61,5 @@ def cap_directions(mesh: RingMesh, opening: float) -> Floats:
     """(k,3) unit vectors around +z, rings of equal width up to the angle ``opening`` from it."""
     theta = opening * mesh.radius
     return np.stack(
-        [np.sin(theta) * np.cos(mesh.angle), np.sin(theta) * np.sin(mesh.angle), np.cos(theta)],
-        axis=1,
+        [np.sin(theta) * np.cos(mesh.angle), np.sin(theta) * np.sin(mesh.angle), np.cos(theta)], axis=1
     )

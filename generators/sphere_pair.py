@@ -81,9 +81,7 @@ def balanced_offsets(
     return (offset, 2.0 * alpha_wall - offset), 4.0 * alpha_left**2 - offset**2
 
 
-def build_pair(
-    left: Sphere, right: Sphere, edge_length: float, upright: bool
-) -> tuple[Builder, Ints, Ints]:
+def build_pair(left: Sphere, right: Sphere, edge_length: float, upright: bool) -> tuple[Builder, Ints, Ints]:
     """The mesh of both caps and their wall, its fixed vertices and its sliding ones.
 
     ``upright`` walls drop to Π; the others stay in the plane of the circle where the spheres meet.

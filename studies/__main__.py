@@ -49,8 +49,7 @@ def _parser() -> argparse.ArgumentParser:
     act.add_argument("--results", type=Path, help="where to write (default: results/)")
     act.set_defaults(act=_benchmark)
     act = acts.add_parser(
-        "readme",
-        help="write results/REPORT.md and the README's summary from the tables in results/",
+        "readme", help="write results/REPORT.md and the README's summary from the tables in results/"
     )
     act.set_defaults(act=_readme)
     return parser
@@ -81,9 +80,7 @@ def _run(studies: Sequence[Study], asked: argparse.Namespace, steps: Sequence[st
     start = time.perf_counter()
     results = asked.results or (_scratch() if asked.short else HOME / "results")
     console = Console(width=None if sys.stdout.isatty() else WIDTH)
-    outcomes = run_all(
-        studies, results, console, workers=asked.workers, short=asked.short, steps=steps
-    )
+    outcomes = run_all(studies, results, console, workers=asked.workers, short=asked.short, steps=steps)
     tables = write_comparison(results)
     show_outcomes(outcomes, console)
     show(*tables, console)

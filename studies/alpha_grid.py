@@ -36,9 +36,7 @@ def flow_grid(folder: Folder, short: bool) -> pd.DataFrame:
 def flow_sweep(mesh: Path, iterations: int, tensions: Sequence[float]) -> Sweep:
     """The paper's flow at each triple of some tensions, from Example 2's initial shape."""
     write_bytes(mesh, pickle.dumps(two_caps(EDGE_LENGTH)))
-    return Sweep(
-        flow_case, dict.fromkeys(AXES, tensions), {"mesh": str(mesh), "iterations": iterations}
-    )
+    return Sweep(flow_case, dict.fromkeys(AXES, tensions), {"mesh": str(mesh), "iterations": iterations})
 
 
 def data(folder: Folder, short: bool) -> None:
@@ -65,9 +63,7 @@ def table(folder: Folder) -> dict[str, float]:
         "wall_small": wall <= 2.0,
         "wall_large": wall >= 8.0,
     }
-    classes |= {
-        f"{name}_at_4": classes[name] & (wall == 4.0) for name in ("equal", "slightly_smaller")
-    }
+    classes |= {f"{name}_at_4": classes[name] & (wall == 4.0) for name in ("equal", "slightly_smaller")}
     found = {name: float(records.converged[mask].mean()) for name, mask in classes.items()}
     low = (records.alpha_large <= 2.0) | (records.alpha_small <= 2.0)
     return found | {

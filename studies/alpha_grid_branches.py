@@ -203,9 +203,7 @@ def finer_case(tensions: list[float], edge_length: float) -> dict[str, Any]:
         except SurfaceError:  # a wall that lies on Π has no triangles to cut
             again = found
         found = again if again.converged else found
-    height, finer_height = (
-        float(r.surface.plane.height(r.surface.vertices).max()) for r in (coarse, found)
-    )
+    height, finer_height = (float(r.surface.plane.height(r.surface.vertices).max()) for r in (coarse, found))
     return {
         "status": found.status.name.lower(),
         "verdict": found.certificate.verdict.name.lower().replace("_", " "),

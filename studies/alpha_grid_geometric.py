@@ -87,9 +87,7 @@ def data(folder: Folder, short: bool) -> None:
     records = records.join(flow[["status", "gradient_squared"]].add_prefix("flow_"), on=list(AXES))
     folder.write_table("records", records)
     lengths = FOLD_LENGTHS[: 1 if short else None]
-    rows = [
-        {"edge_length": h, **{name: patch_fold(h, name) for name in PATCHES[1:]}} for h in lengths
-    ]
+    rows = [{"edge_length": h, **{name: patch_fold(h, name) for name in PATCHES[1:]}} for h in lengths]
     folder.write_table("patch_folds", pd.DataFrame(rows))
     _search(folder, folder.read_table("records"))
 
@@ -187,9 +185,7 @@ def explained(folder: Folder) -> pd.DataFrame:
     for name in _FOUND:
         cases[name] = cases[name].mask(cases.ending == REACHED, cases.pop(f"found_{name}"))
     finer = folder.read_table("finer").set_index(list(AXES))
-    cases = cases.join(
-        finer[["status", "height", "finer_height"]].add_prefix("half_"), on=list(AXES)
-    )
+    cases = cases.join(finer[["status", "height", "finer_height"]].add_prefix("half_"), on=list(AXES))
     cases["crossed"] = cases.flow_status.isin(FAILED)
     cases["near"] = ~cases.crossed & (cases.flow_gradient_squared < CONVERGED)
     cases["equilibrium"] = (cases.status == "converged") | (cases.ending == REACHED)
@@ -220,10 +216,7 @@ def _reason(case: pd.Series[Any], folds: pd.Series[float]) -> str:
     """What a case's category rests on, in numbers."""
     wall, large, small = (case[name] for name in AXES)
     if case["equilibrium"] and case["finer"]:
-        return (
-            f"{case['half_height']:.3f} high here, {case['half_finer_height']:.3f} at half the edge"
-            " length"
-        )
+        return f"{case['half_height']:.3f} high here, {case['half_finer_height']:.3f} at half the edge length"
     if case["equilibrium"]:
         status = case["half_status"]
         why = f": {status.replace('_', ' ')}" if isinstance(status, str) else ""
@@ -235,9 +228,7 @@ def _reason(case: pd.Series[Any], folds: pd.Series[float]) -> str:
         return f"|{large:g} - {small:g}| > {wall:g}"
     if not isinstance(case["ending"], str):
         return ""
-    start, end = (
-        ", ".join(f"{case[f'{where}_{name}']:.4g}" for name in PATCHES) for where in ("from", "at")
-    )
+    start, end = (", ".join(f"{case[f'{where}_{name}']:.4g}" for name in PATCHES) for where in ("from", "at"))
     ends = "folds" if case["ending"] == FOLD else "ends"
     return f"the branch from ({start}) {ends} at ({end})"
 
@@ -281,12 +272,7 @@ STUDY = Study(
     data,
     table,
     figure,
-    parameters={
-        "tensions": TENSIONS,
-        "edge_length": EDGE_LENGTH,
-        "tries": TRIES,
-        "steps": STEPS,
-    },
+    parameters={"tensions": TENSIONS, "edge_length": EDGE_LENGTH, "tries": TRIES, "steps": STEPS},
     seconds=520,
     paper=False,
 )

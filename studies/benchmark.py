@@ -43,9 +43,7 @@ def energy_rate(quick: bool) -> list[Row]:
         found = energy_and_gradient(surface, workers=workers)
         assert np.isclose(found[0], expected[0], rtol=1e-12)
         assert np.allclose(found[1], expected[1], atol=1e-12)
-        seconds[workers] = median_seconds(
-            partial(energy_and_gradient, surface, workers=workers), REPEATS
-        )
+        seconds[workers] = median_seconds(partial(energy_and_gradient, surface, workers=workers), REPEATS)
         rows.append(_rate(f"energy and gradient, {workers} thread(s)", surface, seconds[workers]))
     slow = median_seconds(partial(numpy_energy_and_gradient, surface), repeats=5)
     rows.append(_rate("the same in vectorised numpy", surface, slow))

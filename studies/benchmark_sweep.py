@@ -44,13 +44,7 @@ def _rows(mesh: Path, quick: bool) -> list[Row]:
         rows += [
             Row(f"{what}, 1 worker", one, "s", size),
             Row(f"{what}, 2 workers", two, "s", size, most=None if quick else most),
-            Row(
-                f"{what}, 2 workers over 1",
-                one / two,
-                "times",
-                size,
-                least=None if quick else RATIO,
-            ),
+            Row(f"{what}, 2 workers over 1", one / two, "times", size, least=None if quick else RATIO),
         ]
     start = sweep_seconds(flow_sweep(mesh, 1, tensions[:1]), 1)
     return [*rows, Row("start of a worker, with a case of one iteration", start, "s")]

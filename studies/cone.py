@@ -95,9 +95,7 @@ def _reach(height: float, angle: float) -> float:
 
 
 def _exponent(
-    tensions: tuple[float, float, float],
-    arcs: tuple[float, float, float],
-    angles: tuple[float, float, float],
+    tensions: tuple[float, float, float], arcs: tuple[float, float, float], angles: tuple[float, float, float]
 ) -> float:
     """Smallest ν > 0 for which a displacement r^ν g is in balance at the crest."""
     normals = np.array([[math.cos(angle), -math.sin(angle)] for angle in angles])

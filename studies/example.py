@@ -71,9 +71,7 @@ def shapes(
     stages = folder.read_mesh(case)
     for stage, (shape, error) in pictures.items():
         surface = stages[stage]
-        roofs, walls = (
-            [p.name for p in surface.patches if p.auxiliary is x] for x in (False, True)
-        )
+        roofs, walls = ([p.name for p in surface.patches if p.auxiliary is x] for x in (False, True))
         panel(
             [surface] * 3, folder.figure(shape), views=["diagonal", "elevation", walls_view],
             titles=["(a) diagonal view", "(b) elevation view", "the walls alone, larger"],

@@ -15,15 +15,7 @@ from pcmc.solvers.result import Progress
 
 from .elevations import draw_elevations
 from .example import energy_history, error_percent, error_scale
-from .flow import (
-    PAPER,
-    SHORT_ITERATIONS,
-    Case,
-    curvature_table,
-    junction_top,
-    run_cases,
-    turn,
-)
+from .flow import PAPER, SHORT_ITERATIONS, Case, curvature_table, junction_top, run_cases, turn
 from .folder import Folder
 from .study import Study
 
@@ -105,9 +97,7 @@ def _heights(start: Surface, momentum: bool, iterations: int) -> list[float]:
 def table(folder: Folder) -> dict[str, float]:
     """``curvature``, ``junction`` and ``fig10`` tables, and the numbers for the comparison."""
     meshes = {case.name: folder.read_mesh(case.name) for case in cases()}
-    shapes = {
-        name: stages["final"] for name, stages in meshes.items() if not name.startswith("fig10")
-    }
+    shapes = {name: stages["final"] for name, stages in meshes.items() if not name.startswith("fig10")}
     start = meshes[_main(2.0)]["initial"]
     folder.write_table("curvature", curvature_table({"initial": start} | shapes))
     junction = pd.DataFrame([{"case": name, **_junction(s)} for name, s in shapes.items()])
@@ -233,16 +223,12 @@ def figure(folder: Folder) -> None:
     for surface, name in ((start, "fig06"), (end, "fig08")):
         numbers = mean_curvature(surface)
         draw(surface, folder.figure(name), numbers=numbers, patches=["left", "right"], legend=True)
-    titles = (
-        f"({letter}) α of the wall {wall:g}" for letter, wall in zip("bcde", WALLS, strict=True)
-    )
+    titles = (f"({letter}) α of the wall {wall:g}" for letter, wall in zip("bcde", WALLS, strict=True))
     finals = (stages["final"] for stages in meshes.values())
     shapes = {"(a) initial shape": start} | dict(zip(titles, finals, strict=True))
     draw_elevations(shapes, folder.figure("fig07"), top=1.2)
     standing = folder.read_table("standing")
-    heights = {
-        str(run): (mine.iteration, mine.height) for run, mine in standing.groupby("run", sort=False)
-    }
+    heights = {str(run): (mine.iteration, mine.height) for run, mine in standing.groupby("run", sort=False)}
     lines(heights, folder.figure("fig07-wall"), x="iteration", y="height of the wall",
           title="Example 1, wall of α 3: its middle sinks to the ground and bounces")  # fmt: skip
     pair = [end, folder.read_mesh(_main(2.0, FINE))["final"]]
@@ -253,11 +239,7 @@ def figure(folder: Folder) -> None:
     )  # fmt: skip
     for test, name, what in (
         ("printed", "fig10", "Eq. (25) as printed: the line search changes nothing"),
-        (
-            "sufficient",
-            "fig10-sufficient",
-            "sufficient decrease instead: a late jump does not come",
-        ),
+        ("sufficient", "fig10-sufficient", "sufficient decrease instead: a late jump does not come"),
     ):
         named = {v.replace("-", " "): f"fig10-{v}-{test}" for v in VARIANTS}
         energy_history(folder, named, name, title=f"Example 1, {what}")

@@ -24,10 +24,7 @@ OPTIONS = {"t0": T0, "iterations": ITERATIONS}
 def cases() -> list[Case]:
     """The flow with both Armijo tests, L-BFGS beside it, and the flow on finer meshes."""
     build, varied = partial(two_caps, EDGE_LENGTH), {"edge_length": EDGE_LENGTH}
-    finer = (
-        Case(f"finer-{h:g}", partial(two_caps, h), OPTIONS, {"edge_length": h})
-        for h in (0.8, 0.6, 0.5)
-    )
+    finer = (Case(f"finer-{h:g}", partial(two_caps, h), OPTIONS, {"edge_length": h}) for h in (0.8, 0.6, 0.5))
     return [
         Case("main", build, OPTIONS, varied),
         Case("sufficient", build, OPTIONS | {"armijo": "sufficient"}, varied),
@@ -75,9 +72,7 @@ def _patch(stages: dict[str, Surface], name: str) -> dict[str, float | str]:
         "patch": name,
         "radius": float(np.linalg.norm(start.vertices[inside] - CENTRES[name], axis=1).mean()),
         "initial_curvature": float(np.mean(mean_curvature(start)[inside])),
-        "initial_curvature_variational": float(
-            np.mean(mean_curvature(start, "variational")[inside])
-        ),
+        "initial_curvature_variational": float(np.mean(mean_curvature(start, "variational")[inside])),
         "target": start.patches[index].target_curvature,
         "alpha": start.patches[index].tension,
         "initial_height": float(start.vertices[mine, 2].max()),

@@ -83,8 +83,7 @@ def _rays(folder: Folder, lengths: tuple[float, ...], degrees: tuple[int, ...]) 
     rows, points = [], []
     for length in lengths:
         start = solve(
-            two_caps(length, alpha_large=START[0], alpha_small=START[1], alpha_aux=WALL),
-            target="stationary",
+            two_caps(length, alpha_large=START[0], alpha_small=START[1], alpha_aux=WALL), target="stationary"
         ).surface
         stages = {_tensions(start): start}
         for degree in degrees:
@@ -150,9 +149,7 @@ def table(folder: Folder) -> dict[str, float]:
     lost = events[(events.kind == "index") & (events.index_before == 0)]
     columns = ["rings", "edge_length", "parameter", "height", "index_before", "index_after"]
     folder.write_table("walls", lost[columns].rename(columns={"parameter": "critical_wall"}))
-    return found | {
-        f"critical_wall_{row['rings']}": row["parameter"] for row in lost.to_dict("records")
-    }
+    return found | {f"critical_wall_{row['rings']}": row["parameter"] for row in lost.to_dict("records")}
 
 
 def _cap_table(folder: Folder) -> pd.DataFrame:
@@ -246,9 +243,7 @@ def _draw_rays(folder: Folder) -> None:
                 markerfacecolor=color if ending == "folds" else "white", markeredgewidth=0.8,
             )  # fmt: skip
     axes.plot(*START, "*", color=INK, markersize=5.0, linestyle="", label="the paper's tensions")
-    axes.plot(
-        [], [], color=INK, linewidth=1.0, label="between folds: the branch of this mesh turns back"
-    )
+    axes.plot([], [], color=INK, linewidth=1.0, label="between folds: the branch of this mesh turns back")
     axes.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (4, 3)), label="undecided")
     for ending, meaning in MEANINGS.items():
         if (rays.ending == ending).any():
@@ -271,10 +266,7 @@ def _draw_rays(folder: Folder) -> None:
 def _stretches(ends: pd.DataFrame) -> list[tuple[bool, list[float], list[float]]]:
     """From each ray's end to the next, x and y, and whether both are folds."""
     rows = list(ends[["ending", "alpha_large", "alpha_small"]].itertuples(index=False, name=None))
-    return [
-        (one[0] == two[0] == "folds", [one[1], two[1]], [one[2], two[2]])
-        for one, two in pairwise(rows)
-    ]
+    return [(one[0] == two[0] == "folds", [one[1], two[1]], [one[2], two[2]]) for one, two in pairwise(rows)]
 
 
 def _widened(values: pd.Series[float], above: float = 0.06) -> tuple[float, float]:

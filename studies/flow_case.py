@@ -20,9 +20,7 @@ def flow_case(
     mesh: str, alpha_wall: float, alpha_large: float, alpha_small: float, iterations: int
 ) -> dict[str, Any]:
     """How the paper's flow from a mesh ends at three tensions; one case of the sweep."""
-    surface = initial(mesh).retensioned(
-        {"wall": alpha_wall, "large": alpha_large, "small": alpha_small}
-    )
+    surface = initial(mesh).retensioned({"wall": alpha_wall, "large": alpha_large, "small": alpha_small})
     options: dict[str, Any] = {**PAPER, "t0": T0, "tolerance": None, "iterations": iterations}
     result = solve(surface, "nesterov", **options)
     return {

@@ -106,8 +106,7 @@ class Folder:
         path = self.path / name
         if not path.is_file():
             raise FileError(
-                f"{path} does not exist; run the step that writes it:"
-                f" python -m studies run {self.path.name}",
+                f"{path} does not exist; run the step that writes it: python -m studies run {self.path.name}",
                 what=str(path),
             )
         return path
@@ -116,11 +115,7 @@ class Folder:
 def mesh_hash(surface: Surface) -> str:
     """16 hexadecimal digits that change with any position, face or patch."""
     digest = hashlib.sha256()
-    for array, kind in (
-        (surface.vertices, "<f8"),
-        (surface.faces, "<i8"),
-        (surface.patch_of_face, "<i8"),
-    ):
+    for array, kind in ((surface.vertices, "<f8"), (surface.faces, "<i8"), (surface.patch_of_face, "<i8")):
         digest.update(np.ascontiguousarray(array, dtype=kind).tobytes())
     return digest.hexdigest()[:16]
 

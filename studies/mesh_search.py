@@ -37,13 +37,7 @@ BEST = {
         "initial_gradient_squared", "best_iteration", "best_largest_error", "best_gradient_squared"
     )
 }  # fmt: skip
-GROUPS = (
-    "next to a corner, on the junction",
-    "next to a corner, off it",
-    "junction",
-    "wall",
-    "sheet",
-)
+GROUPS = ("next to a corner, on the junction", "next to a corner, off it", "junction", "wall", "sheet")
 
 
 def cases() -> list[Case]:

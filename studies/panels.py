@@ -33,9 +33,7 @@ def curve_panels(
     rows = math.ceil(len(panels) / columns)
     figure = new(width, rows * (height + 62.0) + 138.0, pad=8.0)
     axes, _ = grid(figure, len(panels), columns, sharex=True, sharey=True)
-    across, up = (
-        _range([pair[k] for curves in panels.values() for pair in curves.values()]) for k in (0, 1)
-    )
+    across, up = (_range([pair[k] for curves in panels.values() for pair in curves.values()]) for k in (0, 1))
     labels = list(dict.fromkeys(label for curves in panels.values() for label in curves))
     looks = {
         label: {"color": CURVES[k % len(CURVES)], **overlap_style(k, len(labels))}
@@ -92,9 +90,7 @@ def category_panels(
     axes, _ = grid(figure, len(tables), columns)
     for k, (place, (title, table)) in enumerate(zip(axes, tables.items(), strict=True)):
         numbers = np.vectorize(names.index, otypes=[int])(table)
-        place.imshow(
-            numbers, origin="lower", cmap=colors, vmin=-0.5, vmax=len(names) - 0.5, aspect="auto"
-        )
+        place.imshow(numbers, origin="lower", cmap=colors, vmin=-0.5, vmax=len(names) - 0.5, aspect="auto")
         for symbol, where in marks.values():
             at = np.argwhere(where[title])
             place.plot(at[:, 1], at[:, 0], symbol, **MARK)

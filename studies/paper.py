@@ -127,13 +127,9 @@ def paper(path: Path = PAPER) -> tuple[list[Claim], list[Figure]]:
             raise FileError(f"{path}: {claim.says!r}: relation must be =, < or >")
         missing = set(claim.figures) - {figure.number for figure in figures}
         if missing:
-            raise FileError(
-                f"{path}: {claim.says!r} names figure {missing.pop()}, which is not there"
-            )
+            raise FileError(f"{path}: {claim.says!r} names figure {missing.pop()}, which is not there")
         if claim.instead and claim.instead not in {other.ours for other in claims}:
-            raise FileError(
-                f"{path}: {claim.says!r} names claim {claim.instead}, which is not there"
-            )
+            raise FileError(f"{path}: {claim.says!r} names claim {claim.instead}, which is not there")
         try:
             claim.fails.format(ours=0, paper=0, instead=0)
         except (KeyError, IndexError, ValueError):
@@ -232,9 +228,7 @@ def compare(measured: Mapping[str, float]) -> tuple[pd.DataFrame, pd.DataFrame]:
 def read_measured(results: Path) -> dict[str, float]:
     """Every study's measured numbers below ``results``."""
     frames = [pd.read_csv(path) for path in sorted(results.glob("*/measured.csv"))]
-    return {
-        key: value for frame in frames for key, value in zip(frame.key, frame.value, strict=True)
-    }
+    return {key: value for frame in frames for key, value in zip(frame.key, frame.value, strict=True)}
 
 
 def _reason(findings: Sequence[Finding], other: Mapping[str, Finding]) -> str:

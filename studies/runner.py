@@ -18,13 +18,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from .study import STEPS, Study
 
 # One thread per worker: two workers share two cores, and sums have the same order in every run.
-THREADS = (
-    "PCMC_THREADS",
-    "NUMBA_NUM_THREADS",
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-)
+THREADS = ("PCMC_THREADS", "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 WORKER = (sys.executable, "-m", "studies.worker")
 

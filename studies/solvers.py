@@ -52,9 +52,7 @@ class Example:
 
 
 EXAMPLES = (
-    Example(
-        "example1", "Example 1", partial(two_squares, alpha_aux=ALPHA_AUX), (4, 8, 16, 32), 0.005
-    ),
+    Example("example1", "Example 1", partial(two_squares, alpha_aux=ALPHA_AUX), (4, 8, 16, 32), 0.005),
     Example("example2", "Example 2", two_caps, (1.2, 0.8, 0.6, 0.4), 0.01),
     Example("example3", "Example 3", four_fans, (7, 10, 14, 28), 0.01),
     Example("example4", "Example 4", bezier_hall, (10.0, 7.0, 5.0, 3.6), 0.005),
@@ -117,9 +115,7 @@ def data(folder: Folder, short: bool) -> None:
     folder.write_table("history_times", pd.concat(clocks, ignore_index=True))
 
 
-def _run(
-    start: Surface, label: str, t0: float, short: bool
-) -> tuple[dict[str, Any], pd.DataFrame, float]:
+def _run(start: Surface, label: str, t0: float, short: bool) -> tuple[dict[str, Any], pd.DataFrame, float]:
     """How a run ended, samples of its way, and its processor time."""
     method, options = METHODS[label]
     options = options | ({"t0": t0} if method == "nesterov" else {})

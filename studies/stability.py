@@ -68,8 +68,7 @@ CORNER_LENGTHS = (0.8, 0.6, 0.4, 0.3, 0.2)
 CREST = 6  # edges of the crest, counted from the corner
 # Example 2's outlines, circles of radius 6 and 4, by middle and radius; and their upper corner.
 OUTLINES = {
-    name: ((ball.centre[0], 0.0), ball.floor_radius)
-    for name, ball in (("large", LARGE), ("small", SMALL))
+    name: ((ball.centre[0], 0.0), ball.floor_radius) for name, ball in (("large", LARGE), ("small", SMALL))
 }
 CORNER = intersection(LARGE, SMALL).points(1)[-1, :2]
 
@@ -182,8 +181,7 @@ def table(folder: Folder) -> dict[str, float]:
     )  # fmt: skip
     folder.write_table("critical", critical)
     found = {
-        f"critical_{row['family']}_{row['size']}": row["critical_wall"]
-        for row in critical.to_dict("records")
+        f"critical_{row['family']}_{row['size']}": row["critical_wall"] for row in critical.to_dict("records")
     }
     sound = records[records.pinched == 0]
     found["largest_curvature_error"] = float(sound.curvature_error.max())

@@ -84,9 +84,7 @@ def perform(
         write_json(folder.path / "provenance.json", provenance(study, folder, short, seconds))
 
 
-def provenance(
-    study: Study, folder: Folder, short: bool, seconds: Mapping[str, float]
-) -> dict[str, Any]:
+def provenance(study: Study, folder: Folder, short: bool, seconds: Mapping[str, float]) -> dict[str, Any]:
     """What the numbers came from, apart from the numbers."""
     return {
         "study": study.name,

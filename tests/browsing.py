@@ -31,9 +31,7 @@ def browser(folder: Path, *flags: str) -> Any:
     for flag in (*FLAGS, *flags, f"--user-data-dir={folder / 'profile'}"):
         options.add_argument(flag)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    options.add_experimental_option(
-        "prefs", {"download.default_directory": str(folder / "downloads")}
-    )
+    options.add_experimental_option("prefs", {"download.default_directory": str(folder / "downloads")})
     return webdriver.Chrome(options=options, service=webdriver.ChromeService(str(DRIVER)))
 
 
@@ -70,10 +68,7 @@ class Explored:
 
     def idle(self) -> None:
         """Until every answer is there and drawn."""
-        until(
-            lambda: self.find("#verdict").get_attribute("data-busy") == "false",
-            "the page to be idle",
-        )
+        until(lambda: self.find("#verdict").get_attribute("data-busy") == "false", "the page to be idle")
         self.driver.execute_async_script(
             "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() => done()))"
         )

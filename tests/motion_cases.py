@@ -12,9 +12,7 @@ TILTED = Plane((0.3, -0.2, 0.5), (1.0, -2.0, 4.0))
 
 def seam() -> Surface:
     """Two roofs of one tension and pressure that meet along y = 0 with nothing between them."""
-    flat = np.array(
-        [[x, y, 0.1 * (4 - x * x) * (1 - y * y)] for y in (-1, 0, 1) for x in range(-2, 3)]
-    )
+    flat = np.array([[x, y, 0.1 * (4 - x * x) * (1 - y * y)] for y in (-1, 0, 1) for x in range(-2, 3)])
     flat[:, 2] += 0.02 * np.cos(np.arange(15))
     F = [[5 * j + i, 5 * j + i + 1, 5 * j + i + 6] for j in (0, 1) for i in range(4)]
     F += [[5 * j + i, 5 * j + i + 6, 5 * j + i + 5] for j in (0, 1) for i in range(4)]

@@ -9,14 +9,7 @@ import pytest
 from pcmc import solve
 from pcmc.solvers.result import Status
 from studies import alpha_grid, alpha_grid_branches, alpha_grid_geometric
-from studies.alpha_grid_branches import (
-    branch_case,
-    branches,
-    equilibrium,
-    finer_case,
-    starts,
-    weakening_case,
-)
+from studies.alpha_grid_branches import branch_case, branches, equilibrium, finer_case, starts, weakening_case
 from studies.alpha_grid_geometric import CATEGORIES, explained
 from studies.alpha_grid_sentences import sentences
 from studies.folder import Folder
@@ -116,9 +109,7 @@ def test_equilibria_are_sought_at_half_the_edge_length():
 
 def _records(rows):
     columns = [*alpha_grid.AXES, "status", "verdict", "flow_status", "flow_gradient_squared"]
-    return pd.DataFrame(rows, columns=columns).assign(
-        index=0, pinched=0, wall_area=1.0, quality=0.5
-    )
+    return pd.DataFrame(rows, columns=columns).assign(index=0, pinched=0, wall_area=1.0, quality=0.5)
 
 
 def test_reason_of_each_case(tmp_path):

@@ -62,9 +62,7 @@ def test_the_stiffness_is_the_weighted_cotangent_laplacian(name):
     classes, space, pattern = ready(surface)
     B = dense_basis(space)
     L = np.kron(dense_laplacian(surface), np.eye(3))
-    found = symmetric(
-        pattern, assemble(surface, classes, space, pattern, surface.vertices, 0.0, 1.0)
-    )
+    found = symmetric(pattern, assemble(surface, classes, space, pattern, surface.vertices, 0.0, 1.0))
     assert relative(found, B.T @ L @ B) < 1e-12
 
 
@@ -75,9 +73,7 @@ def test_both_add_up():
     def data(hessian, stiffness):
         return assemble(surface, classes, space, pattern, surface.vertices, hessian, stiffness)
 
-    np.testing.assert_allclose(
-        data(2.0, 0.3), 2.0 * data(1.0, 0.0) + 0.3 * data(0.0, 1.0), atol=1e-12
-    )
+    np.testing.assert_allclose(data(2.0, 0.3), 2.0 * data(1.0, 0.0) + 0.3 * data(0.0, 1.0), atol=1e-12)
 
 
 def test_other_places_than_the_surfaces_own():

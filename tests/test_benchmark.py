@@ -142,7 +142,5 @@ def test_memory_of_this_process_is_known():
 def test_memory_of_a_child_does_not_hold_its_parents():
     held = np.ones(25_000_000)  # 200 MB
     code = "from studies.timing import peak_bytes; print(peak_bytes())"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=HOME
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=HOME)
     assert not float(done.stdout) > 0.75 * held.nbytes  # NaN where the system does not tell

@@ -80,13 +80,7 @@ def test_the_numbers_and_the_printed_table(squares):
     assert numbers["pinched"] == 0
     assert all(isinstance(value, str | int | float) for value in numbers.values())
     text = str(found)
-    for word in (
-        "stable: at rest",
-        "residual",
-        "Morse index",
-        "left | right | wall",
-        "per_length_max",
-    ):
+    for word in ("stable: at rest", "residual", "Morse index", "left | right | wall", "per_length_max"):
         assert word in text
     assert max(map(len, text.splitlines())) < 130
     assert len(text.splitlines()) < 30
@@ -142,9 +136,7 @@ def test_the_exact_bubbles_balance_as_the_mesh_is_refined():
 
 
 def test_modes_are_fields_that_one_can_move_along():
-    surface = solve(
-        joined_caps(1.0, alpha_left=4, alpha_right=4, alpha_aux=1, depth=5), target="stationary"
-    )
+    surface = solve(joined_caps(1.0, alpha_left=4, alpha_right=4, alpha_aux=1, depth=5), target="stationary")
     assert surface.converged
     surface = surface.surface
     found = certify(surface, modes=3)
@@ -157,9 +149,7 @@ def test_modes_are_fields_that_one_can_move_along():
     t = 1e-3 * surface.size / np.abs(found.modes[0]).max()
     for k, value in enumerate(found.eigenvalues[:2]):
         mode = t * found.modes[k]
-        rise = sum(
-            energy(surface.moved(surface.vertices + s * mode)) for s in (1, -1)
-        ) - 2 * energy(surface)
+        rise = sum(energy(surface.moved(surface.vertices + s * mode)) for s in (1, -1)) - 2 * energy(surface)
         assert rise == pytest.approx(value * t**2, rel=0.02)  # E'' along the mode is λ
     assert certify(surface, modes=0).index == 1
     assert len(certify(surface, modes=0).eigenvalues) == 0
@@ -263,9 +253,7 @@ def test_what_is_fixed_inside_carries_too():
     assert load_ratio(held) == pytest.approx(1.0 / 0.9 / (1.0 + both_sides), rel=5e-3)
     assert certify(held).verdict is Verdict.NOT_CONVERGED
     assert solve(held).certificate.verdict is Verdict.STABLE
-    column = Surface(
-        cap.vertices, cap.faces, cap.patch_of_face, cap.patches, fixed=cap.fixed | (away == 0)
-    )
+    column = Surface(cap.vertices, cap.faces, cap.patch_of_face, cap.patches, fixed=cap.fixed | (away == 0))
     star = np.linalg.norm(cap.vertices[1] - cap.vertices[2])
     carried = 0.45 * (2.0 * np.pi + 0.5 * 6.0 * star)
     assert load_ratio(column) == pytest.approx(np.pi / carried, rel=4e-3)
@@ -371,10 +359,7 @@ def findings(**changes):
         ({"load_ratio": 1e3}, Verdict.STABLE),
         ({"residual": 1e-7, "load_ratio": 1e3}, Verdict.NO_EQUILIBRIUM),
         ({"residual": 1e-7, "load_ratio": 1.1}, Verdict.NOT_CONVERGED),  # the mesh is coarse
-        (
-            {"residual": 1e-7, "load_ratio": 1.1, "evidence": Evidence.COLLAPSED},
-            Verdict.NO_EQUILIBRIUM,
-        ),
+        ({"residual": 1e-7, "load_ratio": 1.1, "evidence": Evidence.COLLAPSED}, Verdict.NO_EQUILIBRIUM),
         ({"residual": 1e-7, "quality": 1e-4, "load_ratio": 1e3}, Verdict.NO_EQUILIBRIUM),
         ({"evidence": Evidence.VANISHED}, Verdict.STABLE),
         ({"surface": pyramid().retensioned({"roof": 0.0}, {"roof": 0.0})}, Verdict.NEUTRAL),

@@ -61,19 +61,11 @@ def test_solve_a_project(folder, capsys):
     assert "stable: at rest" in out
     assert "written: roof.pcmc, roof.obj, roof.png" in out
     assert err == ""
-    assert sorted(p.name for p in folder.iterdir()) == [
-        "roof.obj",
-        "roof.pcmc",
-        "roof.png",
-        "roof.toml",
-    ]
+    assert sorted(p.name for p in folder.iterdir()) == ["roof.obj", "roof.pcmc", "roof.png", "roof.toml"]
 
 
 def test_solve_a_surface_with_other_tensions(solved, capsys):
-    assert (
-        cli.main(["solve", "roof.pcmc", "--tension", "9", "--tension", "roof=3", "-o", "b.pcmc"])
-        == 0
-    )
+    assert cli.main(["solve", "roof.pcmc", "--tension", "9", "--tension", "roof=3", "-o", "b.pcmc"]) == 0
     low, high = pcmc.read("b.pcmc"), pcmc.read("roof.pcmc")
     assert low.patches[0].tension == 3.0
     assert low.vertices[:, 2].max() < high.vertices[:, 2].max()
@@ -101,9 +93,7 @@ def test_remesh_solves_again(solved, capsys):
     assert cli.main(["remesh", "roof.pcmc", "--edge-length", "0.5", "-o", "fine.pcmc"]) == 0
     assert pcmc.certify(pcmc.read("fine.pcmc")).certified
     assert pcmc.read("fine.pcmc").m > 2 * pcmc.read("roof.pcmc").m
-    assert (
-        cli.main(["remesh", "roof.pcmc", "--edge-length", "0.5", "--no-solve", "-o", "f.ply"]) == 0
-    )
+    assert cli.main(["remesh", "roof.pcmc", "--edge-length", "0.5", "--no-solve", "-o", "f.ply"]) == 0
     assert "not solved" in capsys.readouterr().out
 
 
@@ -126,9 +116,7 @@ def test_tensions_that_cannot_balance_are_told_before_solving(folder, capsys, mo
     said = []
     solve_project = running.solve_project
     monkeypatch.setattr(
-        running,
-        "solve_project",
-        lambda *given: said.append(capsys.readouterr().err) or solve_project(*given),
+        running, "solve_project", lambda *given: said.append(capsys.readouterr().err) or solve_project(*given)
     )
     assert cli.main(["solve", "two.pcmc", "--tension", "left=4"]) == 1
     assert "note: the tensions at the junction left | right | wall cannot balance: 4 > " in said[0]
@@ -139,15 +127,7 @@ def test_tensions_that_cannot_balance_are_told_before_solving(folder, capsys, mo
 
 
 def test_sweep(folder, capsys):
-    given = [
-        "sweep",
-        "generators:two_squares",
-        "alpha_aux=0.5,1",
-        "--workers",
-        "1",
-        "--csv",
-        "t.csv",
-    ]
+    given = ["sweep", "generators:two_squares", "alpha_aux=0.5,1", "--workers", "1", "--csv", "t.csv"]
     assert cli.main([*given, "--store", "s.sqlite"]) == 0
     assert pd.read_csv("t.csv")["alpha_aux"].tolist() == [0.5, 1.0]
     assert cli.main([*given, "--store", "s.sqlite"]) == 0  # nothing is left to do
@@ -158,14 +138,9 @@ def test_sweep(folder, capsys):
 def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
     seen = []
     monkeypatch.setattr("pcmc.explore.start", lambda *given: given)
-    monkeypatch.setattr(
-        "pcmc.explore.open_and_wait", lambda given, page: seen.append((*given, page))
-    )
+    monkeypatch.setattr("pcmc.explore.open_and_wait", lambda given, page: seen.append((*given, page)))
     assert cli.main(["explore", "roof.pcmc", "--no-browser"]) == 0
-    assert (
-        cli.main(["explore", "--example", "two_squares", "--set", "alpha_aux=1", "--port", "8"])
-        == 0
-    )
+    assert cli.main(["explore", "--example", "two_squares", "--set", "alpha_aux=1", "--port", "8"]) == 0
     assert seen[0][1:] == ("127.0.0.1", 0, "roof.pcmc", False)
     assert seen[1][1:] == ("127.0.0.1", 8, "two_squares", True)
     assert seen[1][0].patches
@@ -201,10 +176,7 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["sweep", "generators:two_squares", "alpha_aux=1,"], "expected NAME=VALUE"),
         (["sweep", "generators:two_square", "alpha_aux=1,2"], "cannot be found"),
         (["sweep", "generators:two_squares", "alpa=1,2"], "unknown parameter"),
-        (
-            ["sweep", "generators:two_squares", "alpha_aux=1,2", "--csv", "x.txt"],
-            ".csv or .parquet",
-        ),
+        (["sweep", "generators:two_squares", "alpha_aux=1,2", "--csv", "x.txt"], ".csv or .parquet"),
         (["sweep", "generators:two_squares", "alpha_aux=1,2", "--csv", "no/x.csv"], "no folder"),
         (["solve", "roof.toml", "--folder", "roof.toml"], "needs a folder"),
         (["plot", "roof.toml", "away/x.png"], "there is no folder away"),
@@ -247,14 +219,7 @@ def test_letters_that_the_terminal_lacks_are_written_otherwise(folder, encoding)
     for command, name in (("solve", "stable: at rest"), ("certify", "gr\\xf6\\xdfe, \\u014d")):
         if encoding == "cp1252":
             name = name.replace("\\xf6\\xdf", "öß")
-        run = [
-            sys.executable,
-            "-c",
-            code,
-            command,
-            "roof.toml",
-            *(["-o", "ō.obj"] * (command == "solve")),
-        ]
+        run = [sys.executable, "-c", code, command, "roof.toml", *(["-o", "ō.obj"] * (command == "solve"))]
         done = subprocess.run(
             run,
             capture_output=True,
@@ -277,9 +242,7 @@ def test_an_error_of_the_system_names_the_file(folder, monkeypatch, capsys):
 
 
 def test_notes_are_one_line(solved, capsys):
-    (solved / "q.obj").write_text(
-        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", encoding="utf-8"
-    )
+    (solved / "q.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", encoding="utf-8")
     assert cli.main(["convert", "q.obj", "q.ply"]) == 0
     err = capsys.readouterr().err
     assert err.startswith("pcmc: note: q.obj: ")
@@ -377,9 +340,7 @@ sys.exit(main())
     return done.returncode, done.stdout, done.stderr
 
 
-@pytest.mark.parametrize(
-    "module", ["pcmc.cli.running", "numpy", "scipy", "numba", "typer", "pcmc.cli.app"]
-)
+@pytest.mark.parametrize("module", ["pcmc.cli.running", "numpy", "scipy", "numba", "typer", "pcmc.cli.app"])
 def test_ctrl_c_while_a_module_is_imported_is_one_line(folder, module):
     press = f"""
 class Press:
@@ -408,8 +369,7 @@ def test_ctrl_c_stays_ignored_where_it_was(folder):
 
 
 @pytest.mark.parametrize(
-    "command",
-    [["solve", "roof.toml"], ["remesh", "roof.toml", "--edge-length", "0.8", "-o", "a.obj"]],
+    "command", [["solve", "roof.toml"], ["remesh", "roof.toml", "--edge-length", "0.8", "-o", "a.obj"]]
 )
 def test_ctrl_c_while_solving_is_130_and_writes_nothing(folder, monkeypatch, capsys, command):
     def pressed(say):

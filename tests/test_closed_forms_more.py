@@ -219,9 +219,7 @@ def test_a_bubble_on_the_plane_is_a_hemisphere():
     for rings in (4, 8, 16):
         X, faces, rim = dome(rings, 2.0, 0.5 * np.pi)
         X[rim, 2] = 0.0
-        start = Surface(
-            X * [1.05, 0.97, 1.03], faces, [0] * len(faces), [Patch("bubble", 1.0)], on_plane=rim
-        )
+        start = Surface(X * [1.05, 0.97, 1.03], faces, [0] * len(faces), [Patch("bubble", 1.0)], on_plane=rim)
         result = solve(start, target="stationary")
         found = certify(result.surface, modes=4)
         assert found.verdict is Verdict.SADDLE
@@ -264,11 +262,7 @@ def lens(rings, top, bottom, film):
         inner, count = outer, count + len(around)
     patches = [Patch("top", top), Patch("bottom", bottom), Patch("film", film, 0.0)]
     surface = Surface(
-        np.concatenate(X),
-        np.concatenate(F),
-        np.repeat(patch, [len(f) for f in F]),
-        patches,
-        fixed=inner,
+        np.concatenate(X), np.concatenate(F), np.repeat(patch, [len(f) for f in F]), patches, fixed=inner
     )
     return surface, around, circle
 
@@ -333,9 +327,7 @@ def test_a_tense_roof_over_an_ellipse_solves_poisson_s_equation():
         flat, faces = disc(rings)
         rim = np.isclose(np.hypot(*flat.T), 1.0)
         X = np.column_stack([flat * [a, b], 0.0 * rim])
-        surface = solve(
-            Surface(X, faces, [0] * len(faces), [Patch("roof", tension)], fixed=rim)
-        ).surface
+        surface = solve(Surface(X, faces, [0] * len(faces), [Patch("roof", tension)], fixed=rim)).surface
         error.append(volume(surface) / (0.5 * np.pi * a * b * top) - 1.0)
         height.append(surface.vertices[:, 2].max() / top - 1.0)
     assert orders(error) == pytest.approx(2.0, abs=0.1)

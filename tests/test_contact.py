@@ -88,9 +88,7 @@ def test_a_wall_that_does_not_stand_on_the_plane_cannot():
 def test_each_wall_vertex_hangs_where_it_is(make):
     surface = make()
     walls = find_walls(surface)
-    np.testing.assert_allclose(
-        place_wall_rows(surface, walls, surface.vertices), surface.vertices, atol=1e-2
-    )
+    np.testing.assert_allclose(place_wall_rows(surface, walls, surface.vertices), surface.vertices, atol=1e-2)
     i, j = walls.rows.top_ends.T
     for part in (walls.rows.fraction, walls.rows.relative_height):
         assert ((part >= 0.0) & (part <= 1.0)).all()
@@ -127,12 +125,7 @@ def test_the_crest_is_where_a_roof_is_too():
     wall = [[1, 3, 2], [7, 8, 3], [7, 3, 1], [0, 7, 1], [8, 4, 3]]
     patches = [Patch("left", 2.0), Patch("right", 2.0), Patch("wall", 1.0, pressure=0.0)]
     surface = Surface(
-        X,
-        [*left, *right, *wall],
-        [0] * 4 + [1] * 4 + [2] * 5,
-        patches,
-        fixed=[0, 4, 5, 6],
-        on_plane=[7, 8],
+        X, [*left, *right, *wall], [0] * 4 + [1] * 4 + [2] * 5, patches, fixed=[0, 4, 5, 6], on_plane=[7, 8]
     )
     walls = find_walls(surface)
     assert walls.top_edges.tolist() == [[0, 1], [1, 2], [2, 3], [3, 4]]
@@ -195,9 +188,7 @@ def test_pinching_turns_with_the_plane():
     np.testing.assert_array_equal(other.faces, standing.faces)
     np.testing.assert_allclose(other.vertices, place(standing.vertices), atol=1e-12)
     for one, two in zip(
-        pull_and_capacity(standing, walls, resting),
-        pull_and_capacity(other, there, resting),
-        strict=True,
+        pull_and_capacity(standing, walls, resting), pull_and_capacity(other, there, resting), strict=True
     ):
         np.testing.assert_allclose(one, two, atol=1e-12)
 
@@ -224,12 +215,7 @@ def test_curves_and_neighbours_of_the_resting_part():
     crest = crest_of(full, walls)
     corner = np.flatnonzero(walls.corner)
     corner = corner[np.argsort(full.vertices[corner, 1])][0]
-    expected = [
-        (crest[0], corner),
-        (crest[0], crest[1]),
-        (crest[1], crest[0]),
-        (crest[1], crest[2]),
-    ]
+    expected = [(crest[0], corner), (crest[0], crest[1]), (crest[1], crest[0]), (crest[1], crest[2])]
     assert sorted(map(tuple, resting_links(walls, resting).tolist())) == sorted(expected)
     assert np.flatnonzero(beside_resting(walls, resting)).tolist() == [crest[2]]
     spacing = top_spacing(full, walls)
@@ -291,9 +277,7 @@ def complementary(surface):
     """Whether the pull on each resting vertex is one that its wall can take."""
     walls = find_walls(surface)
     resting = resting_vertices(surface, walls)
-    pull, capacity = pull_and_capacity(
-        remove_pinched_walls(surface, walls, resting), walls, resting
-    )
+    pull, capacity = pull_and_capacity(remove_pinched_walls(surface, walls, resting), walls, resting)
     return resting, pull, capacity
 
 

@@ -76,10 +76,7 @@ def test_walls_without_height_come_back_where_patches_are_written_apart(make, su
     order = np.lexsort(([p.name for p in again.patches],))
     assert [again.patches[k] for k in order] == sorted(surface.patches, key=lambda p: p.name)
     assert (again.n, again.m) == (surface.n, surface.m)
-    assert (again.fixed.sum(), again.on_plane.sum()) == (
-        surface.fixed.sum(),
-        surface.on_plane.sum(),
-    )
+    assert (again.fixed.sum(), again.on_plane.sum()) == (surface.fixed.sum(), surface.on_plane.sum())
     for patch in surface.patches:  # each triangle of each patch at its place
         corners = [
             np.sort(s.vertices[s.faces[s.patch_faces([s.patch_index(patch.name)])]].sum(axis=1), 0)
@@ -91,18 +88,12 @@ def test_walls_without_height_come_back_where_patches_are_written_apart(make, su
         resting_vertices(again, find_walls(again)),
     )
     np.testing.assert_allclose(
-        np.sort(again.vertices[back], axis=0),
-        np.sort(surface.vertices[resting], axis=0),
-        atol=1e-14,
+        np.sort(again.vertices[back], axis=0), np.sort(surface.vertices[resting], axis=0), atol=1e-14
     )
     one = certify(surface)
     assert pcmc.energy(again) == pytest.approx(one.energy, rel=10 * digits)
     two = certify(again) if suffix == "3dm" else pcmc.solve(again, target="stationary").certificate
-    assert (two.verdict, two.index, two.pinched.sum()) == (
-        one.verdict,
-        one.index,
-        one.pinched.sum(),
-    )
+    assert (two.verdict, two.index, two.pinched.sum()) == (one.verdict, one.index, one.pinched.sum())
     assert two.residual < 1e-10
     if suffix != "3dm":
         assert len(load(path).scalars["height"]) == again.n
@@ -154,18 +145,13 @@ def test_walls_of_a_surface_changed_elsewhere_are_left_out_and_this_is_said(chan
     assert again.m < surface.m
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["{", "[]", '{"vertices": [[0, 0, 0]]}', None],
-)
+@pytest.mark.parametrize("text", ["{", "[]", '{"vertices": [[0, 0, 0]]}', None])
 def test_a_damaged_description_of_walls_is_refused(text, tmp_path):
     path = tmp_path / "pinched.3dm"
     pcmc.write(path, flat())
 
     def damage(model):
-        told = text or model.Layers[0].GetUserString(KEY).replace(
-            '"faces": [[', '"faces": [[9999, '
-        )
+        told = text or model.Layers[0].GetUserString(KEY).replace('"faces": [[', '"faces": [[9999, ')
         model.Layers[0].SetUserString(KEY, told)
 
     rhino_changed(path, damage)

@@ -82,15 +82,8 @@ def test_every_point_is_the_equilibrium_that_its_row_describes(caps):
 
 def test_fold_lies_where_it_lies_whatever_the_steps_and_the_control(small_cap):
     found = {
-        (control, step): follow(
-            small_cap, "cap", control=control, step=-step, largest=step, folds=1
-        )
-        for control, step in (
-            ("arclength", 0.05),
-            ("arclength", 0.15),
-            ("volume", 0.05),
-            ("height", 0.1),
-        )
+        (control, step): follow(small_cap, "cap", control=control, step=-step, largest=step, folds=1)
+        for control, step in (("arclength", 0.05), ("arclength", 0.15), ("volume", 0.05), ("height", 0.1))
     }
     for branch in found.values():
         assert branch.ending is Ending.FOLDS
@@ -104,9 +97,7 @@ def test_index_changes_across_the_located_place_and_nowhere_else(caps):
     event = caps[1].events.set_index("kind").loc["index"]
     row = int((caps[1].points.arclength < event.arclength).sum()) - 1
     for shift, index in ((-1e-3, 0), (1e-3, 1)):
-        near = follow(
-            caps[1].surfaces[row], "cap", until={"height": event.height + shift}, step=-0.05
-        )
+        near = follow(caps[1].surfaces[row], "cap", until={"height": event.height + shift}, step=-0.05)
         assert certify(near.last).index == index
 
 

@@ -137,10 +137,7 @@ def test_mesh_that_collapses_ends_the_branch_with_that_reason():
     ("arguments", "fields"),
     [
         ({"tensions": [1.0]}, {"what": "Direction.tensions", "found": [1.0]}),
-        (
-            {"tensions": {"roof": 0.0}},
-            {"what": "Direction.tensions", "where": "roof", "found": 0.0},
-        ),
+        ({"tensions": {"roof": 0.0}}, {"what": "Direction.tensions", "where": "roof", "found": 0.0}),
         ({}, {"what": "Direction"}),
     ],
 )
@@ -163,10 +160,7 @@ def test_weights_that_are_not_finite_numbers_are_refused(weight):
             {"parameter": Direction({"roof": 1.0}, {"roof": 2.0})},
             {"what": "parameter", "where": "pressure of 'roof'", "found": 0.5, "expected": 1.0},
         ),
-        (
-            {"until": {"hight": 1.0}},
-            {"what": "column in until", "found": "hight", "expected": QUANTITIES},
-        ),
+        ({"until": {"hight": 1.0}}, {"what": "column in until", "found": "hight", "expected": QUANTITIES}),
         ({"until": ["height"]}, {"what": "until", "found": ["height"]}),
         ({"until": "height"}, {"what": "until", "found": "height"}),
         ({"stop": 0.9, "until": {"parameter": 1.1}}, {"what": "until"}),

@@ -33,9 +33,7 @@ def test_fold_of_two_caps_on_a_coarse_mesh():
     at = branch.folds.iloc[0]
     assert at["tension large"] == pytest.approx(2.976, abs=0.01)
     assert branch.points.residual.max() <= 1e-10
-    lower = start.retensioned(
-        {"large": at["tension large"] - 0.02, "small": at["tension small"] - 0.02}
-    )
+    lower = start.retensioned({"large": at["tension large"] - 0.02, "small": at["tension small"] - 0.02})
     assert not solve(lower).converged  # no minimum is left; a far saddle is
 
 
@@ -60,9 +58,7 @@ def test_wall_comes_down_at_the_same_tensions_whatever_the_steps(largest):
     assert list(dict.fromkeys(pinched.values())) == [0, 1, 3]  # each contact changes what rests
     direct = solve(two_squares(4, alpha_aux=3.0), target="stationary").surface
     height = max(direct.vertices[:, 2])
-    assert branch.points.height.iloc[-1] == pytest.approx(
-        height, rel=1e-2
-    )  # triangles lie otherwise
+    assert branch.points.height.iloc[-1] == pytest.approx(height, rel=1e-2)  # triangles lie otherwise
     assert branch.points.quality.iloc[-1] > 0.8
 
 
@@ -117,9 +113,7 @@ def test_ctrl_c_while_a_contact_is_solved_for_ends_the_branch(monkeypatch):
 @pytest.mark.slow
 def test_new_mesh_on_the_way_keeps_to_the_branch(small_cap):
     pytest.importorskip("mmgpy")
-    branch = follow(
-        small_cap, "cap", until={"height": 1.5}, step=-0.05, min_quality=0.93, remesh=0.25
-    )
+    branch = follow(small_cap, "cap", until={"height": 1.5}, step=-0.05, min_quality=0.93, remesh=0.25)
     assert branch.ending is Ending.REACHED
     assert branch.last.m != small_cap.m
     assert branch.points.residual.max() <= 1e-10

@@ -52,9 +52,7 @@ def test_spacing_is_even_and_bends_get_enough_edges():
     np.testing.assert_allclose(np.diff(line.between(0.0, 1.0, 3.0)), 1 / 3)
     assert len(circle([0, 0], 0.01).between(0.0, 1.0, 1.0)) == 7  # an edge per 45°
     ring = polyline([[0, 0], [4, 0], [4, 4], [0, 4]], closed=True)
-    around = ring.at(
-        ring.between(3.0, 5.0, 1.0)
-    )  # over the closing point: the sides at x = 0, y = 0
+    around = ring.at(ring.between(3.0, 5.0, 1.0))  # over the closing point: the sides at x = 0, y = 0
     assert (around.min(axis=1) == 0.0).all()
     assert len(around) == 7
 
@@ -118,10 +116,7 @@ LINE, BEND = [[0, 0], [1, 0]], {"bezier": [[0, 0], [1, 1]]}
         ({"bezier": [[0, 0], [1, 1]], "closed": True}, {"what": "closed"}),
         ({"bezier": [[0, 0], [1, 1]], "arc": []}, {"what": "curve", "found": ["bezier", "arc"]}),
         ([{"polyline": LINE}, {"polyline": [[2, 0], [1, 1]]}], {"what": "join", "where": 1}),
-        (
-            [{"polyline": LINE}, {"polyline": [[1, 0, 0], [1, 1, 0]]}],
-            {"what": "join", "where": None},
-        ),
+        ([{"polyline": LINE}, {"polyline": [[1, 0, 0], [1, 1, 0]]}], {"what": "join", "where": None}),
         ([{"circle": {"centre": [0, 0], "radius": 1}}, BEND], {"what": "join", "where": 0}),
     ],
 )

@@ -35,9 +35,7 @@ def test_two_apexes_from_wrong_tensions(roof):
         assert abs(measure(design.surface, target).value - target.value) < 1e-6
     assert list(design.targets["met"]) == [True, True]
     assert design.message == DesignStatus.MET.value
-    values = [
-        design.surface.patches[design.surface.patch_index(n)].tension for n in ("north", "east")
-    ]
+    values = [design.surface.patches[design.surface.patch_index(n)].tension for n in ("north", "east")]
     np.testing.assert_array_equal(design.parameters["value"][:2], values)
     assert len(design.history) == design.solves
     assert design.history["misfit"].iloc[-1] < 1e-6
@@ -109,9 +107,7 @@ def test_heights_that_only_a_coarse_mesh_carries_are_met(height):
     """α h / √(1 + h²) = 1/3: at h = 1.2 the load is 1.15 times what the smooth boundary carries."""
     design = meet(pyramid(), Target("apex", "roof", height), "roof")
     assert design.met
-    assert design.surface.tensions[0] == pytest.approx(
-        np.sqrt(1 + height**2) / height / 3, rel=1e-6
-    )
+    assert design.surface.tensions[0] == pytest.approx(np.sqrt(1 + height**2) / height / 3, rel=1e-6)
 
 
 def test_points_that_are_not_worth_a_solve_are_rows_without_one():
@@ -146,9 +142,7 @@ def test_an_unreachable_height_is_refused_with_the_limit():
             assert design.status is DesignStatus.AT_FOLD
             assert design.solves <= 15
             limit = design.targets["limit"].iloc[0]
-            assert (
-                f"apex of cap: wanted {height:g}, nearest reachable {limit:.6g}" in design.message
-            )
+            assert f"apex of cap: wanted {height:g}, nearest reachable {limit:.6g}" in design.message
             assert design.targets["value"].iloc[0] == pytest.approx(limit, rel=1e-2)
             assert design.certificate.residual < 1e-10
             limits.append(limit)

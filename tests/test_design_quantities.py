@@ -63,9 +63,7 @@ def test_explicit_derivatives_by_tension_and_pressure(roof, name, kind):
     explicit = getattr(measure(roof, target), f"by_{kind}")
     parameter = Parameter("north", kind)
     value = parameter.value(roof)
-    ahead, behind = (
-        measure(changed(roof, parameter, value + d), target).value for d in (1e-5, -1e-5)
-    )
+    ahead, behind = (measure(changed(roof, parameter, value + d), target).value for d in (1e-5, -1e-5))
     expected = 0.0 if explicit is None else explicit[roof.patch_index("north")]
     assert (ahead - behind) / 2e-5 == pytest.approx(expected, rel=1e-8, abs=1e-9)
 
@@ -74,9 +72,7 @@ def test_a_flat_membrane_pulls_with_its_tension_at_its_held_boundary():
     """A square of side 1 under no pressure pulls with α per length, wherever it is held."""
     side = np.linspace(0, 1, 5)
     X = np.array([[x, y, 0.0] for y in side for x in side])
-    cells = [
-        [5 * j + i, 5 * j + i + 1, 5 * j + i + 6, 5 * j + i + 5] for j in range(4) for i in range(4)
-    ]
+    cells = [[5 * j + i, 5 * j + i + 1, 5 * j + i + 6, 5 * j + i + 5] for j in range(4) for i in range(4)]
     F = [t for a, b, c, d in cells for t in ([a, b, c], [a, c, d])]
     rim = np.flatnonzero((X[:, :2].min(axis=1) == 0) | (X[:, :2].max(axis=1) == 1))
     flat = pcmc.Surface(X, F, [0] * 32, [Patch("floor", 3.0, 0.0)], fixed=rim)
@@ -148,9 +144,7 @@ def test_a_patchs_volume_is_seen_from_the_point_of_the_plane_however_far():
     found = measure(far, target)
     assert found.value == pytest.approx(np.einsum("fd,fd", X.mean(axis=1), vector) / 3.0, rel=1e-10)
     direction = apply_supports(far, np.random.default_rng(2).standard_normal(far.vertices.shape))
-    ahead, behind = (
-        measure(far.moved(far.vertices + t * direction), target).value for t in (1e-4, -1e-4)
-    )
+    ahead, behind = (measure(far.moved(far.vertices + t * direction), target).value for t in (1e-4, -1e-4))
     slope = float((found.by_position * direction).sum())
     assert slope == pytest.approx((ahead - behind) / 2e-4, rel=1e-6)
 
@@ -161,13 +155,7 @@ def test_points_are_in_the_coordinates_of_a_tilted_plane():
     plane = pcmc.Plane(point=(1, 2, 3), normal=tuple(normal))
     base = pyramid()
     tilted = pcmc.Surface(
-        base.vertices @ plane.axes + plane.point,
-        base.faces,
-        [0] * 4,
-        base.patches,
-        range(4),
-        (),
-        plane,
+        base.vertices @ plane.axes + plane.point, base.faces, [0] * 4, base.patches, range(4), (), plane
     )
     for point in ((0.0, 0.0), (0.25, -0.1), (-0.6, 0.3)):
         here, there = (measure(s, Target("height", point)).value for s in (base, tilted))

@@ -150,9 +150,7 @@ def test_stopped_by_its_callback_it_returns_the_best_so_far(error):
     assert len(design.history) == design.solves == 2
     best = design.history.loc[design.history.misfit.idxmin()]
     assert design.certificate.certified
-    assert (
-        design.surface.tensions[0] == best["tension of cap"] == design.parameters["value"].iloc[0]
-    )
+    assert design.surface.tensions[0] == best["tension of cap"] == design.parameters["value"].iloc[0]
     assert design.targets["value"].iloc[0] == best["apex"] == design.surface.vertices[:, 2].max()
     assert np.isnan(design.targets["limit"].iloc[0])
     assert design.message.startswith(DesignStatus.STOPPED.value)

@@ -70,9 +70,6 @@ def test_a_users_type_checker_sees_the_types(wheel, tmp_path):
         text=True,
         env=environment(),
     )
-    assert (
-        'script.py:3: error: Argument "tension" to "Patch" has incompatible type "str"'
-        in found.stdout
-    )
+    assert 'script.py:3: error: Argument "tension" to "Patch" has incompatible type "str"' in found.stdout
     assert "script.py:4: error: Incompatible types in assignment" in found.stdout
     assert 'Revealed type is "pcmc.surface.surface.Surface"' in found.stdout

@@ -33,13 +33,7 @@ def test_rigid_motions_turn_the_gradient(seed, shift):
     X = surface.vertices @ R.T + shift
     # Rounding may lift sliding vertices off the turned plane by far less than the check allows.
     other = Surface(
-        X,
-        surface.faces,
-        surface.patch_of_face,
-        surface.patches,
-        surface.fixed,
-        surface.on_plane,
-        plane,
+        X, surface.faces, surface.patch_of_face, surface.patches, surface.fixed, surface.on_plane, plane
     )
     assert energy(other) == pytest.approx(energy(surface), rel=1e-12)
     np.testing.assert_allclose(gradient(other), gradient(surface) @ R.T, atol=1e-11)
@@ -78,9 +72,7 @@ def test_labels_do_not_matter(seed):
 
 def test_turning_a_patch_over_turns_its_pressure():
     surface = shaken(pyramid())
-    under = Surface(
-        surface.vertices, surface.faces[:, ::-1], [0] * 4, [Patch("roof", 1.0, -1.0)], range(4)
-    )
+    under = Surface(surface.vertices, surface.faces[:, ::-1], [0] * 4, [Patch("roof", 1.0, -1.0)], range(4))
     assert energy(under) == pytest.approx(energy(surface), rel=1e-15)
     np.testing.assert_allclose(gradient(under), gradient(surface), atol=1e-15)
 

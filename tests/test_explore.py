@@ -171,12 +171,7 @@ def test_the_least_recently_used_session_expires(client, monkeypatch):
     [
         ("/api/NAME/follow", '{"tensions": {"lefft": 3}}', 400, "did you mean 'left'"),
         ("/api/NAME/follow", '{"tensions": {"left": -3}}', 400, "expected a finite number"),
-        (
-            "/api/NAME/follow",
-            '{"tensions": {"left": "a"}}',
-            400,
-            "'left': expected a number, found 'a'",
-        ),
+        ("/api/NAME/follow", '{"tensions": {"left": "a"}}', 400, "'left': expected a number, found 'a'"),
         ("/api/NAME/follow", '{"tensions": {"left": true}}', 400, "expected a number, found True"),
         ("/api/NAME/settle", '{"pressures": [1]}', 400, "pressures: expected numbers by patch"),
         ("/api/NAME/settle", '{"tensions": {"left": 1e999}}', 400, "finite"),
@@ -276,9 +271,7 @@ def test_serve_prints_the_address_opens_the_page_and_ends_with_ctrl_c(monkeypatc
 def test_listening_for_everyone_is_only_when_told(monkeypatch):
     bound = []
     real = server._listen
-    monkeypatch.setattr(
-        server, "_listen", lambda host, port: bound.append(host) or real(host, port)
-    )
+    monkeypatch.setattr(server, "_listen", lambda host, port: bound.append(host) or real(host, port))
     for host in (None, "0.0.0.0"):
         running = explore.start(CAP) if host is None else explore.start(CAP, host=host)
         running.close()

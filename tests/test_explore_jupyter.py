@@ -100,9 +100,7 @@ def test_the_page_is_a_cells_output_and_its_surface_is_in_the_next(lab, tmp_path
 
         run(0)
         frames = until(
-            lambda: driver.find_elements("css selector", "iframe[title='pcmc explore']"),
-            "the page",
-            120,
+            lambda: driver.find_elements("css selector", "iframe[title='pcmc explore']"), "the page", 120
         )
         driver.switch_to.frame(frames[0])
         page = Explored(driver)

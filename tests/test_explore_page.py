@@ -13,9 +13,7 @@ from pcmc import explore
 CAP = spherical_cap(edge_length=0.25)
 HALL = bezier_hall(edge_length=10.0)
 
-pytestmark = pytest.mark.skipif(
-    not (BROWSER and DRIVER), reason="chromium or chromedriver is not installed"
-)
+pytestmark = pytest.mark.skipif(not (BROWSER and DRIVER), reason="chromium or chromedriver is not installed")
 
 
 @pytest.fixture(scope="module")

@@ -55,9 +55,7 @@ def test_following_gives_the_surface_that_solving_gives(hall):
     assert state.surface.pressures == pytest.approx([1.0, 1.02, 1.0, -0.02, 0.02])
     assert state.surface.patches == wanted.patches
     solved = pcmc.solve(wanted)
-    np.testing.assert_allclose(
-        state.surface.vertices, solved.surface.vertices, atol=1e-6 * HALL.size
-    )
+    np.testing.assert_allclose(state.surface.vertices, solved.surface.vertices, atol=1e-6 * HALL.size)
     assert pcmc.certify(state.surface).residual < 1e-8
 
 

@@ -25,9 +25,7 @@ def upper(A):
     """The pattern (with every diagonal entry) and values of a symmetric matrix's upper triangle."""
     rows, columns = np.nonzero(np.triu(A) + np.eye(len(A)))
     pattern = csr_array((np.ones(len(rows)), (rows, columns)), shape=A.shape)
-    return Pattern(pattern.indptr, pattern.indices, np.empty((0, 3))), A[rows, columns].astype(
-        float
-    )
+    return Pattern(pattern.indptr, pattern.indices, np.empty((0, 3))), A[rows, columns].astype(float)
 
 
 def random_symmetric(size, seed):
@@ -61,9 +59,7 @@ def test_solutions_and_inertia_of_random_matrices(backend, seed):
     right = np.random.default_rng(seed).standard_normal((60, 3))
     scale = np.linalg.cond(A) * 1e-13
     np.testing.assert_allclose(found.solve(right), np.linalg.solve(A, right), atol=scale)
-    np.testing.assert_allclose(
-        found.solve(right[:, 0]), np.linalg.solve(A, right[:, 0]), atol=scale
-    )
+    np.testing.assert_allclose(found.solve(right[:, 0]), np.linalg.solve(A, right[:, 0]), atol=scale)
 
 
 @every_backend
@@ -104,9 +100,7 @@ def _one(value, backend):
 
 @every_backend
 @pytest.mark.parametrize(
-    "A",
-    [np.zeros((3, 3)), np.ones((3, 3)), np.diag([1.0, 0.0, 2.0])],
-    ids=["zero", "rank 1", "row"],
+    "A", [np.zeros((3, 3)), np.ones((3, 3)), np.diag([1.0, 0.0, 2.0])], ids=["zero", "rank 1", "row"]
 )
 def test_a_singular_matrix_is_refused(backend, A):
     pattern, data = upper(A)

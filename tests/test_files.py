@@ -48,9 +48,7 @@ def test_an_error_while_writing_leaves_all_as_before(wanted, tmp_path, upto):
 @pytest.mark.parametrize("error", [PermissionError, KeyboardInterrupt])
 @pytest.mark.parametrize("done", [False, True], ids=["before", "after"])
 @pytest.mark.parametrize("name", NAMES)
-def test_an_error_at_any_move_puts_all_back(
-    wanted, tmp_path, monkeypatch, name, done, error, links
-):
+def test_an_error_at_any_move_puts_all_back(wanted, tmp_path, monkeypatch, name, done, error, links):
     replace = os.replace
 
     def broken(source, target):

@@ -131,8 +131,7 @@ def test_the_two_squares_are_mirror_images(n):
 
 def test_symmetric_diagonals_leave_no_triangle_that_cannot_move():
     held = {
-        diagonals: generators.two_squares(4, diagonals=diagonals)
-        for diagonals in ("symmetric", "parallel")
+        diagonals: generators.two_squares(4, diagonals=diagonals) for diagonals in ("symmetric", "parallel")
     }
     stuck = {k: s.fixed[s.faces].all(axis=1).sum() for k, s in held.items()}
     assert stuck == {"symmetric": 0, "parallel": 2}
@@ -296,9 +295,7 @@ def assert_second_order(exact, surfaces):
     assert squared[1] < 0.4 * squared[0]
 
 
-@pytest.mark.parametrize(
-    "tensions", [(4.0, 3.0, 3.0, 4.5), (4.0, 3.0, 2.0, 4.0), (4.0, 4.0, 1.0, 5.0)]
-)
+@pytest.mark.parametrize("tensions", [(4.0, 3.0, 3.0, 4.5), (4.0, 3.0, 2.0, 4.0), (4.0, 4.0, 1.0, 5.0)])
 def test_the_exact_joined_caps_balance_at_the_junction(tensions):
     *alphas, depth = tensions
     keys = ("alpha_left", "alpha_right", "alpha_aux")

@@ -85,6 +85,4 @@ def test_three_vectors_are_those_of_numpy():
 def test_the_plane_cross_product_is_the_area_seen_from_above():
     turned = P @ rotation(3)
     u, v = turned[:, 1] - turned[:, 0], turned[:, 2] - turned[:, 0]
-    np.testing.assert_allclose(
-        cross_2d(u[:, :2], v[:, :2]), 2.0 * area_vectors(turned)[:, 2], atol=1e-15
-    )
+    np.testing.assert_allclose(cross_2d(u[:, :2], v[:, :2]), 2.0 * area_vectors(turned)[:, 2], atol=1e-15)

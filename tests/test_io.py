@@ -9,13 +9,7 @@ from scipy.spatial import cKDTree
 from tents import tent
 
 import pcmc
-from pcmc.base.errors import (
-    FileError,
-    FileWarning,
-    MissingExtra,
-    OptionError,
-    SurfaceError,
-)
+from pcmc.base.errors import FileError, FileWarning, MissingExtra, OptionError, SurfaceError
 from pcmc.io import FORMATS, load
 
 SINGLE = (".stl", ".glb", ".gltf")  # in single precision
@@ -158,9 +152,7 @@ def test_what_the_caller_says_wins(tmp_path):
     path = tmp_path / "a.obj"
     pcmc.write(path, tent())
     plane = tent().plane
-    again = pcmc.read(
-        path, tensions={"wall": 9.0}, pressures=2.0, fixed="boundary", on_plane=(), plane=plane
-    )
+    again = pcmc.read(path, tensions={"wall": 9.0}, pressures=2.0, fixed="boundary", on_plane=(), plane=plane)
     assert again.tensions.tolist() == [3.0, 2.1, 9.0]
     assert again.pressures.tolist() == [2.0] * 3
     np.testing.assert_array_equal(again.fixed, again.topology.on_boundary)
@@ -239,8 +231,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("suffix", "name"),
-    [(".stl", "trimesh"), (".glb", "trimesh"), (".vtp", "pyvista"), (".3dm", "rhino3dm")],
+    ("suffix", "name"), [(".stl", "trimesh"), (".glb", "trimesh"), (".vtp", "pyvista"), (".3dm", "rhino3dm")]
 )
 def test_missing_libraries_are_named(tmp_path, monkeypatch, suffix, name):
     path = tmp_path / f"a{suffix}"

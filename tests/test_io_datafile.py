@@ -44,9 +44,7 @@ hessian
 def test_foreign_datafile(tmp_path):
     path = tmp_path / "a.fe"
     path.write_text(CUBE.replace("side + 1", "side+1"))
-    with pytest.warns(
-        FileWarning, match="1 polygons were cut .*; body 2 has no pressure in the file"
-    ):
+    with pytest.warns(FileWarning, match="1 polygons were cut .*; body 2 has no pressure in the file"):
         surface = pcmc.read(path)
     assert surface.plane == pcmc.Plane((0.0, 0.0, 2.0))
     np.testing.assert_allclose(surface.vertices[[2, 4]], [[2, 2, 2], [1, 1, 3]])

@@ -170,9 +170,7 @@ def test_junctions_written_apart_are_joined(tmp_path):
     wall = np.array([[1, 0, 0], [1, 1, 0], [1, 1, -1], [1, 0, -1.0]])
     jitter = 1e-9 * np.random.default_rng(0).normal(size=(18, 3))
     parts = [X[[0, 1, 4, 3]], X[[1, 2, 5, 4]], wall]
-    text = "".join(
-        f"v {x!r} {y!r} {z!r}\n" for x, y, z in (np.concatenate(parts) + jitter[:12]).tolist()
-    )
+    text = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in (np.concatenate(parts) + jitter[:12]).tolist())
     for k, name in enumerate(("left", "right", "wall")):
         text += f"g {name}\nf {4 * k + 1} {4 * k + 2} {4 * k + 3}\nf {4 * k + 1} {4 * k + 3} {4 * k + 4}\n"
     (tmp_path / "a.obj").write_text(text)
@@ -197,9 +195,7 @@ OBJ = {
 @pytest.mark.parametrize("case", OBJ)
 def test_obj_dialects(tmp_path, case):
     text, names, faces = OBJ[case]
-    head = "# other\nmtllib x.mtl\nvn 0 0 1\n" + "".join(
-        "v {} {} {}\n".format(*x) for x in X.tolist()
-    )
+    head = "# other\nmtllib x.mtl\nvn 0 0 1\n" + "".join("v {} {} {}\n".format(*x) for x in X.tolist())
     (tmp_path / "file.obj").write_text(head + text)
     surface = pcmc.read(tmp_path / "file.obj")
     assert [p.name for p in surface.patches] == names
@@ -271,20 +267,7 @@ def test_polygons_are_cut_well():
     assert origin.tolist() == [0, 1, 1, 1, 1]
     assert notes == ("1 polygons were cut into triangles",)
     comb = np.array(
-        [
-            [0, 0],
-            [5, 0],
-            [5, 3],
-            [4, 3],
-            [4, 1],
-            [3, 1],
-            [3, 3],
-            [2, 3],
-            [2, 1],
-            [1, 1],
-            [1, 3],
-            [0, 3],
-        ]
+        [[0, 0], [5, 0], [5, 3], [4, 3], [4, 1], [3, 1], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]]
     )
     with refused(FileError, where=0, found=12):
         triangulate(np.pad(1.0 * comb, ((0, 0), (0, 1))), np.arange(12), np.array([12]))

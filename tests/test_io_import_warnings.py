@@ -62,9 +62,7 @@ def test_patches_turned_against_each_other_are_named(tmp_path):
 
 @pytest.mark.parametrize(("axes", "named"), [((0, 2, 1), "y"), ((2, 0, 1), "x")])
 def test_a_roof_on_its_side_gives_a_warning(tmp_path, axes, named):
-    with pytest.warns(
-        FileWarning, match=f"faces {named}, but z is up here; rotate it if {named} was up"
-    ):
+    with pytest.warns(FileWarning, match=f"faces {named}, but z is up here; rotate it if {named} was up"):
         pcmc.read(write_obj(tmp_path / "lying.obj", axes=axes))
 
 
@@ -80,10 +78,7 @@ def test_the_command_warns_that_a_plain_mesh_has_no_supports(tmp_path, capsys):
     path = write_obj(tmp_path / "good.obj")
     for command in (["solve", str(path), "--tension", "4"], ["certify", str(path)]):
         cli.main(command)
-        assert (
-            "its boundary is taken as fixed; tensions and pressures are 1"
-            in capsys.readouterr().err
-        )
+        assert "its boundary is taken as fixed; tensions and pressures are 1" in capsys.readouterr().err
     pcmc.write(tmp_path / "told.obj", pcmc.read(path, tensions=4.0))
     assert cli.main(["solve", str(tmp_path / "told.obj")]) == 0
     assert capsys.readouterr().err == ""
@@ -93,21 +88,13 @@ def surveyed():
     near = tent(tilted=False)
     plane = pcmc.Plane(tuple(FAR))
     return near, pcmc.Surface(
-        near.vertices + FAR,
-        near.faces,
-        near.patch_of_face,
-        near.patches,
-        near.fixed,
-        near.on_plane,
-        plane,
+        near.vertices + FAR, near.faces, near.patch_of_face, near.patches, near.fixed, near.on_plane, plane
     )
 
 
 def test_stl_far_from_the_origin_is_written_about_its_middle_and_says_so(tmp_path):
     near, far = surveyed()
-    with pytest.warns(
-        FileWarning, match=r"a\.stl: its coordinates are relative to \[50000\d, 540000\d, 0\]"
-    ):
+    with pytest.warns(FileWarning, match=r"a\.stl: its coordinates are relative to \[50000\d, 540000\d, 0\]"):
         pcmc.write(tmp_path / "a.stl", far)
     again = pcmc.read(tmp_path / "a.stl")
     assert again.size == pytest.approx(near.size, rel=1e-6)
@@ -119,9 +106,7 @@ def test_stl_at_the_origin_is_written_where_it_is(tmp_path):
     near, _ = surveyed()
     pcmc.write(tmp_path / "a.stl", near)
     np.testing.assert_allclose(
-        np.ptp(pcmc.read(tmp_path / "a.stl").vertices, axis=0),
-        np.ptp(near.vertices, axis=0),
-        rtol=1e-6,
+        np.ptp(pcmc.read(tmp_path / "a.stl").vertices, axis=0), np.ptp(near.vertices, axis=0), rtol=1e-6
     )
 
 

@@ -22,13 +22,9 @@ def equator() -> Surface:
     plane = Plane((0.0, 0.0, 0.0), R[:, 2])
     X = octahedron(0.7).vertices
     middle = np.abs(X[:, 2]) < 1e-9
-    X = X + 0.05 * np.cos(np.arange(X.size).reshape(X.shape)) * np.where(
-        middle[:, None], [1, 1, 0], 1
-    )
+    X = X + 0.05 * np.cos(np.arange(X.size).reshape(X.shape)) * np.where(middle[:, None], [1, 1, 0], 1)
     given = octahedron(0.7)
-    return Surface(
-        X @ R.T, given.faces, given.patch_of_face, given.patches, on_plane=middle, plane=plane
-    )
+    return Surface(X @ R.T, given.faces, given.patch_of_face, given.patches, on_plane=middle, plane=plane)
 
 
 def forces(surface, classes, X):
@@ -45,9 +41,7 @@ def slope(surface, classes):
     exact = linearise(surface, classes, space, X, energy_and_gradient(surface, X)[1]).times(d)
     errors = [
         np.abs(
-            space.to_coordinates(
-                forces(surface, classes, X + t * d) - forces(surface, classes, X - t * d)
-            )
+            space.to_coordinates(forces(surface, classes, X + t * d) - forces(surface, classes, X - t * d))
             / (2.0 * t)
             - exact
         ).max()

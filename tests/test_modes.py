@@ -29,9 +29,7 @@ def system_of(surface, rigid=None, backend=None):
 
 def dense_pencil(surface, system):
     """BᵀHB and M on the complement of the rigid motions, and the basis Z of that."""
-    B = np.stack(
-        [system.space.to_vectors(column).ravel() for column in np.eye(len(system.mass))], axis=1
-    )
+    B = np.stack([system.space.to_vectors(column).ravel() for column in np.eye(len(system.mass))], axis=1)
     H = B.T @ hessian(surface).toarray() @ B
     Z = scipy.linalg.null_space(system.rigid.T) if system.rigid.shape[1] else np.eye(len(H))
     return Z.T @ H @ Z, Z.T @ (system.mass[:, None] * Z), Z
@@ -41,9 +39,7 @@ def flat_disc(rings, tension=2.0):
     flat, faces = disc(rings)
     patch = Patch("film", tension, pressure=0.0)
     rim = np.hypot(*flat.T) > 1 - 1e-9
-    return Surface(
-        np.column_stack([flat, 0 * flat[:, 0]]), faces, [0] * len(faces), [patch], fixed=rim
-    )
+    return Surface(np.column_stack([flat, 0 * flat[:, 0]]), faces, [0] * len(faces), [patch], fixed=rim)
 
 
 @pytest.mark.parametrize("backend", [None, "superlu"])
@@ -76,9 +72,7 @@ def test_the_matrix_and_the_mass_are_whole(name):
     H = dense_pencil(surface, system)[0]
     np.testing.assert_allclose(system.matrix.toarray(), H, atol=1e-13 * np.abs(H).max())
     corners = surface.vertices[system_faces(surface)]
-    doubled = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
+    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     mass = np.bincount(system_faces(surface).ravel(), np.repeat(doubled / 6.0, 3), surface.n)
     np.testing.assert_allclose(system.mass, np.repeat(mass, system.space.dimension), rtol=1e-12)
 
@@ -95,9 +89,7 @@ def test_negatives_on_the_complement_of_any_columns(seed):
     Q = np.linalg.qr(random.standard_normal((12, seed)))[0]
     rows, columns = np.triu_indices(12)
     pattern = Pattern(
-        np.searchsorted(rows, np.arange(13)).astype(np.int32),
-        columns.astype(np.int32),
-        np.empty((0, 3)),
+        np.searchsorted(rows, np.arange(13)).astype(np.int32), columns.astype(np.int32), np.empty((0, 3))
     )
     factor = factoriser(pattern).factor(A[rows, columns])
     Z = scipy.linalg.null_space(Q.T) if seed else np.eye(12)
@@ -149,14 +141,7 @@ def held(fixed, sliding):
 
 @pytest.mark.parametrize(
     ("fixed", "sliding", "left"),
-    [
-        ((), (), 6),
-        ((0,), (), 3),
-        ((0, 1), (), 1),
-        ((0, 1, 2), (), 0),
-        ((), EQUATOR[:1], 5),
-        ((), EQUATOR, 3),
-    ],
+    [((), (), 6), ((0,), (), 3), ((0, 1), (), 1), ((0, 1, 2), (), 0), ((), EQUATOR[:1], 5), ((), EQUATOR, 3)],
 )
 def test_rigid_motions_that_supports_leave_free(fixed, sliding, left):
     surface = held(fixed, sliding)

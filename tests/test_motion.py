@@ -203,9 +203,7 @@ def moebius(count: int = 24) -> Surface:
     F = []
     for i in range(count):
         here = [i, count + i, 2 * count + i]
-        there = (
-            [i + 1, count + i + 1, 2 * count + i + 1] if i < count - 1 else [2 * count, count, 0]
-        )
+        there = [i + 1, count + i + 1, 2 * count + i + 1] if i < count - 1 else [2 * count, count, 0]
         for a, b, c, d in zip(here, there, here[1:], there[1:], strict=False):
             F += [[a, b, c], [b, d, c]]
     half_way = np.repeat([0, 1], len(F) // 2)
@@ -243,11 +241,7 @@ def test_a_crest_at_rest_is_a_curve_whatever_meets_there():
     surface = seam()
     classes = vertex_classes(surface, np.array([[6, 7], [7, 6], [7, 8], [8, 7]]))
     assert classes.kind[[6, 7, 8]].tolist() == [POINT, CURVE, POINT]
-    assert motion_space(surface, classes, surface.vertices).dimension[[6, 7, 8]].tolist() == [
-        3,
-        2,
-        3,
-    ]
+    assert motion_space(surface, classes, surface.vertices).dimension[[6, 7, 8]].tolist() == [3, 2, 3]
 
 
 def test_where_a_standing_wall_begins_a_resting_vertex_keeps_to_the_crest():
@@ -261,9 +255,7 @@ def test_where_a_standing_wall_begins_a_resting_vertex_keeps_to_the_crest():
     assert (classes.kind[tip] == CURVE).all()
     space = motion_space(found.surface, classes, found.surface.vertices)
     assert (space.dimension[tip] == 1).all()
-    one, two = found.surface.vertices[classes.beside[np.isin(classes.curve, tip)]].transpose(
-        1, 0, 2
-    )
+    one, two = found.surface.vertices[classes.beside[np.isin(classes.curve, tip)]].transpose(1, 0, 2)
     assert np.einsum("ij,ij->i", two - one, space.basis[tip, 0]) == pytest.approx(0.0, abs=1e-12)
 
 
@@ -294,7 +286,5 @@ def test_force_scale_is_the_norm_of_the_triangles_forces():
     surface = pyramid(1.5)
     classes = vertex_classes(surface)
     # four triangles with sides 2, √3, √3: each corner is pulled with ½ α of the side opposite
-    assert force_scale(surface, classes, surface.vertices) == pytest.approx(
-        0.75 * np.sqrt(4 * 10.0)
-    )
+    assert force_scale(surface, classes, surface.vertices) == pytest.approx(0.75 * np.sqrt(4 * 10.0))
     assert force_scale(surface, classes, 0 * surface.vertices) == 1.0

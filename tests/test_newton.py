@@ -113,10 +113,7 @@ def test_coarse_then_refined_then_finished(name):
 
 
 @pytest.mark.parametrize(
-    "name",
-    marked(
-        [name for name, case in CASES.items() if not case[1]], lambda name: name.endswith(LARGE)
-    ),
+    "name", marked([name for name, case in CASES.items() if not case[1]], lambda name: name.endswith(LARGE))
 )
 def test_stable_shapes_are_found_by_the_default_too(name):
     make, _, pinched = CASES[name]
@@ -223,15 +220,7 @@ def test_the_history_counts_and_describes():
     assert (history["evaluation"].diff().dropna() > 0).all()
     assert (history["factorisation"].diff().dropna() >= 0).all()
     assert history["step"].iloc[0] == "start"
-    assert set(history["step"]) <= {
-        "start",
-        "newton",
-        "shifted",
-        "descent",
-        "contact",
-        "release",
-        "saddle",
-    }
+    assert set(history["step"]) <= {"start", "newton", "shifted", "descent", "contact", "release", "saddle"}
     assert history["energy"].iloc[-1] == result.energy
     assert history["residual"].iloc[-1] <= 1e-12
     assert (history["level"] == 0).all()

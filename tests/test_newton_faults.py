@@ -192,9 +192,7 @@ def test_options_are_values(backend):
     assert NewtonOptions().target == "minimum"
 
 
-@pytest.mark.parametrize(
-    "make", [partial(two_squares, 6), partial(two_caps, 0.8), partial(four_fans, 5)]
-)
+@pytest.mark.parametrize("make", [partial(two_squares, 6), partial(two_caps, 0.8), partial(four_fans, 5)])
 def test_every_backend_gives_the_same(backend, make):
     first = solve(make(), target="stationary", backend=available()[0])
     other = solve(make(), target="stationary", backend=backend)
@@ -268,10 +266,7 @@ def test_a_mesh_that_cannot_be_mended_is_named(backend, target):
 def test_zero_area_is_refused_with_the_face(backend):
     X = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]]
     with pytest.raises(SurfaceError, match=r"faces\[0\] = \[0, 1, 2\] of patch 'roof' has zero"):
-        solve(
-            Surface(X, [[0, 1, 2], [0, 2, 3]], [0, 0], [Patch("roof", 1.0)], fixed=[0]),
-            backend=backend,
-        )
+        solve(Surface(X, [[0, 1, 2], [0, 2, 3]], [0, 0], [Patch("roof", 1.0)], fixed=[0]), backend=backend)
 
 
 def together(one, two, held=True):
@@ -299,9 +294,7 @@ def test_a_part_that_nothing_holds_is_named(backend, target):
 
 
 def test_two_parts_that_are_held(backend):
-    both = solve(
-        together(two_squares(4, alpha_aux=1.0), beside(spherical_cap(0.25))), backend=backend
-    )
+    both = solve(together(two_squares(4, alpha_aux=1.0), beside(spherical_cap(0.25))), backend=backend)
     assert both.certificate.verdict is Verdict.STABLE
     alone = [
         solve(two_squares(4, alpha_aux=1.0), backend=backend),
@@ -367,9 +360,7 @@ def test_walls_without_tension_meet_in_a_line(backend):
     assert result.certificate.verdict is Verdict.STABLE
     assert np.isfinite(result.surface.vertices).all()
     cap = solve(spherical_cap(4.0, radius=20.0, alpha=10.0), target="stationary", backend=backend)
-    assert result.surface.vertices[:, 2].max() == pytest.approx(
-        cap.surface.vertices[:, 2].max(), rel=0.1
-    )
+    assert result.surface.vertices[:, 2].max() == pytest.approx(cap.surface.vertices[:, 2].max(), rel=0.1)
 
 
 @pytest.mark.parametrize(

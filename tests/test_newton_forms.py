@@ -38,9 +38,7 @@ def test_the_cap_is_of_second_order(alpha):
     surfaces = [result.surface for result in results]
     h = sizes(surfaces)
     away = [root_mean_square(exact.distance(surface)) for surface in surfaces]
-    slack = (
-        0.5 if alpha < 0.51 else 0.25
-    )  # next to the fold the error of the edge is felt at its root
+    slack = 0.5 if alpha < 0.51 else 0.25  # next to the fold the error of the edge is felt at its root
     assert order(away, h) == pytest.approx(2.0, abs=slack)
     assert order([energy(s) - exact.energy for s in surfaces], h) == pytest.approx(2.0, abs=slack)
 
@@ -79,9 +77,7 @@ def test_below_the_fold_there_is_no_equilibrium(method):
     assert "1.11 times what the boundary's tension could carry" in found.detail
     assert not found.certified
     assert "no equilibrium" in str(found)
-    assert np.isfinite(
-        np.array([v for v in found.numbers().values() if isinstance(v, float)])
-    ).all()
+    assert np.isfinite(np.array([v for v in found.numbers().values() if isinstance(v, float)])).all()
 
 
 @pytest.mark.parametrize("edge", [0.25, 0.0625])
@@ -176,9 +172,7 @@ def fitted_sphere(X):
 
 
 def part(surface, name):
-    return surface.vertices[
-        np.unique(surface.faces[surface.patch_of_face == surface.patch_index(name)])
-    ]
+    return surface.vertices[np.unique(surface.faces[surface.patch_of_face == surface.patch_index(name)])]
 
 
 @pytest.mark.parametrize("alpha", [1.0, 0.4])
@@ -189,10 +183,7 @@ def test_the_bubble_is_a_sphere_and_a_saddle_of_index_one(alpha):
     h = sizes(surfaces)
     fits = [fitted_sphere(surface.vertices) for surface in surfaces]
     assert order([radius - 2 * alpha for _, radius in fits], h) == pytest.approx(2.0, abs=0.1)
-    round_ = [
-        np.linalg.norm(s.vertices - c, axis=1).std()
-        for s, (c, _) in zip(surfaces, fits, strict=True)
-    ]
+    round_ = [np.linalg.norm(s.vertices - c, axis=1).std() for s, (c, _) in zip(surfaces, fits, strict=True)]
     assert round_[2] < 1e-3 * alpha
     exact = sphere_exact(alpha=alpha)
     assert order([energy(s) - exact.energy for s in surfaces], h) == pytest.approx(2.0, abs=0.1)

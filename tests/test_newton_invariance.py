@@ -10,15 +10,7 @@ from functools import partial
 import numpy as np
 import pytest
 from shapes import rotation
-from starts import (
-    bezier_hall,
-    double_bubble,
-    four_fans,
-    joined_caps,
-    spherical_cap,
-    two_caps,
-    two_squares,
-)
+from starts import bezier_hall, double_bubble, four_fans, joined_caps, spherical_cap, two_caps, two_squares
 
 from pcmc import Patch, Plane, Surface, mean_curvature, solve
 
@@ -28,9 +20,7 @@ SURFACES = {
     "two squares": partial(two_squares, 6, alpha_aux=1.0),
     "pinched squares": partial(two_squares, 6, alpha_aux=3.0),
     "joined caps": partial(joined_caps, 1.0),
-    "weak wall": partial(
-        joined_caps, 1.4, alpha_left=4.0, alpha_right=4.0, alpha_aux=1.0, depth=5.0
-    ),
+    "weak wall": partial(joined_caps, 1.4, alpha_left=4.0, alpha_right=4.0, alpha_aux=1.0, depth=5.0),
     "cap": partial(spherical_cap, 0.25),
     "two caps": partial(two_caps, 1.2),
     "fans": partial(four_fans, 5),
@@ -131,9 +121,7 @@ def test_vertices_patches_and_faces_in_another_order(name, seed, answers):
     other = rebuilt(surface, order=order, rank=rank)
     faces = random.permutation(other.m)
     turn = random.integers(3, size=other.m)
-    F = np.stack(
-        [np.roll(face, k) for face, k in zip(other.faces[faces], turn[faces], strict=True)]
-    )
+    F = np.stack([np.roll(face, k) for face, k in zip(other.faces[faces], turn[faces], strict=True)])
     shuffled = Surface(
         other.vertices,
         F,
@@ -159,13 +147,10 @@ def test_a_tilted_plane_gives_the_surface_tilted():
 
 def test_a_saddle_is_left_the_same_way():
     saddle = solve(
-        joined_caps(1.0, alpha_left=4.0, alpha_right=4.0, alpha_aux=1.0, depth=5.0),
-        target="stationary",
+        joined_caps(1.0, alpha_left=4.0, alpha_right=4.0, alpha_aux=1.0, depth=5.0), target="stationary"
     ).surface
     R = rotation(5)
-    turned = rebuilt(
-        saddle, saddle.vertices @ R.T, Plane(R @ saddle.plane.point, R @ saddle.plane.normal)
-    )
+    turned = rebuilt(saddle, saddle.vertices @ R.T, Plane(R @ saddle.plane.point, R @ saddle.plane.normal))
     ways = [solve(surface, iterations=6).history for surface in (saddle, turned)]
     assert "saddle" in ways[0]["step"].to_list()
     assert ways[1]["step"].to_list() == ways[0]["step"].to_list()

@@ -106,10 +106,7 @@ def test_wrong_values_are_refused_at_once(changes, fields):
     [
         ({"edge": "hinged"}, "unknown edge of the outline 'hinged'"),
         ({"dividers": [{"curve": WALL, "bottom": "hold"}]}, "unknown bottom of divider 1 'hold'"),
-        (
-            {"holes": [{**COURT, "edge": "fix"}]},
-            "unknown edge of hole 1 'fix'; did you mean 'fixed'",
-        ),
+        ({"holes": [{**COURT, "edge": "fix"}]}, "unknown edge of hole 1 'fix'; did you mean 'fixed'"),
     ],
 )
 def test_supports_are_named(changes, message):
@@ -118,8 +115,7 @@ def test_supports_are_named(changes, message):
 
 
 @pytest.mark.parametrize(
-    ("key", "value"),
-    [("edge_length", 0.0), ("edge_length", "1"), ("edge_length", True), ("rise", -1.0)],
+    ("key", "value"), [("edge_length", 0.0), ("edge_length", "1"), ("edge_length", True), ("rise", -1.0)]
 )
 def test_lengths_are_positive(key, value):
     with pytest.raises(OptionError, match=rf"{key}: expected a finite number > 0, found {value!r}"):

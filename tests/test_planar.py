@@ -45,8 +45,7 @@ def opposite_angles(mesh, but):
 
 def edges(mesh):
     return {
-        tuple(sorted(map(int, edge)))
-        for edge in mesh.triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+        tuple(sorted(map(int, edge))) for edge in mesh.triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
     }
 
 
@@ -122,14 +121,7 @@ def test_fine_segments_grade_the_mesh():
 @pytest.mark.parametrize(
     ("points", "segments", "h", "holes", "error", "fields"),
     [
-        (
-            [[0, 0], [1, 0], [0, 1]],
-            loop(3),
-            1.0,
-            [[5, 5]],
-            OptionError,
-            {"what": "holes", "where": 0},
-        ),
+        ([[0, 0], [1, 0], [0, 1]], loop(3), 1.0, [[5, 5]], OptionError, {"what": "holes", "where": 0}),
         ([[0, 0], [1, 0], [0, 1], [0, 1]], loop(4), 1.0, (), SurfaceError, {"where": (2, 3)}),
         ([[0, 0], [1, 0], [0, 1]], loop(3)[:2], 1.0, (), SurfaceError, {"found": 2, "expected": 3}),
         ([[0, 0], [1, 0], [2, 0]], loop(3), 1.0, (), SurfaceError, {"what": "points"}),

@@ -23,10 +23,7 @@ from pcmc.surface.colours import WALLS, patch_colors, rgb
 
 RENDERERS = [
     pytest.param("matplotlib"),
-    pytest.param(
-        "pyvista",
-        marks=pytest.mark.skipif(not raster.opengl(), reason="the system has no OpenGL"),
-    ),
+    pytest.param("pyvista", marks=pytest.mark.skipif(not raster.opengl(), reason="the system has no OpenGL")),
 ]
 
 
@@ -39,19 +36,13 @@ def flat_square(z=0.0, wall=False):
     """A unit square on Π, or one that stands on it."""
     X = np.array([[0, 0, z], [1, 0, z], [1, 1, z], [0, 1, z]], dtype=float)
     return pcmc.Surface(
-        X,
-        [[0, 1, 2], [0, 2, 3]],
-        [0, 0],
-        [pcmc.Patch("a", 1.0, 0.0 if wall else 1.0)],
-        fixed=range(4),
+        X, [[0, 1, 2], [0, 2, 3]], [0, 0], [pcmc.Patch("a", 1.0, 0.0 if wall else 1.0)], fixed=range(4)
     )
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
 def test_lengths_are_to_scale(renderer):
-    image = plot.draw(
-        flat_square(), view="plan", width=420, supports=False, edges=False, renderer=renderer
-    )
+    image = plot.draw(flat_square(), view="plan", width=420, supports=False, edges=False, renderer=renderer)
     assert image.shape == (420, 420, 3)
     covered = (image < 250).any(axis=2)
     rows, columns = np.flatnonzero(covered.any(axis=1)), np.flatnonzero(covered.any(axis=0))
@@ -118,18 +109,14 @@ def test_each_surface_may_show_patches_of_its_own():
     assert (left[:, 210:] == 255).all()
     assert (right[:, 210:390] < 250).any()
     assert (left[:, :190] == right[:, :190]).all()
-    larger = plot.panel(
-        [surface] * 2, views="plan", patches=[["left"], None], width=800, one_scale=False
-    )
+    larger = plot.panel([surface] * 2, views="plan", patches=[["left"], None], width=800, one_scale=False)
     assert (larger[:, 210:390] < 250).any()
 
 
 def test_legend_names_what_is_drawn(monkeypatch):
     surface, shown = two_squares(4, alpha_aux=1.0), []
     entries = legend.entries
-    monkeypatch.setattr(
-        legend, "entries", lambda pictures: shown.append(entries(pictures)) or shown[-1]
-    )
+    monkeypatch.setattr(legend, "entries", lambda pictures: shown.append(entries(pictures)) or shown[-1])
     plot.draw(surface, legend=True)
     plot.draw(surface, legend=True, patches=["left", "right"])  # only the wall slides
     plot.draw(surface, legend=True, scalars=pcmc.mean_curvature(surface))
@@ -312,10 +299,7 @@ def test_a_heatmap_shows_values_marks_and_gaps(tmp_path):
     rows, columns = np.flatnonzero(grey.any(axis=1)), np.flatnonzero(grey.any(axis=0))
     wide = np.ptp(columns) / 3
     at = [
-        (
-            rows.min() + (2 * r + 1) * np.ptp(rows) // 4,
-            columns.min() + (2 * c + 1) * np.ptp(columns) // 6,
-        )
+        (rows.min() + (2 * r + 1) * np.ptp(rows) // 4, columns.min() + (2 * c + 1) * np.ptp(columns) // 6)
         for r in range(2)
         for c in range(3)
     ]
@@ -328,9 +312,7 @@ def test_a_heatmap_shows_values_marks_and_gaps(tmp_path):
 def test_convergence_shows_the_slope(monkeypatch):
     labels = []
     monkeypatch.setattr(
-        plot.curves,
-        "add_legend",
-        lambda axes, _: labels.extend(axes.get_legend_handles_labels()[1]),
+        plot.curves, "add_legend", lambda axes, _: labels.extend(axes.get_legend_handles_labels()[1])
     )
     h = np.array([1.0, 0.5, 0.25])
     plot.convergence({"E": (h, 0.3 * h**2)})
@@ -369,17 +351,12 @@ BAD = [
         lambda s: plot.draw(s, scalars=[1, 2, 3]),
         {"what": "scalars", "found": (3,), "expected": [(10,), (12,)]},
     ),
-    (
-        lambda s: plot.draw(s, numbers=np.zeros(s.m)),
-        {"what": "numbers", "found": (12,), "expected": [(10,)]},
-    ),
+    (lambda s: plot.draw(s, numbers=np.zeros(s.m)), {"what": "numbers", "found": (12,), "expected": [(10,)]}),
     (lambda s: plot.panel([]), {"what": "surfaces", "found": 0}),
     (lambda s: plot.panel([s, s], titles=["one"]), {"what": "titles", "found": 1, "expected": 2}),
     (lambda s: plot.panel([s, s], views=["plan"]), {"what": "views", "found": 1, "expected": 2}),
     (
-        lambda s: plot.reactions(
-            pcmc.Surface(s.vertices, s.faces, s.patch_of_face, s.patches, fixed=[0])
-        ),
+        lambda s: plot.reactions(pcmc.Surface(s.vertices, s.faces, s.patch_of_face, s.patches, fixed=[0])),
         {"what": "surface"},
     ),
     (lambda s: plot.vectors(s, np.zeros(10)), {"what": "field", "expected": (10, 3)}),
@@ -394,10 +371,7 @@ BAD = [
         {"what": "tables", "where": "a", "found": (1, 1), "expected": (1, 2)},
     ),
     (lambda s: plot.heatmap([1], [1], {}), {"what": "tables", "found": 0}),
-    (
-        lambda s: plot.heatmap([1], [1], {"a": [[1]]}, marks={"b": [[True]]}),
-        {"what": "marks", "where": "b"},
-    ),
+    (lambda s: plot.heatmap([1], [1], {"a": [[1]]}, marks={"b": [[True]]}), {"what": "marks", "where": "b"}),
     (lambda s: plot.heatmap([1], [1], {"a": [[1]]}, cmap="no"), {"what": "cmap", "found": "no"}),
 ]
 

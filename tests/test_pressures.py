@@ -83,9 +83,7 @@ def test_far_from_the_plane_s_point_volumes_are_seen_from_near_by():
     )
     assert np.linalg.norm(far.origin - far.vertices.mean(axis=0)) < near.size
     assert far.origin[2] == 0.0
-    np.testing.assert_allclose(
-        gradient(far), gradient(near), atol=1e-8 * np.abs(gradient(near)).max()
-    )
+    np.testing.assert_allclose(gradient(far), gradient(near), atol=1e-8 * np.abs(gradient(near)).max())
     assert volume(far) == pytest.approx(volume(near), rel=1e-8)
     assert far.moved(far.vertices + np.array([1e3, 0, 0])).origin is far.origin
 
@@ -93,9 +91,7 @@ def test_far_from_the_plane_s_point_volumes_are_seen_from_near_by():
 def test_where_pressures_do_not_cancel_the_point_of_the_plane_stays():
     """The force of what is left over depends on it."""
     near = two_caps(1.2)
-    patches = [
-        Patch(p.name, p.tension, p.pressure * (1 + (k == 0))) for k, p in enumerate(near.patches)
-    ]
+    patches = [Patch(p.name, p.tension, p.pressure * (1 + (k == 0))) for k, p in enumerate(near.patches)]
     far = Surface(
         near.vertices + np.array([5e5, 0, 0]),
         near.faces,

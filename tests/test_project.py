@@ -58,12 +58,7 @@ def test_the_example_gives_certified_files_and_a_picture(tmp_path):
         back = pcmc.read(tmp_path / "out" / name)
         assert sorted(p.name for p in back.patches) == sorted(names)
         assert back.m == outcome.surface.m
-    assert {s.split()[0] for s in steps} >= {
-        "meshing",
-        "solving:",
-        "certifying",
-        "writing",
-    }
+    assert {s.split()[0] for s in steps} >= {"meshing", "solving:", "certifying", "writing"}
 
 
 def test_the_native_file_keeps_supports_and_tensions(small):
@@ -89,27 +84,9 @@ def test_build_only_meshes(small):
         ("files =", "file =", 11, "output.file", "files"),
         ("tension =", "tension = 1, tensoin =", 5, "plan.patches.roof.tensoin", "tension"),
         ("[solve]", "[[plan.holes]]\ncurve = []\nedg = 1\n[solve]", 9, "plan.holes.edg", "edge"),
-        (
-            "[solve]",
-            "[[plan.dividers]]\ncurve = []\nbotom = 1\n[solve]",
-            9,
-            "plan.dividers.botom",
-            "bottom",
-        ),
-        (
-            "[solve]",
-            "[plan.plane]\nnormall = [0, 0, 1]\n[solve]",
-            8,
-            "plan.plane.normall",
-            "normal",
-        ),
-        (
-            "[output]",
-            "[[remesh]]\nedge_length = 1\n[[remesh]]\nwen = 1\n[output]",
-            13,
-            "remesh.wen",
-            "when",
-        ),
+        ("[solve]", "[[plan.dividers]]\ncurve = []\nbotom = 1\n[solve]", 9, "plan.dividers.botom", "bottom"),
+        ("[solve]", "[plan.plane]\nnormall = [0, 0, 1]\n[solve]", 8, "plan.plane.normall", "normal"),
+        ("[output]", "[[remesh]]\nedge_length = 1\n[[remesh]]\nwen = 1\n[output]", 13, "remesh.wen", "when"),
         ("[output]", "[targets]\nmeet = []\nvaryy = []\n[output]", 12, "targets.varyy", "vary"),
         (
             "[output]",
@@ -136,18 +113,8 @@ def test_an_unknown_key_has_its_line_and_the_nearest_key(small, old, new, line, 
         ("tension =", "pressure =", 5, "plan.patches.roof.tension"),
         ("[output]", "[remesh]\ngrowth = 2\n[output]", 10, "remesh.edge_length"),
         ("[output]", '[targets]\nmeet = [{quantity = "apex"}]\n[output]', 10, "targets.vary"),
-        (
-            "[output]",
-            '[targets]\nmeet = [{of = "a"}]\nvary = ["a"]\n[output]',
-            11,
-            "targets.meet.quantity",
-        ),
-        (
-            "[output]",
-            "[targets]\nmeet = []\nvary = [{low = 1}]\n[output]",
-            12,
-            "targets.vary.patch",
-        ),
+        ("[output]", '[targets]\nmeet = [{of = "a"}]\nvary = ["a"]\n[output]', 11, "targets.meet.quantity"),
+        ("[output]", "[targets]\nmeet = []\nvary = [{low = 1}]\n[output]", 12, "targets.vary.patch"),
     ],
 )
 def test_a_missing_key_is_named_with_the_line_of_its_table(small, old, new, line, key):
@@ -170,11 +137,7 @@ def test_a_missing_key_is_named_with_the_line_of_its_table(small, old, new, line
         ('"roof.obj"', '"roof.obk"', {"what": "roof.obk", "found": ".obk"}),
         ("files =", 'picture = "roof.jpg"\nfiles =', {"what": "roof.jpg"}),
         ("[output]", "[remesh]\nedge_length = -1\n[output]", {}),
-        (
-            "[output]",
-            "[remesh]\nedge_length = 1\nwhen = 'beforre'\n[output]",
-            {"what": "remesh.when"},
-        ),
+        ("[output]", "[remesh]\nedge_length = 1\nwhen = 'beforre'\n[output]", {"what": "remesh.when"}),
         ("[output]", "[targets]\nmeet = []\nvary = []\n[output]", {"what": "targets.meet"}),
     ],
 )
@@ -217,12 +180,7 @@ def test_values_of_the_wrong_kind(tmp_path, line, key, kind):
 
 @pytest.mark.parametrize(
     ("at", "key"),
-    [
-        ('"b"', "plan.patches.roof.at"),
-        ("3", "plan.patches.roof.at"),
-        ("[1, nan]", "at"),
-        ('["b", 2]', "at"),
-    ],
+    [('"b"', "plan.patches.roof.at"), ("3", "plan.patches.roof.at"), ("[1, nan]", "at"), ('["b", 2]', "at")],
 )
 def test_a_patch_is_at_a_point(small, at, key):
     with refused(FileError, what=key) as caught:
@@ -231,9 +189,7 @@ def test_a_patch_is_at_a_point(small, at, key):
 
 
 def test_a_wrong_value_inside_a_curve(small):
-    changed(
-        small, "edge_length", 'holes = [{circle = {centre = [1, 1], radius = "x"}}]\nedge_length'
-    )
+    changed(small, "edge_length", 'holes = [{circle = {centre = [1, 1], radius = "x"}}]\nedge_length')
     with pytest.raises(FileError, match=r"hole 1: circle: radius: expected .*, found 'x'"):
         load(small)
 
@@ -397,9 +353,7 @@ def test_remeshed_before_or_after_and_certified_anew(small, when):
 
 
 def test_remeshed_twice_with_solves_between_and_finer_at_the_curves(small):
-    twice = (
-        "[[remesh]]\nedge_length = 0.7\n[[remesh]]\nedge_length = 0.7\nnear_curves = 0.25\n[output]"
-    )
+    twice = "[[remesh]]\nedge_length = 0.7\n[[remesh]]\nedge_length = 0.7\nnear_curves = 0.25\n[output]"
     steps = []
     outcome = run(changed(small, "[output]", twice), progress=steps.append)
     assert steps.count("remeshing") == 2
@@ -433,8 +387,7 @@ def test_a_project_is_read_with_the_mark_of_windows_editors(small):
 
 
 @pytest.mark.parametrize(
-    ("view", "found"),
-    [('"diagnal"', "diagnal"), ("[30]", [30]), ("[30, 'a']", [30, "a"]), ("3", 3)],
+    ("view", "found"), [('"diagnal"', "diagnal"), ("[30]", [30]), ("[30, 'a']", [30, "a"]), ("3", 3)]
 )
 def test_a_bad_view_is_refused_before_any_work(small, view, found):
     changed(small, "files =", f"view = {view}\nfiles =")

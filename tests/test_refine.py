@@ -113,9 +113,7 @@ def test_a_held_line_inside_a_patch_is_held_between_its_vertices():
 
 def test_seam_across_the_plan_is_free_but_a_held_chain_along_a_junction_is_fixed():
     X = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-    square = Surface(
-        X, [[0, 1, 2], [0, 2, 3]], [0, 1], [Patch("a", 1.0), Patch("b", 1.0)], fixed=range(4)
-    )
+    square = Surface(X, [[0, 1, 2], [0, 2, 3]], [0, 1], [Patch("a", 1.0), Patch("b", 1.0)], fixed=range(4))
     assert not refine(square).fixed[middle_of(square, 0, 2)]
     base = tent()
     held = Surface(
@@ -163,9 +161,7 @@ def test_sliding_on_a_tilted_plane():
     )
     fine = refine(tilted, levels=2)
     assert fine.on_plane.sum() == refine(base, levels=2).on_plane.sum()
-    np.testing.assert_allclose(
-        fine.vertices, refine(base, levels=2).vertices @ turn.T + shift, atol=1e-13
-    )
+    np.testing.assert_allclose(fine.vertices, refine(base, levels=2).vertices @ turn.T + shift, atol=1e-13)
 
 
 def test_prolongation_carries_linear_fields_exactly():

@@ -29,10 +29,7 @@ def patch_angles(surface: Surface) -> dict[str, float]:
 def sharpest_corner(surface: Surface) -> float:
     """The smallest angle between two curve edges of one triangle: no mesh there can do better."""
     on_curve = surface.topology.curve_edge[surface.topology.edge_of_face]
-    sides = (
-        surface.vertices[surface.faces[:, [2, 0, 1]]]
-        - surface.vertices[surface.faces[:, [1, 2, 0]]]
-    )
+    sides = surface.vertices[surface.faces[:, [2, 0, 1]]] - surface.vertices[surface.faces[:, [1, 2, 0]]]
     corners = []
     for k in range(3):  # the sides opposite the other two corners meet at corner k
         i, j = (k + 1) % 3, (k + 2) % 3
@@ -225,9 +222,7 @@ def test_without_mmgpy_the_extra_is_named(monkeypatch):
 
 
 def test_a_single_triangle():
-    one = Surface(
-        [[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], fixed=range(3)
-    )
+    one = Surface([[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], fixed=range(3))
     fine = remesh(one, 0.25)
     assert patch_areas(fine)[0] == pytest.approx(2.0)
     assert minimum_angle(fine) > 20.0

@@ -56,9 +56,7 @@ def test_a_wall_that_follows_remains_a_wall():
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".3dm"])
-def test_a_pinched_wall_with_a_pressure_comes_back_where_patches_are_written_apart(
-    suffix, tmp_path
-):
+def test_a_pinched_wall_with_a_pressure_comes_back_where_patches_are_written_apart(suffix, tmp_path):
     pinched = pcmc.solve(two_squares(16, alpha_aux=2.0), target="stationary").surface
     surface = with_pressures(pinched, None, {"left": 1.02})
     assert standing_part(surface).surface.m < surface.m
@@ -72,11 +70,7 @@ def test_a_wall_that_passes_several_rooms_has_no_one_pressure():
         [[0, 0], [12, 0], [12, 8], [0, 8]],
         [Divider([[6, 0], [6, 8]], name="spine"), Divider([[6, 4], [12, 4]], name="rib")],
         edge_length=1.0,
-        patches=[
-            Area("west", 6.0, at=[3, 4]),
-            Area("south", 6.0, at=[9, 2]),
-            Area("north", 6.0, at=[9, 6]),
-        ],
+        patches=[Area("west", 6.0, at=[3, 4]), Area("south", 6.0, at=[9, 2]), Area("north", 6.0, at=[9, 6])],
     ).surface()
     both = with_pressures(surface, None, {"south": 0.9, "north": 0.9})
     assert np.abs(both.pressures).tolist() == pytest.approx([1.0, 0.9, 0.9, 0.1, 0.0])
@@ -117,8 +111,8 @@ def test_sensitivities_to_a_room_s_pressure_are_slopes_with_its_wall_following(k
         solved = pcmc.solve(with_pressures(at_rest, None, {"west": west}), **tight).surface
         return measure(solved, target).value
 
-    slope = (
-        8 * (found(1 + step) - found(1 - step)) - found(1 + 2 * step) + found(1 - 2 * step)
-    ) / (12 * step)
+    slope = (8 * (found(1 + step) - found(1 - step)) - found(1 + 2 * step) + found(1 - 2 * step)) / (
+        12 * step
+    )
     table = sensitivities(at_rest, target, Parameter("west", "pressure"))
     assert table.iloc[0, 0] == pytest.approx(slope, rel=1e-6)

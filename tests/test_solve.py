@@ -47,8 +47,7 @@ def test_what_is_not_a_surface_or_a_callback():
 
 
 @pytest.mark.parametrize(
-    ("name", "options"),
-    [("newton", NewtonOptions), ("nesterov", NesterovOptions), ("lbfgs", LbfgsOptions)],
+    ("name", "options"), [("newton", NewtonOptions), ("nesterov", NesterovOptions), ("lbfgs", LbfgsOptions)]
 )
 def test_a_method_is_a_function_and_its_options(name, options):
     method = find_method(name)

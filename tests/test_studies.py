@@ -184,9 +184,7 @@ def test_numbers_printed_for_initial_shapes_are_the_same_wherever_they_stand():
 
 
 def test_paper_file_with_a_wrong_relation_or_key_is_refused(tmp_path):
-    entry = (
-        '[[figure]]\nnumber="1"\nshows="x"\nstudy="s"\n[[claim]]\nsays="a"\nwhere="b"\nours="s.c"\n'
-    )
+    entry = '[[figure]]\nnumber="1"\nshows="x"\nstudy="s"\n[[claim]]\nsays="a"\nwhere="b"\nours="s.c"\n'
     bad = tmp_path / "bad.toml"
     for line, found in (
         ('paper=1\nrelation="~"', "relation must be"),
@@ -383,8 +381,7 @@ def test_a_wall_stands_until_it_first_comes_down_however_it_bounces():
     *_, other = heights
     heights[other] = [1.0, 0.9, 0.8, 0.7, 0.6]
     tables = [
-        pd.DataFrame({"run": run, "iteration": range(5), "height": column})
-        for run, column in heights.items()
+        pd.DataFrame({"run": run, "iteration": range(5), "height": column}) for run, column in heights.items()
     ]
     assert example1._standing_numbers(pd.concat(tables, ignore_index=True)) == {
         "stands_until": 1, "stands_until_without_momentum": 1, "least_height_3_parallel": 0.6,
@@ -395,8 +392,7 @@ def test_a_flow_starts_from_the_same_bits_whatever_the_last_digits_of_a_linear_s
     surface = four_fans(5)
     noise = 1e-12 * np.random.default_rng(1).standard_normal((surface.n, 3))
     cases = [
-        Case("a", lambda X=X: surface.moved(X), {})
-        for X in (surface.vertices, surface.vertices + noise)
+        Case("a", lambda X=X: surface.moved(X), {}) for X in (surface.vertices, surface.vertices + noise)
     ]
     one, other = (start_of(case).vertices for case in cases)
     assert not np.array_equal(surface.vertices, surface.vertices + noise)

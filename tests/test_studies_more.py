@@ -110,9 +110,7 @@ def test_cone_is_in_balance_at_its_crest(tensions):
     assert sum(found.azimuths) == pytest.approx(stability.opening())
     crest = np.array([math.cos(found.height), 0.0, math.sin(found.height)])
     total = np.zeros(3)
-    for sign, azimuth, arc, tension in zip(
-        (1, -1), found.azimuths, found.arcs, tensions, strict=False
-    ):
+    for sign, azimuth, arc, tension in zip((1, -1), found.azimuths, found.arcs, tensions, strict=False):
         outline = np.array([math.cos(azimuth), sign * math.sin(azimuth), 0.0])
         assert math.acos(crest @ outline) == pytest.approx(arc)
         along = outline - (outline @ crest) * crest
@@ -226,9 +224,7 @@ def test_closed_forms_are_met_with_second_order(tmp_path, monkeypatch):
 
 
 def test_solvers_side_by_side_on_one_small_mesh(tmp_path, monkeypatch):
-    example = solvers.Example(
-        "small", "Small", lambda n: two_squares(n, alpha_aux=1.0), (4,), 0.005
-    )
+    example = solvers.Example("small", "Small", lambda n: two_squares(n, alpha_aux=1.0), (4,), 0.005)
     monkeypatch.setattr(solvers, "EXAMPLES", (example,))
     perform(solvers.STUDY, tmp_path, short=True)
     folder = Folder(tmp_path / "solvers")

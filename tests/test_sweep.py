@@ -228,9 +228,7 @@ def test_any_program_can_read_the_store(tmp_path):
     result = run(CHAOS, tmp_path / "s.sqlite", workers=2)
     with closing(sqlite3.connect(tmp_path / "s.sqlite")) as database:
         ((declaration,),) = database.execute("SELECT declaration FROM sweep")
-        rows = database.execute(
-            "SELECT parameters, json_extract(record, '$.verdict') FROM cases"
-        ).fetchall()
+        rows = database.execute("SELECT parameters, json_extract(record, '$.verdict') FROM cases").fetchall()
     assert json.loads(declaration) == {
         "case": "sweep_cases:chaos",
         "grid": dict(CHAOS.grid),

@@ -248,10 +248,7 @@ def test_a_project_changed_while_it_is_swept_is_noticed(roof):
         (["none.obj", "west.tension=3,4"], "none.obj: cannot be read"),
         (["roof.toml", "west.tension=3,4", "--store", "."], "is a folder"),
         (["roof.toml", "west.tension=3,4", "--time-limit", "inf"], "time_limit (seconds;"),
-        (
-            ["roof.toml", "west.tension=3,4", "--store", "./t.csv", "--csv", "t.csv"],
-            "name two files",
-        ),
+        (["roof.toml", "west.tension=3,4", "--store", "./t.csv", "--csv", "t.csv"], "name two files"),
         (["roof.toml", "west.tension=3,4", "--store", "no/s"], "there is no folder"),
     ],
 )

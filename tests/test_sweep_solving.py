@@ -49,10 +49,7 @@ def test_solve_case_in_a_sweep():
     [
         ({"generator": "generators:two_square"}, "'generators:two_square' cannot be found"),
         ({"generator": "generators:two_squares", "method": "newtn"}, "did you mean 'newton'"),
-        (
-            {"generator": "generators:two_squares", "alpha_au": 3},
-            "'alpha_au'; did you mean 'alpha_aux'",
-        ),
+        ({"generator": "generators:two_squares", "alpha_au": 3}, "'alpha_au'; did you mean 'alpha_aux'"),
         ({"generator": "generators:two_squares", "gama": 3}, "'gama'; did you mean 'gamma'"),
         ({"generator": "generators:two_squares", "gamma": -1.0}, "gamma: expected"),
         ({}, "needs the parameter 'generator'"),
@@ -77,7 +74,5 @@ print(callable(numpy.f2py.run_main), "numpy.f2py.crackfortran" in sys.modules)
 
 
 def test_what_no_case_needs_is_imported_when_it_is_used():
-    found = subprocess.run(
-        [sys.executable, "-c", POSTPONED], capture_output=True, text=True, check=True
-    )
+    found = subprocess.run([sys.executable, "-c", POSTPONED], capture_output=True, text=True, check=True)
     assert found.stdout.split() == ["False", "True", "True"]

@@ -235,10 +235,7 @@ def test_folders_pipes_and_devices_are_no_stores(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     for path in (tmp_path, pipe, "/dev/zero"):
-        for use in (
-            lambda path=path: run(SWEEP, path, workers=1),
-            lambda path=path: read_store(path),
-        ):
+        for use in (lambda path=path: run(SWEEP, path, workers=1), lambda path=path: read_store(path)):
             with pytest.raises(FileError, match="is no regular file"):
                 use()
 
@@ -300,10 +297,7 @@ with open_store(sys.argv[1], SWEEP):
 
 def test_a_fork_of_a_killed_sweep_does_not_hold_its_store(tmp_path):
     """The workers of a process pool outlive their parent when it is killed."""
-    path, environment = (
-        tmp_path / "s.sqlite",
-        os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
-    )
+    path, environment = (tmp_path / "s.sqlite", os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)})
     killed = subprocess.Popen(
         [sys.executable, "-c", FORKS, str(path)], env=environment, start_new_session=True
     )

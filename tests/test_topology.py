@@ -62,9 +62,7 @@ def test_kinds_of_vertices(make):
 def test_the_three_patches_of_fig_4():
     surface = three_patches(3)
     t = surface.topology
-    assert (
-        surface.n - len(t.edges) + surface.m == 1
-    )  # three half-discs' roofs and fins: contractible
+    assert surface.n - len(t.edges) + surface.m == 1  # three half-discs' roofs and fins: contractible
     assert [c.sheets for c in t.junctions] == [(0, 1, 4), (1, 2, 5), (0, 2, 3), (3, 4, 5)]
     assert [len(c.vertices) for c in t.junctions] == [4, 4, 4, 4]
     top = np.flatnonzero((surface.vertices == [0, 0, 1.5]).all(axis=1))[0]
@@ -123,9 +121,7 @@ def test_two_parts_are_two_components():
     X = np.column_stack([flat, np.zeros(7)])
     both = np.concatenate([X, X + np.array([10, 0, 0])])
     patches = [Patch("a", 1.0), Patch("b", 1.0)]
-    surface = Surface(
-        both, np.concatenate([faces, faces + 7]), [0] * 6 + [1] * 6, patches, fixed=[0]
-    )
+    surface = Surface(both, np.concatenate([faces, faces + 7]), [0] * 6 + [1] * 6, patches, fixed=[0])
     label = surface.topology.components
     assert len(set(label[:7])) == len(set(label[7:])) == 1
     assert label[0] != label[7]
@@ -139,9 +135,7 @@ def test_neighbours_along_a_curve_are_those_before_and_after():
     assert inner.tolist() == np.flatnonzero(t.vertex_kind == CURVE).tolist()
     found = {int(v): set(pair) for v, pair in zip(inner, beside.tolist(), strict=True)}
     for curve in t.junctions:
-        for before, v, after in zip(
-            curve.vertices, curve.vertices[1:], curve.vertices[2:], strict=False
-        ):
+        for before, v, after in zip(curve.vertices, curve.vertices[1:], curve.vertices[2:], strict=False):
             assert found[int(v)] == {before, after}
 
 

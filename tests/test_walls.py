@@ -99,9 +99,7 @@ def test_held_bottoms_and_chosen_borders():
 
 def test_four_quarters_of_two_patches_get_a_wall_for_each_border():
     X, F = grid(8, bump)
-    surface = surface_from_labels(
-        X, F, [3, 5, 5, 3] @ np.eye(4)[quarters(X, F)].T, tension=2.0, walls=1.0
-    )
+    surface = surface_from_labels(X, F, [3, 5, 5, 3] @ np.eye(4)[quarters(X, F)].T, tension=2.0, walls=1.0)
     assert [p.name for p in surface.patches[2:]] == [f"wall-3.0-5.0-{k}" for k in (1, 2, 3, 4)]
     (line,) = line_of(surface)
     assert line.sheets == (2, 3, 4, 5)
@@ -123,9 +121,7 @@ def test_walls_on_a_tilted_plane():
     turn *= np.linalg.det(turn)
     plane = Plane((3, 1, 2), turn[:, 2])
     one = surface_from_labels(X, F, labels, tension=2.0, walls=1.0)
-    two = surface_from_labels(
-        X @ turn.T + [3, 1, 2], F, labels, tension=2.0, walls=1.0, plane=plane
-    )
+    two = surface_from_labels(X @ turn.T + [3, 1, 2], F, labels, tension=2.0, walls=1.0, plane=plane)
     np.testing.assert_allclose(two.vertices, one.vertices @ turn.T + [3, 1, 2], atol=1e-12)
     np.testing.assert_array_equal(two.on_plane, one.on_plane)
 
@@ -155,12 +151,7 @@ def test_labels_become_patches_in_the_order_they_come():
         tension={"a": 1.0, "b": 2.0, "c": 3.0, "d": 4.0},
         pressure=0.5,
     )
-    assert [(p.name, p.tension) for p in surface.patches] == [
-        ("d", 4),
-        ("c", 3),
-        ("b", 2),
-        ("a", 1),
-    ]
+    assert [(p.name, p.tension) for p in surface.patches] == [("d", 4), ("c", 3), ("b", 2), ("a", 1)]
     assert {p.pressure for p in surface.patches} == {0.5}
     assert surface.fixed.sum() == 16
     free = surface_from_labels(X, F, tension=1.0, boundary="sliding")

@@ -92,9 +92,7 @@ def flag(name: str, value: object) -> bool:
     return value
 
 
-def vector(
-    name: str, value: Any, *, error: type[PcmcError] = OptionError
-) -> tuple[float, float, float]:
+def vector(name: str, value: Any, *, error: type[PcmcError] = OptionError) -> tuple[float, float, float]:
     """Three finite numbers.
 
     >>> vector("normal", [0, 0, 1])
@@ -118,9 +116,7 @@ def choice(name: str, value: object, known: Sequence[str]) -> str:
     pcmc.base.errors.OptionError: unknown armijo 'suficient'; did you mean 'sufficient'? Known: ...
     """
     if value not in known:
-        raise OptionError(
-            unknown(name, value, known), what=name, found=value, expected=tuple(known)
-        )
+        raise OptionError(unknown(name, value, known), what=name, found=value, expected=tuple(known))
     return str(value)
 
 

@@ -45,9 +45,7 @@ def load_ratio(surface: Surface) -> float:
 def load(surface: Surface) -> float:
     """Σ p A_T ν_T · n: the force of the pressure along Π's normal n, which the supports carry."""
     vector = area_vectors(surface.vertices[surface.faces])
-    return float(
-        surface.pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
-    )
+    return float(surface.pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal)))
 
 
 def coarseness(surface: Surface) -> float:
@@ -214,8 +212,7 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
                 "junction": " | ".join(surface.patches[i].name for i in curve.sheets),
                 "length": total,
                 **_middle(surface, curve),
-                "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max())
-                / _mean(lengths),
+                "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max()) / _mean(lengths),
                 "sum_alpha_n_mean": float(imbalance[edges] @ lengths) / total if total else 0.0,
                 "sum_alpha_n_max": float(imbalance[edges].max()),
             }

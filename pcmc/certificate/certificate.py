@@ -23,14 +23,7 @@ from ..stability.modes import Stiffness, lowest, surface_stiffness
 from ..surface import Surface
 from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
-from .balance import (
-    boundary_table,
-    junction_table,
-    load,
-    load_ratio,
-    pressures_left_over,
-    reactions,
-)
+from .balance import boundary_table, junction_table, load, load_ratio, pressures_left_over, reactions
 from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
@@ -133,11 +126,7 @@ class Certificate:
 
 
 def certify(
-    surface: Surface,
-    *,
-    modes: int = 1,
-    tolerance: float = TOLERANCE,
-    evidence: Evidence | None = None,
+    surface: Surface, *, modes: int = 1, tolerance: float = TOLERANCE, evidence: Evidence | None = None
 ) -> Certificate:
     """Examine a surface.
 
@@ -192,9 +181,7 @@ def certify(
     )
     return Certificate(
         verdict=verdict,
-        detail="; ".join(
-            filter(None, (reason, _pulled_off(unheld), pressures_left_over(standing)))
-        ),
+        detail="; ".join(filter(None, (reason, _pulled_off(unheld), pressures_left_over(standing)))),
         residual=residual,
         scale=scale,
         energy=value,

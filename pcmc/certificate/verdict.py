@@ -164,11 +164,7 @@ RULES = (
     ),
     Rule(Verdict.DEGENERATE, lambda f: f.collapsed, _collapse),
     Rule(Verdict.NOT_CONVERGED, lambda f: f.moving or f.index is None, _forces_left),
-    Rule(
-        Verdict.NOT_CONVERGED,
-        lambda f: bool(f.own_residuals.max() > SMALL * f.tolerance),
-        _weak_patch,
-    ),
+    Rule(Verdict.NOT_CONVERGED, lambda f: bool(f.own_residuals.max() > SMALL * f.tolerance), _weak_patch),
     Rule(Verdict.SADDLE, lambda f: f.index != 0, _ways_down),
     Rule(
         Verdict.NEUTRAL,

@@ -36,16 +36,10 @@ Pressures = Annotated[
     ),
 ]
 ViewName = Annotated[
-    str,
-    typer.Option(
-        metavar="NAME", help="diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees."
-    ),
+    str, typer.Option(metavar="NAME", help="diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")
 ]
 Colour = Annotated[
-    str,
-    typer.Option(
-        "--colour", "--color", metavar="NAME", help="patches, curvature, error or reactions."
-    ),
+    str, typer.Option("--colour", "--color", metavar="NAME", help="patches, curvature, error or reactions.")
 ]
 
 
@@ -86,10 +80,7 @@ def check_input(file: Path) -> None:
 def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str] | None) -> Surface:
     """The surface with the tensions and pressures of the command line."""
     loaded = [patch.name for patch in surface.patches if not patch.auxiliary]
-    tensions, pressures = (
-        _by_name(loaded, tension, "--tension"),
-        _by_name(loaded, pressure, "--pressure"),
-    )
+    tensions, pressures = (_by_name(loaded, tension, "--tension"), _by_name(loaded, pressure, "--pressure"))
     return with_pressures(surface, tensions, pressures)
 
 

@@ -93,18 +93,13 @@ def plot(
 def explore(
     file: Annotated[Path | None, typer.Argument(metavar="[FILE]")] = None,
     example: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="A generator, such as two_caps, instead of a file."),
+        str | None, typer.Option(metavar="NAME", help="A generator, such as two_caps, instead of a file.")
     ] = None,
     parameter: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set", metavar="NAME=VALUE", help="Parameter of the example; may be repeated."
-        ),
+        typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the example; may be repeated."),
     ] = None,
-    host: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="Address to listen on.")
-    ] = "127.0.0.1",
+    host: Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[
         int, typer.Option(parser=integer, metavar="NUMBER", help="Port; 0 for any free one.")
     ] = 0,

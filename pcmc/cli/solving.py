@@ -13,16 +13,7 @@ from .. import project as projects
 from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
-from .arguments import (
-    TOML,
-    Input,
-    Pressures,
-    Settings,
-    check_input,
-    number,
-    retensioned,
-    surface_in,
-)
+from .arguments import TOML, Input, Pressures, Settings, check_input, number, retensioned, surface_in
 from .codes import NOT_CERTIFIED, OK, code, names, report
 from .progress import working
 
@@ -37,14 +28,10 @@ def solve_(
         typer.Option("-o", "--output", metavar="FILE", help="File to write; may be repeated."),
     ] = None,
     picture: Annotated[Path | None, typer.Option(metavar="PNG", help="Picture to draw.")] = None,
-    method: Annotated[
-        str | None, typer.Option(metavar="NAME", help="newton, nesterov or lbfgs.")
-    ] = None,
+    method: Annotated[str | None, typer.Option(metavar="NAME", help="newton, nesterov or lbfgs.")] = None,
     target: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME", help="minimum, or stationary to accept saddles too (newton only)."
-        ),
+        typer.Option(metavar="NAME", help="minimum, or stationary to accept saddles too (newton only)."),
     ] = None,
     tension: Settings = None,
     pressure: Pressures = None,
@@ -69,10 +56,7 @@ def solve_(
     project = replace(project, method=method or project.method, options=options)
     with working() as say:
         outcome = projects.run_project(
-            project,
-            say,
-            anyway=anyway,
-            changed=partial(retensioned, tension=tension, pressure=pressure),
+            project, say, anyway=anyway, changed=partial(retensioned, tension=tension, pressure=pressure)
         )
     print(f"{outcome.surface.m} triangles; {outcome.result.message}")
     if outcome.design is not None:
@@ -126,14 +110,11 @@ def remesh_(
         float, typer.Option(parser=number, metavar="LENGTH", help="Edge length of the triangles.")
     ],
     output: Annotated[
-        list[Path],
-        typer.Option("-o", "--output", metavar="FILE", help="File to write; may be repeated."),
+        list[Path], typer.Option("-o", "--output", metavar="FILE", help="File to write; may be repeated.")
     ],
     near_curves: Annotated[
         float | None,
-        typer.Option(
-            parser=number, metavar="LENGTH", help="Edge length at junctions and boundaries."
-        ),
+        typer.Option(parser=number, metavar="LENGTH", help="Edge length at junctions and boundaries."),
     ] = None,
     chord: Annotated[
         float | None,

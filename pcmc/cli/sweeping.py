@@ -26,14 +26,12 @@ def sweep(
     ],
     values: Annotated[list[str], typer.Argument(metavar="NAME=V1,V2,...")],
     method: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="newton, nesterov or lbfgs; default: the project's."),
+        str | None, typer.Option(metavar="NAME", help="newton, nesterov or lbfgs; default: the project's.")
     ] = None,
     store: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE",
-            help="File for finished cases. The same command again runs only the missing ones.",
+            metavar="FILE", help="File for finished cases. The same command again runs only the missing ones."
         ),
     ] = None,
     csv: Annotated[
@@ -41,16 +39,13 @@ def sweep(
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(
-            parser=integer, metavar="NUMBER", help="Local processes; default: one per processor."
-        ),
+        typer.Option(parser=integer, metavar="NUMBER", help="Local processes; default: one per processor."),
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler to use: tcp://HOST:8786.")
     ] = None,
     time_limit: Annotated[
-        float,
-        typer.Option(parser=number, metavar="SECONDS", help="Time limit per case, in seconds."),
+        float, typer.Option(parser=number, metavar="SECONDS", help="Time limit per case, in seconds.")
     ] = 600.0,
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Run the stored cases that failed again.")
@@ -74,17 +69,13 @@ def sweep(
     for path, suffixes in ((csv, (".csv", ".parquet")), (store, ())):
         _check_place(path, suffixes)
     if csv is not None and store is not None and csv.resolve() == store.resolve():
-        raise OptionError(
-            f"{csv} cannot be both the store and the table; name two files", what="--store"
-        )
+        raise OptionError(f"{csv} cannot be both the store and the table; name two files", what="--store")
     if csv is not None and csv.suffix == ".parquet" and find_spec("pyarrow") is None:
         raise MissingExtra("pyarrow", "files")
     given: dict[str, list[Any]] = {}
     for name, listed in map(values_of, values):
         if name in given:
-            raise OptionError(
-                f"{name} is given twice; list its values with commas: {name}=1,2", what=name
-            )
+            raise OptionError(f"{name} is given twice; list its values with commas: {name}=1,2", what=name)
         given[name] = listed
     grid = {name: listed for name, listed in given.items() if len(listed) > 1}
     fixed = {name: listed[0] for name, listed in given.items() if len(listed) == 1}
@@ -151,6 +142,4 @@ def _check_place(path: Path | None, suffixes: tuple[str, ...]) -> None:
     if not path.parent.is_dir():
         raise FileError(f"{path}: there is no folder {path.parent}; make it first", what=str(path))
     if not os.access(path.parent, os.W_OK):
-        raise FileError(
-            f"{path}: cannot be written (the folder {path.parent} is read-only)", what=str(path)
-        )
+        raise FileError(f"{path}: cannot be written (the folder {path.parent} is read-only)", what=str(path))

@@ -86,9 +86,7 @@ def find_walls(surface: Surface) -> Walls:
     )
 
 
-def place_wall_rows(
-    surface: Surface, walls: Walls, X: Floats, space: MotionSpace | None = None
-) -> Floats:
+def place_wall_rows(surface: Surface, walls: Walls, X: Floats, space: MotionSpace | None = None) -> Floats:
     """X (n,3) with the rows of walls moved to their places below the top edges.
 
     With a motion space given, they move within the wall only: they keep their distance across it.
@@ -314,6 +312,4 @@ def _pressure_push(surface: Surface) -> Floats:
     vector = area_vectors(surface.vertices[surface.faces])
     force = (surface.pressures * ~surface.walls)[surface.patch_of_face] / 3.0
     push = force * (vector @ np.array(surface.plane.normal))
-    return np.asarray(
-        np.bincount(surface.faces.ravel(), np.repeat(push, 3), surface.n), dtype=float
-    )
+    return np.asarray(np.bincount(surface.faces.ravel(), np.repeat(push, 3), surface.n), dtype=float)

@@ -14,9 +14,7 @@ from ..surface import Surface
 
 SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
 FLAT = 1e-9  # of the size: with its top edge at most this high, a wall's heights show no rows
-MAX_OFFSET = (
-    4.0  # heights of the top edge that a wall vertex may be off the line below its place there
-)
+MAX_OFFSET = 4.0  # heights of the top edge that a wall vertex may be off the line below its place there
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +83,7 @@ def join_rows(parts: list[WallRows]) -> WallRows:
     """The rows of several walls as one; a vertex that two walls share belongs to the first."""
     if not parts:
         none = np.empty(0, dtype=int)
-        return WallRows(
-            none, np.empty((0, 2), dtype=int), np.empty(0), np.empty(0), np.empty((0, 3))
-        )
+        return WallRows(none, np.empty((0, 2), dtype=int), np.empty(0), np.empty(0), np.empty((0, 3)))
     columns = {
         column.name: np.concatenate([getattr(part, column.name) for part in parts])
         for column in fields(WallRows)

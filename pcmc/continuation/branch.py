@@ -156,9 +156,7 @@ def _goals(stop: float | None, until: Mapping[str, float] | None) -> dict[str, f
         validate.refuse("until", until, "a value by column, such as {'height': 1.0}")
     goals = dict(until or {})
     if stop is not None and "parameter" in goals:
-        raise OptionError(
-            "stop and until['parameter'] are the same goal; give one of them", what="until"
-        )
+        raise OptionError("stop and until['parameter'] are the same goal; give one of them", what="until")
     for name, value in goals.items():
         validate.choice("column in until", name, QUANTITIES)
         validate.number(f"until[{name!r}]", value)

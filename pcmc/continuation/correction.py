@@ -86,9 +86,7 @@ def fixed_arclength(near: State, row: Floats, rate: float) -> Constraint:
 def fixed_volume(mesh: BranchMesh, volume: float) -> Constraint:
     """The volume is given."""
     unit = mesh.full.size**3
-    return Constraint(
-        lambda at: (at.volume - volume) / unit, lambda at: at.volume_gradient / unit, 0.0
-    )
+    return Constraint(lambda at: (at.volume - volume) / unit, lambda at: at.volume_gradient / unit, 0.0)
 
 
 def fixed_height(mesh: BranchMesh, vertex: int, height: float) -> Constraint:
@@ -96,9 +94,7 @@ def fixed_height(mesh: BranchMesh, vertex: int, height: float) -> Constraint:
     plane, unit = mesh.surface.plane, mesh.full.size
     row = np.zeros((mesh.full.n, 3))
     row[vertex] = np.array(plane.normal) / unit
-    return Constraint(
-        lambda at: float(plane.height(at.X[vertex]) - height) / unit, lambda _: row, 0.0
-    )
+    return Constraint(lambda at: float(plane.height(at.X[vertex]) - height) / unit, lambda _: row, 0.0)
 
 
 class BorderedMatrix:
@@ -149,8 +145,7 @@ class BorderedMatrix:
         d = at.moved(at.motion(z[:-1])) - at.aligned
         along = float((self.row * d).sum())
         return np.append(
-            at.jacobian.times(d) + at.parameter_derivative * z[-1],
-            self.unit * (along + self.rate * z[-1]),
+            at.jacobian.times(d) + at.parameter_derivative * z[-1], self.unit * (along + self.rate * z[-1])
         )
 
 

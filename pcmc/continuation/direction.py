@@ -59,8 +59,7 @@ class Direction:
                     validate.refuse(f"Direction.{key}", weight, "a weight other than 0", name)
         if not self.tensions and not self.pressures:
             raise OptionError(
-                "Direction: name at least one patch whose tension or pressure varies",
-                what="Direction",
+                "Direction: name at least one patch whose tension or pressure varies", what="Direction"
             )
 
     @classmethod
@@ -81,21 +80,16 @@ class Direction:
         w = _rates(surface, self.tensions)
         u = _rates(surface, self.pressures)
         value = 0.0 if self.relative else _common_value(surface, w, u)
-        u = u + wall_pressure_changes(
-            surface, u, {surface.patch_index(name) for name in self.pressures}
-        )
+        u = u + wall_pressure_changes(surface, u, {surface.patch_index(name) for name in self.pressures})
         if not (surface.tensions[w != 0.0] > 0.0).all():
             name = surface.patches[int(np.argmax((w != 0.0) & (surface.tensions <= 0.0)))].name
             raise OptionError(
-                f"the tension of {name!r} is 0, where its triangles stop pulling; start from a"
-                " tension > 0",
+                f"the tension of {name!r} is 0, where its triangles stop pulling; start from a tension > 0",
                 what="parameter",
                 where=name,
                 found=0.0,
             )
-        return ParameterLine(
-            value, surface.tensions - w * value, surface.pressures - u * value, w, u
-        )
+        return ParameterLine(value, surface.tensions - w * value, surface.pressures - u * value, w, u)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,9 +140,7 @@ class ParameterLine:
             if self.tension_rates[i]:
                 columns[f"tension {patch.name}"] = self.tensions[i] + self.tension_rates[i] * value
             if self.pressure_rates[i]:
-                columns[f"pressure {patch.name}"] = (
-                    self.pressures[i] + self.pressure_rates[i] * value
-                )
+                columns[f"pressure {patch.name}"] = self.pressures[i] + self.pressure_rates[i] * value
         return columns
 
     def energy_derivative(self, surface: Surface, X: Floats) -> float:
@@ -166,9 +158,7 @@ def weighted_gradient(surface: Surface, X: Floats, areas: Floats, volumes: Float
     return apply_supports(surface, _measured(surface, X, areas, volumes)[2])
 
 
-def _measured(
-    surface: Surface, X: Floats, areas: Floats, volumes: Floats
-) -> tuple[Floats, Floats, Floats]:
+def _measured(surface: Surface, X: Floats, areas: Floats, volumes: Floats) -> tuple[Floats, Floats, Floats]:
     """A_i and V_i (k,) at X, and Σ areas_i ∇A_i - Σ volumes_i ∇V_i (n,3)."""
     return kernels.measure(kernels.energy_mesh(surface, areas, volumes), X)
 

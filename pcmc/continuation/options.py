@@ -17,9 +17,7 @@ class Ending(Enum):
     FOLDS = "the branch passed the requested number of folds"
     STEPS = "stopped at the limit of steps; raise steps to go on"
     LOST = "the branch could not be followed further: the steps became too short"
-    DEGENERATE = (
-        "the branch could not be followed further: triangles collapse; try remesh=, or a finer mesh"
-    )
+    DEGENERATE = "the branch could not be followed further: triangles collapse; try remesh=, or a finer mesh"
     STOPPED = "stopped on request"
 
 

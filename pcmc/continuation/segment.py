@@ -25,8 +25,7 @@ GOAL_ACCURACY = 1e-12  # arclength to which goals are met
 def crosses_goal(before: State, after: State, goals: Mapping[str, float]) -> bool:
     """Whether a goal lies between the quantities of two states."""
     return any(
-        (getattr(before, name) - goal) * (getattr(after, name) - goal) < 0.0
-        for name, goal in goals.items()
+        (getattr(before, name) - goal) * (getattr(after, name) - goal) < 0.0 for name, goal in goals.items()
     )
 
 
@@ -116,9 +115,7 @@ class Segment:
         off = [self.value(name, t) - goal for t in ends]
         for k in range(len(ends) - 1):
             if off[k] * off[k + 1] < 0.0:
-                return root(
-                    lambda t: self.value(name, t) - goal, ends[k], ends[k + 1], GOAL_ACCURACY
-                )
+                return root(lambda t: self.value(name, t) - goal, ends[k], ends[k + 1], GOAL_ACCURACY)
             if off[k + 1] == 0.0:
                 return ends[k + 1]
         return None

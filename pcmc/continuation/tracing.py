@@ -98,9 +98,7 @@ class Tracer:
             if not start.residual <= START_RESIDUAL:
                 raise NotOnBranch(f"relative residual {start.residual:.1e}")
             if start.overpulled:
-                raise NotOnBranch(
-                    "a junction is pulled off the plane harder than its wall can hold"
-                )
+                raise NotOnBranch("a junction is pulled off the plane harder than its wall can hold")
             constraint = fixed_parameter(start.parameter, self.line.scale)
             corrected = correct(start, constraint, self.options.tolerance)
             return branch_point(corrected, math.copysign(1.0, self.options.step))
@@ -173,9 +171,7 @@ class Tracer:
         goal = segment.first_goal(self.goals)
         if goal is not None:
             if not segment.same_mesh:
-                raise NotOnBranch(
-                    "the contact of a wall with the plane changes just before the goal"
-                )
+                raise NotOnBranch("the contact of a wall with the plane changes just before the goal")
             segment = segment.up_to(goal)
         return Step(segment, bend, goal is not None, self.events_on(segment))
 
@@ -294,9 +290,7 @@ class Tracer:
             index += sign * count
         return [event for _, event in sorted(located, key=lambda pair: pair[0])]
 
-    def events_between(
-        self, before: BranchPoint, after: BranchPoint, length: float
-    ) -> list[dict[str, Any]]:
+    def events_between(self, before: BranchPoint, after: BranchPoint, length: float) -> list[dict[str, Any]]:
         """Events between two points that are too near, or too different, to search between them."""
         kinds = {
             "fold": before.tangent.slope * after.tangent.slope < 0.0,

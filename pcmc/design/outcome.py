@@ -72,9 +72,7 @@ class Design:
         missed = self.targets[~self.targets["met"]]
         for label, row in missed.iterrows():
             known = not math.isnan(row["limit"])
-            reached = (
-                f"nearest reachable {row['limit']:.6g}" if known else f"so far {row['value']:.6g}"
-            )
+            reached = f"nearest reachable {row['limit']:.6g}" if known else f"so far {row['value']:.6g}"
             text += f"; {label}: wanted {row['wanted']:.6g}, {reached}"
         if len(missed):
             values = (f"{name} {value:.6g}" for name, value in self.parameters["value"].items())

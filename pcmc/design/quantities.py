@@ -73,9 +73,7 @@ def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
     over = np.flatnonzero((weight >= -1e-9).all(axis=1) & ~upright)
     if not len(over):
         raise OptionError(
-            f"height at ({point[0]:g}, {point[1]:g}): no patch is over that point",
-            what="of",
-            found=point,
+            f"height at ({point[0]:g}, {point[1]:g}): no patch is over that point", what="of", found=point
         )
     heights = np.einsum("fc,fc->f", weight[over], corner[over, :, 2])
     face = over[heights.argmax()]
@@ -109,14 +107,10 @@ def _curvature(surface: Surface, of: str) -> Measurement:
     index = surface.patch_index(of)
     alpha, p = surface.tensions[index], surface.pressures[index]
     if alpha == 0.0:
-        raise OptionError(
-            f"curvature of {of}: a wall without tension has none", what="of", found=of
-        )
+        raise OptionError(f"curvature of {of}: a wall without tension has none", what="of", found=of)
     by_tension, by_pressure = np.zeros((2, len(surface.patches)))
     by_tension[index], by_pressure[index] = -p / (2.0 * alpha**2), 1.0 / (2.0 * alpha)
-    return Measurement(
-        float(p / (2.0 * alpha)), np.zeros_like(surface.vertices), by_tension, by_pressure
-    )
+    return Measurement(float(p / (2.0 * alpha)), np.zeros_like(surface.vertices), by_tension, by_pressure)
 
 
 def _reaction(surface: Surface, of: str | None) -> Measurement:
@@ -132,9 +126,7 @@ def _reaction(surface: Surface, of: str | None) -> Measurement:
     if of is not None:
         considered = np.intersect1d(edges, topo.edge_of_face[_faces_of(surface, of)])
     if not len(considered):
-        raise OptionError(
-            f"reaction of {of}: nothing holds the boundary of that patch", what="of", found=of
-        )
+        raise OptionError(f"reaction of {of}: nothing holds the boundary of that patch", what="of", found=of)
     ends, share = topo.edges[edges], held_lengths(surface)
     force = reactions(surface)
     vertices = np.unique(topo.edges[considered])

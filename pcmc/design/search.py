@@ -31,9 +31,7 @@ from .outcome import Design, DesignStatus
 from .sensitivity import sensitivities
 from .targets import Parameter, Target, measure
 
-LEAST_CHANGE = (
-    1e-3  # part of an unknown that a step must change to be worth a solve near failing ones
-)
+LEAST_CHANGE = 1e-3  # part of an unknown that a step must change to be worth a solve near failing ones
 FOLD_GAP = 1e-3  # relative distance of the misfit from its value at a fold where the search ends
 FOLD_SHARE = 0.97  # of the parameters' way to a fold is tried next
 TRIES = 6  # points tried along a step, each nearer, before it is given up
@@ -41,14 +39,10 @@ LEAST_GAIN = 1e-6  # part of φ below which a further step is not worth a solve
 DAMPING = 1e-6  # of the largest singular value: ``_metric`` chooses among steps of equal misfit
 PROPORTIONAL = 0.9  # how much less it costs to change all tensions in proportion than a single one
 STIFFEN = 1.5  # factor on tensions while the surface given has no equilibrium
-STARTS = (
-    7  # solves with stiffer tensions: 1.5⁶ is 11; if that does not help, tension is not the reason
-)
+STARTS = 7  # solves with stiffer tensions: 1.5⁶ is 11; if that does not help, tension is not the reason
 INFLATION = 4.0  # of a solve, which starts near its solution: a surface that grows more runs away
 ITERATIONS = 60  # of a solve, for the same reason
-SMALL_CHANGE = (
-    0.02  # of an unknown: below it the mesh is not improved, as quantities depend on it a little
-)
+SMALL_CHANGE = 0.02  # of an unknown: below it the mesh is not improved, as quantities depend on it a little
 OVERLOADED = "overloaded"  # in place of a solve's status where none was tried
 
 
@@ -121,9 +115,7 @@ class Search:
             if here.phi - misfit <= LEAST_GAIN * here.phi:
                 end = here.x + step
                 bounded = ((end <= self.bounds[0]) | (end >= self.bounds[1])).any()
-                return self.design(
-                    DesignStatus.AT_BOUND if bounded else DesignStatus.CONFLICT, here
-                )
+                return self.design(DesignStatus.AT_BOUND if bounded else DesignStatus.CONFLICT, here)
             plan = StepPlan.of(before, here, step)
             if plan.at_fold:
                 change = plan.to_limit * (here.jacobian @ plan.step) * self.scale

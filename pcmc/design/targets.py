@@ -53,9 +53,7 @@ class Target:
             object.__setattr__(self, "of", _point(self.of))
         elif not (isinstance(self.of, str) or (self.of is None and self.quantity != "curvature")):
             raise OptionError(
-                f"{self.quantity}: expected the name of a patch, found {self.of!r}",
-                what="of",
-                found=self.of,
+                f"{self.quantity}: expected the name of a patch, found {self.of!r}", what="of", found=self.of
             )
         for key in ("value", "at_most", "at_least"):
             if getattr(self, key) is not None:
@@ -143,9 +141,7 @@ class Parameter:
         """(low, high), with the defaults that follow from its present value."""
         present = self.value(surface)
         if present == 0.0 and None in (self.low, self.high):
-            raise OptionError(
-                f"{self.label} is 0 now; give low and high", what=self.label, found=0.0
-            )
+            raise OptionError(f"{self.label} is 0 now; give low and high", what=self.label, found=0.0)
         ends = sorted((present / FACTOR, present * FACTOR))
         low = ends[0] if self.low is None else self.low
         high = ends[1] if self.high is None else self.high

@@ -41,10 +41,7 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     """
     if method not in METHODS:
         raise OptionError(
-            unknown("mean curvature method", method, METHODS),
-            what="method",
-            found=method,
-            expected=METHODS,
+            unknown("mean curvature method", method, METHODS), what="method", found=method, expected=METHODS
         )
     area_gradient, area_vector, star_area = _star(surface)
     along = np.einsum("ij,ij->i", area_gradient, area_vector)

@@ -113,9 +113,7 @@ def hessian(surface: Surface) -> csr_array:
     rows = np.broadcast_to(unknowns[:, :, None, :, None], blocks.shape)
     columns = np.broadcast_to(unknowns[:, None, :, None, :], blocks.shape)
     size = 3 * surface.n
-    return csr_array(
-        coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size))
-    )
+    return csr_array(coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
 
 
 def patch_areas(surface: Surface) -> Floats:

@@ -113,9 +113,7 @@ def _at_sheets(
 
 
 @compiled
-def _across_normals(
-    area_vector: Floats, chosen: Bools, basis: Floats, gradient: Floats, out: Floats
-) -> None:
+def _across_normals(area_vector: Floats, chosen: Bools, basis: Floats, gradient: Floats, out: Floats) -> None:
     for v in range(len(area_vector)):
         if not chosen[v]:
             continue
@@ -125,9 +123,7 @@ def _across_normals(
 
 
 @compiled
-def _add_times(
-    mesh: Mesh, X: Floats, D: Floats, sheet_factor: Floats, change: Floats, turn: Floats
-) -> None:
+def _add_times(mesh: Mesh, X: Floats, D: Floats, sheet_factor: Floats, change: Floats, turn: Floats) -> None:
     """Add (∂²E) D to change (n,3), and ⟨sheet_factor, Da⟩ to turn (n,), a the vertices' area vectors.
 
     The force of a tension is ½ α ν × e, with ν = n / |n| and n = u × w of two edges; so it changes by

@@ -21,17 +21,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.compiled import blocks, compiled, run_blocks, threads
 from ..surface import Surface
-from ..surface.geometry import (
-    Vector,
-    accumulate,
-    cross,
-    dot,
-    norm,
-    point,
-    scaled,
-    sub,
-    vector,
-)
+from ..surface.geometry import Vector, accumulate, cross, dot, norm, point, scaled, sub, vector
 
 
 class Mesh(NamedTuple):
@@ -51,9 +41,7 @@ class Mesh(NamedTuple):
     pressure: Floats
 
 
-def energy_mesh(
-    surface: Surface, tension: Floats | None = None, pressure: Floats | None = None
-) -> Mesh:
+def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Floats | None = None) -> Mesh:
     """All triangles of a surface, with its own tensions and pressures (k,) or with others."""
     return Mesh(
         surface.faces,
@@ -98,9 +86,7 @@ def measure_block(
 
 
 @compiled
-def _measure_areas(
-    mesh: Mesh, X: Floats, first: int, last: int, area: Floats, volume: Floats
-) -> None:
+def _measure_areas(mesh: Mesh, X: Floats, first: int, last: int, area: Floats, volume: Floats) -> None:
     """The areas and volumes alone, for line searches that need no gradient."""
     F, patch, origin = mesh.faces, mesh.patch, vector(mesh.origin)
     for f in range(first, last):

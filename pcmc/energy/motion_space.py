@@ -21,17 +21,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..surface import Surface
-from ..surface.geometry import (
-    accumulate,
-    divided,
-    dot,
-    norm,
-    point,
-    scaled,
-    sub,
-    vector,
-    vertex_area_vectors,
-)
+from ..surface.geometry import accumulate, divided, dot, norm, point, scaled, sub, vector, vertex_area_vectors
 from ..surface.topology import (
     CURVE,
     POINT,
@@ -115,9 +105,7 @@ class MotionSpace(NamedTuple):
         return self.to_vectors(self.to_coordinates(vectors))
 
 
-def vertex_classes(
-    surface: Surface, crest: Ints | None = None, level: Bools | None = None
-) -> VertexClasses:
+def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | None = None) -> VertexClasses:
     """The active faces of a surface and the classes of its vertices.
 
     ``crest`` (k,2) leads from each junction vertex that rests on Π to its neighbours on the junction:
@@ -232,9 +220,7 @@ def _against_the_others(topo: Topology) -> Bools:
     return np.asarray(label[:m] > label[m:])
 
 
-def _within_plane(
-    normal: Floats, tangent: Floats, sliding: Ints, basis: Floats, dimension: Ints
-) -> None:
+def _within_plane(normal: Floats, tangent: Floats, sliding: Ints, basis: Floats, dimension: Ints) -> None:
     """Cut the basis at sliding vertices down to directions along Π, in place."""
     first, second = perpendicular(normal[None])
     for size in (1, 2, 3):

@@ -17,11 +17,7 @@ __all__ = ["open_and_wait", "serve", "show", "start"]
 
 
 def serve(
-    surface: Surface,
-    host: str = "127.0.0.1",
-    port: int = 0,
-    open_browser: bool = True,
-    title: str = "",
+    surface: Surface, host: str = "127.0.0.1", port: int = 0, open_browser: bool = True, title: str = ""
 ) -> None:
     """Explore a surface in the browser; returns when Ctrl-C is pressed.
 

@@ -33,12 +33,7 @@ MOST_SESSIONS = 32  # more pages than this end the least recently used session
 SOLVES_AT_ONCE = 2
 LONGEST_REQUEST = 1_000_000  # bytes
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
-TYPES = {
-    ".html": "text/html",
-    ".css": "text/css",
-    ".js": "text/javascript",
-    ".svg": "image/svg+xml",
-}
+TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 ACTS = ("follow", "settle", "stabilise", "undo", "redo", "reset", "state")
 
 
@@ -92,10 +87,7 @@ class Explorer:
         """The session of that name."""
         with self._lock:
             if name not in self.sessions:
-                raise RequestError(
-                    HTTPStatus.GONE,
-                    "this session has expired; reload the page",
-                )
+                raise RequestError(HTTPStatus.GONE, "this session has expired; reload the page")
             self.sessions.move_to_end(name)
             return self.sessions[name]
 
@@ -215,9 +207,7 @@ class _Handler(BaseHTTPRequestHandler):
         if explorer.local and name not in LOOPBACK:
             raise RequestError(HTTPStatus.FORBIDDEN, f"open this page at {explorer.url}")
         if origin is not None and urlsplit(origin).netloc != host:
-            raise RequestError(
-                HTTPStatus.FORBIDDEN, "requests from pages of other sites are refused"
-            )
+            raise RequestError(HTTPStatus.FORBIDDEN, "requests from pages of other sites are refused")
 
     def _get(self) -> None:
         parts = urlsplit(self.path)
@@ -254,8 +244,7 @@ class _Handler(BaseHTTPRequestHandler):
         if not length.isdigit() or int(length) > LONGEST_REQUEST:
             self.close_connection = True
             raise RequestError(
-                HTTPStatus.BAD_REQUEST,
-                f"a request needs a length of at most {LONGEST_REQUEST} bytes",
+                HTTPStatus.BAD_REQUEST, f"a request needs a length of at most {LONGEST_REQUEST} bytes"
             )
         try:
             asked = json.loads(self.rfile.read(int(length)) or b"{}")
@@ -268,10 +257,7 @@ class _Handler(BaseHTTPRequestHandler):
     # -- answers -----------------------------------------------------------------------------------
 
     def _send_state(
-        self,
-        state: State,
-        first: dict[str, Any] | None = None,
-        arrays: dict[str, Any] | None = None,
+        self, state: State, first: dict[str, Any] | None = None, arrays: dict[str, Any] | None = None
     ) -> None:
         header: dict[str, Any] = {"superseded": state.superseded, **(first or {})}
         drawn: dict[str, Any] = dict(arrays or {})
@@ -324,10 +310,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Content-Length", str(len(body)))
         self.send_header("Cache-Control", "no-store")
         self.send_header("X-Content-Type-Options", "nosniff")
-        self.send_header(
-            "Content-Security-Policy",
-            "default-src 'self'; img-src 'self' blob: data:",
-        )
+        self.send_header("Content-Security-Policy", "default-src 'self'; img-src 'self' blob: data:")
         if disposition:
             self.send_header("Content-Disposition", disposition)
         self.end_headers()

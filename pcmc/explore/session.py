@@ -153,9 +153,7 @@ class Session:
     def undo(self) -> State:
         """One step back; if the values asked for were not reached, back to those of the surface shown."""
         return self._run(
-            lambda stop: self._go(
-                self._place if self._has_unsaved_changes else max(self._place - 1, 0)
-            )
+            lambda stop: self._go(self._place if self._has_unsaved_changes else max(self._place - 1, 0))
         )
 
     def redo(self) -> State:
@@ -223,9 +221,7 @@ class Session:
     def _state(self, superseded: bool = False) -> State:
         after = len(self._steps) - 1 - self._place
         before = self._place + self._has_unsaved_changes
-        return State(
-            self.surface, self._certificate, self._asked, self._failure, before, after, superseded
-        )
+        return State(self.surface, self._certificate, self._asked, self._failure, before, after, superseded)
 
 
 def until(stop: Callable[[], bool], end: float) -> Callable[[], bool]:

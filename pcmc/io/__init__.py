@@ -210,18 +210,14 @@ def write(
     values = _values(certificate)
     try:
         with atomic_write(path) as temporary:
-            note = _module(form).write(
-                temporary, shown, scalars=scalars, certificate=values, walls=walls
-            )
+            note = _module(form).write(temporary, shown, scalars=scalars, certificate=values, walls=walls)
     except OSError as error:
         reason = error.strerror or error
         raise FileError(f"{path}: cannot be written ({reason})", what=str(path)) from None
     except PcmcError as error:
         raise _in_file(path, error, FileError) from None
     if lost:
-        text = (
-            f"{path}: a {path.suffix} file cannot carry {', '.join([*lost, *form.loses])}; left out"
-        )
+        text = f"{path}: a {path.suffix} file cannot carry {', '.join([*lost, *form.loses])}; left out"
         warnings.warn(text, LostWarning, stacklevel=2)
     if note:
         warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)

@@ -63,14 +63,10 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
         file.write("\nVERTICES\n")
         file.write(format_rows("%d %r %r %r%s\n", _count(X), *X.T, tag[support]))
         file.write("\nEDGES\n")
-        file.write(
-            format_rows("%d %d %d%s\n", _count(edges), *edges.T, tag[_edge_support(surface)])
-        )
+        file.write(format_rows("%d %d %d%s\n", _count(edges), *edges.T, tag[_edge_support(surface)]))
         file.write("\nFACES\n")
         sides = _signed_edges(surface)
-        file.write(
-            format_rows("%d %d %d %d%s\n", _count(sides), *sides.T, face_tag[surface.patch_of_face])
-        )
+        file.write(format_rows("%d %d %d %d%s\n", _count(sides), *sides.T, face_tag[surface.patch_of_face]))
         file.write("\nBODIES\n" + _bodies(surface) + "\nREAD\n")
 
 
@@ -127,9 +123,7 @@ def read(path: Path, **_: Any) -> MeshData:
     given = re.search(r"^// origin (\S+) (\S+) (\S+)$", file.header, re.M)
     origin = np.array([float(c) for c in given.groups()]) if given else np.zeros(3)
     plane = _plane(file, constraint, origin, known)
-    return MeshData(
-        X + origin, F, patch_of_face[source], patches, support, plane, notes=(*notes, *more)
-    )
+    return MeshData(X + origin, F, patch_of_face[source], patches, support, plane, notes=(*notes, *more))
 
 
 @dataclass(frozen=True)
@@ -182,9 +176,7 @@ def _open(path: Path) -> _File:
     bare = re.sub(r"/\*.*?\*/", lambda m: "\f" * m[0].count("\n") + " ", text, flags=re.S)
     bare = re.sub(r"//[^\n]*", "", bare)
     bare = re.sub(r"\\[^\S\n]*\n", "\f", bare)
-    heads = list(
-        re.finditer(r"^[^\S\n]*(vertices|edges|faces|facets|bodies|read)\b", bare, re.I | re.M)
-    )
+    heads = list(re.finditer(r"^[^\S\n]*(vertices|edges|faces|facets|bodies|read)\b", bare, re.I | re.M))
     starts = [0, *(h.end() for h in heads)]
     ends = [*(h.start() for h in heads), len(bare)]
     names = ["top", *("faces" if h[1].lower() == "facets" else h[1].lower() for h in heads)]
@@ -295,9 +287,7 @@ def _places(ids: Ints, wanted: Ints, section: _Section, what: str, row: Ints | N
     return place
 
 
-def _pressures(
-    file: _File, face_ids: Ints, known: Mapping[str, float]
-) -> tuple[Floats, tuple[str, ...]]:
+def _pressures(file: _File, face_ids: Ints, known: Mapping[str, float]) -> tuple[Floats, tuple[str, ...]]:
     """(m,) pressure along each face's normal: the sum over the bodies on its two sides."""
     pressure = np.zeros(len(face_ids))
     if "bodies" not in file.sections:
@@ -341,9 +331,7 @@ def _patches(
     return of_face.ravel(), tuple(patches)
 
 
-def _plane(
-    file: _File, constraint: Ints, origin: Floats, known: Mapping[str, float]
-) -> Plane | None:
+def _plane(file: _File, constraint: Ints, origin: Floats, known: Mapping[str, float]) -> Plane | None:
     """Π: the one constraint that sliding vertices lie on, as seen from the file's origin."""
     top = file.section("top")
     used = np.unique(constraint[constraint > 0])

@@ -112,8 +112,6 @@ class _Walls:
                 raise ValueError
         except (ValueError, KeyError, TypeError):
             raise FileError(
-                f"the description of walls in it is damaged: {text!r:.60}",
-                where=KEY,
-                found=text[:60],
+                f"the description of walls in it is damaged: {text!r:.60}", where=KEY, found=text[:60]
             ) from None
         return walls

@@ -31,9 +31,7 @@ from .trimesh_scene import from_meshes
 SUPPORT = "_SUPPORT"
 
 
-def write(
-    path: Path, surface: Surface, scalars: Mapping[str, Floats], walls: str | None, **_: Any
-) -> None:
+def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], walls: str | None, **_: Any) -> None:
     """One file, with its buffers inside."""
     trimesh = load_library("trimesh")
     data = {SUPPORT: support_of(surface).astype(np.float32)}
@@ -78,15 +76,12 @@ def read(path: Path) -> MeshData:
     trimesh = load_library("trimesh")
     with translated_errors("glTF"):
         if path.suffix.lower() == ".gltf":
-            json.loads(
-                path.read_bytes()
-            )  # in a file that is cut off, trimesh would look for another file
+            json.loads(path.read_bytes())  # in a file that is cut off, trimesh would look for another file
         try:
             scene = trimesh.load_scene(path, process=False)
         except FileNotFoundError as error:
             raise FileError(
-                f"its part {error} is missing; keep the files of a .gltf in one folder",
-                where=str(error),
+                f"its part {error} is missing; keep the files of a .gltf in one folder", where=str(error)
             ) from None
     mesh = from_meshes(scene, path.stem, parse_metadata(scene.metadata.get("pcmc")))
     X = mesh.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]

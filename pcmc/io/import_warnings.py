@@ -83,10 +83,7 @@ def _wrong_up(data: MeshData) -> str:
     vector = area_vectors(data.vertices[data.faces])
     total = np.abs(vector.sum(axis=0))
     size = float(np.linalg.norm(total))
-    if (
-        size < FACES_ONE_WAY * float(np.linalg.norm(vector, axis=1).sum())
-        or total[2] > FACES_UP * size
-    ):
+    if size < FACES_ONE_WAY * float(np.linalg.norm(vector, axis=1).sum()) or total[2] > FACES_UP * size:
         return ""
     axis = "xy"[int(total[:2].argmax())]
     return f"the surface faces {axis}, but z is up here; rotate it if {axis} was up"

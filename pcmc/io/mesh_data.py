@@ -90,11 +90,7 @@ def merged(data: MeshData) -> MeshData:
     n = len(data.vertices)
     scalars = {k: v[keep] if len(v) == n else v for k, v in data.scalars.items()}
     return replace(
-        data,
-        vertices=data.vertices[keep],
-        faces=place[data.faces],
-        support=support,
-        scalars=scalars,
+        data, vertices=data.vertices[keep], faces=place[data.faces], support=support, scalars=scalars
     )
 
 

@@ -29,16 +29,10 @@ FORMAT = "pcmc surface"
 
 
 def write(
-    path: Path,
-    surface: Surface,
-    scalars: Mapping[str, Floats],
-    certificate: Mapping[str, Any],
-    **_: Any,
+    path: Path, surface: Surface, scalars: Mapping[str, Floats], certificate: Mapping[str, Any], **_: Any
 ) -> None:
     """The archive; the same surface gives the same bytes."""
-    tables = {
-        k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object
-    }
+    tables = {k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object}
     meta = {
         "format": FORMAT,
         "version": VERSION,
@@ -61,11 +55,7 @@ def write(
 
 def read(path: Path) -> MeshData:
     """All of it."""
-    with (
-        translated_errors("pcmc"),
-        path.open("rb") as file,
-        np.load(file, allow_pickle=False) as archive,
-    ):
+    with translated_errors("pcmc"), path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
         arrays = {name: archive[name] for name in archive.files}
         meta = json.loads(str(arrays.pop("meta")))
         if meta["format"] != FORMAT:

@@ -37,9 +37,7 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
                 file.write(f"g {name}\n" + format_rows("p %d\n", held))
         for k, patch in enumerate(surface.patches):
             file.write(f"g {patch.name}\n")
-            file.write(
-                format_rows("f %d %d %d\n", *(surface.faces[surface.patch_of_face == k].T + 1))
-            )
+            file.write(format_rows("f %d %d %d\n", *(surface.faces[surface.patch_of_face == k].T + 1)))
 
 
 def read(path: Path) -> MeshData:
@@ -124,9 +122,7 @@ def _faces(text: str, part: str, offset: int, n: int) -> tuple[Ints, Ints]:
     bad = np.flatnonzero((corner < 1) | (corner > n))
     short = np.flatnonzero(counts < 3)
     if len(bad) or len(short):
-        face = int(
-            np.searchsorted(np.cumsum(counts), bad[0], side="right") if len(bad) else short[0]
-        )
+        face = int(np.searchsorted(np.cumsum(counts), bad[0], side="right") if len(bad) else short[0])
         line = list(FACE.finditer(part))[face]
         wrong = f"names a vertex outside 1..{n}" if len(bad) else "has fewer than three corners"
         raise _error(text, offset + line.start(), f"the face {wrong}", line[0])

@@ -93,9 +93,7 @@ class _Element:
 
     def row(self, count: int) -> list[tuple[str, str, tuple[int, ...]]]:
         """dtype of a row whose list has ``count`` items."""
-        row: list[tuple[str, str, tuple[int, ...]]] = [
-            (name, kind, ()) for name, kind in self.before
-        ]
+        row: list[tuple[str, str, tuple[int, ...]]] = [(name, kind, ()) for name, kind in self.before]
         if self.items is not None:
             name, of_count, of_items = self.items
             row += [(f"{name} count", of_count, ()), (name, of_items, (count,))]
@@ -156,8 +154,7 @@ def _elements(header: str, order: str) -> list[_Element]:
                     last = elements.pop()
                     if last.items is not None:
                         raise FileError(
-                            f"line {number}: pcmc reads one list per element, this is a second",
-                            where=number,
+                            f"line {number}: pcmc reads one list per element, this is a second", where=number
                         )
                     items = (name, order + TYPES[of_count], order + TYPES[of_items])
                     elements.append(_Element(last.name, last.size, last.before, items, []))
@@ -169,9 +166,7 @@ def _elements(header: str, order: str) -> list[_Element]:
             raise
         except (KeyError, IndexError, ValueError):
             raise FileError(
-                f"line {number}: not a line of a PLY header: {line[:60]!r}",
-                where=number,
-                found=line,
+                f"line {number}: not a line of a PLY header: {line[:60]!r}", where=number, found=line
             ) from None
     names = [e.name for e in elements]
     if "vertex" not in names or "face" not in names[names.index("vertex") :]:
@@ -188,9 +183,7 @@ def _elements(header: str, order: str) -> list[_Element]:
 
 def _as_numbers(element: _Element) -> _Element:
     """The same with every number a double, as the words of a text become."""
-    before, after = (
-        [(name, "<f8") for name, _ in part] for part in (element.before, element.after)
-    )
+    before, after = ([(name, "<f8") for name, _ in part] for part in (element.before, element.after))
     items = None if element.items is None else (element.items[0], "<f8", "<f8")
     return _Element(element.name, element.size, before, items, after)
 
@@ -236,9 +229,7 @@ def _list_counts(element: _Element, data: bytes, start: int) -> tuple[Ints, Ints
     for k in range(element.size):  # each row says only where the next one starts
         offsets[k], counts[k] = start, count_at(start)
         if counts[k] < 0:
-            raise FileError(
-                f"{element.name} {k} lists {counts[k]} items", where=k, found=int(counts[k])
-            )
+            raise FileError(f"{element.name} {k} lists {counts[k]} items", where=k, found=int(counts[k]))
         start += base.itemsize + int(counts[k]) * item
     offsets[-1] = start
     return counts, offsets

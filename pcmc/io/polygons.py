@@ -129,11 +129,7 @@ def from_polygons(
     support = point_data.get("support")
     scalars = {
         **{k: _column(v) for k, v in point_data.items() if k != "support" and _one(v, len(X))},
-        **{
-            k: _column(v)[source]
-            for k, v in cell_data.items()
-            if k != label and _one(v, len(counts))
-        },
+        **{k: _column(v)[source] for k, v in cell_data.items() if k != label and _one(v, len(counts))},
     }
     return MeshData(
         X,

@@ -62,9 +62,7 @@ def write(path: Path, surface: Surface, walls: str | None, **_: Any) -> None:
                 cloud.Add(rhino.Point3d(*point))
             model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], text))
     if not model.Write(str(path), VERSION):
-        raise FileError(
-            "rhino3dm cannot write it; check that the folder exists and the disk has space"
-        )
+        raise FileError("rhino3dm cannot write it; check that the folder exists and the disk has space")
 
 
 def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str) -> Any:
@@ -99,12 +97,8 @@ def read(path: Path) -> MeshData:
             walls = layer.GetUserString(flat_walls.KEY) or walls
         if isinstance(geometry, rhino.Mesh):
             points = _coordinates(geometry.Vertices.ToPoint3dArray())
-            faces = np.array([geometry.Faces[k] for k in range(geometry.Faces.Count)]).reshape(
-                -1, 4
-            )
-            size = np.where(
-                faces[:, 2] == faces[:, 3], 3, 4
-            )  # a triangle names its last corner twice
+            faces = np.array([geometry.Faces[k] for k in range(geometry.Faces.Count)]).reshape(-1, 4)
+            size = np.where(faces[:, 2] == faces[:, 3], 3, 4)  # a triangle names its last corner twice
             names += [] if name in names else [name]
             X.append(points)
             corners.append(faces[np.arange(4) < size[:, None]] + start)

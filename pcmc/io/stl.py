@@ -40,9 +40,7 @@ def write(path: Path, surface: Surface, **_: Any) -> str:
         for k, patch in enumerate(surface.patches):
             chosen = lines[surface.patch_of_face == k]
             if len(chosen):
-                file.write(
-                    f"solid {patch.name}\n{format_rows(FACET, *chosen.T)}endsolid {patch.name}\n"
-                )
+                file.write(f"solid {patch.name}\n{format_rows(FACET, *chosen.T)}endsolid {patch.name}\n")
     if not moved:
         return ""
     return (
@@ -77,8 +75,7 @@ def _complete(path: Path) -> None:
     count = int.from_bytes(data[80:84], "little")
     if len(data) < 84 or len(data) < 84 + 50 * count:
         raise FileError(
-            f"not an STL file, or cut off: {count} triangles need {84 + 50 * count} bytes, found"
-            f" {len(data)}",
+            f"not an STL file, or cut off: {count} triangles need {84 + 50 * count} bytes, found {len(data)}",
             where=count,
             found=len(data),
             expected=84 + 50 * count,

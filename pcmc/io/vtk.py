@@ -51,16 +51,10 @@ def read(path: Path) -> MeshData:
     pyvista = load_library("pyvista")
     if not path.read_bytes()[-64:].rstrip().endswith(b"</VTKFile>"):
         raise FileError("not a VTK XML file, or cut off before '</VTKFile>'", expected="</VTKFile>")
-    with (
-        translated_errors(path.suffix[1:]),
-        pyvista.vtk_verbosity("off"),
-        warnings.catch_warnings(),
-    ):
+    with translated_errors(path.suffix[1:]), pyvista.vtk_verbosity("off"), warnings.catch_warnings():
         warnings.simplefilter("error")  # VTK's errors come as warnings
         mesh = pyvista.read(path)
-        corners, counts, chosen = (_polygons if isinstance(mesh, pyvista.PolyData) else _cells)(
-            mesh
-        )
+        corners, counts, chosen = (_polygons if isinstance(mesh, pyvista.PolyData) else _cells)(mesh)
         points, text = np.asarray(mesh.points), mesh.field_data.get("pcmc")
         point_data = {k: np.asarray(v) for k, v in mesh.point_data.items()}
         cell_data = {k: np.asarray(v)[chosen] for k, v in mesh.cell_data.items()}

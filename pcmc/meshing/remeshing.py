@@ -26,9 +26,7 @@ PASSES = 3  # of MMG at most, each on the result of the one before; a patch take
 GOOD_ANGLE = 25.0  # degrees; no further pass is made when all angles reach it
 LEAST_ANGLE = 20.0  # degrees; a patch that stays below it ...
 WORSE = 0.8  # ... and below this share of its old smallest angle keeps its old triangles, cut
-RAISED = (
-    0.25  # of its spacing: height to which a resting junction is lifted, so that its wall has area
-)
+RAISED = 0.25  # of its spacing: height to which a resting junction is lifted, so that its wall has area
 BLUNT, OBTUSE = 25.0, 100.0  # degrees; for the upper two angles of one that fills a corner well
 
 
@@ -114,10 +112,7 @@ class _Mesh:
 
 
 def check_lengths(
-    edge_length: float,
-    near_curves: float | None = None,
-    growth: float = 1.2,
-    chord: float | None = None,
+    edge_length: float, near_curves: float | None = None, growth: float = 1.2, chord: float | None = None
 ) -> None:
     """Check the arguments of ``remesh``.
 
@@ -200,8 +195,7 @@ def _edge_normals(surface: Surface, chosen: Ints) -> Floats:
     X, F, topo = surface.vertices, surface.faces, surface.topology
     vector = area_vectors(X[F])
     key, place = np.unique(
-        (surface.patch_of_face[:, None].astype(np.int64) * surface.n + F).ravel(),
-        return_inverse=True,
+        (surface.patch_of_face[:, None].astype(np.int64) * surface.n + F).ravel(), return_inverse=True
     )
     total = np.zeros((len(key), 3))
     np.add.at(total, place, np.repeat(vector, 3, axis=0))

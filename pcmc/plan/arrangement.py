@@ -58,16 +58,11 @@ class Arrangement:
     @property
     def segments(self) -> Ints:
         """(s,2) the edges of all chains."""
-        return np.concatenate(
-            [np.stack([c.vertices[:-1], c.vertices[1:]], axis=1) for c in self.chains]
-        )
+        return np.concatenate([np.stack([c.vertices[:-1], c.vertices[1:]], axis=1) for c in self.chains])
 
 
 def arrange(
-    lines: Sequence[Line],
-    edge_length: float,
-    spots: Floats | None = None,
-    stops: Floats | None = None,
+    lines: Sequence[Line], edge_length: float, spots: Floats | None = None, stops: Floats | None = None
 ) -> Arrangement:
     """Cut the lines at corners and where they meet, and divide them into edges.
 

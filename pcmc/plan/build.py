@@ -32,18 +32,14 @@ def build_surface(plan: PlanData) -> Surface:
     _check_size(plan)
     lines, on_edge = _lines(plan)
     spots = np.array([to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)])
-    stops = np.concatenate(
-        [np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in on_edge)]
-    )
+    stops = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in on_edge)])
     drawn = arrange(lines, plan.edge_length, spots.reshape(-1, 3), stops)
     mesh = _meshed(plan, drawn, hole_points(drawn, lines))
     fixed, sliding = _supports(plan, drawn, lines, on_edge, len(mesh.points))
     if not (fixed | sliding).any():
         raise PlanError("nothing holds the roof; fix an edge or give supports", what="supports")
     if (fixed | sliding).all():
-        raise PlanError(
-            "every vertex of the mesh is held; use a smaller edge_length", what="edge_length"
-        )
+        raise PlanError("every vertex of the mesh is held; use a smaller edge_length", what="edge_length")
     _warn_of_free_edges(drawn, lines, fixed | sliding)
     base, height = _heights(plan, drawn, mesh, fixed | sliding)
     patches, patch_of_face = _patches(plan, mesh)
@@ -112,17 +108,12 @@ def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:
     lines = [Line("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
     lines += [Line(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
     boundary = [Drawn(line) for line in lines]
-    lines += [
-        Line(f"divider {d.name!r}", Kind.DIVIDER, d.curve.local(plan.plane)) for d in plan.dividers
-    ]
+    lines += [Line(f"divider {d.name!r}", Kind.DIVIDER, d.curve.local(plan.plane)) for d in plan.dividers]
     on_edge, snap = [], SNAP * plan.edge_length
     for number, support in enumerate(plan.supports, start=1):
         if isinstance(support, Curve):
             local = support.local(plan.plane)
-            if all(
-                any(b.nearest(xy)[1] <= snap for b in boundary)
-                for xy in local.at(local.dense)[:, :2]
-            ):
+            if all(any(b.nearest(xy)[1] <= snap for b in boundary) for xy in local.at(local.dense)[:, :2]):
                 on_edge.append(local)
             else:
                 lines.append(Line(f"support {number}", Kind.SUPPORT, local))
@@ -168,9 +159,7 @@ def _warn_of_free_edges(drawn: Arrangement, lines: Sequence[Line], held: Bools) 
             warnings.warn(text, PlanWarning, stacklevel=4)
 
 
-def _heights(
-    plan: PlanData, drawn: Arrangement, mesh: PlanarMesh, held: Bools
-) -> tuple[Floats, Floats]:
+def _heights(plan: PlanData, drawn: Arrangement, mesh: PlanarMesh, held: Bools) -> tuple[Floats, Floats]:
     """(n,) the heights of the surface that the boundary spans, and of the initial surface."""
     given = np.full(len(mesh.points), np.nan)
     given[: len(drawn.heights)] = drawn.heights
@@ -184,9 +173,7 @@ def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
     area = signed_areas(mesh.points, mesh.triangles)
     weight = np.bincount(mesh.region, area, count)
     middle = mesh.points[mesh.triangles].mean(axis=1)
-    centroid = np.stack(
-        [np.bincount(mesh.region, area * m, count) / weight for m in middle.T], axis=1
-    )
+    centroid = np.stack([np.bincount(mesh.region, area * m, count) / weight for m in middle.T], axis=1)
     areas = plan.patches
     if not areas:
         assert plan.tension is not None
@@ -205,9 +192,7 @@ def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
     elif len(located) < len(areas):
         missing = next(a.name for a in areas if a.at is None)
         raise PlanError(
-            f"patch {missing!r} has no at=; give it to all patches or to none",
-            what="at",
-            where=missing,
+            f"patch {missing!r} has no at=; give it to all patches or to none", what="at", where=missing
         )
     else:
         owner = _located(areas, mesh, count, centroid)

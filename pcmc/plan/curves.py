@@ -113,9 +113,7 @@ class Curve:
     def corners(self) -> Floats:
         """(c,) parameters of the joints where the curve turns by more than 10°; no open ends."""
         joints = np.arange(0 if self.closed else 1, len(self.pieces))
-        turns = [
-            _angle(self.pieces[j - 1].direction(1), self.pieces[j].direction(0)) for j in joints
-        ]
+        turns = [_angle(self.pieces[j - 1].direction(1), self.pieces[j].direction(0)) for j in joints]
         return joints[np.array(turns, dtype=float) > CORNER].astype(float)
 
     def parameter(self, length: Floats) -> Floats:

@@ -42,9 +42,7 @@ class PlanData:
         if self.rise is not None:
             validate.number("rise", self.rise, above=0.0)
         if not self.patches and self.tension is None:
-            raise OptionError(
-                "a plan needs patches with tensions, or one tension= for all", what="tension"
-            )
+            raise OptionError("a plan needs patches with tensions, or one tension= for all", what="tension")
         if self.patches and self.tension is not None:
             raise OptionError(
                 "a plan has either patches, each with its tension, or one tension= for all; leave one"

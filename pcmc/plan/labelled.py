@@ -122,9 +122,7 @@ def _by_name(value: Any, names: list[str], what: str) -> dict[str, float]:
         return dict.fromkeys(names, float(value))
     for name in value:
         if name not in names:
-            raise OptionError(
-                unknown("patch", name, names), what=what, found=name, expected=tuple(names)
-            )
+            raise OptionError(unknown("patch", name, names), what=what, found=name, expected=tuple(names))
     missing = [name for name in names if name not in value]
     if missing:
         raise OptionError(f"{what}: no value for patch {missing[0]!r}", what=what, where=missing[0])
@@ -147,8 +145,7 @@ def _oriented(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Ints:
     both = np.flatnonzero(side[:m] == side[m:])
     if len(both):
         raise SurfaceError(
-            f"the patch of face {both[0]} has only one side (like a Möbius strip); cut it into two"
-            " patches",
+            f"the patch of face {both[0]} has only one side (like a Möbius strip); cut it into two patches",
             what="faces",
             where=int(both[0]),
         )

@@ -114,9 +114,7 @@ def inside(drawn: Sequence[Drawn]) -> Callable[[Floats], bool]:
     return lambda xy: bool(shapely.contains_xy(area, *xy))
 
 
-def lines_at(
-    drawn: Sequence[Drawn], xy: Floats, snap: float, leave_out: int = -1
-) -> list[tuple[int, float]]:
+def lines_at(drawn: Sequence[Drawn], xy: Floats, snap: float, leave_out: int = -1) -> list[tuple[int, float]]:
     """Lines that pass through a point, with their parameter there."""
     near = [(number, *one.nearest(xy)) for number, one in enumerate(drawn) if number != leave_out]
     return [(number, t) for number, t, distance in near if distance <= snap]
@@ -135,10 +133,7 @@ def crossing(one: Drawn, s: float, two: Drawn, t: float) -> tuple[float, float]:
         turn = float(cross_2d(along_s, along_t))
         if abs(turn) < 1e-9 * float(np.linalg.norm(along_s) * np.linalg.norm(along_t)):
             break
-        new_s, new_t = (
-            s + float(cross_2d(gap, along_t)) / turn,
-            t + float(cross_2d(gap, along_s)) / turn,
-        )
+        new_s, new_t = (s + float(cross_2d(gap, along_t)) / turn, t + float(cross_2d(gap, along_s)) / turn)
         new_s = min(max(new_s, 0.0), float(len(one.curve.pieces)))
         new_t = min(max(new_t, 0.0), float(len(two.curve.pieces)))
         new_gap = apart(new_s, new_t)

@@ -98,11 +98,7 @@ def curve_of(spec: Any, what: str, closed: bool = False) -> Curve:
         return curve(spec, closed=closed)
     except OptionError as error:
         raise OptionError(
-            f"{what}: {error}",
-            what=what,
-            where=error.where,
-            found=error.found,
-            expected=error.expected,
+            f"{what}: {error}", what=what, where=error.where, found=error.found, expected=error.expected
         ) from None
 
 
@@ -111,9 +107,7 @@ def divider_of(spec: Any, number: int) -> Divider:
     what = f"divider {number}"
     part = _part_of(Divider, spec, what)
     validate.choice(f"bottom of {what}", part.bottom, BOTTOMS)
-    return Divider(
-        curve_of(part.curve, what), part.wall, part.name or f"wall {number}", part.bottom
-    )
+    return Divider(curve_of(part.curve, what), part.wall, part.name or f"wall {number}", part.bottom)
 
 
 def hole_of(spec: Any, number: int) -> Hole:

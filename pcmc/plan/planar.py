@@ -121,9 +121,7 @@ def _check(points: Floats, segments: Ints, edge_length: float) -> None:
     if near:
         i, j = min(near)
         raise SurfaceError(
-            f"points {i} and {j} coincide at {points[i].tolist()}; merge them",
-            what="points",
-            where=(i, j),
+            f"points {i} and {j} coincide at {points[i].tolist()}; merge them", what="points", where=(i, j)
         )
     if len(segments) < 3:
         raise SurfaceError(
@@ -215,9 +213,7 @@ def _constrained(points: Floats, segments: Ints) -> Ints:
     try:
         T: Ints = Delaunay(points).simplices.astype(np.int64)
     except QhullError:
-        raise SurfaceError(
-            "the points lie on one line and enclose no area", what="points"
-        ) from None
+        raise SurfaceError("the points lie on one line and enclose no area", what="points") from None
     area = signed_areas(points, T)
     T[area < 0] = T[area < 0][:, ::-1]
     for a, b in segments[_absent(segments, T, len(points))]:
@@ -303,9 +299,7 @@ def _wanted(points: Floats, fixed: Floats, spacing: Floats, h: float) -> Floats:
     return np.minimum(h, spacing[nearest] + 0.3 * distance)
 
 
-def _additions(
-    mesh: PlanarMesh, segments: Ints, fixed: Floats, spacing: Floats, h: float
-) -> Floats:
+def _additions(mesh: PlanarMesh, segments: Ints, fixed: Floats, spacing: Floats, h: float) -> Floats:
     """(p,2) circumcentres of triangles that are too large or too sharp, apart from each other."""
     X, T = mesh.points, mesh.triangles
     a, b, c = (X[T[:, i]] for i in range(3))

@@ -187,11 +187,7 @@ class _Builder:
         if vertex not in self.lines:
             x, y, top = self.local[vertex]
             bottom = self.floor[vertex]
-            rows = (
-                0
-                if top - bottom <= self.tolerance
-                else max(1, round((top - bottom) / self.edge_length))
-            )
+            rows = 0 if top - bottom <= self.tolerance else max(1, round((top - bottom) / self.edge_length))
             first = len(self.new)
             self.new += [np.array([x, y, bottom + (top - bottom) * k / rows]) for k in range(rows)]
             self.lines[vertex] = [*(len(self.local) + first + np.arange(rows)), vertex]
@@ -215,15 +211,11 @@ class _Builder:
         height = np.array([self._position(i)[2] for i in ids])
         ring = np.arange(len(ids))
         mesh = triangulate(
-            np.stack([s, height], axis=1),
-            np.stack([ring, np.roll(ring, -1)], axis=1),
-            self.edge_length,
+            np.stack([s, height], axis=1), np.stack([ring, np.roll(ring, -1)], axis=1), self.edge_length
         )
         inner = mesh.points[len(ids) :]
         first = len(self.local) + len(self.new)
-        ground_xy = np.stack(
-            [np.interp(inner[:, 0], along, self.local[chain, k]) for k in (0, 1)], axis=1
-        )
+        ground_xy = np.stack([np.interp(inner[:, 0], along, self.local[chain, k]) for k in (0, 1)], axis=1)
         self.new += list(np.column_stack([ground_xy, inner[:, 1]]))
         number = np.concatenate([ids, first + np.arange(len(inner))])
         self.faces.append(number[mesh.triangles])
@@ -260,9 +252,7 @@ def _labels(
     label, names = [], []
     for place, pair in enumerate(pairs):
         ends = [
-            b.vertices[[0, -1]]
-            for b, p in zip(borders, pairs, strict=True)
-            if p == pair and not b.closed
+            b.vertices[[0, -1]] for b, p in zip(borders, pairs, strict=True) if p == pair and not b.closed
         ]
         crossing = bool(ends) and np.bincount(np.concatenate(ends)).max() > 2
         name = (pair, place if crossing else -1)
@@ -274,9 +264,7 @@ def _labels(
         alike = [n for p, n in names if p == pair]
         suffix = "" if number < 0 else f"-{alike.index(number) + 1}"
         between = pressure[pair[0]] - pressure[pair[1]]
-        patches.append(
-            Patch(f"wall-{pair[0]}-{pair[1]}{suffix}", tension[pair], between, wall=True)
-        )
+        patches.append(Patch(f"wall-{pair[0]}-{pair[1]}{suffix}", tension[pair], between, wall=True))
     return label, patches
 
 

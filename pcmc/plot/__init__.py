@@ -8,14 +8,4 @@ from .curves import convergence, heatmap, histories, lines
 from .diagrams import diagram
 from .pictures import draw, panel
 
-__all__ = [
-    "convergence",
-    "diagram",
-    "draw",
-    "heatmap",
-    "histories",
-    "lines",
-    "panel",
-    "reactions",
-    "vectors",
-]
+__all__ = ["convergence", "diagram", "draw", "heatmap", "histories", "lines", "panel", "reactions", "vectors"]

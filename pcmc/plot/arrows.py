@@ -12,15 +12,7 @@ from ..base.errors import OptionError
 from ..certificate.balance import reactions_per_length
 from ..surface import Surface
 from .figure import INK, SMALL, TEXT, Image, finish
-from .pictures import (
-    DOTS_FROM,
-    EDGES_FROM,
-    Path,
-    ViewName,
-    fit_frames,
-    frame_axes,
-    frames_of,
-)
+from .pictures import DOTS_FROM, EDGES_FROM, Path, ViewName, fit_frames, frame_axes, frames_of
 from .raster import paint
 from .scene import mean_edge, scene, view_of
 

@@ -33,9 +33,7 @@ class ColorScale:
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
 
-        bar = color_bar(
-            figure, ScalarMappable(Normalize(self.low, self.high), self.cmap), axes, label
-        )
+        bar = color_bar(figure, ScalarMappable(Normalize(self.low, self.high), self.cmap), axes, label)
         bar.ax.locator_params(nbins=5)
         bar.formatter.set_powerlimits((-3, 4))
 

@@ -12,19 +12,7 @@ import numpy.typing as npt
 from ..base.arrays import Floats
 from ..base.errors import OptionError, unknown
 from .colors import color_bar, color_map
-from .figure import (
-    CURVES,
-    INK,
-    SMALL,
-    TEXT,
-    Image,
-    finish,
-    fit_height,
-    grid,
-    new,
-    overlap_style,
-    style,
-)
+from .figure import CURVES, INK, SMALL, TEXT, Image, finish, fit_height, grid, new, overlap_style, style
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,19 +59,9 @@ def lines(
             else {"linewidth": 1.1, "linestyle": ("-", "--")[turn % 2]}
         )
         marker = MARKERS[(k + turn) % len(MARKERS)] if markers else None
-        axes.plot(
-            px,
-            py,
-            color=CURVES[k % len(CURVES)],
-            marker=marker,
-            markersize=2.8,
-            label=label,
-            **look,
-        )
+        axes.plot(px, py, color=CURVES[k % len(CURVES)], marker=marker, markersize=2.8, label=label, **look)
     for label, level in (levels or {}).items():
-        axes.axhline(
-            level, color=INK, linewidth=0.9, linestyle=(0, (5, 3)), label=label, zorder=1.5
-        )
+        axes.axhline(level, color=INK, linewidth=0.9, linestyle=(0, (5, 3)), label=label, zorder=1.5)
     if xscale == "log":
         _plain_ticks(axes.xaxis)
     add_legend(axes, len(curves) + len(levels or {}))
@@ -215,9 +193,7 @@ def heatmap(
     shape = (len(ys), len(xs))
     data = {k: _table("tables", k, v, shape).astype(float) for k, v in tables.items()}
     if not data:
-        raise OptionError(
-            "heatmap: expected at least one table, found none", what="tables", found=0
-        )
+        raise OptionError("heatmap: expected at least one table, found none", what="tables", found=0)
     for name, v in data.items():
         data[name] = np.where(np.isfinite(v) & ((v > 0.0) | (not log)), v, np.nan)
     crosses = {k: _table("marks", k, v, shape) for k, v in (marks or {}).items()}
@@ -235,9 +211,7 @@ def heatmap(
         if title in crosses:
             at = np.argwhere(crosses[title])
             for color, heavy in (("white", 1.8), (INK, 0.8)):
-                axes.plot(
-                    at[:, 1], at[:, 0], "x", color=color, markersize=3.0, markeredgewidth=heavy
-                )
+                axes.plot(at[:, 1], at[:, 0], "x", color=color, markersize=3.0, markeredgewidth=heavy)
         axes.set_title(title, fontsize=TEXT, color=INK, pad=3.0)
         first, last = k % columns == 0, k + columns >= len(data)
         table_ticks(axes, xs if last else (), ys if first else (), shape)
@@ -262,11 +236,7 @@ def add_legend(axes: Any, count: int) -> None:
     """A legend of the curves, where there are several; beside the axes if it is long."""
     if count > LEGEND_INSIDE:
         axes.figure.legend(
-            fontsize=SMALL,
-            labelcolor=INK,
-            handlelength=2.4,
-            frameon=False,
-            loc="outside right upper",
+            fontsize=SMALL, labelcolor=INK, handlelength=2.4, frameon=False, loc="outside right upper"
         )
     elif count > 1 or axes.get_legend_handles_labels()[1] not in ([], [""]):
         axes.legend(
@@ -309,9 +279,7 @@ def _curve(
     return px, py
 
 
-def _table(
-    what: str, title: str, values: npt.ArrayLike, shape: tuple[int, int]
-) -> npt.NDArray[Any]:
+def _table(what: str, title: str, values: npt.ArrayLike, shape: tuple[int, int]) -> npt.NDArray[Any]:
     table = np.asarray(values)
     if table.shape != shape:
         raise OptionError(

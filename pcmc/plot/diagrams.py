@@ -50,9 +50,7 @@ def diagram(
         color = CURVES[k % len(CURVES)]
         named = label
         for stable, (px, py) in _pieces(branch, x, y):
-            axes.plot(
-                px, py, color=color, linewidth=1.1, linestyle="-" if stable else "--", label=named
-            )
+            axes.plot(px, py, color=color, linewidth=1.1, linestyle="-" if stable else "--", label=named)
             named = ""
         for kind, rows in branch.events.groupby("kind", sort=False):
             text = "" if kind in marked else MEANINGS[str(kind)]
@@ -75,9 +73,7 @@ def _pieces(branch: Branch, x: str, y: str) -> list[tuple[bool, tuple[Floats, Fl
     """The branch cut where its stability changes; events are points of it too."""
     columns = ["arclength", x, y]
     events = branch.events[columns].assign(index=branch.events.index_after)
-    every = np.concatenate(
-        [branch.points[[*columns, "index"]].to_numpy(float), events.to_numpy(float)]
-    )
+    every = np.concatenate([branch.points[[*columns, "index"]].to_numpy(float), events.to_numpy(float)])
     every = every[np.argsort(every[:, 0], kind="stable")]
     stable = every[:, 3] == 0.0
     cuts = np.flatnonzero(stable[1:] != stable[:-1]) + 1

@@ -62,9 +62,7 @@ def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
     for _ in range(4):
         figure.draw_without_rendering()
         boxes = {axes: axes.get_window_extent() for axes in ratios}
-        missing = sum(
-            ratio * boxes[axes].width - boxes[axes].height for axes, ratio in ratios.items()
-        )
+        missing = sum(ratio * boxes[axes].width - boxes[axes].height for axes, ratio in ratios.items())
         figure.set_figheight(round(figure.get_figheight() * DPI + missing) / DPI)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")

@@ -52,8 +52,7 @@ def add_legend(figure: Any, pictures: Iterable[Shown]) -> None:
 
     colors, dots = entries(pictures)
     handles: list[Any] = [
-        Swatch(facecolor=color, edgecolor=INK, linewidth=0.4, label=name)
-        for name, color in colors.items()
+        Swatch(facecolor=color, edgecolor=INK, linewidth=0.4, label=name) for name, color in colors.items()
     ]
     handles += [
         Line2D([], [], linestyle="", marker="o", markersize=2.6, color=color, label=name)

@@ -127,9 +127,7 @@ def panel(
     """
     drawings = _drawings(surfaces, views, titles, scalars, numbers, patches)
     columns = min(columns or (3 if len(drawings) not in (1, 2, 4) else 2), len(drawings))
-    frames = frames_of(
-        [drawing.points(one_scale) for drawing in drawings], columns, width, one_scale
-    )
+    frames = frames_of([drawing.points(one_scale) for drawing in drawings], columns, width, one_scale)
     edge = [mean_edge(d.surface) * f.scale for d, f in zip(drawings, frames, strict=True)]
     dotted = [supports and length >= DOTS_FROM for length in edge]
     colors = color_scale([drawing.values for drawing in drawings], limits, cmap)
@@ -139,9 +137,7 @@ def panel(
     if colors is not None:
         colors.bar(figure, axes, label)
     if legend:
-        shown = [
-            (d.surface, d.patches, d.values, dots) for d, dots in zip(drawings, dotted, strict=True)
-        ]
+        shown = [(d.surface, d.patches, d.values, dots) for d, dots in zip(drawings, dotted, strict=True)]
         add_legend(figure, shown)
     fit_frames(figure, axes, frames, columns)
     for k, drawing in enumerate(drawings):
@@ -153,9 +149,7 @@ def panel(
             edges=edge[k] >= EDGES_FROM if edges is None else edges,
             patches=drawing.patches,
         )
-        frames[k].show(
-            axes[k], paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer)
-        )
+        frames[k].show(axes[k], paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer))
         if drawing.numbers is not None:
             _print_numbers(axes[k], drawing.surface, drawing.view, drawing.numbers, form)
     return finish(figure, path)
@@ -184,19 +178,14 @@ def _drawings(
     """One for each surface, from the arguments of ``panel``."""
     count = len(surfaces)
     if not count:
-        raise OptionError(
-            "panel: expected at least one surface, found none", what="surfaces", found=0
-        )
+        raise OptionError("panel: expected at least one surface, found none", what="surfaces", found=0)
     if _is_view(views):
         views = [views] * count
     if patches is None or all(isinstance(entry, str) for entry in patches):
         patches = [patches] * count
     columns = (
         list(surfaces),
-        [
-            view_of(*pair)
-            for pair in zip(surfaces, _per_surface("views", views, count), strict=True)
-        ],
+        [view_of(*pair) for pair in zip(surfaces, _per_surface("views", views, count), strict=True)],
         _per_surface("titles", titles, count) if len(titles) else [""] * count,
         _arrays("scalars", scalars, surfaces, faces=True),
         _arrays("numbers", numbers, surfaces, faces=False),
@@ -232,9 +221,7 @@ class Frame:
         axes.imshow(image, extent=(self.low[0], right, self.low[1], top), aspect="auto")
 
 
-def frames_of(
-    points: Sequence[Floats], columns: int, width: int, one_scale: bool = True
-) -> list[Frame]:
+def frames_of(points: Sequence[Floats], columns: int, width: int, one_scale: bool = True) -> list[Frame]:
     """Frames around the given points (k,2), row by row; those of a row are of one height."""
     lows = np.array([p.min(axis=0) for p in points])
     spans = np.array([np.ptp(p, axis=0) for p in points])
@@ -314,10 +301,7 @@ def _per_surface(name: str, entries: Any, count: int) -> list[Any]:
 
 
 def _arrays(
-    name: str,
-    given: Sequence[npt.ArrayLike | None] | None,
-    surfaces: Sequence[Surface],
-    faces: bool,
+    name: str, given: Sequence[npt.ArrayLike | None] | None, surfaces: Sequence[Surface], faces: bool
 ) -> list[Floats | None]:
     """One float array or None per surface, of length n (or m, where ``faces``)."""
     if given is None:

@@ -18,9 +18,7 @@ SAMPLES = 2  # pixels painted for each pixel shown, in each direction
 DOT = 5.0  # pixels across
 
 
-def paint(
-    scene: Scene, low: Floats, scale: float, size: tuple[int, int], renderer: str = "auto"
-) -> Floats:
+def paint(scene: Scene, low: Floats, scale: float, size: tuple[int, int], renderer: str = "auto") -> Floats:
     """(h,w,3) bytes: the scene with picture coordinates ``low`` at the lower left corner.
 
     ``scale`` is pixels per unit of length, ``size`` (w, h) in pixels.
@@ -70,9 +68,7 @@ def _with_pyvista(scene: Scene, low: Floats, scale: float, size: tuple[int, int]
             ends = scene.segments[chosen].reshape(-1, 3)
             lines = pyvista.line_segments_from_points(ends)
             lines.cell_data["rgb"] = np.round(scene.shades[chosen] * 255.0).astype(np.uint8)
-            plotter.add_mesh(
-                lines, scalars="rgb", rgb=True, lighting=False, line_width=SAMPLES * line_width
-            )
+            plotter.add_mesh(lines, scalars="rgb", rgb=True, lighting=False, line_width=SAMPLES * line_width)
         if len(scene.dots):
             dots = pyvista.PolyData(scene.dots)
             dots["rgb"] = np.round(scene.dot_colors * 255.0).astype(np.uint8)
@@ -115,11 +111,7 @@ def _with_matplotlib(scene: Scene, low: Floats, scale: float, size: tuple[int, i
     project = scene.view.project
     circle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
     disc = np.stack([np.cos(circle), np.sin(circle)], axis=1) * DOT / (2.0 * scale)
-    shapes = [
-        *project(scene.corners),
-        *project(scene.segments),
-        *(project(scene.dots)[:, None] + disc),
-    ]
+    shapes = [*project(scene.corners), *project(scene.segments), *(project(scene.dots)[:, None] + disc)]
     fills = np.concatenate([scene.colors.mean(axis=1), scene.shades, scene.dot_colors])
     thin = np.full(len(scene.corners), 0.4)
     widths = np.concatenate([thin, scene.widths, np.zeros(len(scene.dots))])

@@ -107,9 +107,7 @@ def scene(
     F = surface.faces[shown]
     P = surface.vertices[F]
     near = view.depth(P).mean(axis=1)
-    light = _light(
-        _normals(surface, smooth=not edges)[shown], view, 0.45 if values is None else 0.08
-    )
+    light = _light(_normals(surface, smooth=not edges)[shown], view, 0.45 if values is None else 0.08)
     if values is None:
         base = patch_colors(surface)[surface.patch_of_face[shown]]
     elif len(values) == surface.m and surface.m != surface.n:
@@ -123,11 +121,7 @@ def scene(
         triangles_near = np.tile(near, 6)
     chosen, ends, widths, shades = _segments(surface, view, edges, shown)
     held, points, kinds = _dots(surface, view, supports, F)
-    depth = [
-        triangles_near,
-        _nearest(surface, shown, near)[chosen],
-        _nearest_vertex(surface, F, near)[held],
-    ]
+    depth = [triangles_near, _nearest(surface, shown, near)[chosen], _nearest_vertex(surface, F, near)[held]]
     return Scene(
         view,
         P,
@@ -207,9 +201,7 @@ def _mean_known(values: Floats, faces: Ints) -> Floats:
     return np.where(count > 0, total / np.maximum(count, 1), rgb(NO_VALUE))
 
 
-def _segments(
-    surface: Surface, view: View, edges: bool, shown: Bools
-) -> tuple[Ints, Floats, Floats, Floats]:
+def _segments(surface: Surface, view: View, edges: bool, shown: Bools) -> tuple[Ints, Floats, Floats, Floats]:
     """Indices of the edges to draw, their ends, widths and colours."""
     topo = surface.topology
     curve = topo.curve_edge

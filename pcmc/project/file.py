@@ -86,9 +86,7 @@ def read_data(path: Path) -> tuple[str, dict[str, Any]]:
         text = path.read_text(encoding="utf-8-sig")  # skips the byte-order mark of Windows editors
         data = tomllib.loads(text)
     except OSError as error:
-        raise FileError(
-            f"{path}: cannot be read ({error.strerror or error})", what=str(path)
-        ) from None
+        raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
     except UnicodeDecodeError as error:
         raise FileError(
             f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8",
@@ -119,11 +117,7 @@ def _toml_error(text: str, message: str) -> tuple[int | None, str]:
 def in_file(path: Path, error: PcmcError, kind: type[PcmcError] | None = None) -> PcmcError:
     """The same error, or one of another kind, with the file at the start of its message."""
     return (kind or type(error))(
-        f"{path}: {error}",
-        what=error.what,
-        where=error.where,
-        found=error.found,
-        expected=error.expected,
+        f"{path}: {error}", what=error.what, where=error.where, found=error.found, expected=error.expected
     )
 
 

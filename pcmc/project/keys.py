@@ -72,9 +72,7 @@ KINDS: dict[str, Callable[[Any], bool]] = {
     "true or false": lambda value: isinstance(value, bool),
     "a text": lambda value: isinstance(value, str),
     "a table": lambda value: isinstance(value, Mapping),
-    "a table or a list of tables": lambda value: (
-        isinstance(value, Mapping) or _list_of(Mapping)(value)
-    ),
+    "a table or a list of tables": lambda value: isinstance(value, Mapping) or _list_of(Mapping)(value),
     "a list of tables": _list_of(Mapping),
     "a list of curves or tables": _list_of(list, Mapping),
     "a list of points and curves": _list_of(list, Mapping),
@@ -88,18 +86,11 @@ KINDS: dict[str, Callable[[Any], bool]] = {
     "a name or two angles": lambda value: isinstance(value, str | list),
 }
 
-_KIND_OF_TYPE = {
-    "float": "a number",
-    "int": "a whole number",
-    "bool": "true or false",
-    "str": "a text",
-}
+_KIND_OF_TYPE = {"float": "a number", "int": "a whole number", "bool": "true or false", "str": "a text"}
 
 
 def _of_class(
-    cls: Any,
-    kinds: Mapping[str, str] | None = None,
-    choices: Mapping[str, tuple[str, ...]] | None = None,
+    cls: Any, kinds: Mapping[str, str] | None = None, choices: Mapping[str, tuple[str, ...]] | None = None
 ) -> tuple[Key, ...]:
     """A key for each field of a dataclass: its default, and its sentence from the docstring."""
     help_of = {}
@@ -108,8 +99,7 @@ def _of_class(
     return tuple(
         Key(
             f.name,
-            (kinds or {}).get(f.name)
-            or _KIND_OF_TYPE.get(str(f.type).removesuffix(" | None"), "a value"),
+            (kinds or {}).get(f.name) or _KIND_OF_TYPE.get(str(f.type).removesuffix(" | None"), "a value"),
             None if f.default_factory is not MISSING else f.default,
             help_of.get(f.name, ""),
             (choices or {}).get(f.name, ()),
@@ -143,9 +133,7 @@ def main_sections() -> tuple[Section, ...]:
                 Key("output", "a table", None, "the files and the picture to write"),
             ),
         ),
-        Section(
-            "plan", "The roof, by the lines of its plan.", _of_class(Plan, plan, {"edge": EDGES})
-        ),
+        Section("plan", "The roof, by the lines of its plan.", _of_class(Plan, plan, {"edge": EDGES})),
         Section(
             "plan.patches.NAME",
             "A patch; NAME is its name.",
@@ -157,9 +145,7 @@ def main_sections() -> tuple[Section, ...]:
             _of_class(Divider, curve, {"bottom": BOTTOMS}),
         ),
         Section(
-            "plan.holes",
-            "An opening. A curve alone is a hole, too.",
-            _of_class(Hole, curve, {"edge": EDGES}),
+            "plan.holes", "An opening. A curve alone is a hole, too.", _of_class(Hole, curve, {"edge": EDGES})
         ),
         Section(
             "plan.plane",
@@ -208,9 +194,7 @@ def solve_section(method: str) -> Section:
         "nesterov": {"armijo": ("printed", "sufficient")},
     }
     options = _of_class(find_method(method).options, choices=limits.get(method))
-    return Section(
-        "solve", "The solver and its options.", (known, *options), f'method = "{method}"'
-    )
+    return Section("solve", "The solver and its options.", (known, *options), f'method = "{method}"')
 
 
 @cache
@@ -251,9 +235,7 @@ _CURVE = Section(
         Key("polyline", "a list of points", None, "straight segments from point to point"),
         Key("closed", "true or false", False, "whether a polyline returns to its first point"),
         Key("bezier", "a list of points", None, "the control points of a Bézier curve"),
-        Key(
-            "arc", "a list of points", None, "start, a point on the way, and end of a circular arc"
-        ),
+        Key("arc", "a list of points", None, "start, a point on the way, and end of a circular arc"),
         Key("circle", "a table", None, "{centre = [x, y], radius = r}"),
     ),
 )  # its keys are checked where curves are made

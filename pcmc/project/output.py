@@ -137,9 +137,7 @@ def check_picture(view: Any, colour: str) -> None:
         and all(isinstance(angle, int | float) and math.isfinite(angle) for angle in view)
     ):
         raise OptionError(
-            f"view: expected a name or two angles in degrees, found {view!r}",
-            what="view",
-            found=view,
+            f"view: expected a name or two angles in degrees, found {view!r}", what="view", found=view
         )
 
 

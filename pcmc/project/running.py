@@ -49,11 +49,7 @@ class Outcome:
 
 
 def run(
-    path: PathLike,
-    out_dir: PathLike | None = None,
-    progress: OnStep | None = None,
-    *,
-    anyway: bool = False,
+    path: PathLike, out_dir: PathLike | None = None, progress: OnStep | None = None, *, anyway: bool = False
 ) -> Outcome:
     """Mesh, solve, meet the targets, certify, and write all output of a project.
 
@@ -155,9 +151,7 @@ def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcom
     if design is not None:
         result = design.result
     else:
-        result = raise_if_stopped(
-            solve(surface, project.method, reporter(report), **project.options)
-        )
+        result = raise_if_stopped(solve(surface, project.method, reporter(report), **project.options))
     report("certifying")
     result.certificate  # noqa: B018 — computed here, while the progress is shown
     return Outcome(result, (), design)

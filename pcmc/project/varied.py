@@ -30,9 +30,7 @@ def numbers(data: Mapping[str, Any]) -> dict[str, KeyPath]:
     return {".".join(names): path for names, path in _leaves(data, (), ())}
 
 
-def _leaves(
-    value: Any, names: tuple[str, ...], path: KeyPath
-) -> Iterator[tuple[tuple[str, ...], KeyPath]]:
+def _leaves(value: Any, names: tuple[str, ...], path: KeyPath) -> Iterator[tuple[tuple[str, ...], KeyPath]]:
     if isinstance(value, Mapping):
         for key, item in value.items():
             yield from _leaves(item, (*names, key), (*path, key))
@@ -85,9 +83,7 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
         for value in given:
             if isinstance(value, bool | str | None) or not math.isfinite(value):
                 raise OptionError(
-                    f"{path}: {name} must be a finite number, found {value!r}",
-                    what=name,
-                    found=value,
+                    f"{path}: {name} must be a finite number, found {value!r}", what=name, found=value
                 )
             _project(path, {name: value})
             _retensioned(path, surface, {name: value})

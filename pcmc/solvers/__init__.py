@@ -42,11 +42,7 @@ def _lbfgs() -> Method:
     return Method(lbfgs, LbfgsOptions)
 
 
-METHODS: Mapping[str, Callable[[], Method]] = {
-    "newton": _newton,
-    "nesterov": _nesterov,
-    "lbfgs": _lbfgs,
-}
+METHODS: Mapping[str, Callable[[], Method]] = {"newton": _newton, "nesterov": _nesterov, "lbfgs": _lbfgs}
 
 
 def find_method(name: str) -> Method:
@@ -116,7 +112,5 @@ def solve(
     if surface.size == 0.0:
         message = "solve: all vertices are at one point; start from a surface that has a size"
         raise SurfaceError(message, what="vertices")
-    result: Result = solver.solve(
-        surface, validate.build(solver.options, method, options), callback
-    )
+    result: Result = solver.solve(surface, validate.build(solver.options, method, options), callback)
     return result

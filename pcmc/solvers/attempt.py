@@ -74,12 +74,7 @@ class Attempt:
     """
 
     def __init__(
-        self,
-        surface: Surface,
-        options: NewtonOptions,
-        history: History,
-        level: int,
-        smooth_steps: int = 0,
+        self, surface: Surface, options: NewtonOptions, history: History, level: int, smooth_steps: int = 0
     ) -> None:
         self.options, self.history, self.level = options, history, level
         self.state = State(surface, options.min_quality)

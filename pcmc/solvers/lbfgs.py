@@ -147,9 +147,7 @@ class Objective:
         return point
 
 
-def lbfgs(
-    surface: Surface, options: LbfgsOptions | None = None, callback: Callback | None = None
-) -> Result:
+def lbfgs(surface: Surface, options: LbfgsOptions | None = None, callback: Callback | None = None) -> Result:
     """Minimise E over the free coordinates with NLopt's LD_LBFGS (Nocedal 1980; Luksan's code).
 
     The same energy and supports as in the paper's flow. NLopt shows only its evaluations, not which of

@@ -121,9 +121,7 @@ def nesterov(
 class _Flow:
     """The flow from one surface: the last move, and the history up to it."""
 
-    def __init__(
-        self, surface: Surface, options: NesterovOptions, callback: Callback | None
-    ) -> None:
+    def __init__(self, surface: Surface, options: NesterovOptions, callback: Callback | None) -> None:
         self.surface, self.options, self.callback = surface, options, callback
         self.evaluate = Evaluator(surface)
         start = self.evaluate(surface.vertices)

@@ -32,9 +32,7 @@ class Smoother:
     have one factorisation, the normal one another.
     """
 
-    def __init__(
-        self, surface: Surface, classes: VertexClasses, backend: str | None = None
-    ) -> None:
+    def __init__(self, surface: Surface, classes: VertexClasses, backend: str | None = None) -> None:
         floor = FLOOR * float(surface.tensions.max())
         tensions = {p.name: max(p.tension, floor) for p in surface.patches}
         self._surface = surface.retensioned(tensions, dict.fromkeys(tensions, 0.0))
@@ -79,9 +77,7 @@ class Smoother:
 class _Coordinate:
     """L_α over the vertices whose coordinate is free."""
 
-    def __init__(
-        self, surface: Surface, classes: VertexClasses, free: Bools, backend: str | None
-    ) -> None:
+    def __init__(self, surface: Surface, classes: VertexClasses, free: Bools, backend: str | None) -> None:
         basis = np.zeros((surface.n, 3, 3))
         basis[:, 0, 0] = 1.0
         self._space = MotionSpace.of(basis, free.astype(np.int64))

@@ -27,9 +27,7 @@ from ..surface import Surface
 LOW = 5e-3  # height, in spacings along the junction, at which a sinking vertex is set to rest
 LIFT = 5e-2  # height, in the same, to which a resting vertex is lifted the first time
 DAMPING = 0.25  # factor on both, each time that the vertex is lifted again
-POOR = (
-    2 / 3
-)  # of the quality aimed at: below this redistribution is tried again after it has failed
+POOR = 2 / 3  # of the quality aimed at: below this redistribution is tried again after it has failed
 REDISTRIBUTIONS = 60  # the most of them
 RELEASES = 30  # the most times that resting junctions are lifted or walls are updated
 

@@ -133,9 +133,7 @@ class Stepper:
         self._drop_outdated()
         rigid = rigid_modes(state.space, self._motions, state.X)
         try:
-            system = stiffness(
-                state.surface.moved(state.X), state.classes, state.space, rigid, self.backend
-            )
+            system = stiffness(state.surface.moved(state.X), state.classes, state.space, rigid, self.backend)
         except SingularMatrix:
             return False
         self.factorisations += 1
@@ -191,9 +189,7 @@ class Stepper:
             self._factoriser = factoriser(self._pattern, self.backend)
         rigid = rigid_modes(state.space, self._motions, state.X)
         for weight in (shift, shift + SOFT):
-            data = assemble(
-                state.surface, state.classes, state.space, self._pattern, state.X, 1.0, weight
-            )
+            data = assemble(state.surface, state.classes, state.space, self._pattern, state.X, 1.0, weight)
             try:
                 factor = self._factoriser.factor(data)
                 self.negative = negatives_without(factor, rigid)
@@ -209,9 +205,7 @@ class Stepper:
         """The little stiffness that was added to a singular matrix."""
         state = self.state
         assert self._pattern is not None
-        data = assemble(
-            state.surface, state.classes, state.space, self._pattern, state.X, 0.0, SOFT
-        )
+        data = assemble(state.surface, state.classes, state.space, self._pattern, state.X, 0.0, SOFT)
         return full_matrix(self._pattern, data)
 
     def _in_factor_basis(self, action: Callable[[Floats], Floats], s: Floats) -> Floats:
@@ -270,18 +264,14 @@ class Stepper:
     def _shifted_direction(self) -> Floats:
         self._gmres_steps = 0
         assert self._factor is not None
-        return -self.state.space.to_vectors(
-            self._in_factor_basis(self._factor.solve, self.state.residual)
-        )
+        return -self.state.space.to_vectors(self._in_factor_basis(self._factor.solve, self.state.residual))
 
     def _with_sheets(self, d: Floats) -> Floats:
         """The motion d with the insides of the sheets following their curves."""
         if self._extension is None:
             state = self.state
             try:
-                self._extension = HarmonicExtension(
-                    state.surface, state.classes, state.X, self.backend
-                )
+                self._extension = HarmonicExtension(state.surface, state.classes, state.X, self.backend)
             except SingularMatrix:
                 return d
             self.factorisations += 1

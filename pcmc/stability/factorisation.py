@@ -118,18 +118,14 @@ class _SuperLU:
 
     def __init__(self, pattern: Pattern) -> None:
         entry = np.arange(1, len(pattern.indices) + 1)
-        upper = csr_array(
-            (entry, pattern.indices, pattern.indptr), shape=(pattern.size, pattern.size)
-        )
+        upper = csr_array((entry, pattern.indices, pattern.indptr), shape=(pattern.size, pattern.size))
         rows = np.repeat(np.arange(pattern.size), np.diff(pattern.indptr))
         off = rows != pattern.indices
         lower = csr_array((entry[off], (pattern.indices[off], rows[off])), shape=upper.shape)
         self._full = csr_array(upper + lower)
         self._ordering: Literal["MMD_AT_PLUS_A", "NATURAL"] = "MMD_AT_PLUS_A"
         empty = np.empty(0, dtype=np.int32)
-        self._arrange(
-            reverse_cuthill_mckee(self._full, symmetric_mode=True) if pattern.size else empty
-        )
+        self._arrange(reverse_cuthill_mckee(self._full, symmetric_mode=True) if pattern.size else empty)
 
     def _arrange(self, order: Ints) -> None:
         """Take rows and columns in this order from now on."""
@@ -254,9 +250,7 @@ def _mkl_path() -> str:
 
 def _release(solver: Any, pattern: Pattern) -> None:
     solver.set_phase(-1)
-    solver._call_pardiso(
-        pattern.matrix(np.zeros(len(pattern.indices))), np.zeros((pattern.size, 1))
-    )
+    solver._call_pardiso(pattern.matrix(np.zeros(len(pattern.indices))), np.zeros((pattern.size, 1)))
 
 
 @dataclass(frozen=True, eq=False)

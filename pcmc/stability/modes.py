@@ -73,11 +73,7 @@ def negatives_without(factor: Factor, rigid: Floats) -> int:
 
 
 def stiffness(
-    surface: Surface,
-    classes: VertexClasses,
-    space: MotionSpace,
-    rigid: Floats,
-    backend: str | None = None,
+    surface: Surface, classes: VertexClasses, space: MotionSpace, rigid: Floats, backend: str | None = None
 ) -> Stiffness:
     """Assemble and factorise Bᵀ(∂²E)B at the positions of the surface.
 

@@ -101,13 +101,7 @@ def mask(chosen: Any, n: int, what: str) -> Bools:
 
 
 def mesh(
-    X: Floats,
-    F: Ints,
-    patch: Ints,
-    topo: Topology,
-    patches: Sequence[Any],
-    held: Bools,
-    height: Floats,
+    X: Floats, F: Ints, patch: Ints, topo: Topology, patches: Sequence[Any], held: Bools, height: Floats
 ) -> None:
     """Every vertex is used, no triangle is flat or doubled, each patch is an oriented manifold."""
     names = [p.name for p in patches]
@@ -153,9 +147,7 @@ def _vanished(F: Ints, patch: Ints, patches: Sequence[Any], held: Bools, low: Bo
 
 def lying(height: Floats, X: Floats) -> Bools:
     """(n,) whether vertices at these heights over Π lie on it, to rounding of their coordinates."""
-    return np.abs(height) <= max(
-        RESTING * bounding_size(X), ROUNDED * float(np.abs(X).max(initial=0.0))
-    )
+    return np.abs(height) <= max(RESTING * bounding_size(X), ROUNDED * float(np.abs(X).max(initial=0.0)))
 
 
 def on_plane(height: Floats, sliding: Bools, X: Floats, size: float) -> None:

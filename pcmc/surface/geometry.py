@@ -173,9 +173,7 @@ def angles(P: Floats) -> Floats:
 
 def vertex_sums(values: Floats, F: Ints, n: int) -> Floats:
     """(n,3) at each vertex the sum of the values (m,3) of the faces around it."""
-    return np.stack(
-        [np.bincount(F.ravel(), np.repeat(column, 3), n) for column in values.T], axis=1
-    )
+    return np.stack([np.bincount(F.ravel(), np.repeat(column, 3), n) for column in values.T], axis=1)
 
 
 def cross_2d(u: Floats, v: Floats) -> Floats:

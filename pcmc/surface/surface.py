@@ -62,13 +62,9 @@ class Patch:
 
     def _number(self, key: str, least: float | None = None, hint: str = "") -> float:
         value, where, most = getattr(self, key), self.name, checks.LARGEST
-        number = validate.number(
-            key, value, least=least, where=where, hint=hint, error=SurfaceError
-        )
+        number = validate.number(key, value, least=least, where=where, hint=hint, error=SurfaceError)
         hint = "use a larger unit of force"
-        validate.number(
-            key, number, least=-most, most=most, where=where, hint=hint, error=SurfaceError
-        )
+        validate.number(key, number, least=-most, most=most, where=where, hint=hint, error=SurfaceError)
         object.__setattr__(self, key, number)
         return number
 
@@ -308,9 +304,7 @@ class Surface:
         ``walls`` names patches that are walls whatever their pressure.
         """
         patches = list(self.patches)
-        changes: dict[int, dict[str, Any]] = {
-            self.patch_index(name): {"wall": True} for name in walls
-        }
+        changes: dict[int, dict[str, Any]] = {self.patch_index(name): {"wall": True} for name in walls}
         for key, given in (("tension", tensions), ("pressure", pressures)):
             for name, value in (given or {}).items():
                 changes.setdefault(self.patch_index(name), {})[key] = value

@@ -179,18 +179,12 @@ def topology(faces: Ints, patch_of_face: Ints, vertex_count: int) -> Topology:
     >>> t.edges[~t.boundary_edge].tolist(), t.valence.tolist()
     ([[0, 2]], [1, 2, 1, 1, 1])
     """
-    corners = np.concatenate([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]]).astype(
-        np.int64
-    )
+    corners = np.concatenate([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]]).astype(np.int64)
     low, high = corners.min(axis=1), corners.max(axis=1)
-    key, inverse, count = np.unique(
-        low * vertex_count + high, return_inverse=True, return_counts=True
-    )
+    key, inverse, count = np.unique(low * vertex_count + high, return_inverse=True, return_counts=True)
     edges = np.stack([key // vertex_count, key % vertex_count], axis=1).astype(np.int32)
     edge_of_face = inverse.reshape(3, -1).T.astype(np.int32)
-    return Topology(
-        faces, patch_of_face, vertex_count, edges, np.ascontiguousarray(edge_of_face), count
-    )
+    return Topology(faces, patch_of_face, vertex_count, edges, np.ascontiguousarray(edge_of_face), count)
 
 
 def vertex_kind(ends: Ints, vertex_count: int) -> Ints:

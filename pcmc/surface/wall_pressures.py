@@ -31,10 +31,7 @@ def with_pressures(
     changed = surface.retensioned(tensions, pressures)
     named = {surface.patch_index(name) for name in pressures or ()}
     follow = wall_pressure_changes(surface, changed.pressures - surface.pressures, named)
-    walls = {
-        surface.patches[k].name: float(surface.pressures[k] + follow[k])
-        for k in np.flatnonzero(follow)
-    }
+    walls = {surface.patches[k].name: float(surface.pressures[k] + follow[k]) for k in np.flatnonzero(follow)}
     return changed.retensioned(None, walls, walls) if walls else changed
 
 

@@ -32,9 +32,10 @@ from ..base.errors import SweepError
 from . import case_script
 
 GRACE = 2.0  # seconds that a process may exceed its time limit before it is killed from outside
-ONE_THREAD = {
-    f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA", "NUMEXPR")
-} | {"VECLIB_MAXIMUM_THREADS": "1", "PCMC_THREADS": "1"}
+ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA", "NUMEXPR")} | {
+    "VECLIB_MAXIMUM_THREADS": "1",
+    "PCMC_THREADS": "1",
+}
 
 
 class CaseProcess:
@@ -222,9 +223,7 @@ _teams: dict[str, Team] = {}
 _lock = threading.Lock()
 
 
-def run_case(
-    team: str, case: str, parameters: Mapping[str, Any], time_limit: float | None
-) -> dict[str, Any]:
+def run_case(team: str, case: str, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
     """Run one case in a process of ``team``, a name that belongs to one sweep.
 
     Returns

@@ -58,9 +58,7 @@ def scalar(value: object) -> bool | int | float | str | None:
     if value is None or isinstance(value, bool):
         return value
     if isinstance(value, int) and value.bit_length() > LONGEST:
-        raise TypeError(
-            f"expected a number in the range of floats, found {value.bit_length()} bits"
-        )
+        raise TypeError(f"expected a number in the range of floats, found {value.bit_length()} bits")
     if isinstance(value, str) and value != escape_surrogates(value):
         raise TypeError(f"expected a text without lone surrogates, found {value!r:.80}")
     for kind in (int, float, str):
@@ -143,12 +141,7 @@ def postpone(name: str) -> None:
 def provenance() -> dict[str, Any]:
     """Host, process and versions."""
     packages = {name: version(name) for name in ("pcmc", "numpy", "scipy", "numba")}
-    return {
-        "host": platform.node(),
-        "pid": os.getpid(),
-        "python": platform.python_version(),
-        **packages,
-    }
+    return {"host": platform.node(), "pid": os.getpid(), "python": platform.python_version(), **packages}
 
 
 def version(package: str) -> str:
@@ -170,9 +163,7 @@ def _cut_forks_off(*pipes: BinaryIO) -> None:
     """Close the pipes in every process that a case forks: it must neither answer nor hold them open."""
     nothing = os.open(os.devnull, os.O_RDWR)
     if hasattr(os, "register_at_fork"):
-        os.register_at_fork(
-            after_in_child=lambda: [os.dup2(nothing, pipe.fileno(), False) for pipe in pipes]
-        )
+        os.register_at_fork(after_in_child=lambda: [os.dup2(nothing, pipe.fileno(), False) for pipe in pipes])
 
 
 def _outlive(parent: int) -> None:

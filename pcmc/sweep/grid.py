@@ -170,8 +170,7 @@ def _path(function: Callable[..., Any]) -> str:
 def _axis(name: str, values: object) -> list[Any]:
     if isinstance(values, str | bytes | Mapping | Set) or not np.iterable(values):
         raise OptionError(
-            f"grid[{name!r}] must be a list of values, found {values!r:.60}; a single value belongs"
-            " to fixed",
+            f"grid[{name!r}] must be a list of values, found {values!r:.60}; a single value belongs to fixed",
             what="grid",
             where=name,
             found=values,

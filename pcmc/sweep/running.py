@@ -154,9 +154,7 @@ def _check_options(
     if workers is not None:
         validate.integer("workers", workers, least=1)
     if time_limit is not None:
-        validate.number(
-            "time_limit (seconds; None for no limit)", time_limit, above=0.0, below=LONGEST
-        )
+        validate.number("time_limit (seconds; None for no limit)", time_limit, above=0.0, below=LONGEST)
 
 
 def _wrong_option(name: str, value: object, expected: str) -> OptionError:
@@ -164,9 +162,7 @@ def _wrong_option(name: str, value: object, expected: str) -> OptionError:
     return OptionError(text, what=name, found=value, expected=expected)
 
 
-def _progress(
-    records: dict[int, Record], todo: dict[int, Any], total: int
-) -> Callable[[Record], Progress]:
+def _progress(records: dict[int, Record], todo: dict[int, Any], total: int) -> Callable[[Record], Progress]:
     """A function that counts a new record and returns the state of the sweep."""
     counts = Counter(r.verdict or r.status for n, r in records.items() if n not in todo)
     before, begin = total - len(todo), time.perf_counter()
@@ -182,9 +178,7 @@ def _progress(
 
 @contextmanager
 def _submitted(
-    submit: Submit,
-    todo: dict[int, dict[str, Any]],
-    finished: SimpleQueue[Any],
+    submit: Submit, todo: dict[int, dict[str, Any]], finished: SimpleQueue[Any]
 ) -> Iterator[dict[Future[dict[str, Any]], int]]:
     """Submit all cases. Futures that finish come out of ``finished``; at the end the others are cancelled."""
     pending: dict[Future[dict[str, Any]], int] = {}

@@ -67,9 +67,7 @@ class Record:
 class Store:
     """An open store: ``records`` by case number, and ``append`` for more."""
 
-    def __init__(
-        self, path: Path, database: sqlite3.Connection, records: dict[int, Record]
-    ) -> None:
+    def __init__(self, path: Path, database: sqlite3.Connection, records: dict[int, Record]) -> None:
         self.path, self.records = path, records
         self._database = database
 
@@ -110,16 +108,12 @@ def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FileError(
-            f"{path}: cannot be opened for writing ({error.strerror})", what=str(path)
-        ) from error
+        raise FileError(f"{path}: cannot be opened for writing ({error.strerror})", what=str(path)) from error
     with _connected(path, "rwc") as database:
         _lock(path, database)
         if not database.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]:
             database.execute("CREATE TABLE sweep (version TEXT, declaration TEXT)")
-            database.execute(
-                "CREATE TABLE cases (parameters TEXT PRIMARY KEY, record TEXT, crc INTEGER)"
-            )
+            database.execute("CREATE TABLE cases (parameters TEXT PRIMARY KEY, record TEXT, crc INTEGER)")
             database.execute("INSERT INTO sweep VALUES (?, ?)", (version("pcmc"), "{}"))
             database.execute(f"PRAGMA user_version = {FORMAT}")
         else:
@@ -167,9 +161,7 @@ def _connected(path: Path, mode: str) -> Iterator[sqlite3.Connection]:
         )
         yield database
     except sqlite3.Error as error:
-        raise FileError(
-            f"{path}: cannot be used as a sweep's store ({error})", what=str(path)
-        ) from error
+        raise FileError(f"{path}: cannot be used as a sweep's store ({error})", what=str(path)) from error
     finally:
         if database is not None:
             database.close()
@@ -293,9 +285,7 @@ def _row(record: Record) -> tuple[str, str, int]:
     return key, text, zlib.crc32((key + text).encode())
 
 
-def _records(
-    path: Path, database: sqlite3.Connection, sweep: Iterable[dict[str, Any]]
-) -> dict[int, Record]:
+def _records(path: Path, database: sqlite3.Connection, sweep: Iterable[dict[str, Any]]) -> dict[int, Record]:
     """The stored records of the sweep's cases by case number."""
     rows = {key: rest for key, *rest in database.execute("SELECT * FROM cases")}
     records = {}

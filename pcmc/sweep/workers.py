@@ -22,11 +22,7 @@ CONNECT = 10.0  # seconds a scheduler has to answer, and then to show a worker
 
 @contextmanager
 def open_workers(
-    case: str,
-    time_limit: float | None,
-    executor: Executor | None,
-    scheduler: str | None,
-    workers: int | None,
+    case: str, time_limit: float | None, executor: Executor | None, scheduler: str | None, workers: int | None
 ) -> Iterator[Submit]:
     """A function that has a case run, given its parameters. At the end, the case processes are ended."""
     team = uuid.uuid4().hex
@@ -70,8 +66,7 @@ def _cluster(team: str, address: str) -> Iterator[Executor]:
             client.wait_for_workers(1, timeout=CONNECT)
         except TimeoutError as error:
             raise SweepError(
-                f"the Dask scheduler at {address!r} has no workers; start one with:"
-                f" dask worker {address}",
+                f"the Dask scheduler at {address!r} has no workers; start one with: dask worker {address}",
                 what="scheduler",
                 found=address,
             ) from error
