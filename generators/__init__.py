@@ -1,12 +1,11 @@
-"""The paper's examples and the closed forms, as Surfaces to start from."""
+"""Starting surfaces: the paper's examples, and surfaces with a closed form."""
 
 from .bezier_hall import bezier_hall
 from .double_bubble import double_bubble, double_bubble_exact
-from .four_fans import four_fans
+from .fans import four_fans, three_patches
 from .joined_caps import joined_caps, joined_caps_exact
 from .sphere import sphere, sphere_exact
 from .spherical_cap import spherical_cap, spherical_cap_exact
-from .three_patches import three_patches
 from .two_caps import two_caps
 from .two_squares import two_squares
 

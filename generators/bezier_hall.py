@@ -7,13 +7,13 @@ from itertools import pairwise
 import numpy as np
 
 from pcmc import Patch, Surface
+from pcmc.base import validate
 from pcmc.base.arrays import Floats, Ints
 
 from .bezier import chain
-from .building import Builder
-from .drape import membrane
+from .builder import Builder
+from .membranes import membrane
 from .meshing import fill
-from .options import positive
 
 WIDTH, DEPTH, HEIGHT = 190.22, 101.56, 29.17
 LEFT, MIDDLE, RIGHT, LEFT_WALL, RIGHT_WALL = range(5)
@@ -83,7 +83,7 @@ def bezier_hall(
     >>> [round(float(side), 2) for side in np.ptp(surface.vertices, axis=0)]
     [190.22, 101.56, 29.17]
     """
-    edge_length = positive(edge_length, "edge_length")
+    edge_length = validate.positive("edge_length", edge_length)
     mesh = Builder()
     outline, arches, hole = _curves(mesh, edge_length)
     held = mesh.positions(np.arange(1 + hole[-1]))
@@ -96,11 +96,11 @@ def bezier_hall(
     plan = np.concatenate([held[:, :2], *(inner for inner, _ in pieces)])
     given = np.arange(count) < len(held)
     z = membrane(plan, np.concatenate(faces), given, np.resize(held[:, 2], count), HEIGHT)
-    mesh.points(np.column_stack([plan, z])[~given])
+    mesh.add_points(np.column_stack([plan, z])[~given])
     for patch, part in zip((LEFT, MIDDLE, RIGHT), faces, strict=True):
-        mesh.faces(part, patch)
+        mesh.add_faces(part, patch)
     feet = [
-        mesh.wall(wall, arch, _slope(held[arch]), edge_length)
+        mesh.add_wall(wall, arch, _slope(held[arch]), edge_length)
         for wall, arch in zip((LEFT_WALL, RIGHT_WALL), arches, strict=True)
     ]
     patches = [Patch(name, alpha) for name in ("left", "middle", "right")]
@@ -111,15 +111,15 @@ def bezier_hall(
 def _curves(mesh: Builder, edge_length: float) -> tuple[list[Ints], list[Ints], Ints]:
     """Numbers along the outline's four curves, the two arches, and the hole, which comes last."""
     curves = [chain(np.array(c), edge_length) for c in (WEST, SOUTH, EAST, NORTH, *ARCHES)]
-    feet = mesh.points([curve[0] for curve in curves[:4]])
+    feet = mesh.add_points([curve[0] for curve in curves[:4]])
     northwest, southwest, southeast, northeast = feet[:, None]
     around = [northwest, southwest, southeast, northeast, northwest]
     ends = [*pairwise(around), (southwest, northwest), (southeast, northeast)]
     lines = [
-        np.concatenate([start, mesh.points(curve[1:-1]), end])
+        np.concatenate([start, mesh.add_points(curve[1:-1]), end])
         for curve, (start, end) in zip(curves, ends, strict=True)
     ]
-    return lines[:4], lines[4:], mesh.points(chain(np.array(HOLE), edge_length)[:-1])
+    return lines[:4], lines[4:], mesh.add_points(chain(np.array(HOLE), edge_length)[:-1])
 
 
 def _bays(outline: list[Ints], arches: list[Ints], hole: Ints) -> list[list[Ints]]:

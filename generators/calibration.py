@@ -1,8 +1,7 @@
-"""How near each mesh family comes to the ‖∇E‖² that the paper prints for its initial shapes.
+"""‖∇E‖² of each family of meshes beside the value that the paper prints for its initial shapes.
 
-The paper does not publish its meshes, and ‖∇E‖² of the same shape falls with the triangles' size.
-So every family of each example is tried at every resolution of a declared list; nothing else is
-varied.
+The paper does not publish its meshes, and ‖∇E‖² of the same shape falls with the size of the triangles.
+So each family of an example is tried at each resolution of a fixed list; nothing else varies.
 """
 
 from __future__ import annotations
@@ -12,10 +11,10 @@ from dataclasses import dataclass
 from functools import partial
 
 from pcmc import Surface, gradient
-from pcmc.base.errors import OptionError, unknown
+from pcmc.base import validate
 
 from .bezier_hall import bezier_hall
-from .four_fans import four_fans
+from .fans import four_fans
 from .two_caps import two_caps
 
 PRINTED = {"example2": 12.204, "example3": 7893.633, "example4": 2.678e5}  # Secs. 4.2, 4.3, 4.4
@@ -60,8 +59,7 @@ def candidates(examples: Iterable[str] = tuple(PRINTED)) -> Iterator[Candidate]:
     ('soap film, rings', 'rings', 4, 7893.633)
     """
     for example in examples:
-        if example not in PRINTED:
-            raise OptionError(unknown("example", example, PRINTED))
+        validate.choice("example", example, tuple(PRINTED))
         for family, parameter, resolutions, build in _families(example):
             for resolution in resolutions:
                 surface = build(resolution)
@@ -71,15 +69,15 @@ def candidates(examples: Iterable[str] = tuple(PRINTED)) -> Iterator[Candidate]:
                 )
 
 
-def nearest(found: Iterable[Candidate]) -> list[Candidate]:
-    """Of each family the candidate whose ratio is nearest to 1, in the order of the families.
+def nearest(tried: Iterable[Candidate]) -> list[Candidate]:
+    """The candidate of each family whose ratio is nearest to 1, in the order of the families.
 
     >>> near, far = (Candidate("e", "f", "n", n, 9, g, 8.0) for n, g in ((1, 9.0), (2, 2.0)))
     >>> [candidate.resolution for candidate in nearest([far, near])]
     [1]
     """
     best: dict[tuple[str, str], Candidate] = {}
-    for one in found:
+    for one in tried:
         key = (one.example, one.family)
         if key not in best or _distance(one) < _distance(best[key]):
             best[key] = one

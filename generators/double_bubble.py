@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Patch, Surface
+from pcmc.base import validate
 from pcmc.base.arrays import Floats, Ints
 from pcmc.base.errors import OptionError
 
-from .building import Builder
-from .exact import Exact, Sphere, UprightPlane
-from .options import positive
-from .rosette import cap_directions, disc_points, even_segments, rosette
+from .builder import Builder
+from .exact import ExactSolution, Sphere, UprightPlane
+from .ring_mesh import cap_directions, disc_points, even_segments, ring_mesh
 from .sphere import STRETCH
+from .sphere_pair import balanced_offsets
 
 LEFT, RIGHT, WALL = range(3)
 
@@ -34,27 +35,27 @@ def double_bubble(
     ----------
     edge_length : length.
     alpha_left, alpha_right, alpha_aux : tension of the patches "left", "right" and "wall".
-    exact : put the vertices on the exact solution; otherwise it is drawn out by 1.05, 1 and 0.95
+    exact : put the vertices on the exact solution; otherwise it is stretched by 1.05, 1 and 0.95
         along the axes.
 
     >>> surface = double_bubble(exact=True)
     >>> bool(double_bubble_exact().distance(surface).max() < 1e-12)
     True
     """
-    edge_length = positive(edge_length, "edge_length")
+    edge_length = validate.positive("edge_length", edge_length)
     offsets, rim_radius = _offsets(alpha_left, alpha_right, alpha_aux)
     count = int(even_segments(np.array([rim_radius]), edge_length)[0])
     around = 2.0 * np.pi * np.arange(count) / count
     mesh = Builder()
     ring = np.stack([0.0 * around, np.cos(around), np.sin(around)], axis=1)
-    rim = mesh.points(rim_radius * ring)
+    rim = mesh.add_points(rim_radius * ring)
     for patch, alpha, sign in ((LEFT, alpha_left, -1.0), (RIGHT, alpha_right, 1.0)):
         opening = np.pi - float(np.arctan2(rim_radius, offsets[patch]))
         points, faces = _bubble(2.0 * alpha, opening, count, edge_length)
         points[:, 0] = sign * (points[:, 0] + offsets[patch])
         _glue(mesh, points, faces[:, :: int(sign)], rim, patch)
     rings = max(1, round(rim_radius / edge_length))
-    net = rosette(_up_to(rim_radius * np.arange(1, rings + 1) / rings, count, edge_length))
+    net = ring_mesh(_segments(rim_radius * np.arange(1, rings + 1) / rings, count, edge_length))
     disc = rim_radius * disc_points(net)
     _glue(mesh, np.column_stack([0.0 * net.angle, disc]), net.faces, rim, WALL)
     patches = [
@@ -68,8 +69,8 @@ def double_bubble(
 
 def double_bubble_exact(
     *, alpha_left: float = 1.0, alpha_right: float = 1.0, alpha_aux: float = 1.0
-) -> Exact:
-    """Two spheres less what the disc cuts off.
+) -> ExactSolution:
+    """Two spheres without the caps that the disc cuts off.
 
     A = 2π r (r + d) and V = π (r + d)² (2r - d)/3 for each, with r = 2α its radius and d the
     distance of its centre from the disc, negative when it lies in the other bubble.
@@ -91,34 +92,37 @@ def double_bubble_exact(
         "wall": UprightPlane(),
     }
     widest = max([rim_radius, *r[d > 0.0].tolist()])
-    return Exact(energy, float(areas.sum() + wall), volume, 2.0 * widest, shapes)
+    return ExactSolution(energy, float(areas.sum() + wall), volume, 2.0 * widest, shapes)
 
 
 def _offsets(
     alpha_left: float, alpha_right: float, alpha_aux: float
 ) -> tuple[tuple[float, float], float]:
     """Distance of each centre from the disc, and the disc's radius."""
-    left, right = positive(alpha_left, "alpha_left"), positive(alpha_right, "alpha_right")
-    wall = positive(alpha_aux, "alpha_aux")
-    offset = wall + (left**2 - right**2) / wall
-    square = 4.0 * left**2 - offset**2
+    left = validate.positive("alpha_left", alpha_left)
+    right = validate.positive("alpha_right", alpha_right)
+    wall = validate.positive("alpha_aux", alpha_aux)
+    offsets, square = balanced_offsets(left, right, wall)
     if square <= 0.0:
         raise OptionError(
             f"tensions {left:g}, {right:g}, {wall:g} cannot balance at a junction: each must be"
-            " less than the sum of the others"
+            " less than the sum of the others",
+            what="alpha_aux",
+            found=wall,
+            expected=(abs(left - right), left + right),
         )
-    return (offset, 2.0 * wall - offset), float(np.sqrt(square))
+    return offsets, float(np.sqrt(square))
 
 
 def _bubble(radius: float, opening: float, count: int, edge_length: float) -> tuple[Floats, Ints]:
     """A cap about +x whose rim has ``count`` vertices; they come last."""
     rings = max(2, round(radius * opening / edge_length))
     theta = opening * np.arange(1, rings + 1) / rings
-    net = rosette(_up_to(radius * np.sin(theta), count, edge_length))
+    net = ring_mesh(_segments(radius * np.sin(theta), count, edge_length))
     return radius * cap_directions(net, opening)[:, [2, 0, 1]], net.faces
 
 
-def _up_to(radii: Floats, count: int, edge_length: float) -> Ints:
+def _segments(radii: Floats, count: int, edge_length: float) -> Ints:
     segments = even_segments(radii, edge_length)
     segments[-1] = count
     return segments
@@ -126,5 +130,5 @@ def _up_to(radii: Floats, count: int, edge_length: float) -> Ints:
 
 def _glue(mesh: Builder, points: Floats, faces: Ints, rim: Ints, patch: int) -> None:
     """Add a piece whose last points are the rim's."""
-    numbers = np.concatenate([mesh.points(points[: -len(rim)]), rim])
-    mesh.faces(numbers[faces], patch)
+    numbers = np.concatenate([mesh.add_points(points[: -len(rim)]), rim])
+    mesh.add_faces(numbers[faces], patch)

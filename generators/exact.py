@@ -1,4 +1,4 @@
-"""What a closed form knows about its surface."""
+"""Surfaces in closed form: energy, area, volume, height, and the shape of each patch."""
 
 from __future__ import annotations
 
@@ -18,6 +18,30 @@ class Sphere:
     centre: tuple[float, float, float]
     radius: float
 
+    @property
+    def floor_radius(self) -> float:
+        """Radius of its circle on Π (z = 0), length."""
+        return float(np.sqrt(self.radius**2 - self.centre[2] ** 2))
+
+    def project(self, points: Floats) -> Floats:
+        """(k,2) stereographic projection of points (k,3) on the sphere from its lowest point.
+
+        Angles are preserved; lengths are those of the sphere at its top.
+        """
+        q = (points - np.array(self.centre)) / self.radius
+        return self.radius * 2.0 * q[:, :2] / (1.0 + q[:, 2:])
+
+    def lift(self, projections: Floats) -> Floats:
+        """(k,3) points on the sphere with these stereographic projections (k,2).
+
+        >>> Sphere((0.0, 0.0, 1.0), 2.0).lift(np.array([[0.0, 0.0]])).tolist()
+        [[0.0, 0.0, 3.0]]
+        """
+        w = projections / (2.0 * self.radius)
+        s = (w**2).sum(axis=1, keepdims=True)
+        unit = np.concatenate([2.0 * w, 1.0 - s], axis=1) / (1.0 + s)
+        return self.radius * unit + np.array(self.centre)
+
     def distance(self, points: Floats) -> Floats:
         """(k,) distance of points (k,3) from the sphere, length.
 
@@ -29,7 +53,7 @@ class Sphere:
 
 @dataclass(frozen=True)
 class UprightPlane:
-    """The plane at x, upright on Π."""
+    """The plane of all points with this x, perpendicular to Π."""
 
     x: float = 0.0
 
@@ -39,7 +63,7 @@ class UprightPlane:
 
 
 @dataclass(frozen=True)
-class Exact:
+class ExactSolution:
     """A surface in closed form.
 
     Attributes
@@ -48,7 +72,7 @@ class Exact:
     area : A of all patches together, length².
     volume : V under pressure, length³.
     height : of the highest point over Π (or over the lowest point of a closed surface), length.
-    shapes : the sphere or plane that each patch is a part of, by the patch's name.
+    shapes : the sphere or plane that contains each patch, by the patch's name.
     """
 
     energy: float
@@ -58,13 +82,10 @@ class Exact:
     shapes: Mapping[str, Sphere | UprightPlane]
 
     def distance(self, surface: Surface) -> Floats:
-        """(n,) how far each vertex lies from the shape of its patch, length.
-
-        Where patches meet, the largest of the distances.
-        """
+        """(n,) distance of each vertex from the shape of its patch, length; the largest of several."""
         largest = np.zeros(surface.n)
         for i, patch in enumerate(surface.patches):
-            used = np.unique(surface.faces[surface.patch_of_face == i])
-            apart = self.shapes[patch.name].distance(surface.vertices[used])
-            largest[used] = np.maximum(largest[used], apart)
+            vertices = np.unique(surface.faces[surface.patch_of_face == i])
+            distance = self.shapes[patch.name].distance(surface.vertices[vertices])
+            largest[vertices] = np.maximum(largest[vertices], distance)
         return largest

@@ -1,19 +1,17 @@
-"""Two joined caps in closed form: every condition of a P-CMC surface holds exactly."""
+"""Two joined caps in closed form; every condition of a P-CMC surface holds exactly."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from pcmc import Patch, Surface
+from pcmc.base import validate
 from pcmc.base.errors import OptionError
 
-from .exact import Exact, Sphere, UprightPlane
-from .options import positive
-from .sphere_pair import Ball, build_pair
+from .exact import ExactSolution, Sphere, UprightPlane
+from .sphere_pair import balanced_offsets, build_pair
 
-RISE = 0.7  # of the exact height: a start that is plainly not the solution, and near enough to it
+RISE = 0.7  # of the exact height: a start that is clearly not the solution, yet near enough to reach it
 
 
 def joined_caps(
@@ -42,10 +40,8 @@ def joined_caps(
     >>> bool(joined_caps_exact().distance(surface).max() < 1e-12)
     True
     """
-    edge_length = positive(edge_length, "edge_length")
-    pair = _Pair.of(alpha_left, alpha_right, alpha_aux, depth)
-    left = Ball(-pair.left_offset, -depth, 2.0 * alpha_left)
-    right = Ball(pair.right_offset, -depth, 2.0 * alpha_right)
+    edge_length = validate.positive("edge_length", edge_length)
+    left, right = _spheres(alpha_left, alpha_right, alpha_aux, depth)
     mesh, fixed, sliding = build_pair(left, right, edge_length, upright=True)
     patches = [
         Patch("left", alpha_left),
@@ -62,7 +58,7 @@ def joined_caps_exact(
     alpha_right: float = 3.0,
     alpha_aux: float = 3.0,
     depth: float = 4.5,
-) -> Exact:
+) -> ExactSolution:
     """Energy, area, volume and height of the two joined caps, and their spheres.
 
     Areas follow from Gauss-Bonnet on the sphere, volumes from the divergence theorem.
@@ -70,54 +66,50 @@ def joined_caps_exact(
     >>> round(joined_caps_exact().height, 12), joined_caps_exact().shapes["left"].radius
     (3.5, 8.0)
     """
-    pair = _Pair.of(alpha_left, alpha_right, alpha_aux, depth)
-    left, left_volume = _half(2.0 * alpha_left, pair.left_offset, depth)
-    right, right_volume = _half(2.0 * alpha_right, pair.right_offset, depth)
-    wall = _segment(pair.wall_radius, depth)
-    volume = left_volume + right_volume
-    tops = [pair.wall_radius - depth]
-    tops += [2.0 * alpha_left - depth] if pair.left_offset > 0.0 else []
-    tops += [2.0 * alpha_right - depth] if pair.right_offset > 0.0 else []
+    spheres = _spheres(alpha_left, alpha_right, alpha_aux, depth)
+    offsets = -spheres[0].centre[0], spheres[1].centre[0]
+    wall_radius = float(np.sqrt(spheres[0].radius ** 2 - offsets[0] ** 2))
+    (left, left_volume), (right, right_volume) = (
+        _part(sphere.radius, offset, depth) for sphere, offset in zip(spheres, offsets, strict=True)
+    )
+    wall, volume = _segment(wall_radius, depth), left_volume + right_volume
+    tops = [s.radius - depth for s, offset in zip(spheres, offsets, strict=True) if offset > 0.0]
     shapes: dict[str, Sphere | UprightPlane] = {
-        "left": Sphere((-pair.left_offset, 0.0, -depth), 2.0 * alpha_left),
-        "right": Sphere((pair.right_offset, 0.0, -depth), 2.0 * alpha_right),
+        "left": spheres[0],
+        "right": spheres[1],
         "wall": UprightPlane(),
     }
     energy = alpha_left * left + alpha_right * right + alpha_aux * wall - volume
-    return Exact(energy, left + right + wall, volume, max(tops), shapes)
+    height = max(wall_radius - depth, *tops)
+    return ExactSolution(energy, left + right + wall, volume, height, shapes)
 
 
-@dataclass(frozen=True)
-class _Pair:
-    """How far each centre is from the wall, and the radius of the circle both spheres share."""
-
-    left_offset: float
-    right_offset: float
-    wall_radius: float
-
-    @staticmethod
-    def of(alpha_left: float, alpha_right: float, alpha_aux: float, depth: float) -> _Pair:
-        positive(depth, "depth")
-        for name, alpha in (
-            ("alpha_left", alpha_left),
-            ("alpha_right", alpha_right),
-            ("alpha_aux", alpha_aux),
-        ):
-            positive(alpha, name)
-        # offsets add up to 2 α_aux, and both triangles with a radius 2 α share the wall's circle
-        offset = alpha_aux + (alpha_left**2 - alpha_right**2) / alpha_aux
-        square = 4.0 * alpha_left**2 - offset**2
-        if square <= depth**2:
-            raise OptionError(
-                f"tensions {alpha_left:g}, {alpha_right:g}, {alpha_aux:g} at depth {depth:g}: the"
-                " spheres do not meet above the plane; take a smaller depth, or a wall tension"
-                " between the difference and the sum of the others"
-            )
-        return _Pair(offset, 2.0 * alpha_aux - offset, float(np.sqrt(square)))
+def _spheres(
+    alpha_left: float, alpha_right: float, alpha_aux: float, depth: float
+) -> tuple[Sphere, Sphere]:
+    """The spheres of both caps; the wall is at x = 0."""
+    validate.positive("depth", depth)
+    validate.positive("alpha_left", alpha_left)
+    validate.positive("alpha_right", alpha_right)
+    validate.positive("alpha_aux", alpha_aux)
+    (left, right), square = balanced_offsets(alpha_left, alpha_right, alpha_aux)
+    if square <= depth**2:
+        raise OptionError(
+            f"tensions {alpha_left:g}, {alpha_right:g}, {alpha_aux:g} at depth {depth:g}: the"
+            " spheres do not meet above the plane; take a smaller depth, or a wall tension"
+            " between the difference and the sum of the others",
+            what="depth",
+            found=depth,
+            expected=float(np.sqrt(max(square, 0.0))),
+        )
+    return (
+        Sphere((-left, 0.0, -depth), 2.0 * alpha_left),
+        Sphere((right, 0.0, -depth), 2.0 * alpha_right),
+    )
 
 
-def _half(radius: float, offset: float, depth: float) -> tuple[float, float]:
-    """Area and volume of a ball's part above ``depth`` over its centre and up to ``offset`` beyond.
+def _part(radius: float, offset: float, depth: float) -> tuple[float, float]:
+    """Area and volume of the part of a ball higher than ``depth`` over its centre, up to x = ``offset``.
 
     Gauss-Bonnet: A/r² = 2π - Σ turning angles - Σ ∫ geodesic curvature. Both edges are circles; one
     at distance d from the centre has geodesic curvature d/(r √(r² - d²)), positive if it bulges.

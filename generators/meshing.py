@@ -1,7 +1,7 @@
-"""Near-equilateral triangles inside plane outlines whose vertices are given and stay.
+"""Nearly equilateral triangles inside plane outlines; the vertices of the outlines do not move.
 
-The meshes of the paper's examples come from here and not from ``pcmc.plan``: what the flow does depends on
-the mesh, and a better mesher for plans must not move the reproduced numbers.
+The examples of the paper use these meshes and not those of ``pcmc.plan``: the result of a flow depends on
+its mesh, and changes to the mesher of plans must not change the reproduced numbers.
 """
 
 from __future__ import annotations
@@ -17,18 +17,17 @@ from pcmc.base.arrays import Bools, Floats, Ints
 from pcmc.base.errors import OptionError
 from pcmc.surface.geometry import cross_2d
 
-CLEARANCE = 0.65  # of the spacing: where the lattice ends before an outline
-SWEEPS, PUSHES = 4, 5  # triangulations, and steps on each; more gain nothing
-REACH = 1.05  # of the spacing: longer edges are left alone
-STEP = 0.1  # of an edge's shortness, from each of its triangles: twice that rings
+CLEARANCE = 0.65  # of the spacing: distance of the lattice from the outlines
+SWEEPS, RELAXATIONS = 4, 5  # triangulations, and steps on each; more do not improve the mesh
+REACH = 1.05  # of the spacing: shorter edges push their ends apart
+STEP = 0.1  # of the length that an edge lacks, for each of its triangles; 0.2 oscillates
 
 
 def fill(outlines: Sequence[Floats], spacing: float) -> tuple[Floats, Ints]:
     """Interior points and faces of the region inside ``outlines``.
 
-    A triangular lattice fills the region up to a clearance from the outlines; then, in a few
-    sweeps, edges that are too short push their ends apart and the points are triangulated anew
-    (Delaunay).
+    A triangular lattice fills the region at some distance from the outlines. In each of a few
+    sweeps, short edges push their ends apart, and a new Delaunay triangulation connects the points.
 
     Parameters
     ----------
@@ -45,8 +44,8 @@ def fill(outlines: Sequence[Floats], spacing: float) -> tuple[Floats, Ints]:
     Raises
     ------
     OptionError
-        When an outline's side is not an edge of the triangulation: its segments are too long where
-        it comes near itself or another outline.
+        If a side of an outline is not an edge of the triangulation: the segments are too long where
+        outlines are close to each other.
 
     >>> square = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [2, 2], [1, 2], [0, 2], [0, 1.0]])
     >>> points, faces = fill([square], 1.0)
@@ -60,7 +59,7 @@ def fill(outlines: Sequence[Floats], spacing: float) -> tuple[Floats, Ints]:
     points = points[region.contains(points)]
     points = points[_distance(points, rim, sides) > CLEARANCE * spacing]
     for _ in range(SWEEPS):
-        points = _pushed(rim, points, region.triangulate(points), spacing)
+        points = _relaxed(rim, points, region.triangulate(points), spacing)
     faces = region.triangulate(points)
     _require_sides(faces, sides, rim)
     return points, faces
@@ -73,7 +72,7 @@ class _Region:
         self.rim = rim
         self.coarse: Any = Delaunay(rim)
         centroids = rim[self.coarse.simplices].mean(axis=1)
-        self.inside = np.append(_crossings(centroids, rim, sides) % 2 == 1, False)
+        self.inside = np.append(_ray_crossings(centroids, rim, sides) % 2 == 1, False)
 
     def contains(self, points: Floats) -> Bools:
         """(k,) bool."""
@@ -107,8 +106,8 @@ def _lattice(rim: Floats, spacing: float) -> Floats:
     return middle + points
 
 
-def _crossings(points: Floats, rim: Floats, sides: Ints) -> Ints:
-    """How many sides a ray to the right from each point meets: odd inside."""
+def _ray_crossings(points: Floats, rim: Floats, sides: Ints) -> Ints:
+    """Number of sides that a ray to the right of each point crosses; odd inside."""
     counts = np.zeros(len(points), dtype=np.int64)
     for part in np.array_split(np.arange(len(points)), 1 + len(points) * len(sides) // 10**7):
         x, y = points[part].T[:, :, None]
@@ -134,14 +133,14 @@ def _distance(points: Floats, rim: Floats, sides: Ints) -> Floats:
     return distance
 
 
-def _pushed(rim: Floats, points: Floats, faces: Ints, spacing: float) -> Floats:
-    """The interior points after short edges have pushed their ends apart; the rim stays."""
+def _relaxed(rim: Floats, points: Floats, faces: Ints, spacing: float) -> Floats:
+    """The interior points after short edges have pushed their ends apart; the rim does not move."""
     both = np.concatenate([rim, points])
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     side = np.tile(np.arange(len(sides)), 2)
     signs = np.repeat([STEP, -STEP], len(sides))
     ends = coo_array((signs, (sides.T.ravel(), side)), shape=(len(both), len(sides))).tocsr()
-    for _ in range(PUSHES):
+    for _ in range(RELAXATIONS):
         apart = both[sides[:, 0]] - both[sides[:, 1]]
         length = np.linalg.norm(apart, axis=1)
         short = np.maximum(REACH * spacing - length, 0.0)
@@ -157,6 +156,8 @@ def _require_sides(faces: Ints, sides: Ints, rim: Floats) -> None:
     if len(lost):
         point = rim[sides[lost[0], 0]].round(6).tolist()
         raise OptionError(
-            f"the outline's side at {point} is no edge of the triangulation ({len(lost)} such"
-            " sides): its segments are too long there; use a smaller edge length"
+            f"the side of the outline at {point} is not an edge of the triangulation ({len(lost)} such"
+            " sides): its segments are too long there; use a smaller edge length",
+            what="outlines",
+            where=tuple(point),
         )

@@ -1,16 +1,16 @@
-"""A patch over a disc: the simplest surface in closed form, a part of the sphere of radius 2α."""
+"""A patch over a disc, part of the sphere of radius 2α: the simplest surface in closed form."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pcmc import Patch, Surface
+from pcmc.base import validate
 from pcmc.base.errors import OptionError
 
-from .building import Builder
-from .exact import Exact, Sphere
-from .options import positive
-from .rosette import cap_directions, rosette
+from .builder import Builder
+from .exact import ExactSolution, Sphere
+from .ring_mesh import cap_directions, ring_mesh
 
 
 def spherical_cap(
@@ -21,9 +21,9 @@ def spherical_cap(
     height: float | None = None,
     exact: bool = False,
 ) -> Surface:
-    """A patch with a fixed circle on Π, starting as a dome of another height than at rest.
+    """A patch with a fixed circle on Π, as a dome whose height is not that of the equilibrium.
 
-    Its equilibrium, for α ≥ radius/2, is `spherical_cap_exact`.
+    Its equilibrium, for α ≥ radius/2, is ``spherical_cap_exact``.
 
     Parameters
     ----------
@@ -31,50 +31,55 @@ def spherical_cap(
     alpha : tension of "cap", force/length.
     height : of the initial dome, a part of a sphere; 0.3 radius unless given. It may exceed the
         radius: more than a hemisphere.
-    exact : put the vertices on the exact solution instead.
+    exact : put the vertices on the exact solution.
 
     Raises
     ------
     OptionError
-        With ``exact`` where α < radius/2, since there is no solution.
+        With ``exact`` if α < radius/2: there is no solution.
 
     >>> surface = spherical_cap(0.25, exact=True)
     >>> bool(abs(surface.vertices[0, 2] - spherical_cap_exact().height) < 1e-12)
     True
     """
-    edge_length, radius = positive(edge_length, "edge_length"), positive(radius, "radius")
+    edge_length = validate.positive("edge_length", edge_length)
+    radius = validate.positive("radius", radius)
     if exact:
         height = spherical_cap_exact(radius=radius, alpha=alpha).height
-    dome = 0.3 * radius if height is None else positive(height, "height")
+    dome = 0.3 * radius if height is None else validate.positive("height", height)
     ball = (radius**2 + dome**2) / (2.0 * dome)
     opening = 2.0 * np.arctan2(dome, radius)  # from the pole to the rim, seen from the centre
     rings = max(2, round(radius / edge_length))
-    net = rosette(6 * np.arange(1, rings + 1))
+    net = ring_mesh(6 * np.arange(1, rings + 1))
     points = ball * cap_directions(net, opening) + [0.0, 0.0, dome - ball]
     rim = np.arange(len(points) - 6 * rings, len(points))
     points[rim, 2] = 0.0
     mesh = Builder()
-    mesh.faces(mesh.points(points)[net.faces], 0)
+    mesh.add_faces(mesh.add_points(points)[net.faces], 0)
     return mesh.surface([Patch("cap", alpha)], fixed=rim)
 
 
-def spherical_cap_exact(*, radius: float = 1.0, alpha: float = 0.6) -> Exact:
+def spherical_cap_exact(*, radius: float = 1.0, alpha: float = 0.6) -> ExactSolution:
     """The sphere of radius 2α through the circle: height h = 2α - √(4α² - radius²).
 
-    A = 4π α h and V = π h² (6α - h) / 3. The lower of the two branches, which is the stable one.
+    A = 4π α h and V = π h² (6α - h) / 3. This is the lower of the two branches, the stable one.
 
     >>> cap = spherical_cap_exact()
     >>> round(cap.energy, 10), round(cap.height, 10)
     (1.5039191689, 0.5366750419)
     """
-    radius, alpha = positive(radius, "radius"), positive(alpha, "alpha")
+    radius = validate.positive("radius", radius)
+    alpha = validate.positive("alpha", alpha)
     if 2.0 * alpha < radius:
         raise OptionError(
             f"alpha must be at least radius/2 = {radius / 2:g}, found {alpha:g}: below the"
-            " hemisphere's tension a cap has no equilibrium"
+            " hemisphere's tension a cap has no equilibrium",
+            what="alpha",
+            found=alpha,
+            expected=radius / 2,
         )
     h = 2.0 * alpha - float(np.sqrt(4.0 * alpha**2 - radius**2))
     area = 4.0 * np.pi * alpha * h
     volume = np.pi * h**2 * (6.0 * alpha - h) / 3.0
     ball = Sphere((0.0, 0.0, h - 2.0 * alpha), 2.0 * alpha)
-    return Exact(alpha * area - volume, area, volume, h, {"cap": ball})
+    return ExactSolution(alpha * area - volume, area, volume, h, {"cap": ball})

@@ -1,4 +1,4 @@
-"""Triangles between neighbouring lines of vertices: walls, fans and discs are made of these."""
+"""Strips of triangles between neighbouring lines of vertices, for walls, fans and discs."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from pcmc.base.arrays import Bools, Ints
 
 
 def strips(line_vertices: Ints, segments: Ints, mirrored: Bools | None = None) -> Ints:
-    """Triangles (f,3) that fill the gaps between consecutive lines of vertices.
+    """Triangles (f,3) that fill the strips between consecutive lines of vertices.
 
-    Line i has ``segments[i] + 1`` vertices, and the gap to the next line gets a triangle per
-    segment of either line, in the order of their midpoints. A line of 0 segments is one vertex.
+    Line i has ``segments[i] + 1`` vertices, and the strip to the next line has a triangle for
+    each segment of either line, in the order of their midpoints. A line of 0 segments is one vertex.
     Faces are counter-clockwise where lines run upwards and the next line lies to the right.
 
     Parameters
     ----------
     line_vertices : the vertex numbers of all lines, one line after the other.
     segments : (c,) int, segments of each line.
-    mirrored : (c-1,) bool, gaps whose diagonals lean the other way where midpoints coincide.
+    mirrored : (c-1,) bool, strips whose diagonals lean the other way where midpoints coincide.
 
     >>> strips(np.array([0, 1, 2, 3]), np.array([1, 1])).tolist()
     [[0, 2, 1], [1, 2, 3]]
@@ -30,13 +30,13 @@ def strips(line_vertices: Ints, segments: Ints, mirrored: Bools | None = None) -
     left, right = segments[:-1], segments[1:]
     lean = np.zeros(len(left), dtype=bool) if mirrored is None else mirrored
 
-    gap, j = numbered(left)
+    gap, j = number_within_groups(left)
     passed = _midpoints_before(j, left[gap], right[gap], lean[gap])
     on_left = start[gap] + j
     first = np.stack([on_left, start[gap + 1] + passed, on_left + 1], axis=1)
     order_first = (gap, j + passed)
 
-    gap, k = numbered(right)
+    gap, k = number_within_groups(right)
     passed = _midpoints_before(k, right[gap], left[gap], ~lean[gap])
     on_right = start[gap + 1] + k
     second = np.stack([start[gap] + passed, on_right, on_right + 1], axis=1)
@@ -47,10 +47,10 @@ def strips(line_vertices: Ints, segments: Ints, mirrored: Bools | None = None) -
     return np.asarray(line_vertices)[faces]
 
 
-def numbered(counts: Ints) -> tuple[Ints, Ints]:
+def number_within_groups(counts: Ints) -> tuple[Ints, Ints]:
     """For each of counts[i] items of group i: the group, and the item's number within it.
 
-    >>> [a.tolist() for a in numbered(np.array([2, 0, 1]))]
+    >>> [a.tolist() for a in number_within_groups(np.array([2, 0, 1]))]
     [[0, 0, 2], [0, 1, 0]]
     """
     group = np.repeat(np.arange(len(counts)), counts)
@@ -59,7 +59,7 @@ def numbered(counts: Ints) -> tuple[Ints, Ints]:
 
 def _midpoints_before(j: Ints, own: Ints, other: Ints, ties: Bools) -> Ints:
     """How many of the other line's midpoints (k + ½)/other come before (j + ½)/own, or tie."""
-    # (2k + 1) own < (2j + 1) other, in whole numbers so that no tie is lost to rounding
+    # (2k + 1) own < (2j + 1) other, in integers, so that rounding loses no tie
     twice = (2 * j + 1) * other
     below = (twice + own - 1) // (2 * own)
     return np.clip(np.where(ties, (twice + own) // (2 * own), below), 0, other)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pcmc import Patch, Surface
-from pcmc.base.errors import OptionError, unknown
+from pcmc.base import validate
 
-from .options import positive
-from .sphere_pair import Ball, build_pair
+from .exact import Sphere
+from .sphere_pair import build_pair
 
-LARGE = Ball(-5.0, -17.5, 18.5)
-SMALL = Ball(3.0, -7.5, 8.5)
+LARGE = Sphere((-5.0, 0.0, -17.5), 18.5)
+SMALL = Sphere((3.0, 0.0, -7.5), 8.5)
 WALLS = ("upright", "inclined")
 
 
@@ -28,7 +28,7 @@ def two_caps(
     Π. The outline is fixed, the wall's foot slides.
 
     The paper prints ‖∇E‖² = 12.204 for its initial shape; an edge length of 0.36 comes nearest
-    (`generators.calibration`). The paper's flow converges as printed at 1.2, not at 0.36.
+    (``generators.calibration``). The paper's flow converges as printed at 1.2, not at 0.36.
 
     Parameters
     ----------
@@ -46,9 +46,8 @@ def two_caps(
     >>> [p.name for p in surface.patches], float(surface.vertices[:, 2].max().round(1))
     (['large', 'small', 'wall'], 1.0)
     """
-    edge_length = positive(edge_length, "edge_length")
-    if wall not in WALLS:
-        raise OptionError(unknown("wall", wall, WALLS))
+    edge_length = validate.positive("edge_length", edge_length)
+    validate.choice("wall", wall, WALLS)
     mesh, fixed, sliding = build_pair(LARGE, SMALL, edge_length, upright=wall == "upright")
     patches = (
         Patch("large", alpha_large),

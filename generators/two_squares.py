@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pcmc import Patch, Surface
+from pcmc.base import validate
 from pcmc.base.arrays import Floats, Ints
-from pcmc.base.errors import OptionError, unknown
 
-from .building import Builder
-from .options import positive, whole
+from .builder import Builder
 
 LEFT, RIGHT, WALL = range(3)
 DIAGONALS = ("symmetric", "parallel")
@@ -47,16 +46,16 @@ def two_squares(
     >>> surface.n, surface.m, float(surface.vertices[:, 2].max())
     (48, 70, 1.0)
     """
-    n = whole(n, "n", least=2)
-    side, height = positive(side, "side"), positive(height, "height")
-    if diagonals not in DIAGONALS:
-        raise OptionError(unknown("diagonals", diagonals, DIAGONALS))
+    n = validate.integer("n", n, least=2)
+    side = validate.positive("side", side)
+    height = validate.positive("height", height)
+    validate.choice("diagonals", diagonals, DIAGONALS)
     mesh = Builder()
-    number = mesh.points(_roof(n, side, height)).reshape(2 * n + 1, n + 1)
+    number = mesh.add_points(_roof(n, side, height)).reshape(2 * n + 1, n + 1)
     faces = _squares(number, n, diagonals)
-    mesh.faces(faces[: len(faces) // 2], LEFT)
-    mesh.faces(faces[len(faces) // 2 :], RIGHT)
-    foot = mesh.wall(WALL, number[n], mesh.positions(number[n]) * [1.0, 1.0, 0.0], side / n)
+    mesh.add_faces(faces[: len(faces) // 2], LEFT)
+    mesh.add_faces(faces[len(faces) // 2 :], RIGHT)
+    foot = mesh.add_wall(WALL, number[n], mesh.positions(number[n]) * [1.0, 1.0, 0.0], side / n)
     return mesh.surface(
         (Patch("left", alpha), Patch("right", alpha), Patch("wall", alpha_aux, pressure=0.0)),
         fixed=np.concatenate([number[0], number[-1], number[:, 0], number[:, -1]]),

@@ -11,7 +11,7 @@ import numpy as np
 from generators import bezier_hall
 from pcmc import Surface
 from pcmc.explore import start
-from pcmc.explore.packing import unpack
+from pcmc.explore.messages import unpack
 
 from .timing import Row
 
@@ -43,7 +43,7 @@ def answers(surface: Surface, asked: list[dict[str, float]]) -> list[float]:
     explorer = start(surface)
     line = http.client.HTTPConnection("127.0.0.1", explorer.port, timeout=60)
     try:
-        name = unpack(_post(line, "/api/open", {}))[0]["draft"]
+        name = unpack(_post(line, "/api/open", {}))[0]["session"]
         seconds = []
         for tensions in [asked[0], *asked]:
             begun = time.perf_counter()

@@ -61,7 +61,7 @@ def sweep_seconds(sweep: Sweep, workers: int) -> float:
     """Wall time of a sweep into a new store."""
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        table = run(sweep, Path(folder) / "cases.jsonl", workers=workers)
+        table = run(sweep, Path(folder) / "cases.sqlite", workers=workers)
         seconds = time.perf_counter() - start
     assert len(table) == len(sweep)
     assert not table.status.isin(["raised", "timed out", "killed"]).any()

@@ -33,7 +33,7 @@ def run_sweep(
     SweepError : the run was stopped (Ctrl-C), and is not complete; or a case raised, was killed or
         timed out: a table would have holes. The study's next run tries it again.
     """
-    store = folder.path / "build" / f"{name}-{sweep.fingerprint[:8]}.jsonl"
+    store = folder.path / "build" / f"{name}-{sweep.fingerprint[:8]}.sqlite"
     store.parent.mkdir(parents=True, exist_ok=True)
     table = run(sweep, store, workers=workers, time_limit=limit, retry_failed=True)
     if len(table) < len(sweep):

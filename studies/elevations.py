@@ -16,8 +16,7 @@ from pcmc import Surface
 from pcmc.base.arrays import Floats, Ints
 from pcmc.surface.colours import patch_colors
 
-PIXELS = 78.0  # a unit of length
-LEFT, GAP, RIGHT, TITLE, FOOT = 70.0, 60.0, 20.0, 40.0, 60.0  # pixels around the axes
+WIDTH = 1086  # pixels
 
 
 def draw_elevations(shapes: Mapping[str, Surface], path: Path, *, top: float) -> None:
@@ -25,29 +24,27 @@ def draw_elevations(shapes: Mapping[str, Surface], path: Path, *, top: float) ->
 
     ``top`` is the height up to which all rows are drawn.
     """
-    from pcmc.plot.figure import INK, SMALL, TEXT, finish, new, style
+    from pcmc.plot.figure import INK, SMALL, TEXT, finish, fit_height, grid, new, style
 
     X = np.concatenate([surface.vertices for surface in shapes.values()])
     ranges = [(float(X[:, k].min()), float(X[:, k].max())) for k in (0, 1)]
-    widths = [PIXELS * (high - low) for low, high in ranges]
-    row = PIXELS * top
-    total = LEFT + sum(widths) + GAP + RIGHT, len(shapes) * (row + TITLE) + FOOT
-    figure = new(*total)
+    widths = [high - low for low, high in ranges]
+    figure = new(WIDTH, 180.0 * len(shapes))
+    axes, _ = grid(figure, 2 * len(shapes), 2, width_ratios=widths)
     for k, (title, surface) in enumerate(shapes.items()):
-        below = total[1] - (k + 1) * (row + TITLE)
-        for axis, left in ((0, LEFT), (1, LEFT + widths[0] + GAP)):
-            place = (left / total[0], below / total[1], widths[axis] / total[0], row / total[1])
-            axes = style(figure.add_axes(place))
-            axes.set(xlim=ranges[axis], ylim=(0.0, top), yticks=np.arange(0.0, top, 0.5))
+        for axis, place in enumerate(axes[2 * k : 2 * k + 2]):
+            style(place)
+            place.set(xlim=ranges[axis], ylim=(0.0, top), yticks=np.arange(0.0, top, 0.5))
             faces = np.arange(surface.m) if axis == 0 else _walls(surface)
-            _paint(axes, surface, faces, axis)
+            _paint(place, surface, faces, axis)
             name = title if axis == 0 else "its wall alone, from the side" if k == 0 else ""
-            axes.set_title(name, fontsize=TEXT, color=INK, pad=4.0, loc="left")
+            place.set_title(name, fontsize=TEXT, color=INK, pad=4.0, loc="left")
             if k + 1 < len(shapes):
-                axes.set_xticklabels([])
+                place.set_xticklabels([])
             else:
-                axes.set_xlabel("xy"[axis], fontsize=SMALL, color=INK, labelpad=1.5)
-            axes.set_ylabel("height" if axis == 0 else "", fontsize=SMALL, color=INK, labelpad=2.0)
+                place.set_xlabel("xy"[axis], fontsize=SMALL, color=INK, labelpad=1.5)
+            place.set_ylabel("height" if axis == 0 else "", fontsize=SMALL, color=INK, labelpad=2.0)
+    fit_height(figure, dict.fromkeys(axes[::2], top / widths[0]))
     finish(figure, path)
 
 
@@ -69,7 +66,11 @@ def _paint(axes: Any, surface: Surface, faces: Ints, axis: int) -> None:
     edge = np.where(np.sort(walls)[:, None], 0.1, 0.35 * np.ones(3))
     axes.add_collection(
         PolyCollection(
-            list(seen), facecolors=colors, edgecolors=edge, clip_on=False, joinstyle="round",
+            list(seen),
+            facecolors=colors,
+            edgecolors=edge,
+            clip_on=False,
+            joinstyle="round",
             linewidths=np.where(np.sort(walls), 0.9, 0.35),
         )
-    )  # fmt: skip
+    )

@@ -232,8 +232,8 @@ def _draw_rays(folder: Folder) -> None:
     from pcmc.plot.figure import CURVES, INK, SMALL, TEXT, finish, new, style
 
     rays = folder.read_table("rays")
-    figure = new(900, 820)
-    axes = style(figure.add_axes((0.11, 0.09, 0.86, 0.84)))
+    figure = new(900, 820, pad=8.0)
+    axes = style(figure.subplots())
     for color, (length, mine) in zip(CURVES, rays.groupby("edge_length", sort=False), strict=False):
         closed = pd.concat([mine, mine.iloc[:1]])
         for proved, x, y in _stretches(closed):

@@ -33,7 +33,7 @@ from generators import (
     two_caps,
     two_squares,
 )
-from generators.exact import Exact, Sphere
+from generators.exact import ExactSolution, Sphere
 from generators.two_caps import LARGE, SMALL
 from pcmc import Surface, solve
 from pcmc.base.arrays import Floats
@@ -68,7 +68,7 @@ class Family:
     build: Callable[..., Surface]
     levels: int
     circles: Sequence[Circle] = ()
-    exact: Callable[[], Exact] | None = None
+    exact: Callable[[], ExactSolution] | None = None
     lengths: Sequence[float] = ()
 
     def solved(self, levels: int) -> Iterator[tuple[Result, float]]:
@@ -100,7 +100,7 @@ def _onto(circle: Circle, points: Floats) -> Floats:
     return np.column_stack([on, points[:, 2]])
 
 
-def _outlines(exact: Exact) -> list[Circle]:
+def _outlines(exact: ExactSolution) -> list[Circle]:
     """The circles in which the spheres of a closed form meet Π."""
     balls = [shape for shape in exact.shapes.values() if isinstance(shape, Sphere)]
     return [(b.centre[0], b.centre[1], (b.radius**2 - b.centre[2] ** 2) ** 0.5) for b in balls]
@@ -137,7 +137,7 @@ FAMILIES = (
     Family("example1", "Example 1", _squares, 7),
     Family("example2", "Example 2", two_caps, 7, lengths=(1.2, 0.8, 0.6, 0.4, 0.3, 0.2, 0.19)),
     Family("example2_near", "Example 2, α small 3.2", _near, 6,
-           [(ball.x, 0.0, ball.floor_radius) for ball in (LARGE, SMALL)]),
+           [(ball.centre[0], 0.0, ball.floor_radius) for ball in (LARGE, SMALL)]),
     Family("example3", "Example 3", _fans, 6, [(0.0, 0.0, 20.0)]),
     Family("example4", "Example 4", _hall, 6),
 )  # fmt: skip

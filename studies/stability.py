@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from generators import four_fans, three_patches, two_caps, two_squares
-from generators.sphere_pair import meeting
+from generators.sphere_pair import intersection
 from generators.two_caps import LARGE, SMALL
 from pcmc import Certificate, Surface, certify, solve
 from pcmc.base.arrays import Floats
@@ -68,9 +68,10 @@ CORNER_LENGTHS = (0.8, 0.6, 0.4, 0.3, 0.2)
 CREST = 6  # edges of the crest, counted from the corner
 # Example 2's outlines, circles of radius 6 and 4, by middle and radius; and their upper corner.
 OUTLINES = {
-    name: ((ball.x, 0.0), ball.floor_radius) for name, ball in (("large", LARGE), ("small", SMALL))
+    name: ((ball.centre[0], 0.0), ball.floor_radius)
+    for name, ball in (("large", LARGE), ("small", SMALL))
 }
-CORNER = meeting(LARGE, SMALL).points(1)[-1, :2]
+CORNER = intersection(LARGE, SMALL).points(1)[-1, :2]
 
 
 def data(folder: Folder, short: bool) -> None:

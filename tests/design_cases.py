@@ -7,7 +7,7 @@ import numpy as np
 
 import pcmc
 from generators import spherical_cap
-from pcmc.design.quantities import measure
+from pcmc.design.targets import measure
 from pcmc.plan import plan_from
 from pcmc.surface.wall_pressures import with_pressures
 
@@ -49,9 +49,9 @@ def difference(surface, targets, parameter, step, **options):
     """Central difference of the quantities of re-solved surfaces, with one Richardson step."""
 
     def at(change):
-        value = parameter.of(surface) * (1.0 + change)
+        value = parameter.value(surface) * (1.0 + change)
         solved = pcmc.solve(changed(surface, parameter, value), **TIGHT, **options).surface
         return np.array([measure(solved, t).value for t in targets])
 
     one, two = ((at(h) - at(-h)) / (2 * h) for h in (step, 2 * step))
-    return (4 * one - two) / 3 / parameter.of(surface)
+    return (4 * one - two) / 3 / parameter.value(surface)

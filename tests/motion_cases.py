@@ -39,9 +39,12 @@ def touching() -> Surface:
     lid = np.where(F == 4, 4, F + 5)[:, ::-1]
     X += [[1.3, 1, 1], [-1, 1.2, 1], [-0.8, -1, 0.9], [1, -1, 1]]
     return Surface(
-        X, [*F, *lid], [0] * 4 + [1] * 4, [Patch("floor", 1.3), Patch("lid", 1.3)],
+        X,
+        [*F, *lid],
+        [0] * 4 + [1] * 4,
+        [Patch("floor", 1.3), Patch("lid", 1.3)],
         fixed=[0, 1, 2, 3, 5, 6, 7, 8],
-    )  # fmt: skip
+    )
 
 
 SURFACES = {

@@ -121,9 +121,14 @@ def three_patches(rings: int = 3, plane: Plane | None = None) -> Surface:
     roofs = [Patch(f"roof{k}", 2.0 + 0.5 * k) for k in range(3)]
     walls = [Patch(f"wall{k}", 0.7 + 0.2 * k, pressure=0.0) for k in range(3)]
     return Surface(
-        np.array(X) @ frame + plane.point, faces, patch, [*roofs, *walls],
-        fixed=np.flatnonzero(ring == rings), on_plane=bottom, plane=plane,
-    )  # fmt: skip
+        np.array(X) @ frame + plane.point,
+        faces,
+        patch,
+        [*roofs, *walls],
+        fixed=np.flatnonzero(ring == rings),
+        on_plane=bottom,
+        plane=plane,
+    )
 
 
 def shaken(surface: Surface, amount: float = 0.05, seed: int = 0) -> Surface:

@@ -28,7 +28,11 @@ def tent(names=("west side", "east", "wall"), pressures=(1.0, 0.5, 0.5), tilted=
         X = X @ rotation.T + point
         plane = Plane(tuple(point), tuple(rotation[:, 2]))
     return Surface(
-        X, west + east + wall, [0] * 4 + [1] * 4 + [2] * 4,
+        X,
+        west + east + wall,
+        [0] * 4 + [1] * 4 + [2] * 4,
         [Patch(*p) for p in zip(names, (3.0, 2.1, 0.7), pressures, strict=True)],
-        fixed=[0, 1, 6, 7, 8, 9], on_plane=[4, 5], plane=plane,
-    )  # fmt: skip
+        fixed=[0, 1, 6, 7, 8, 9],
+        on_plane=[4, 5],
+        plane=plane,
+    )

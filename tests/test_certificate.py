@@ -1,6 +1,7 @@
 """The certificate: its numbers against their definitions and closed forms, and every verdict."""
 
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -11,12 +12,14 @@ from starts import double_bubble, four_fans, joined_caps, sphere, spherical_cap,
 from generators import spherical_cap_exact
 from pcmc import Patch, Surface, certify, curvature_error, energy, gradient, mean_curvature, solve
 from pcmc.certificate import Evidence, Verdict
-from pcmc.certificate.balance import coarseness, conormal_sum, load_ratio
+from pcmc.certificate.balance import coarseness, conormal_sum, load_ratio, reactions_per_length
 from pcmc.certificate.verdict import Findings, judge
+from pcmc.contact.pinching import standing_part
 from pcmc.energy.functional import patch_areas, volume
 from pcmc.meshing.quality import triangle_quality
 from pcmc.plan import Divider, Plan
 from pcmc.solvers.result import Status
+from pcmc.stability.modes import morse_index
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
@@ -205,9 +208,10 @@ def beside_a_stiff_cap(soft: Surface, times: float) -> Surface:
     return Surface(
         np.concatenate([soft.vertices, stiff.vertices + np.array([3.0, 0.0, 0.0])]),
         np.concatenate([soft.faces, soft.n + stiff.faces]),
-        np.repeat([0, 1], [soft.m, stiff.m]), patches,
+        np.repeat([0, 1], [soft.m, stiff.m]),
+        patches,
         fixed=np.concatenate([soft.fixed, stiff.fixed]),
-    )  # fmt: skip
+    )
 
 
 def test_a_mode_is_soft_beside_the_tension_of_what_it_moves():
@@ -430,10 +434,29 @@ def test_supports_carry_the_whole_load_and_the_tension_of_the_rim():
     assert found.boundaries["per_length_max"][0] == pytest.approx(0.6, rel=2e-3)
 
 
-def test_every_verdict_is_a_sentence():
-    sentences = [verdict.value for verdict in Verdict]
-    assert len(set(sentences)) == len(sentences)
-    assert all(": " in sentence for sentence in sentences)
+def test_every_verdict_names_itself_and_says_what_it_means():
+    for verdict in Verdict:
+        name, meaning = verdict.value.split(": ")
+        assert name.startswith(verdict.name.lower().replace("_", " "))
+        assert len(meaning.split()) > 3
+
+
+def test_the_standing_part_is_computed_once_for_each_surface():
+    surface = solve(two_squares(6, alpha_aux=3.0)).surface
+    part = standing_part(surface)
+    assert part.surface.m < surface.m
+    with mock.patch("pcmc.contact.pinching.find_walls", side_effect=AssertionError):
+        certify(surface)
+        reactions_per_length(surface)
+        assert standing_part(surface) is part
+    moved = surface.moved(two_squares(6, alpha_aux=3.0).vertices)
+    assert standing_part(moved).surface is moved
+
+
+@pytest.mark.parametrize("make", [four_fans, two_squares])
+def test_the_morse_index_alone_is_that_of_the_certificate(make):
+    surface = solve(make(5), target="stationary").surface
+    assert morse_index(surface) == certify(surface).index
 
 
 def test_the_certificate_sees_walls_apart():

@@ -264,9 +264,12 @@ def lens(rings, top, bottom, film):
         inner, count = outer, count + len(around)
     patches = [Patch("top", top), Patch("bottom", bottom), Patch("film", film, 0.0)]
     surface = Surface(
-        np.concatenate(X), np.concatenate(F), np.repeat(patch, [len(f) for f in F]), patches,
+        np.concatenate(X),
+        np.concatenate(F),
+        np.repeat(patch, [len(f) for f in F]),
+        patches,
         fixed=inner,
-    )  # fmt: skip
+    )
     return surface, around, circle
 
 

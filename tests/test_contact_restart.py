@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from refusals import refused
 from starts import bezier_hall, stationary, two_caps, two_squares
 
 from pcmc import Surface, certify, solve
@@ -199,7 +200,7 @@ def collapsed(surface, face):
 def test_other_triangles_without_area_are_still_refused():
     surface = flat()
     outer = int(np.flatnonzero(surface.patch_of_face == 0)[9])
-    with pytest.raises(SurfaceError, match=rf"face {outer} = .* of patch 'left' has zero area"):
+    with refused(SurfaceError, what="faces", where=outer):
         rebuilt(surface, **collapsed(surface, outer))
     with pytest.raises(SurfaceError, match="of patch 'wall' has zero area"):
         rebuilt(surface.retensioned({}, {"left": 0.0, "right": 0.0}))  # nothing resting but walls
@@ -223,5 +224,5 @@ def test_a_standing_wall_with_a_triangle_of_no_area_is_refused():
     height = surface.plane.height(surface.vertices)
     wall = np.flatnonzero(surface.patch_of_face == 2)
     face = int(wall[np.argmax(height[surface.faces[wall]].min(axis=1))])
-    with pytest.raises(SurfaceError, match=r"face \d+ = .* of patch 'wall' has zero area"):
+    with pytest.raises(SurfaceError, match="of patch 'wall' has zero area"):
         rebuilt(surface, **collapsed(surface, face))

@@ -82,11 +82,16 @@ def test_every_point_is_the_equilibrium_that_its_row_describes(caps):
 
 def test_fold_lies_where_it_lies_whatever_the_steps_and_the_control(small_cap):
     found = {
-        (control, step): follow(small_cap, "cap", control=control, step=-step, largest=step, folds=1)
-        for control, step in (
-            ("arclength", 0.05), ("arclength", 0.15), ("volume", 0.05), ("height", 0.1),
+        (control, step): follow(
+            small_cap, "cap", control=control, step=-step, largest=step, folds=1
         )
-    }  # fmt: skip
+        for control, step in (
+            ("arclength", 0.05),
+            ("arclength", 0.15),
+            ("volume", 0.05),
+            ("height", 0.1),
+        )
+    }
     for branch in found.values():
         assert branch.ending is Ending.FOLDS
     first, *others = (branch.events.set_index("kind").parameter for branch in found.values())
@@ -151,11 +156,13 @@ def pyramid_height(ratio):
         (Parameter("roof", "pressure"), lambda v: v / 3.0),
         (Direction(pressures={"roof": 2.0}), lambda v: 2.0 * v / 3.0),
         (Direction({"roof": -1.0}, relative=True), lambda v: 1.0 / (3.0 * (1.0 - v))),
-        (Direction({"roof": 1.0}, {"roof": 0.5}, relative=True),
-         lambda v: (1.0 + 0.5 * v) / (3.0 * (1.0 + v))),
+        (
+            Direction({"roof": 1.0}, {"roof": 0.5}, relative=True),
+            lambda v: (1.0 + 0.5 * v) / (3.0 * (1.0 + v)),
+        ),
     ],
     ids=["tension", "Parameter", "pressure", "weight", "relative", "both"],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("sign", [1, -1])
 def test_pyramid_follows_its_closed_form(parameter, ratio, sign):
     branch = follow(pyramid(height=AT_REST), parameter, step=0.05 * sign, steps=4)
@@ -189,5 +196,5 @@ def test_diagram_cuts_the_branch_where_stability_changes(small_cap, tmp_path):
         assert (piece[1][0][end], piece[1][1][end]) == (change.parameter, change.height)
     assert diagram({"cap": branch}, tmp_path / "cap.png").shape[2] == 3
     assert (tmp_path / "cap.png").stat().st_size > 1000
-    with pytest.raises(OptionError, match="branch 'cap': unknown column 'heigt'; did you mean"):
+    with pytest.raises(OptionError, match=r"'cap'.*'heigt'; did you mean 'height'"):
         diagram({"cap": branch}, y="heigt")

@@ -167,7 +167,7 @@ def test_a_branch_in_one_rooms_pressure_does_not_depend_on_where_the_plan_is_dra
 def test_a_wall_that_follows_its_rooms_stays_a_wall():
     start = two_squares(4)
     line = Direction(pressures={"left": 1.0}).line(start)
-    changed = line.applied(start, 1.25)
+    changed = line.surface_at(start, 1.25)
     assert abs(changed.pressures[2]) == 0.25
     assert changed.walls.tolist() == start.walls.tolist() == [False, False, True]
     assert not changed.uncancelled.any()

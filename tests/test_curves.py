@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from pcmc import Plane
 from pcmc.base.errors import OptionError
-from pcmc.plan.curves import arc, bezier, circle, curve, frame, join, polyline, to_local, to_space
+from pcmc.plan.coordinates import to_local, to_space
+from pcmc.plan.curves import arc, bezier, circle, curve, join, polyline
 
 
 def test_lengths_in_closed_form():
@@ -77,7 +79,7 @@ def test_plane_coordinates_there_and_back():
     local = to_local(points, plane)
     np.testing.assert_allclose(local[:, 2], plane.height(points), atol=1e-14)
     np.testing.assert_allclose(to_space(local, plane), points, atol=1e-14)
-    np.testing.assert_array_equal(frame(Plane()), np.eye(3))
+    np.testing.assert_array_equal(Plane().axes, np.eye(3))
     on_plane = circle([0, 0], 2.0).local(plane).at([0.3])
     assert on_plane[0, 2] == 0.0
     in_space = circle([1, 2, 3], 2.0)
@@ -96,36 +98,51 @@ def test_curves_from_plain_data():
     assert curve({"polyline": [[0, 0], [1, 0], [0, 1]], "closed": True}).closed
 
 
+LINE, BEND = [[0, 0], [1, 0]], {"bezier": [[0, 0], [1, 1]]}
+
+
 @pytest.mark.parametrize(
-    ("spec", "message"),
+    ("spec", "fields"),
     [
-        ([[0, 0]], "polyline: expected 2 points, found 1"),
-        ([[0, 0], [0, 0]], "points 0 and 1 are both"),
-        ([[0, 0], [1, np.nan]], "point 1 = .* is not finite"),
-        ([[0, 0], [1]], "expected points"),
-        ([[0, 0, 0, 0], [1, 1, 1, 1]], "found shape"),
-        ("outline", "expected points"),
-        ({"spline": [[0, 0], [1, 1]]}, "unknown curve 'spline'"),
-        ({"circl": {}}, "did you mean 'circle'"),
-        ({"arc": [[0, 0], [1, 1]]}, "arc: expected 3 points, found 2"),
-        ({"arc": [[0, 0], [1, 1], [2, 2]]}, "lie on one line"),
-        ({"circle": {"centre": [0, 0], "radius": -1.0}}, "radius must be a finite number > 0"),
-        ({"circle": {"centre": [0, 0]}}, "expected centre and radius"),
-        ({"bezier": [[1, 1], [1, 1]]}, "all control points"),
-        ({"bezier": [[0, 0], [1, 1]], "closed": True}, "closed is for polylines"),
-        ({"bezier": [[0, 0], [1, 1]], "arc": []}, "exactly one of"),
-        ([{"polyline": [[0, 0], [1, 0]]}, {"polyline": [[2, 0], [1, 1]]}], "curve 1 starts at"),
-        ([{"polyline": [[0, 0], [1, 0]]}, {"polyline": [[1, 0, 0], [1, 1, 0]]}], "in space"),
-        ([{"circle": {"centre": [0, 0], "radius": 1}}, {"bezier": [[0, 0], [1, 1]]}], "is closed"),
+        ([[0, 0]], {"what": "polyline", "found": 1, "expected": 2}),
+        ([[0, 0], [0, 0]], {"what": "polyline", "where": 0}),
+        ([[0, 0], [1, np.nan]], {"what": "polyline", "where": 1}),
+        ([[0, 0], [1]], {"what": "polyline", "found": [[0, 0], [1]]}),
+        ([[0, 0, 0, 0], [1, 1, 1, 1]], {"what": "polyline", "found": (2, 4)}),
+        ("outline", {"what": "polyline", "found": "outline"}),
+        ({"spline": [[0, 0], [1, 1]]}, {"what": "curve", "found": "spline"}),
+        ({"arc": [[0, 0], [1, 1]]}, {"what": "arc", "found": 2, "expected": 3}),
+        ({"arc": [[0, 0], [1, 1], [2, 2]]}, {"what": "arc", "found": None}),
+        ({"circle": {"centre": [0, 0]}}, {"what": "circle", "found": {"centre": [0, 0]}}),
+        ({"bezier": [[1, 1], [1, 1]]}, {"what": "bezier"}),
+        ({"bezier": [[0, 0], [1, 1]], "closed": True}, {"what": "closed"}),
+        ({"bezier": [[0, 0], [1, 1]], "arc": []}, {"what": "curve", "found": ["bezier", "arc"]}),
+        ([{"polyline": LINE}, {"polyline": [[2, 0], [1, 1]]}], {"what": "join", "where": 1}),
+        (
+            [{"polyline": LINE}, {"polyline": [[1, 0, 0], [1, 1, 0]]}],
+            {"what": "join", "where": None},
+        ),
+        ([{"circle": {"centre": [0, 0], "radius": 1}}, BEND], {"what": "join", "where": 0}),
     ],
-)  # fmt: skip
-def test_bad_curves_are_refused(spec, message):
-    with pytest.raises(OptionError, match=message):
+)
+def test_bad_curves_are_refused(spec, fields):
+    with refused(OptionError, **fields):
         curve(spec)
 
 
+def test_an_unknown_curve_has_a_hint():
+    with pytest.raises(OptionError, match="unknown curve 'circl'; did you mean 'circle'"):
+        curve({"circl": {}})
+
+
+@pytest.mark.parametrize("radius", [-1.0, 0, np.inf, "x"])
+def test_a_radius_is_positive(radius):
+    with pytest.raises(OptionError, match="circle: radius: expected a finite number > 0"):
+        circle([0, 0], radius)
+
+
 def test_a_closed_polyline_needs_three_points():
-    with pytest.raises(OptionError, match="needs 3 points"):
+    with refused(OptionError, what="polyline", found=2, expected=3):
         polyline([[0, 0], [1, 0]], closed=True)
-    with pytest.raises(OptionError, match="no curves"):
+    with refused(OptionError, what="join"):
         join()

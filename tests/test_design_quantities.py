@@ -5,13 +5,16 @@ import dataclasses
 import numpy as np
 import pytest
 from design_cases import TIGHT, cap, changed, difference, roof_at_rest
+from refusals import refused
 from shapes import pyramid
 
 import pcmc
 from generators import double_bubble, spherical_cap, two_caps, two_squares
 from pcmc import Parameter, Patch, Target, sensitivities
 from pcmc.base.errors import SurfaceError
-from pcmc.design.quantities import QUANTITIES, measure
+from pcmc.certificate.certificate import TOLERANCE
+from pcmc.design.quantities import QUANTITIES
+from pcmc.design.targets import measure
 from pcmc.energy.functional import apply_supports
 
 
@@ -26,17 +29,24 @@ def roof():
 @pytest.mark.parametrize(
     "target",
     [
-        Target("apex", "north"), Target("height", (5, 20)), Target("height", (20.3, 8.1)),
-        Target("volume"), Target("volume", "east"), Target("area"), Target("area", "wall 1"),
-        Target("reaction"), Target("reaction", "north"), Target("reaction", "wall 2"),
+        Target("apex", "north"),
+        Target("height", (5, 20)),
+        Target("height", (20.3, 8.1)),
+        Target("volume"),
+        Target("volume", "east"),
+        Target("area"),
+        Target("area", "wall 1"),
+        Target("reaction"),
+        Target("reaction", "north"),
+        Target("reaction", "wall 2"),
     ],
     ids=lambda t: t.label,
-)  # fmt: skip
+)
 def test_derivatives_by_position_have_taylor_slope_two(roof, target):
     rng = np.random.default_rng(1)
     direction = rng.standard_normal(roof.vertices.shape)
     found = measure(roof, target)
-    slope = float((found.position * direction).sum())
+    slope = float((found.by_position * direction).sum())
     left = []
     for t in (1e-4, 1e-5):
         # fixed vertices move too: the derivative is by all positions
@@ -50,9 +60,9 @@ def test_derivatives_by_position_have_taylor_slope_two(roof, target):
 @pytest.mark.parametrize("name", sorted(QUANTITIES))
 def test_explicit_derivatives_by_tension_and_pressure(roof, name, kind):
     target = Target(name, (5, 20) if name == "height" else "north")
-    explicit = getattr(measure(roof, target), kind)
+    explicit = getattr(measure(roof, target), f"by_{kind}")
     parameter = Parameter("north", kind)
-    value = parameter.of(roof)
+    value = parameter.value(roof)
     ahead, behind = (
         measure(changed(roof, parameter, value + d), target).value for d in (1e-5, -1e-5)
     )
@@ -60,7 +70,7 @@ def test_explicit_derivatives_by_tension_and_pressure(roof, name, kind):
     assert (ahead - behind) / 2e-5 == pytest.approx(expected, rel=1e-8, abs=1e-9)
 
 
-def test_the_reaction_of_a_membrane_is_its_tension_less_half_the_pressure_of_its_rim():
+def test_a_flat_membrane_pulls_with_its_tension_at_its_held_boundary():
     """A square of side 1 under no pressure pulls with α per length, wherever it is held."""
     side = np.linspace(0, 1, 5)
     X = np.array([[x, y, 0.0] for y in side for x in side])
@@ -70,9 +80,7 @@ def test_the_reaction_of_a_membrane_is_its_tension_less_half_the_pressure_of_its
     F = [t for a, b, c, d in cells for t in ([a, b, c], [a, c, d])]
     rim = np.flatnonzero((X[:, :2].min(axis=1) == 0) | (X[:, :2].max(axis=1) == 1))
     flat = pcmc.Surface(X, F, [0] * 32, [Patch("floor", 3.0, 0.0)], fixed=rim)
-    corner = 3.0 * np.sqrt(0.5)  # both sides' halves, at right angles, over their length
     assert measure(flat, Target("reaction", "floor")).value == pytest.approx(3.0)
-    assert corner < 3.0
 
 
 def test_reactions_are_the_certificates():
@@ -97,7 +105,7 @@ def test_reactions_at_the_parts_of_a_roof_are_the_certificates(roof):
 
 def test_heights_are_the_meshs_own(roof):
     apex = measure(roof, Target("apex", "north"))
-    vertex = int(np.abs(apex.position).sum(axis=1).argmax())
+    vertex = int(np.abs(apex.by_position).sum(axis=1).argmax())
     x, y, z = roof.vertices[vertex]
     assert apex.value == z
     assert measure(roof, Target("height", (x, y))).value == pytest.approx(z, abs=1e-12)
@@ -108,9 +116,14 @@ def test_heights_are_the_meshs_own(roof):
 
 def drawn_at(surface, shift):
     return pcmc.Surface(
-        surface.vertices + shift, surface.faces, surface.patch_of_face, surface.patches,
-        surface.fixed, surface.on_plane, surface.plane,
-    )  # fmt: skip
+        surface.vertices + shift,
+        surface.faces,
+        surface.patch_of_face,
+        surface.patches,
+        surface.fixed,
+        surface.on_plane,
+        surface.plane,
+    )
 
 
 @pytest.mark.parametrize("make", [cap, lambda: two_caps(1.2)], ids=["cap", "two caps"])
@@ -123,7 +136,7 @@ def test_volumes_over_the_plane_are_the_same_wherever_it_is_drawn(make, shift):
     assert found.value == pytest.approx(whole.value, rel=1e-7)
     assert pcmc.energy(far) == pytest.approx(pcmc.energy(near), rel=1e-7)
     free = near.free
-    np.testing.assert_allclose(found.position[free], whole.position[free], atol=1e-8)
+    np.testing.assert_allclose(found.by_position[free], whole.by_position[free], atol=1e-8)
 
 
 def test_a_patchs_volume_is_seen_from_the_point_of_the_plane_however_far():
@@ -138,7 +151,7 @@ def test_a_patchs_volume_is_seen_from_the_point_of_the_plane_however_far():
     ahead, behind = (
         measure(far.moved(far.vertices + t * direction), target).value for t in (1e-4, -1e-4)
     )
-    slope = float((found.position * direction).sum())
+    slope = float((found.by_position * direction).sum())
     assert slope == pytest.approx((ahead - behind) / 2e-4, rel=1e-6)
 
 
@@ -147,7 +160,7 @@ def test_points_are_in_the_coordinates_of_a_tilted_plane():
     normal = frame[:, 2] * np.sign(np.linalg.det(frame))
     plane = pcmc.Plane(point=(1, 2, 3), normal=tuple(normal))
     base = pyramid()
-    from pcmc.plan.curves import to_space
+    from pcmc.plan.coordinates import to_space
 
     tilted = pcmc.Surface(
         to_space(base.vertices, plane), base.faces, [0] * 4, base.patches, range(4), (), plane
@@ -163,10 +176,14 @@ def test_points_are_in_the_coordinates_of_a_tilted_plane():
 
 def test_sensitivities_are_the_slopes_of_resolved_surfaces(roof):
     targets = [
-        Target("apex", "north"), Target("height", (20.3, 8.1)), Target("volume"),
-        Target("area", "corner"), Target("area", "wall 1"), Target("reaction", "east"),
+        Target("apex", "north"),
+        Target("height", (20.3, 8.1)),
+        Target("volume"),
+        Target("area", "corner"),
+        Target("area", "wall 1"),
+        Target("reaction", "east"),
         Target("curvature", "north"),
-    ]  # fmt: skip
+    ]
     to = [Parameter("north"), Parameter("wall 1"), Parameter("east", "pressure")]
     table = sensitivities(roof, targets, to)
     assert list(table.index) == [t.label for t in targets]
@@ -222,5 +239,5 @@ def test_a_junction_pulled_off_by_more_than_its_wall_holds_is_not_at_rest():
     pinched = pcmc.solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
     assert len(pcmc.certify(pinched).pinched) == 5
     assert np.isfinite(sensitivities(pinched, Target("volume"), "left").to_numpy()).all()
-    with pytest.raises(SurfaceError, match=r"not at rest \(relative residual .*; solve it first"):
+    with refused(SurfaceError, what="surface", expected=TOLERANCE):
         sensitivities(pinched.retensioned({"wall": 1.0}), Target("volume"), "left")

@@ -216,9 +216,8 @@ def test_gradient_is_the_papers_formula(case):
             7: pull - held[roof].sum(axis=0),  # (22)
         }[case]
         np.testing.assert_allclose(g[p], expected, atol=1e-13)
-        assert touching.sum() == {1: 1, 2: 1, 3: 3, 5: touching.sum(), 6: 3, 7: 6}.get(
-            case, 3 if p in surface.topology.junctions[-1].vertices else 1
-        )
+        at_foot = 3 if surface.topology.vertex_kind[p] == POINT else 1  # where a junction ends on Π
+        assert touching.sum() == {1: 1, 2: 1, 3: 3, 4: at_foot, 5: at_foot, 6: 3, 7: 6}[case]
 
 
 # ---- supports and odd triangles -----------------------------------------------------------------

@@ -33,9 +33,14 @@ def test_rigid_motions_turn_the_gradient(seed, shift):
     X = surface.vertices @ R.T + shift
     # Rounding may lift sliding vertices off the turned plane by far less than the check allows.
     other = Surface(
-        X, surface.faces, surface.patch_of_face, surface.patches,
-        surface.fixed, surface.on_plane, plane,
-    )  # fmt: skip
+        X,
+        surface.faces,
+        surface.patch_of_face,
+        surface.patches,
+        surface.fixed,
+        surface.on_plane,
+        plane,
+    )
     assert energy(other) == pytest.approx(energy(surface), rel=1e-12)
     np.testing.assert_allclose(gradient(other), gradient(surface) @ R.T, atol=1e-11)
 
@@ -59,10 +64,13 @@ def test_labels_do_not_matter(seed):
     turned = (np.arange(3) + rng.integers(0, 3, (surface.m, 1))) % 3  # start at another corner
     F = np.argsort(vertex)[surface.faces[face]]
     other = Surface(
-        surface.vertices[vertex], np.take_along_axis(F, turned, axis=1),
-        np.argsort(patch)[surface.patch_of_face[face]], [surface.patches[k] for k in patch],
-        surface.fixed[vertex], surface.on_plane[vertex],
-    )  # fmt: skip
+        surface.vertices[vertex],
+        np.take_along_axis(F, turned, axis=1),
+        np.argsort(patch)[surface.patch_of_face[face]],
+        [surface.patches[k] for k in patch],
+        surface.fixed[vertex],
+        surface.on_plane[vertex],
+    )
     assert energy(other) == pytest.approx(energy(surface), rel=1e-13)
     np.testing.assert_allclose(gradient(other), gradient(surface)[vertex], atol=1e-13)
     np.testing.assert_allclose(patch_areas(other), patch_areas(surface)[patch], rtol=1e-13)

@@ -35,13 +35,13 @@ def driver(tmp_path_factory):
 
 
 def newest(explorer):
-    """The draft of the page that was opened or used last."""
-    return explorer.drafts[next(reversed(explorer.drafts))]
+    """The session of the page that was opened or used last."""
+    return explorer.sessions[next(reversed(explorer.sessions))]
 
 
 @pytest.fixture
 def page(driver, explorer):
-    return Explored(driver, f"{explorer.url}?draft={explorer.open()[0]}")
+    return Explored(driver, f"{explorer.url}?session={explorer.open()[0]}")
 
 
 def test_the_page_loads_draws_and_complains_of_nothing(page):
@@ -97,7 +97,7 @@ def test_dragging_a_slider_with_the_mouse_is_one_step(page):
     assert changed(before, page.picture()) == 0.0
 
 
-def test_the_verdict_says_that_no_equilibrium_exists_and_the_last_surface_stays(driver):
+def test_without_an_equilibrium_the_verdict_shows_it_and_the_last_surface_stays(driver):
     running = explore.start(CAP)
     try:
         page = Explored(driver, running.url)
@@ -105,7 +105,7 @@ def test_the_verdict_says_that_no_equilibrium_exists_and_the_last_surface_stays(
         page.enter("Tension α of cap", 0.2)
         assert page.verdict == "no_equilibrium"
         assert "cannot balance" in page.text("#verdict")
-        assert "Drawn is the last one at rest" in page.text("#verdict")
+        assert "Shown: the last surface at rest" in page.text("#verdict")
         drawn = newest(running).surface
         assert 0.47 < drawn.patches[0].tension < 0.6
         assert changed(before, page.picture()) > 0.01  # it went as far as there was a way
@@ -114,7 +114,7 @@ def test_the_verdict_says_that_no_equilibrium_exists_and_the_last_surface_stays(
         assert page.verdict == "stable"
         assert float(page.number("Tension α of cap").get_attribute("value")) > 0.47
         page.enter("Tension α of cap", -1)
-        assert "must be a finite number" in until(lambda: page.text("#note"), "the note")
+        assert "expected a finite number" in until(lambda: page.text("#note"), "the note")
         assert float(page.number("Tension α of cap").get_attribute("value")) > 0.47
         console = page.complaints()
         assert all("400 (Bad Request)" in line for line in console)
@@ -161,7 +161,7 @@ def test_the_export_downloads_the_surface(page, driver, explorer):
     assert page.complaints() == []
 
 
-def test_two_pages_are_two_drafts(driver, explorer):
+def test_two_pages_are_two_sessions(driver, explorer):
     one = Explored(driver, explorer.url)
     first = driver.current_window_handle
     one.enter("Tension α of left wall", 20)
@@ -175,15 +175,13 @@ def test_two_pages_are_two_drafts(driver, explorer):
     assert one.text("#findings") == changed_words
     driver.refresh()
     one.idle()
-    assert one.text("#findings") == changed_words  # the same tab finds its draft again
+    assert one.text("#findings") == changed_words  # the same tab finds its session again
 
 
 def test_colours_come_with_their_scale(page):
     before = page.picture()
     assert not page.find("#legend").is_displayed()
-    for name, words in (
-        ("curvature", "1/length"), ("error", "%"), ("reactions", "force/length"),
-    ):  # fmt: skip
+    for name, words in (("curvature", "1/length"), ("error", "%"), ("reactions", "force/length")):
         page.find(f"#colours input[value={name}]").click()
         page.idle()
         assert words in page.text("#legend .name")
@@ -311,5 +309,5 @@ def test_when_the_program_has_ended_the_page_says_so(driver):
     page = Explored(driver, running.url)
     running.close()
     page.enter("Tension α of cap", 0.7)
-    assert "has ended" in until(lambda: page.text("#note"), "the note")
+    assert "has stopped" in until(lambda: page.text("#note"), "the note")
     page.complaints()

@@ -6,9 +6,10 @@ import warnings
 
 import numpy as np
 import pytest
+from refusals import refused
 
 import generators
-from generators import calibration
+from generators import calibration, fans
 from generators.calibration import PRINTED
 from pcmc import energy, gradient
 from pcmc.base.errors import OptionError
@@ -359,31 +360,55 @@ def test_the_search_finds_the_defaults(monkeypatch):
 
 
 BAD = [
-    ("two_squares", {"n": 1}, "n must be a whole number ≥ 2, found 1"),
-    ("two_squares", {"n": 4.5}, "n must be a whole number"),
-    ("two_squares", {"height": 0.0}, "height must be a finite number > 0, found 0.0"),
-    ("two_squares", {"diagonals": "paralel"}, "did you mean 'parallel'"),
-    ("two_caps", {"edge_length": -1.0}, "edge_length must be a finite number > 0"),
-    ("two_caps", {"wall": "upritght"}, "did you mean 'upright'"),
-    ("four_fans", {"rings": 1}, "rings must be a whole number ≥ 2"),
-    ("four_fans", {"mesh": "latice"}, "did you mean 'lattice'"),
-    ("four_fans", {"bulge": np.nan}, "bulge must be a finite number"),
-    ("three_patches", {"radius": "wide"}, "radius must be a finite number > 0, found 'wide'"),
-    ("bezier_hall", {"edge_length": np.inf}, "edge_length must be a finite number > 0"),
-    ("spherical_cap", {"alpha": 0.45, "exact": True}, "alpha must be at least radius/2 = 0.5"),
-    ("spherical_cap", {"height": -1.0}, "height must be"),
-    ("joined_caps", {"alpha_aux": 8.0}, "do not meet above the plane"),
-    ("joined_caps", {"depth": 7.0}, "do not meet above the plane"),
-    ("joined_caps", {"alpha_left": -4.0}, "alpha_left must be a finite number > 0"),
-    ("double_bubble", {"alpha_aux": 2.0}, "cannot balance at a junction"),
-    ("sphere", {"alpha": 0.0}, "alpha must be a finite number > 0"),
+    ("two_squares", "n", 1, "a whole number ≥ 2"),
+    ("two_squares", "n", 4.5, "a whole number ≥ 2"),
+    ("two_squares", "height", 0.0, "a finite number > 0"),
+    ("two_squares", "diagonals", "paralel", ("symmetric", "parallel")),
+    ("two_caps", "edge_length", -1.0, "a finite number > 0"),
+    ("two_caps", "wall", "upritght", ("upright", "inclined")),
+    ("four_fans", "rings", 1, "a whole number ≥ 2"),
+    ("four_fans", "mesh", "latice", fans.MESHES),
+    ("four_fans", "bulge", np.inf, "a finite number"),
+    ("three_patches", "radius", "wide", "a finite number > 0"),
+    ("bezier_hall", "edge_length", np.inf, "a finite number > 0"),
+    ("spherical_cap", "height", -1.0, "a finite number > 0"),
+    ("joined_caps", "alpha_left", -4.0, "a finite number > 0"),
+    ("sphere", "alpha", 0.0, "a finite number > 0"),
 ]
 
 
-@pytest.mark.parametrize(("name", "arguments", "message"), BAD)
-def test_bad_input_is_refused(name, arguments, message):
+@pytest.mark.parametrize(("name", "what", "found", "expected"), BAD)
+def test_bad_input_is_refused(name, what, found, expected):
+    with refused(OptionError, what=what, found=found, expected=expected):
+        getattr(generators, name)(**{what: found})
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "message"),
+    [
+        ("spherical_cap", {"alpha": 0.45, "exact": True}, "alpha must be at least radius/2 = 0.5"),
+        ("joined_caps", {"alpha_aux": 8.0}, "do not meet above the plane"),
+        ("joined_caps", {"depth": 7.0}, "do not meet above the plane"),
+        ("double_bubble", {"alpha_aux": 2.0}, "cannot balance at a junction"),
+    ],
+)
+def test_values_that_do_not_fit_together_are_refused(name, arguments, message):
     with pytest.raises(OptionError, match=message):
         getattr(generators, name)(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "fields"),
+    [
+        ("spherical_cap", {"alpha": 0.45}, {"what": "alpha", "found": 0.45, "expected": 0.5}),
+        ("joined_caps", {"alpha_aux": 8.0}, {"what": "depth", "found": 4.5}),
+        ("joined_caps", {"depth": 7.0}, {"what": "depth", "found": 7.0}),
+        ("double_bubble", {"alpha_aux": 2.0}, {"what": "alpha_aux", "expected": (0.0, 2.0)}),
+    ],
+)
+def test_closed_forms_that_do_not_exist_are_refused(name, arguments, fields):
+    with refused(OptionError, **fields):
+        getattr(generators, name)(exact=True, **arguments)
 
 
 def test_an_unknown_example_is_refused():

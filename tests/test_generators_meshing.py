@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from refusals import refused
 
-from generators.bezier import chain, cubic, spaced
-from generators.building import Builder
-from generators.drape import membrane, soap_film
+from generators.bezier import chain, cubic, equally_spaced
+from generators.builder import Builder
+from generators.exact import Sphere
+from generators.membranes import membrane, soap_film
 from generators.meshing import fill
-from generators.sphere_pair import Ball, meeting
+from generators.sphere_pair import intersection
 from generators.strips import strips
 from pcmc.base.errors import OptionError
 
@@ -70,7 +72,7 @@ def test_fill_wants_outlines_as_fine_as_its_spacing():
     left = [[0, 0], [4, 0], [4, 4], [4, 8], [0, 8], [0, 4]]
     right = [[4.1, 8], [8, 8], [8, 0], [4, -2], [0, -2]]
     slit = np.array([[4.1, 2.0], *right, *left, [4.1, 6.0]][::-1])
-    with pytest.raises(OptionError, match="use a smaller edge length"):
+    with refused(OptionError, what="outlines"):
         fill([slit], 1.0)
 
 
@@ -100,9 +102,9 @@ def test_even_strips_lean_as_told():
 
 def test_a_wall_shares_what_it_is_given():
     mesh = Builder()
-    side = mesh.points([[0, 0, 0], [0, 0, 0.9], [0, 0, 2.0]])
-    top = np.append(side[-1], mesh.points([[1, 0, 1.1], [2, 0, 0]]))
-    foot = mesh.wall(0, top, mesh.positions(top) * [1, 1, 0], spacing=1.0, side=side)
+    side = mesh.add_points([[0, 0, 0], [0, 0, 0.9], [0, 0, 2.0]])
+    top = np.append(side[-1], mesh.add_points([[1, 0, 1.1], [2, 0, 0]]))
+    foot = mesh.add_wall(0, top, mesh.positions(top) * [1, 1, 0], spacing=1.0, side=side)
     assert foot[0] == side[0]
     assert foot[-1] == top[-1]
     wall = mesh.surface([_wall_patch()], on_plane=foot)
@@ -130,7 +132,7 @@ def test_curves_pass_their_ends_and_touch_their_controls():
 
 
 def test_curves_are_cut_evenly_in_plan():
-    points = spaced(CONTROLS, 0.01)
+    points = equally_spaced(CONTROLS, 0.01)
     steps = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)
     assert steps == pytest.approx(0.01, rel=1e-3)
     assert np.ptp(steps) < 1e-4 * steps.mean()
@@ -170,24 +172,24 @@ def test_membranes_are_paraboloids_on_discs():
 
 
 def test_stereographic_pictures_come_back():
-    ball = Ball(0.5, -1.0, 2.0)
+    ball = Sphere((0.5, 0.0, -1.0), 2.0)
     rng = np.random.default_rng(1)
     pictures = rng.uniform(-1.0, 1.0, (9, 2))
-    points = ball.lifted(pictures)
+    points = ball.lift(pictures)
     assert np.linalg.norm(points - [0.5, 0.0, -1.0], axis=1) == pytest.approx(2.0)
-    np.testing.assert_allclose(ball.flat(points), pictures, atol=1e-13)
+    np.testing.assert_allclose(ball.project(points), pictures, atol=1e-13)
 
 
 @pytest.mark.parametrize(
     "pair",
     [
-        (Ball(0.0, -1.0, 2.0), Ball(5.0, -1.0, 2.0)),
-        (Ball(0.0, -1.0, 2.0), Ball(0.0, -1.0, 2.0)),
-        (Ball(0.0, -1.0, 3.0), Ball(0.5, -1.0, 2.0)),
-        (Ball(0.0, -2.0, 2.5), Ball(4.0, -2.0, 2.5)),
+        (Sphere((0.0, 0.0, -1.0), 2.0), Sphere((5.0, 0.0, -1.0), 2.0)),
+        (Sphere((0.0, 0.0, -1.0), 2.0), Sphere((0.0, 0.0, -1.0), 2.0)),
+        (Sphere((0.0, 0.0, -1.0), 3.0), Sphere((0.5, 0.0, -1.0), 2.0)),
+        (Sphere((0.0, 0.0, -2.0), 2.5), Sphere((4.0, 0.0, -2.0), 2.5)),
     ],
     ids=["apart", "the same", "one in the other", "meeting below the plane"],
 )
 def test_spheres_that_make_no_arc_are_refused(pair):
-    with pytest.raises(OptionError, match="do not meet in an arc"):
-        meeting(*pair)
+    with refused(OptionError, what="spheres", found=pair):
+        intersection(*pair)

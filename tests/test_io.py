@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 import pytest
+from refusals import refused
 from scipy.spatial import cKDTree
 from tents import tent
 
@@ -13,7 +14,6 @@ from pcmc.base.errors import (
     FileWarning,
     MissingExtra,
     OptionError,
-    PcmcError,
     SurfaceError,
 )
 from pcmc.io import FORMATS, load
@@ -107,9 +107,14 @@ def test_single_precision_is_enough_in_a_survey_s_coordinates(tmp_path, suffix):
     near = tent()
     shift = np.array([5e5, 5e6, 0.0])
     far = pcmc.Surface(
-        near.vertices + shift, near.faces, near.patch_of_face, near.patches, fixed=near.fixed,
-        on_plane=near.on_plane, plane=pcmc.Plane(near.plane.point + shift, near.plane.normal),
-    )  # fmt: skip
+        near.vertices + shift,
+        near.faces,
+        near.patch_of_face,
+        near.patches,
+        fixed=near.fixed,
+        on_plane=near.on_plane,
+        plane=pcmc.Plane(near.plane.point + shift, near.plane.normal),
+    )
     pcmc.write(tmp_path / f"far{suffix}", far)
     back = pcmc.read(tmp_path / f"far{suffix}")
     assert back.n == far.n
@@ -128,9 +133,9 @@ def test_native_keeps_the_certificate(tmp_path):
     assert again["verdict"] == certificate.verdict.name.lower()
     np.testing.assert_array_equal(again["reactions"], certificate.reactions)
     assert [row["patch"] for row in again["patches"]] == ["west side", "east", "wall"]
-    with pytest.raises(FileError, match="expected a Certificate, found int"):
+    with refused(FileError, what="certificate", found="int"):
         pcmc.write(tmp_path / "b.pcmc", tent(), certificate=3)
-    with pytest.raises(FileError, match="a object cannot be written"):
+    with refused(FileError, where="certificate", found="object"):
         pcmc.write(tmp_path / "b.pcmc", tent(), certificate={"what": object()})
     with pytest.warns(FileWarning, match="cannot carry certificate"):
         pcmc.write(tmp_path / "a.obj", tent(), certificate=told)
@@ -189,14 +194,14 @@ def test_other_formats_under_this_suffix_are_refused(tmp_path, suffix):
     path = tmp_path / f"wrong{suffix}"
     for data in (b"", b"\x00\xff\xfe" * 200, "Grüße\n".encode("latin-1"), b"<html></html>\n" * 9):
         path.write_bytes(data)
-        with pytest.raises(FileError, match="wrong"):
+        with refused(FileError, what=str(path)):
             pcmc.read(path)
 
 
 def test_paths_that_cannot_be(tmp_path):
     with pytest.raises(FileError, match=r"unknown suffix '\.obk'; did you mean '\.obj'"):
         pcmc.read(tmp_path / "a.obk")
-    with pytest.raises(FileError, match="unknown suffix ''"):
+    with refused(FileError, what=str(tmp_path / "a"), found="", expected=list(FORMATS)):
         pcmc.write(tmp_path / "a", tent())
     with pytest.raises(FileError, match=r"cannot be read \(No such file"):
         pcmc.read(tmp_path / "none.ply")
@@ -204,14 +209,15 @@ def test_paths_that_cannot_be(tmp_path):
     with pytest.raises(FileError, match=r"cannot be read \(Is a directory"):
         pcmc.read(tmp_path / "folder.obj")
     for suffix in FORMATS:
-        with pytest.raises(FileError, match="cannot be written"):
-            pcmc.write(tmp_path / "no folder" / f"a{suffix}", tent())
-    with pytest.raises(FileError, match="has a line break"):
+        path = tmp_path / "no folder" / f"a{suffix}"
+        with refused(FileError, what=str(path)):
+            pcmc.write(path, tent())
+    with refused(FileError, what=str(tmp_path / "a.obj"), where="patches", found="a\nb"):
         pcmc.write(tmp_path / "a.obj", tent(names=("a\nb", "c", "d")))
-    with pytest.raises(FileError, match=r"scalars\['h'\]: expected shape \(10,\)"):
+    with refused(FileError, what="scalars", where="h", found=(3,)):
         pcmc.write(tmp_path / "a.ply", tent(), scalars={"h": np.zeros(3)})
     for suffix in (".ply", ".vtp"):
-        with pytest.raises(FileError, match="the name 'support' is taken"):
+        with refused(FileError, where="support", found="support"):
             pcmc.write(tmp_path / f"a{suffix}", tent(), scalars={"support": np.zeros(10)})
     assert [p.name for p in tmp_path.iterdir()] == ["folder.obj"]
 
@@ -258,14 +264,10 @@ def test_damaged_native_files(tmp_path):
             np.savez(file, **{**arrays, "meta": np.array(json.dumps({**meta, **changes}))})
         return path
 
-    with pytest.raises(FileError, match=r"newer pcmc \(format 2.*update pcmc"):
+    with refused(FileError, where="version", found=2, expected=1):
         pcmc.read(changed(version=2))
-    with pytest.raises(FileError, match="expected the format 'pcmc surface', found 'other'"):
+    with refused(FileError, where="format", found="other", expected="pcmc surface"):
         pcmc.read(changed(format="other"))
-    with pytest.raises(FileError, match="description is damaged"):
+    with refused(FileError, where="metadata", found="{}"):
         pcmc.read(changed(description="{}"))
     assert pcmc.read(changed()).n == 10
-
-
-def test_every_error_is_ours():
-    assert issubclass(FileError, PcmcError)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 
 import pcmc
 from pcmc.base.errors import FileError, FileWarning, FreeSurfaceWarning
@@ -64,8 +65,11 @@ def test_trimesh_scenes(tmp_path, suffix):
             )
         )
     else:
-        path.write_bytes(trimesh.util.decode_text(scene.export(file_type=suffix[1:])).encode()
-                         if suffix == ".obj" else scene.export(file_type="glb"))  # fmt: skip
+        path.write_bytes(
+            trimesh.util.decode_text(scene.export(file_type=suffix[1:])).encode()
+            if suffix == ".obj"
+            else scene.export(file_type="glb")
+        )
     check(pcmc.read(path))
 
 
@@ -116,7 +120,7 @@ def test_vtk_cells_of_other_kinds(tmp_path):
         assert pcmc.read(tmp_path / "s.vtp").m == 2
     solid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: np.array([[0, 1, 3, 5]])}, X)
     solid.save(tmp_path / "a.vtu")
-    with pytest.raises(FileError, match="cell 0 is of VTK's type 10; only triangles"):
+    with refused(FileError, where=0, found=10):
         pcmc.read(tmp_path / "a.vtu")
 
 
@@ -157,7 +161,7 @@ def test_rhino_quads_on_layers(tmp_path):
     empty = rhino3dm.File3dm()
     empty.Objects.AddPoint(rhino3dm.Point3d(0, 0, 0))
     empty.Write(str(tmp_path / "b.3dm"), 7)
-    with pytest.raises(FileError, match=r"no meshes \(1 other objects\); mesh the surfaces"):
+    with refused(FileError, what=str(tmp_path / "b.3dm"), where="meshes", found=0):
         pcmc.read(tmp_path / "b.3dm")
 
 
@@ -266,9 +270,23 @@ def test_polygons_are_cut_well():
     faces, origin, notes = triangulate(hexagon, corners, np.array([3, 6]))
     assert origin.tolist() == [0, 1, 1, 1, 1]
     assert notes == ("1 polygons were cut into triangles",)
-    comb = np.array([[0, 0], [5, 0], [5, 3], [4, 3], [4, 1], [3, 1], [3, 3], [2, 3], [2, 1], [1, 1],
-                     [1, 3], [0, 3]])  # fmt: skip
-    with pytest.raises(FileError, match="face 1 is a polygon of 12 corners that no fan"):
+    comb = np.array(
+        [
+            [0, 0],
+            [5, 0],
+            [5, 3],
+            [4, 3],
+            [4, 1],
+            [3, 1],
+            [3, 3],
+            [2, 3],
+            [2, 1],
+            [1, 1],
+            [1, 3],
+            [0, 3],
+        ]
+    )
+    with refused(FileError, where=0, found=12):
         triangulate(np.pad(1.0 * comb, ((0, 0), (0, 1))), np.arange(12), np.array([12]))
 
 

@@ -45,11 +45,14 @@ def slope(surface, classes):
     exact = linearise(surface, classes, space, X, energy_and_gradient(surface, X)[1]).times(d)
     errors = [
         np.abs(
-            space.to_coordinates(forces(surface, classes, X + t * d) - forces(surface, classes, X - t * d))
-            / (2.0 * t) - exact
+            space.to_coordinates(
+                forces(surface, classes, X + t * d) - forces(surface, classes, X - t * d)
+            )
+            / (2.0 * t)
+            - exact
         ).max()
         for t in surface.size * np.array([2e-5, 1e-5])
-    ]  # fmt: skip
+    ]
     assert errors[1] < 1e-4 * np.abs(exact).max()
     return np.log2(errors[0] / errors[1])
 

@@ -65,9 +65,10 @@ def test_directions_are_the_normal_and_the_plane_across_the_curve():
     vector = np.zeros_like(X)
     for corner in range(3):
         np.add.at(
-            vector, classes.faces[:, corner],
+            vector,
+            classes.faces[:, corner],
             np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]),
-        )  # fmt: skip
+        )
     sheet = surface.free & (classes.kind == SHEET)
     normal = vector[sheet] / np.linalg.norm(vector[sheet], axis=1)[:, None]
     np.testing.assert_allclose(space.basis[sheet, 0], normal, atol=1e-14)
@@ -100,9 +101,13 @@ def test_a_foot_that_runs_across_the_plane_slides_both_ways():
     X = [[0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 0]]
     walls = [[0, 5, 1], [0, 2, 5], [0, 5, 3], [0, 4, 5]]
     surface = Surface(
-        X, walls, [0, 1, 2, 3], [Patch(f"wall {k}", 1.0, pressure=0.0) for k in range(4)],
-        fixed=[0, 1, 2, 3, 4], on_plane=[5],
-    )  # fmt: skip
+        X,
+        walls,
+        [0, 1, 2, 3],
+        [Patch(f"wall {k}", 1.0, pressure=0.0) for k in range(4)],
+        fixed=[0, 1, 2, 3, 4],
+        on_plane=[5],
+    )
     space = frame_and_space(surface)[1]
     assert space.dimension.tolist() == [0, 0, 0, 0, 0, 2]
 
@@ -113,10 +118,14 @@ def test_the_space_turns_with_the_surface(seed):
     R = rotation(seed)
     shift = np.array([1.0, -2.0, 0.5])
     turned = Surface(
-        surface.vertices @ R.T + shift, surface.faces, surface.patch_of_face, surface.patches,
-        fixed=surface.fixed, on_plane=surface.on_plane,
+        surface.vertices @ R.T + shift,
+        surface.faces,
+        surface.patch_of_face,
+        surface.patches,
+        fixed=surface.fixed,
+        on_plane=surface.on_plane,
         plane=Plane(R @ surface.plane.point + shift, R @ surface.plane.normal),
-    )  # fmt: skip
+    )
     v = np.random.default_rng(seed).standard_normal((surface.n, 3))
     here, there = frame_and_space(surface)[1], frame_and_space(turned)[1]
     np.testing.assert_array_equal(here.dimension, there.dimension)

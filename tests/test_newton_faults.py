@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from refusals import refused
 from shapes import pyramid
 from starts import four_fans, sphere, spherical_cap, two_caps, two_squares
 
@@ -13,7 +14,7 @@ from pcmc.certificate import Verdict
 from pcmc.meshing.quality import triangle_quality
 from pcmc.solvers.newton import NewtonOptions
 from pcmc.solvers.result import Status
-from pcmc.stability.factorisation import available
+from pcmc.stability.factorisation import BACKENDS, available
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning"),
@@ -109,11 +110,11 @@ def test_the_iteration_limit(backend, iterations):
         np.testing.assert_array_equal(result.surface.vertices, surface.vertices)
 
 
-def test_a_tolerance_that_rounding_cannot_meet_ends_all_the_same(backend):
+def test_a_tolerance_that_rounding_cannot_meet_counts_as_met(backend):
     result = solve(two_squares(4, alpha_aux=1.0), tolerance=1e-30, backend=backend)
-    assert result.status in (Status.CONVERGED, Status.STALLED, Status.ITERATION_LIMIT)
-    assert result.iterations <= 200
-    assert result.certificate.residual < 1e-12
+    assert result.status is Status.CONVERGED
+    assert result.iterations <= 20
+    assert 1e-30 < result.certificate.residual < 1e-14
 
 
 def test_a_loose_tolerance_ends_early(backend):
@@ -137,15 +138,16 @@ def test_a_loose_tolerance_ends_early(backend):
         ({"min_quality": "x"}, "min_quality: expected a finite number ≥ 0 and < 1, found 'x'"),
         ({"inflation": 0.5}, "inflation: expected a finite number > 1, found 0.5"),
         ({"inflation": float("nan")}, "inflation: expected a finite number > 1, found nan"),
-        (
-            {"backend": "pardisso"},
-            "unknown factorisation backend 'pardisso'; did you mean 'pardiso'",
-        ),
     ],
 )
 def test_options_are_checked_by_name(backend, option, message):
     with pytest.raises(OptionError, match=f"^{message}"):
         solve(two_squares(4), **{"backend": backend} | option)
+
+
+def test_a_backend_that_does_not_exist_is_refused(backend):
+    with refused(OptionError, what="backend", found="pardisso", expected=BACKENDS):
+        solve(two_squares(4), backend="pardisso")
 
 
 def test_a_lost_run_tells_of_the_saddle_it_met(backend):
@@ -174,13 +176,13 @@ def test_stopped_on_the_second_way_the_first_one_counts_if_it_came_farther(backe
 
 def test_a_collapsed_surface_is_no_start(backend):
     surface = two_squares(4)
-    with pytest.raises(SurfaceError, match="all vertices are at one point"):
+    with refused(SurfaceError, what="vertices"):
         solve(surface.moved(0.0 * surface.vertices), backend=backend)
 
 
-def test_a_backend_that_is_not_installed_is_said_so(backend, monkeypatch):
+def test_a_backend_that_is_not_installed_is_named_with_its_extra(backend, monkeypatch):
     monkeypatch.setattr("pcmc.stability.factorisation.available", lambda: ("superlu",))
-    with pytest.raises(MissingExtra, match="pypardiso is not installed"):
+    with pytest.raises(MissingExtra, match=r"pypardiso is not installed.*\[fast\]"):
         solve(two_squares(4), backend="pardiso")
     assert solve(two_squares(4)).converged
 
@@ -232,8 +234,11 @@ def merged(surface, X):
 
 
 @TARGETS
-@pytest.mark.parametrize("move", [thrown(1.5), thrown(4.0), flattened, merged],
-                         ids=["inverted", "inverted far", "zero area", "merged"])  # fmt: skip
+@pytest.mark.parametrize(
+    "move",
+    [thrown(1.5), thrown(4.0), flattened, merged],
+    ids=["inverted", "inverted far", "zero area", "merged"],
+)
 def test_bad_triangles_at_the_start_are_mended(backend, target, move):
     start = cap_with(move)
     normal = np.cross(
@@ -262,7 +267,7 @@ def test_a_mesh_that_cannot_be_mended_is_named(backend, target):
 
 def test_zero_area_is_refused_with_the_face(backend):
     X = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]]
-    with pytest.raises(SurfaceError, match=r"face 0 = \[0, 1, 2\] of patch 'roof' has zero area"):
+    with pytest.raises(SurfaceError, match=r"faces\[0\] = \[0, 1, 2\] of patch 'roof' has zero"):
         solve(
             Surface(X, [[0, 1, 2], [0, 2, 3]], [0, 0], [Patch("roof", 1.0)], fixed=[0]),
             backend=backend,
@@ -289,9 +294,7 @@ def beside(surface):
 @TARGETS
 def test_a_part_that_nothing_holds_is_named(backend, target):
     loose = together(spherical_cap(0.25), beside(spherical_cap(0.25)), held=False)
-    with pytest.raises(
-        SurfaceError, match=r"around vertex 61 \(patch 'cap too'\).*no support; hold it"
-    ):
+    with refused(SurfaceError, what="cap too", where=61):
         solve(loose, target=target, backend=backend)
 
 
@@ -335,7 +338,7 @@ def test_tensions_at_the_limit_of_balance_are_named(backend, target, right):
     """Where 4 = 3 + 1, the weaker patch and the wall would have to lie on each other."""
     surface = two_squares(4, alpha_aux=1.0).retensioned({"left": 4.0, "right": right})
     found = solve(surface, target=target, backend=backend).certificate
-    assert found.verdict in (Verdict.DEGENERATE, Verdict.NOT_CONVERGED)
+    assert found.verdict is Verdict.DEGENERATE
     assert "junction left | right | wall could balance only with its sheets nearly" in found.detail
     assert f"4 against 1 + {right:g}" in found.detail
 
@@ -384,9 +387,18 @@ def test_the_smallest_surfaces(backend, surface):
         assert result.iterations == 0
 
 
-@TARGETS
-@pytest.mark.parametrize("seed", range(3))
-def test_a_start_of_pure_noise_ends_and_says_how(backend, target, seed):
+@pytest.mark.parametrize(
+    ("target", "seed", "verdict"),
+    [
+        ("minimum", 0, Verdict.STABLE),
+        ("minimum", 1, Verdict.STABLE),
+        ("minimum", 2, Verdict.STABLE),
+        ("stationary", 0, Verdict.STABLE),
+        ("stationary", 1, Verdict.STABLE),
+        ("stationary", 2, Verdict.SADDLE),  # the upper cap
+    ],
+)
+def test_a_start_of_pure_noise_ends_at_a_cap(backend, target, seed, verdict):
     surface = spherical_cap(0.25)
     X = surface.vertices + np.where(surface.free[:, None], 1.0, 0.0) * np.random.default_rng(
         seed
@@ -396,11 +408,7 @@ def test_a_start_of_pure_noise_ends_and_says_how(backend, target, seed):
     assert np.isfinite(result.energy)
     assert result.energy == pytest.approx(energy(result.surface), rel=1e-12)
     assert (result.surface.vertices[surface.fixed] == surface.vertices[surface.fixed]).all()
-    found = result.certify()
-    if result.converged:
-        assert found.verdict in (Verdict.STABLE, Verdict.SADDLE)
-    else:
-        assert found.verdict in (Verdict.DEGENERATE, Verdict.NOT_CONVERGED, Verdict.NO_EQUILIBRIUM)
-        assert found.detail
+    assert result.converged
+    assert result.certificate.verdict is verdict
     noisy, mended = (triangle_quality(Y, surface.faces).min() for Y in (X, result.surface.vertices))
     assert noisy < 0.1 < 0.3 < mended

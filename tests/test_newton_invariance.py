@@ -47,9 +47,14 @@ def rebuilt(surface, X=None, plane=None, patches=None, order=None, rank=None):
     X = surface.vertices if X is None else X
     patches = surface.patches if patches is None else patches
     return Surface(
-        X[order], place[surface.faces], seat[surface.patch_of_face], [patches[k] for k in rank],
-        fixed=surface.fixed[order], on_plane=surface.on_plane[order], plane=plane or surface.plane,
-    )  # fmt: skip
+        X[order],
+        place[surface.faces],
+        seat[surface.patch_of_face],
+        [patches[k] for k in rank],
+        fixed=surface.fixed[order],
+        on_plane=surface.on_plane[order],
+        plane=plane or surface.plane,
+    )
 
 
 def answer(surface):
@@ -70,7 +75,7 @@ def answer(surface):
         "pinched": len(found.pinched),
         "eigenvalue": found.eigenvalues[0] * scale,
         "lengths": np.sort(np.linalg.norm(X - centre, axis=1)) / scale,
-    }  # fmt: skip
+    }
 
 
 @pytest.fixture(scope="module")
@@ -130,9 +135,14 @@ def test_vertices_patches_and_faces_in_another_order(name, seed, answers):
         [np.roll(face, k) for face, k in zip(other.faces[faces], turn[faces], strict=True)]
     )
     shuffled = Surface(
-        other.vertices, F, other.patch_of_face[faces], other.patches,
-        fixed=other.fixed, on_plane=other.on_plane, plane=other.plane,
-    )  # fmt: skip
+        other.vertices,
+        F,
+        other.patch_of_face[faces],
+        other.patches,
+        fixed=other.fixed,
+        on_plane=other.on_plane,
+        plane=other.plane,
+    )
     agrees(answer(shuffled), answers[name])
 
 
@@ -177,6 +187,7 @@ def test_drawn_in_a_survey_s_coordinates(name, shift):
     lost = 10.0 * np.spacing(np.abs(shift).max()) + 1e-12 * surface.size
     np.testing.assert_allclose(there.surface.vertices - shift, here.surface.vertices, atol=lost)
     np.testing.assert_allclose(
-        there.certificate.reactions, here.certificate.reactions,
+        there.certificate.reactions,
+        here.certificate.reactions,
         atol=1e-7 * np.abs(here.certificate.reactions).max(),
-    )  # fmt: skip
+    )

@@ -10,8 +10,9 @@ from pcmc.base.errors import PlanWarning
 from pcmc.energy.functional import patch_areas
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.plan import Area, Divider, Hole, Plan, plan_from
-from pcmc.plan.curves import arc, bezier, circle, join, polyline, to_local
-from pcmc.plan.lift import dome, spanned
+from pcmc.plan.coordinates import to_local
+from pcmc.plan.curves import arc, bezier, circle, join, polyline
+from pcmc.plan.heights import dome, harmonic_heights
 from pcmc.plan.planar import triangulate
 from pcmc.surface.topology import POINT
 
@@ -186,9 +187,11 @@ def test_dividers_that_cross_share_a_line():
 def test_points_curves_and_edges_as_supports():
     beam = bezier([[5, 8, 1], [10, 10, 4], [15, 8, 1]])
     plan = Plan(
-        BOX, edge="free", tension=10.0,
+        BOX,
+        edge="free",
+        tension=10.0,
         supports=[[[0, 0], [6, 0]], [[20, 6], [20, 12], [14, 12]], [0, 12], [10, 4, 2.0], beam],
-    )  # fmt: skip
+    )
     with pytest.warns(PlanWarning, match="nothing holds the outline at .* has nothing to pull"):
         surface = plan.surface()
     X = surface.vertices[surface.fixed]
@@ -268,7 +271,7 @@ def test_heights_in_closed_form():
     gap = np.linalg.norm(mesh.points[:, None] - rim[None], axis=2).min(axis=1)
     assert (full <= 0.8 * gap + 1e-12).all()
     heights = np.where(held, mesh.points[:, 0] * 2 + 1, np.nan)
-    base = spanned(mesh.points, mesh.triangles, heights)
+    base = harmonic_heights(mesh.points, mesh.triangles, heights)
     np.testing.assert_allclose(base, mesh.points[:, 0] * 2 + 1, atol=1e-12)
 
 

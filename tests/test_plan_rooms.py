@@ -37,9 +37,14 @@ def test_the_difference_pushes_the_wall_from_the_fuller_room():
 def test_two_pressures_give_one_roof_whatever_the_point_of_the_plane():
     here = two_rooms().surface()
     there = Surface(
-        here.vertices, here.faces, here.patch_of_face, here.patches, fixed=here.fixed,
-        on_plane=here.on_plane, plane=Plane((40.0, -30.0, 0.0)),
-    )  # fmt: skip
+        here.vertices,
+        here.faces,
+        here.patch_of_face,
+        here.patches,
+        fixed=here.fixed,
+        on_plane=here.on_plane,
+        plane=Plane((40.0, -30.0, 0.0)),
+    )
     one, two = solve(here), solve(there)
     assert two.energy == pytest.approx(one.energy, rel=1e-12)
     assert two.certificate.volume == pytest.approx(one.certificate.volume, rel=1e-12)
@@ -70,9 +75,11 @@ def test_a_divider_past_three_rooms_has_a_wall_for_each_difference():
 
 def test_walls_put_under_a_mesh_carry_the_difference_too():
     bare = Plan(
-        [[0, 0], [12, 0], [12, 8], [0, 8]], [Divider([[6, 0], [6, 8]], wall=None)], edge_length=1.5,
+        [[0, 0], [12, 0], [12, 8], [0, 8]],
+        [Divider([[6, 0], [6, 8]], wall=None)],
+        edge_length=1.5,
         patches=[Area("west", 6.0, 1.0), Area("east", 6.0, 0.8)],
-    ).surface()  # fmt: skip
+    ).surface()
     found = certify(bare)
     assert "the pressures do not cancel: 0.2 is left over" in found.detail
     wall = add_walls(bare).patches[-1]

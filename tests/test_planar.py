@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.plan.planar import locate, signed_areas, triangulate
@@ -119,17 +120,36 @@ def test_fine_segments_grade_the_mesh():
 
 
 @pytest.mark.parametrize(
-    ("points", "segments", "h", "holes", "error", "message"),
+    ("points", "segments", "h", "holes", "error", "fields"),
     [
-        ([[0, 0], [1, 0], [0, 1]], loop(3), 0.0, (), OptionError, "edge_length must be"),
-        ([[0, 0], [1, 0], [0, 1]], loop(3), 1.0, [[5, 5]], OptionError, r"hole's point \[5, 5\]"),
-        ([[0, 0], [1, 0], [0, 1], [0, 1]], loop(4), 1.0, (), SurfaceError, "points 2 and 3"),
-        ([[0, 0], [1, 0], [0, 1]], loop(3)[:2], 1.0, (), SurfaceError, "at least 3"),
-        ([[0, 0], [1, 0], [2, 0]], loop(3), 1.0, (), SurfaceError, "one line"),
-        ([[0, 0], [2, 2], [2, 0], [0, 2]], loop(4), 5.0, (), SurfaceError, "crosses another"),
-        ([[0, 0], [2, 0], [2, 2], [0, 2]], loop(4)[:3], 5.0, (), SurfaceError, "enclose no area"),
+        (
+            [[0, 0], [1, 0], [0, 1]],
+            loop(3),
+            1.0,
+            [[5, 5]],
+            OptionError,
+            {"what": "holes", "where": 0},
+        ),
+        ([[0, 0], [1, 0], [0, 1], [0, 1]], loop(4), 1.0, (), SurfaceError, {"where": (2, 3)}),
+        ([[0, 0], [1, 0], [0, 1]], loop(3)[:2], 1.0, (), SurfaceError, {"found": 2, "expected": 3}),
+        ([[0, 0], [1, 0], [2, 0]], loop(3), 1.0, (), SurfaceError, {"what": "points"}),
+        ([[0, 0], [2, 2], [2, 0], [0, 2]], loop(4), 5.0, (), SurfaceError, {"what": "segments"}),
+        (
+            [[0, 0], [2, 0], [2, 2], [0, 2]],
+            loop(4)[:3],
+            5.0,
+            (),
+            SurfaceError,
+            {"what": "segments", "where": None},
+        ),
     ],
-)  # fmt: skip
-def test_bad_input_is_refused(points, segments, h, holes, error, message):
-    with pytest.raises(error, match=message):
+)
+def test_bad_input_is_refused(points, segments, h, holes, error, fields):
+    with refused(error, **fields):
         triangulate(np.array(points, dtype=float), segments, h, holes)
+
+
+@pytest.mark.parametrize("h", [0.0, -1.0, np.nan, np.inf])
+def test_an_edge_length_is_positive(h):
+    with pytest.raises(OptionError, match="edge_length: expected a finite number > 0"):
+        triangulate(np.array([[0, 0], [1, 0], [0, 1.0]]), loop(3), h)

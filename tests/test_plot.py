@@ -7,14 +7,15 @@ import pandas as pd
 import pytest
 from matplotlib.patches import Rectangle
 from PIL import Image
+from refusals import refused
 from tents import tent
 
 import pcmc
 from generators import two_squares
 from pcmc import plot
 from pcmc.base.errors import FileError, MissingExtra, OptionError
-from pcmc.explore.drawing import fields
-from pcmc.plot import raster, supports
+from pcmc.explore.page_data import fields as page_fields
+from pcmc.plot import arrows, legend, raster
 from pcmc.plot.figure import CURVES, finish, new
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
 from pcmc.project import paint
@@ -93,9 +94,13 @@ def test_what_is_behind_is_hidden(renderer):
 def test_light_falls_on_both_sides_alike():
     surface = two_squares(4)
     under = pcmc.Surface(
-        surface.vertices, surface.faces[:, ::-1], surface.patch_of_face, surface.patches,
-        surface.fixed, surface.on_plane,
-    )  # fmt: skip
+        surface.vertices,
+        surface.faces[:, ::-1],
+        surface.patch_of_face,
+        surface.patches,
+        surface.fixed,
+        surface.on_plane,
+    )
     np.testing.assert_array_equal(plot.draw(surface), plot.draw(under))
 
 
@@ -113,26 +118,55 @@ def test_each_surface_may_show_patches_of_its_own():
     assert (left[:, 210:] == 255).all()
     assert (right[:, 210:390] < 250).any()
     assert (left[:, :190] == right[:, :190]).all()
-    larger = plot.panel([surface] * 2, views="plan", patches=[["left"], None], width=800,
-                        one_scale=False)  # fmt: skip
+    larger = plot.panel(
+        [surface] * 2, views="plan", patches=[["left"], None], width=800, one_scale=False
+    )
     assert (larger[:, 210:390] < 250).any()
 
 
-def test_legend_says_what_colours_and_dots_mean(monkeypatch):
+def test_legend_names_what_is_drawn(monkeypatch):
     surface, shown = two_squares(4, alpha_aux=1.0), []
-    legend = plot.pictures._legend
+    entries = legend.entries
     monkeypatch.setattr(
-        plot.pictures, "_legend", lambda f, names: (shown.append(names), legend(f, names))
+        legend, "entries", lambda pictures: shown.append(entries(pictures)) or shown[-1]
     )
     plot.draw(surface, legend=True)
     plot.draw(surface, legend=True, patches=["left", "right"])  # only the wall slides
     plot.draw(surface, legend=True, scalars=pcmc.mean_curvature(surface))
     plot.draw(surface, legend=True, scalars=np.ones(surface.m), supports=False)
-    assert [[name for name, _, _ in names] for names in shown] == [
-        ["left", "right", "wall", "fixed", "sliding"], ["left", "right", "fixed"],
-        ["no value", "fixed", "sliding"],
-    ]  # fmt: skip
-    assert [color for _, color, dot in shown[0] if dot] == [FIXED_DOT, SLIDING_DOT]
+    assert [(list(colors), list(dots)) for colors, dots in shown] == [
+        (["left", "right", "wall"], ["fixed", "sliding"]),
+        (["left", "right"], ["fixed"]),
+        (["no value"], ["fixed", "sliding"]),
+        ([], []),
+    ]
+    assert shown[0][1] == {"fixed": FIXED_DOT, "sliding": SLIDING_DOT}
+
+
+def test_no_text_of_a_full_panel_lies_on_another(monkeypatch):
+    """Titles, scale and legend each have a place of their own, and the pictures keep their height."""
+    finished = []
+    keep = plot.pictures.finish
+    monkeypatch.setattr(
+        plot.pictures, "finish", lambda figure, path: finished.append(figure) or keep(figure, path)
+    )
+    surface = two_squares(4)
+    H = pcmc.mean_curvature(surface)
+    plot.panel([surface] * 4, titles=list("abcd"), scalars=[H] * 3 + [None], label="H", legend=True)
+    plain = plot.draw(surface, width=600)  # as wide as a column of the panel
+    (figure, _) = finished
+    *pictures, bar = figure.axes
+    boxes = [axes.get_window_extent() for axes in pictures]
+    assert [round(box.height) for box in boxes] == [len(plain)] * 4
+    boxes += [axes.title.get_window_extent() for axes in pictures]
+    boxes += [bar.get_tightbbox(), *(text.get_window_extent() for text in figure.legends[0].texts)]
+    for k, one in enumerate(boxes):
+        assert figure.bbox.x0 <= one.x0 <= one.x1 <= figure.bbox.x1
+        assert figure.bbox.y0 - 1 <= one.y0 <= one.y1 <= figure.bbox.y1 + 1
+        for two in boxes[:k]:
+            assert min(one.x1, two.x1) - max(one.x0, two.x0) < 1 or (
+                min(one.y1, two.y1) - max(one.y0, two.y0) < 1
+            )
 
 
 @pytest.mark.skipif(not raster.opengl(), reason="the system has no OpenGL")
@@ -232,13 +266,13 @@ def test_reactions_are_those_of_the_certificate_per_length(monkeypatch, tmp_path
     """Half of each boundary edge to either end; the same numbers as the page for exploring has."""
     surface = two_squares(6)
     found, drawn = pcmc.certify(surface), []
-    arrows = supports.vectors
+    vectors = arrows.vectors
     monkeypatch.setattr(
-        supports, "vectors", lambda s, field, *more, **how: drawn.append(field) or arrows(s, field)
+        arrows, "vectors", lambda s, field, *_, **__: drawn.append(field) or vectors(s, field)
     )
     paint(surface, tmp_path / "a.png", "diagonal", "reactions")
     np.testing.assert_allclose(
-        drawn[0], np.nan_to_num(fields(surface, found, np.zeros(3))["reactions"]), atol=1e-12
+        drawn[0], np.nan_to_num(page_fields(surface, found, np.zeros(3))["reactions"]), atol=1e-12
     )
     most = np.linalg.norm(drawn[0], axis=1).max()
     assert most == pytest.approx(found.boundaries["per_length_max"].max(), rel=1e-12)
@@ -263,21 +297,40 @@ def test_curves(tmp_path):
         image = plot.histories(frames, tmp_path / name, **options)
         assert near(image, rgb("#0072B2")).any()
         assert near(image, rgb("#D55E00")).any()
-    h = np.array([1.0, 0.5, 0.25, 0.125])
-    plot.convergence({"E": (h, 0.3 * h**2), "x": (h, [0.1, 0.02, np.nan, 0.0])}, tmp_path / "c.png")
+
+
+def test_a_heatmap_shows_values_marks_and_gaps(tmp_path):
     table = np.array([[1.0, 10.0, np.nan], [-1.0, 1e-3, 1e3]])
-    plot.heatmap(
-        [1, 2, 4], [1, 3], {"a": table, "b": table}, tmp_path / "h.png", log=True, label="m",
-        marks={"a": np.isnan(table)}, xlabel="α", ylabel="β",
-    )  # fmt: skip
-    assert len(list(tmp_path.iterdir())) == 4
-    assert all(p.stat().st_size > 5000 for p in tmp_path.iterdir())
+    crosses = {"a": np.array([[False, False, False], [False, False, True]])}
+    options = {"log": True, "label": "m", "xlabel": "α", "ylabel": "β"}
+    plain, marked = (
+        plot.heatmap([1, 2, 4], [1, 3], {"a": table}, tmp_path / "h.png", marks=m, **options)
+        for m in (None, crosses)
+    )
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "h.png").convert("RGB")), marked)
+    grey = near(plain, rgb("#D9D9D9"), 0.01)
+    rows, columns = np.flatnonzero(grey.any(axis=1)), np.flatnonzero(grey.any(axis=0))
+    wide = np.ptp(columns) / 3
+    at = [
+        (
+            rows.min() + (2 * r + 1) * np.ptp(rows) // 4,
+            columns.min() + (2 * c + 1) * np.ptp(columns) // 6,
+        )
+        for r in range(2)
+        for c in range(3)
+    ]
+    assert [bool(grey[place]) for place in at] == [True, False, False, False, False, True]
+    y, x = np.nonzero((plain != marked).any(axis=2))
+    assert abs(x.mean() - at[2][1]) < 0.1 * wide
+    assert abs(y.mean() - at[2][0]) < 0.1 * wide
 
 
 def test_convergence_shows_the_slope(monkeypatch):
     labels = []
     monkeypatch.setattr(
-        plot.curves, "_key", lambda axes, _: labels.extend(axes.get_legend_handles_labels()[1])
+        plot.curves,
+        "add_legend",
+        lambda axes, _: labels.extend(axes.get_legend_handles_labels()[1]),
     )
     h = np.array([1.0, 0.5, 0.25])
     plot.convergence({"E": (h, 0.3 * h**2)})
@@ -296,7 +349,7 @@ def test_curves_on_each_other_are_all_seen_with_dashes():
 
 def test_levels_go_across_and_short_logarithmic_axes_have_round_ticks(monkeypatch):
     seen = []
-    monkeypatch.setattr(plot.curves, "_key", lambda axes, _: seen.append(axes))
+    monkeypatch.setattr(plot.curves, "add_legend", lambda axes, _: seen.append(axes))
     plot.lines({"a": ([0.5, 1.5], [1, 2])}, xscale="log", levels={"bound": 1.5})
     (axes,) = seen
     assert axes.get_legend_handles_labels()[1] == ["a", "bound"]
@@ -307,49 +360,65 @@ def test_levels_go_across_and_short_logarithmic_axes_have_round_ticks(monkeypatc
     assert len(seen[1].get_xticks(minor=True))
 
 
-BAD = {
-    "unknown view 'diagnal'; did you mean 'diagonal'": lambda s: plot.draw(s, view="diagnal"),
-    "unknown renderer": lambda s: plot.draw(s, renderer="povray"),
-    "unknown cmap 'virdis'; did you mean 'viridis'": lambda s: plot.draw(
-        s, scalars=np.zeros(s.n), cmap="virdis"
+BAD = [
+    (lambda s: plot.draw(s, view="diagnal"), {"what": "view", "found": "diagnal"}),
+    (lambda s: plot.draw(s, renderer="povray"), {"what": "renderer", "found": "povray"}),
+    (lambda s: plot.draw(s, scalars=np.zeros(s.n), cmap="virdis"), {"what": "cmap"}),
+    (lambda s: plot.draw(s, scalars=np.zeros(s.n), limits=(1.0, 1.0)), {"what": "limits"}),
+    (
+        lambda s: plot.draw(s, scalars=[1, 2, 3]),
+        {"what": "scalars", "found": (3,), "expected": [(10,), (12,)]},
     ),
-    "limits": lambda s: plot.draw(s, scalars=np.zeros(s.n), limits=(1.0, 1.0)),
-    r"scalars: expected shape \(10,\) or \(12,\), found \(3,\)": lambda s: plot.draw(
-        s, scalars=[1, 2, 3]
+    (
+        lambda s: plot.draw(s, numbers=np.zeros(s.m)),
+        {"what": "numbers", "found": (12,), "expected": [(10,)]},
     ),
-    r"numbers: expected shape \(10,\), found \(12,\)": lambda s: plot.draw(
-        s, numbers=np.zeros(s.m)
+    (lambda s: plot.panel([]), {"what": "surfaces", "found": 0}),
+    (lambda s: plot.panel([s, s], titles=["one"]), {"what": "titles", "found": 1, "expected": 2}),
+    (lambda s: plot.panel([s, s], views=["plan"]), {"what": "views", "found": 1, "expected": 2}),
+    (
+        lambda s: plot.reactions(
+            pcmc.Surface(s.vertices, s.faces, s.patch_of_face, s.patches, fixed=[0])
+        ),
+        {"what": "surface"},
     ),
-    "unknown patch 'wal'; did you mean 'wall'": lambda s: plot.draw(s, patches=["wal"]),
-    "at least one surface": lambda s: plot.panel([]),
-    "titles: expected 2": lambda s: plot.panel([s, s], titles=["one"]),
-    "views: expected 2": lambda s: plot.panel([s, s], views=["plan"]),
-    "no boundary of the surface is held": lambda s: plot.reactions(
-        pcmc.Surface(s.vertices, s.faces, s.patch_of_face, s.patches, fixed=[0])
+    (lambda s: plot.vectors(s, np.zeros(10)), {"what": "field", "expected": (10, 3)}),
+    (
+        lambda s: plot.histories({"a": pd.DataFrame({"energy": [1.0]})}, y="enrgy"),
+        {"what": "history", "where": "a", "found": "enrgy"},
     ),
-    r"field: expected finite numbers of shape \(10, 3\)": lambda s: plot.vectors(s, np.zeros(10)),
-    "history 'a': unknown column 'enrgy'; did you mean 'energy'": lambda s: plot.histories(
-        {"a": pd.DataFrame({"energy": [1.0]})}, y="enrgy"
+    (lambda s: plot.lines({"a": ([1], [1])}, xscale="cubic"), {"what": "scale", "found": "cubic"}),
+    (lambda s: plot.lines({"a": ([1, 2], [1])}), {"what": "curves", "where": "a"}),
+    (
+        lambda s: plot.heatmap([1, 2], [1], {"a": [[1]]}),
+        {"what": "tables", "where": "a", "found": (1, 1), "expected": (1, 2)},
     ),
-    "unknown scale": lambda s: plot.lines({"a": ([1], [1])}, xscale="cubic"),
-    "curve 'a': expected x and y of one length": lambda s: plot.lines({"a": ([1, 2], [1])}),
-    r"tables\['a'\]: expected shape \(1, 2\)": lambda s: plot.heatmap([1, 2], [1], {"a": [[1]]}),
-    "at least one table": lambda s: plot.heatmap([1], [1], {}),
-    "unknown table 'b'": lambda s: plot.heatmap([1], [1], {"a": [[1]]}, marks={"b": [[True]]}),
-    "unknown cmap": lambda s: plot.heatmap([1], [1], {"a": [[1]]}, cmap="no"),
-}
+    (lambda s: plot.heatmap([1], [1], {}), {"what": "tables", "found": 0}),
+    (
+        lambda s: plot.heatmap([1], [1], {"a": [[1]]}, marks={"b": [[True]]}),
+        {"what": "marks", "where": "b"},
+    ),
+    (lambda s: plot.heatmap([1], [1], {"a": [[1]]}, cmap="no"), {"what": "cmap", "found": "no"}),
+]
 
 
-@pytest.mark.parametrize("message", BAD)
-def test_bad_input_is_named(message):
-    with pytest.raises(OptionError, match=message):
-        BAD[message](tent())
+@pytest.mark.parametrize(("act", "fields"), BAD)
+def test_bad_input_is_named(act, fields):
+    with refused(OptionError, **fields):
+        act(tent())
+
+
+def test_a_misspelt_patch_or_colour_map_is_answered_with_the_nearest():
+    with pytest.raises(OptionError, match="unknown patch 'wal'; did you mean 'wall'"):
+        plot.draw(tent(), patches=["wal"])
+    with pytest.raises(OptionError, match="unknown cmap 'virdis'; did you mean 'viridis'"):
+        plot.draw(tent(), scalars=np.zeros(10), cmap="virdis")
 
 
 def test_bad_paths_leave_nothing(tmp_path):
-    with pytest.raises(FileError, match=r"end the name with \.png"):
+    with refused(FileError, what=str(tmp_path / "a.pdf"), expected=".png"):
         plot.draw(flat_square(), tmp_path / "a.pdf")
-    with pytest.raises(FileError, match="cannot be written"):
+    with refused(FileError, what=str(tmp_path / "no folder" / "a.png")):
         plot.draw(flat_square(), tmp_path / "no folder" / "a.png")
     assert not list(tmp_path.iterdir())
 
@@ -382,7 +451,7 @@ def test_a_million_triangles_are_drawn(tmp_path):
 def test_a_large_picture_is_written_in_fewer_colours_and_keeps_the_rare_ones(tmp_path):
     shades = np.linspace(0.2, 0.9, 150 * 300).reshape(150, 300)
     figure = new(900.0, 600.0)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes = figure.subplots()
     noise = np.random.default_rng(1).uniform(-0.1, 0.1, (150, 300))
     axes.imshow(np.stack([0.2 + 0.0 * shades, shades, 1.0 - shades + noise], 2).clip(0, 1))
     axes.add_patch(Rectangle((10, 10), 3, 3, color="#EE8866"))

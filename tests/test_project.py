@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 
 import pcmc
 from pcmc.base.errors import FileError, OptionError
-from pcmc.project import build, check_names, check_outputs, load, run
+from pcmc.project import build, check_names, check_outputs, load, reference, run, sections
 
 ROOF = Path(__file__).resolve().parent.parent / "notebooks" / "roof.toml"
 SMALL = """
@@ -78,103 +80,218 @@ def test_build_only_meshes(small):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "line", "near"),
+    ("old", "new", "line", "key", "near"),
     [
-        ("[output]", "[outptu]", 10, "output"),
-        ("edge_length", "edge_lenght", 3, "edge_length"),
-        ("method =", "metod =", 8, "method"),
-        ('"newton"', '"newton"\ntoleranse = 1e-9', 9, "tolerance"),
-        ("files =", "file =", 11, "files"),
-        ("tension =", "tensoin =", 5, "tension"),
-        ("[solve]", "[[plan.holes]]\ncurve = []\nedg = 1\n[solve]", 9, "edge"),
-        ("[solve]", "[[plan.dividers]]\ncurve = []\nbotom = 1\n[solve]", 9, "bottom"),
-        ("[solve]", "[plan.plane]\nnormall = [0, 0, 1]\n[solve]", 8, "normal"),
+        ("[output]", "[outptu]", 10, "outptu", "output"),
+        ("edge_length", "edge_lenght", 3, "plan.edge_lenght", "edge_length"),
+        ("method =", "metod =", 8, "solve.metod", "method"),
+        ('"newton"', '"newton"\ntoleranse = 1e-9', 9, "solve.toleranse", "tolerance"),
+        ("files =", "file =", 11, "output.file", "files"),
+        ("tension =", "tension = 1, tensoin =", 5, "plan.patches.roof.tensoin", "tension"),
+        ("[solve]", "[[plan.holes]]\ncurve = []\nedg = 1\n[solve]", 9, "plan.holes.edg", "edge"),
+        (
+            "[solve]",
+            "[[plan.dividers]]\ncurve = []\nbotom = 1\n[solve]",
+            9,
+            "plan.dividers.botom",
+            "bottom",
+        ),
+        (
+            "[solve]",
+            "[plan.plane]\nnormall = [0, 0, 1]\n[solve]",
+            8,
+            "plan.plane.normall",
+            "normal",
+        ),
+        (
+            "[output]",
+            "[[remesh]]\nedge_length = 1\n[[remesh]]\nwen = 1\n[output]",
+            13,
+            "remesh.wen",
+            "when",
+        ),
+        ("[output]", "[targets]\nmeet = []\nvaryy = []\n[output]", 12, "targets.varyy", "vary"),
+        (
+            "[output]",
+            '[targets]\nvary = []\nmeet = [{quantity = "apex", valu = 1}]\n[output]',
+            12,
+            "targets.meet.valu",
+            "value",
+        ),
     ],
 )
-def test_an_unknown_key_is_named_with_its_line_and_the_nearest(small, old, new, line, near):
-    with pytest.raises(FileError) as caught:
+def test_an_unknown_key_has_its_line_and_the_nearest_key(small, old, new, line, key, near):
+    with refused(FileError, what=key, where=line, found=key.rpartition(".")[2]) as caught:
         load(changed(small, old, new))
     text = str(caught.value)
     assert text.startswith(f"{small}: line {line}: unknown ")
-    assert f"did you mean '{near}'?" in text
+    assert f"did you mean {near!r}?" in text
     assert "\n" not in text
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("old", "new", "line", "key"),
     [
-        ("[plan]", "[plan", "at line 2"),
-        ('"newton"', '"newtn"', "did you mean 'newton'"),
-        ('"newton"', '"newton"\niterations = -1', "iterations"),
-        ("edge_length = 1.0", "edge_length = -1.0", "edge_length"),
-        ("outline = [[0, 0], [4, 0], [4, 3], [0, 3]]", "", "needs an outline"),
-        ('files = ["roof.pcmc", "roof.obj"]', 'files = "roof.obj"', "list of names"),
-        ("files =", "picture = 3\nfiles =", "picture"),
-        ("files =", 'colour = "eror"\nfiles =', "did you mean 'error'"),
-        ("[output]", "[output.files]", "list of names|unknown"),
-        ("[plan]", "solve = 3\n[plan]", "twice|must be a table|Cannot"),
+        ("[plan]", "[plna]", 1, "plan"),
+        ("outline = [[0, 0], [4, 0], [4, 3], [0, 3]]", "", 2, "plan.outline"),
+        ("tension =", "pressure =", 5, "plan.patches.roof.tension"),
+        ("[output]", "[remesh]\ngrowth = 2\n[output]", 10, "remesh.edge_length"),
+        ("[output]", '[targets]\nmeet = [{quantity = "apex"}]\n[output]', 10, "targets.vary"),
+        (
+            "[output]",
+            '[targets]\nmeet = [{of = "a"}]\nvary = ["a"]\n[output]',
+            11,
+            "targets.meet.quantity",
+        ),
+        (
+            "[output]",
+            "[targets]\nmeet = []\nvary = [{low = 1}]\n[output]",
+            12,
+            "targets.vary.patch",
+        ),
     ],
 )
-def test_a_bad_value_is_told_in_a_line(small, old, new, message):
-    with pytest.raises(FileError, match=message) as caught:
-        load(changed(small, old, new))
-    assert str(caught.value).startswith(f"{small}: ")
+def test_a_missing_key_is_named_with_the_line_of_its_table(small, old, new, line, key):
+    text = small.read_text(encoding="utf-8").replace("[plan]", "[plan]" if new != "[plna]" else "")
+    small.write_text(text, encoding="utf-8")
+    if new == "[plna]":
+        small.write_text("# nothing", encoding="utf-8")
+    else:
+        changed(small, old, new)
+    with refused(FileError, what=key, where=line) as caught:
+        load(small)
+    assert f"needs the key {key.rpartition('.')[2]!r}" in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("line", "message"),
+    ("old", "new", "fields"),
     [
-        ("dividers = 3", r"line 3: dividers must be a list, found 3"),
+        ("[plan]", "[plan", {"where": 2}),
+        ("[plan]", "solve = 3\n[plan]", {"where": 8}),
+        ('"newton"', '"newtn"', {"what": "solve.method", "where": 8, "found": "newtn"}),
+        ('"newton"', '"newton"\niterations = -1', {}),
+        ("edge_length = 1.0", "edge_length = -1.0", {}),
+        ('["roof.pcmc", "roof.obj"]', '"roof.obj"', {"what": "output.files", "where": 11}),
+        ("files =", "picture = 3\nfiles =", {"what": "output.picture", "where": 11, "found": 3}),
+        ("files =", 'colour = "eror"\nfiles =', {"what": "output.colour", "found": "eror"}),
+        ('"roof.obj"', '"roof.obk"', {"what": "roof.obk", "found": ".obk"}),
+        ("files =", 'picture = "roof.jpg"\nfiles =', {"what": "roof.jpg"}),
+        ("[output]", "[remesh]\nedge_length = -1\n[output]", {}),
         (
-            "holes = {curve = 3}",
-            r"line 3: holes must be a list, found .*; write \[\[plan.holes\]\]",
+            "[output]",
+            "[remesh]\nedge_length = 1\nwhen = 'beforre'\n[output]",
+            {"what": "remesh.when"},
         ),
-        ('supports = "x"', r"line 3: supports must be a list"),
-        ("patches = 3", r"line 3: plan\.patches must be a table, found 3"),
-        ("patches = {roof = 3}", r"plan\.patches\.roof must be a table, found 3"),
-        (
-            'patches = {roof = {tension = 2.0, at = "b"}}',
-            "'roof': at must be a point .x, y. .*found 'b'",
-        ),
-        ("patches = {roof = {tension = 2.0, at = 3}}", "at must be a point .* found 3"),
-        ("patches = {roof = {tension = 2.0, at = [1, nan]}}", "at must be a point"),
-        ('patches = {roof = {tension = "b"}}', "tension must be a number"),
-        ('holes = [{curve = {circle = {centre = [1, 1], radius = "x"}}}]', "wrong kind"),
-        ('dividers = [{curve = [[2, 0], [2, 3]], wall = "a"}]\ntension = 2.0', "tension"),
-        ("outline = 3", "outline"),
-        ('rise = "x"', "rise"),
-        ("plane = {normal = 3}", "normal"),
+        ("[output]", "[targets]\nmeet = []\nvary = []\n[output]", {"what": "targets.meet"}),
     ],
 )
-def test_values_of_the_wrong_kind(tmp_path, line, message):
+def test_a_bad_value_is_one_line_with_the_file(small, old, new, fields):
+    with refused(FileError, **fields) as caught:
+        load(changed(small, old, new))
+    assert str(caught.value).startswith(f"{small}: ")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "key", "kind"),
+    [
+        ("dividers = 3", "dividers", "a list of curves or tables"),
+        ("holes = {curve = 3}", "holes", "a list of curves or tables"),
+        ('supports = "x"', "supports", "a list of points and curves"),
+        ("patches = 3", "patches", "a table"),
+        ("patches = {roof = 3}", "patches.roof", "a table"),
+        ('patches = {roof = {tension = "b"}}', "patches.roof.tension", "a number"),
+        ("patches = {roof = {tension = true}}", "patches.roof.tension", "a number"),
+        ('dividers = [{curve = [[2, 0], [2, 3]], wall = "a"}]', "dividers.wall", "a number"),
+        ("outline = 3", "outline", "a curve"),
+        ('rise = "x"', "rise", "a number"),
+        ("plane = {normal = 3}", "plane.normal", "a point [x, y, z]"),
+    ],
+)
+def test_values_of_the_wrong_kind(tmp_path, line, key, kind):
     path = tmp_path / "p.toml"
     rest = ["edge_length = 1.0"]
     if not line.startswith("outline"):
         rest.append("outline = [[0, 0], [4, 0], [4, 3], [0, 3]]")
-    if not line.startswith(("patches", "dividers = [")):
+    if not line.startswith("patches"):
         rest.append("patches = {roof = {tension = 2.0}}")
     path.write_text("\n".join(["[plan]", "edge = 'fixed'", line, *rest]), encoding="utf-8")
-    with pytest.raises(pcmc.base.errors.PcmcError, match=message) as caught:
-        build(path)
-    assert str(caught.value).startswith(f"{path}: ")
-    assert "\n" not in str(caught.value)
-
-
-def test_a_section_that_is_no_table(tmp_path):
-    path = tmp_path / "p.toml"
-    path.write_text("plan = 3", encoding="utf-8")
-    with pytest.raises(FileError, match="line 1: plan must be a table"):
+    with refused(FileError, what=f"plan.{key}", where=3, expected=kind) as caught:
         load(path)
+    assert str(caught.value).startswith(f"{path}: line 3: plan.{key} must be {kind}, found ")
+    assert ("; write [[plan.holes]]" in str(caught.value)) == (key == "holes")
 
 
-def test_files_that_are_none(tmp_path):
+@pytest.mark.parametrize("at", ['"b"', "3", "[1, nan]", '["b", 2]'])
+def test_a_patch_is_at_a_point(small, at):
+    changed(small, "tension = 2.0", f"tension = 2.0, at = {at}")
+    with refused(FileError) as caught:
+        load(small)
+    assert caught.value.what in ("plan.patches.roof.at", "at")
+    assert "a point [x, y] or a list of points" in str(caught.value)
+
+
+def test_a_wrong_value_inside_a_curve(small):
+    changed(
+        small, "edge_length", 'holes = [{circle = {centre = [1, 1], radius = "x"}}]\nedge_length'
+    )
+    with pytest.raises(FileError, match=r"hole 1: circle: radius: expected .*, found 'x'"):
+        load(small)
+
+
+def test_the_line_is_that_of_the_entry_with_the_wrong_value(small):
+    holes = "[[plan.holes]]\ncurve = []\nedge = 'free'\n[[plan.holes]]\ncurve = []\nedge = 'fred'\n"
+    with refused(FileError, what="plan.holes.edge", where=12, found="fred"):
+        load(changed(small, "[solve]", f"{holes}[solve]"))
+
+
+def test_the_manual_lists_every_key_that_is_read():
+    from dataclasses import fields
+
+    from pcmc.design import Parameter, Target
+    from pcmc.plan import Area, Divider, Hole, Plan
+    from pcmc.plot.scene import VIEWS
+    from pcmc.project import Remeshing
+    from pcmc.project.keys import KINDS
+    from pcmc.solvers import find_method
+    from pcmc.surface import Plane
+
+    classes = {
+        "plan": Plan,
+        "plan.patches.NAME": Area,
+        "plan.dividers": Divider,
+        "plan.holes": Hole,
+        "plan.plane": Plane,
+        "remesh": Remeshing,
+        "targets.meet": Target,
+        "targets.vary": Parameter,
+    }
+    listed = {(s.name, s.condition): s for s in sections()}
+    for name, cls in classes.items():
+        names = {f.name for f in fields(cls)} - ({"name"} if cls is Area else set())
+        assert {key.name for key in listed[name, ""].keys} == names
+    for method in ("newton", "nesterov", "lbfgs"):
+        options = {f.name: f.default for f in fields(find_method(method).options)}
+        section = listed["solve", f'method = "{method}"']
+        assert {key.name: key.default for key in section.keys[1:]} == options
+    manual = reference()
+    for section in sections()[1:]:
+        for key in section.keys:
+            assert key.help, (section.name, key.name)
+            assert KINDS[key.kind]
+            assert f"| `{key.name}` | " in manual
+    (view,) = (key for key in listed["output", ""].keys if key.name == "view")
+    assert all(name in view.help for name in VIEWS)
+
+
+def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(FileError, match="cannot be read"):
         load(tmp_path / "none.toml")
-    (tmp_path / "p.toml").write_bytes(b"\xff\xfe")
-    with pytest.raises(FileError, match="byte 0 is not text in UTF-8; save it as that"):
+    (tmp_path / "p.toml").write_bytes(b"ab\xff\xfe")
+    with refused(FileError, what=str(tmp_path / "p.toml"), where=2):
         load(tmp_path / "p.toml")
-    (tmp_path / "p.toml").write_text("", encoding="utf-8")
-    with pytest.raises(FileError, match=r"needs a \[plan\]"):
+    (tmp_path / "p.toml").write_text("plan = 3", encoding="utf-8")
+    with refused(FileError, what="plan", where=1, found=3, expected="a table"):
         load(tmp_path / "p.toml")
 
 
@@ -209,15 +326,15 @@ def test_nothing_is_written_when_not_certified_unless_asked(small):
 
 def test_output_names_are_checked_before_any_work(tmp_path):
     (tmp_path / "a.obj").mkdir()
-    with pytest.raises(FileError, match="is a folder"):
+    with pytest.raises(FileError, match="is a folder; give the name of a file"):
         check_outputs([tmp_path / "a.obj"])
     with pytest.raises(FileError, match="named twice"):
         check_outputs([tmp_path / "b.obj", tmp_path / "b.obj"])
-    with pytest.raises(FileError, match=r"b.obk: unknown suffix .*did you mean '.obj'"):
+    with refused(FileError, what="b.obk", found=".obk"):
         check_names(["b.obk"])
-    with pytest.raises(FileError, match=r"b.png: .*a picture has an option of its own"):
+    with pytest.raises(FileError, match=r"b.png: .*a picture has its own option"):
         check_names(["b.png"])
-    with pytest.raises(FileError, match=r"b.jpg: a picture is written as .png"):
+    with refused(FileError, what="b.jpg", found=".jpg", expected=".png"):
         check_names([], "b.jpg")
     with pytest.raises(FileError, match="there is no folder"):
         check_outputs([tmp_path / "away" / "b.obj"])
@@ -236,23 +353,10 @@ def test_a_folder_that_may_not_be_written_to_is_refused_before_any_work(small, m
     assert [p.name for p in small.parent.iterdir()] == ["small.toml"]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('"roof.obj"', '"roof.obk"', "roof.obk: unknown suffix '.obk'; did you mean '.obj'"),
-        ("files =", 'picture = "roof.jpg"\nfiles =', "roof.jpg: a picture is written as .png"),
-    ],
-)
-def test_names_of_output_are_told_with_the_project(small, old, new, message):
-    with pytest.raises(FileError, match=message) as caught:
-        load(changed(small, old, new))
-    assert str(caught.value).startswith(f"{small}: ")
-
-
 @pytest.mark.parametrize("text", ["[plan]\ngröße = 1", "[größe]", "[plan]\na = {süd = 1}"])
 def test_letters_beyond_a_to_z_need_quotes_and_this_is_said(small, text):
     small.write_text(text, encoding="utf-8")
-    with pytest.raises(FileError, match=r"not TOML: .*letters beyond a-z stand in quotes"):
+    with pytest.raises(FileError, match=r"not TOML: .*put names with letters beyond a-z in quotes"):
         load(small)
     small.write_text("[plan", encoding="utf-8")
     with pytest.raises(FileError, match=r"at end of document\)$"):
@@ -321,46 +425,19 @@ def test_what_is_not_certified_is_not_remeshed(small):
     assert "remeshing" not in steps
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            "[remesh]\nedge_lenght = 0.5",
-            "line 11: unknown key of .remesh.*did you mean 'edge_length'",
-        ),
-        ("[[remesh]]\nedge_length = 1\n[[remesh]]\nwen = 1", "line 13: unknown key .*'when'"),
-        ("[remesh]\nnear_curves = 0.5", "needs an edge_length"),
-        ("[remesh]\nedge_length = -1", "remesh: edge_length must be a finite number > 0, found -1"),
-        (
-            "[remesh]\nedge_length = 'a'",
-            "remesh: edge_length must be a finite number > 0, found 'a'",
-        ),
-        ("[remesh]\nedge_length = 1\ngrowth = 1", "remesh: growth must be"),
-        ("[remesh]\nedge_length = 1\nwhen = 'beforre'", "did you mean 'before'"),
-    ],
-)
-def test_bad_remeshing(small, text, message):
-    with pytest.raises(FileError, match=message) as caught:
-        load(changed(small, "[output]", f"{text}\n[output]"))
-    assert "\n" not in str(caught.value)
-
-
 def test_a_project_is_read_with_the_mark_of_windows_editors(small):
     small.write_bytes(b"\xef\xbb\xbf" + small.read_bytes())
     assert load(small).method == "newton"
 
 
-def test_a_bad_view_is_refused_before_any_work(small):
-    for view, message in (
-        ('"diagnal"', "did you mean 'diagonal'"), ("[30]", "two angles"), ("[nan, 30]", "two angles"),
-        ("3", "view: expected a name or two angles in degrees, found 3"),
-        ("3", "view: expected a name or two angles in degrees, found 3"),
-    ):  # fmt: skip
-        text = small.read_text(encoding="utf-8")
-        changed(small, "files =", f"view = {view}\nfiles =")
-        with pytest.raises(FileError, match=message):
-            load(small)
-        small.write_text(text, encoding="utf-8")
+@pytest.mark.parametrize(
+    ("view", "found"),
+    [('"diagnal"', "diagnal"), ("[30]", [30]), ("[30, 'a']", [30, "a"]), ("3", 3)],
+)
+def test_a_bad_view_is_refused_before_any_work(small, view, found):
+    changed(small, "files =", f"view = {view}\nfiles =")
+    with pytest.raises(FileError, match=rf"view.* {re.escape(repr(found))}"):
+        load(small)
 
 
 def test_targets_are_met(small):
@@ -372,26 +449,11 @@ def test_targets_are_met(small):
     assert pcmc.read(small.parent / "roof.pcmc").patches == outcome.surface.patches
 
 
-@pytest.mark.parametrize(
-    ("targets", "message"),
-    [
-        ('meet = [{quantity = "apex", value = 1.0}]', "needs both"),
-        ('meet = [{of = "roof", value = 1.0}]\nvary = ["roof"]', "needs the key 'quantity'"),
-        ('meet = [{quantity = "apx"}]\nvary = ["roof"]', "did you mean 'apex'"),
-        ('meet = [{quantity = "apex", valu = 1.0}]\nvary = ["roof"]', "line 11: .*'value'"),
-        ('meet = []\nvaryy = ["roof"]', "line 12: .*did you mean 'vary'"),
-    ],
-)
-def test_bad_targets(small, targets, message):
-    with pytest.raises(FileError, match=message):
-        load(changed(small, "[output]", f"[targets]\n{targets}\n[output]"))
-
-
 def test_targets_for_a_patch_that_is_not_there_and_another_method(small):
     aim = '[targets]\nmeet = [{quantity = "apex", of = "rof", value = 0.6}]\nvary = ["roof"]\n[output]'
     changed(small, "[output]", aim)
     with pytest.raises(OptionError, match=r"small\.toml: unknown patch 'rof'; did you mean 'roof'"):
         run(small)
     changed(small, '"newton"', '"lbfgs"')
-    with pytest.raises(OptionError, match="with method 'newton' only"):
+    with refused(OptionError, what="solve.method", found="lbfgs"):
         run(small)

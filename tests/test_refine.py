@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from pcmc import Patch, Plane, Surface
 from pcmc.base.errors import OptionError, SurfaceError
@@ -20,10 +21,14 @@ def tent(plane: Plane | None = None) -> Surface:
     right = [[0, 8, 2], [2, 8, 3], [3, 8, 9], [3, 9, 1]]
     wall = [[0, 4, 2], [4, 5, 2], [5, 3, 2], [5, 1, 3]]
     return Surface(
-        X, left + right + wall, [0] * 4 + [1] * 4 + [2] * 4,
+        X,
+        left + right + wall,
+        [0] * 4 + [1] * 4 + [2] * 4,
         [Patch("left", 3.0), Patch("right", 2.0), Patch("wall", 1.0, pressure=0.0)],
-        fixed=[0, 1, 6, 7, 8, 9], on_plane=[4, 5], plane=plane or Plane(),
-    )  # fmt: skip
+        fixed=[0, 1, 6, 7, 8, 9],
+        on_plane=[4, 5],
+        plane=plane or Plane(),
+    )
 
 
 def middle_of(surface: Surface, a: int, b: int) -> int:
@@ -70,17 +75,23 @@ def test_supports_of_midpoints(a, b, fixed, sliding):
 
 def test_interior_edge_between_fixed_vertices_is_free():
     square = Surface(
-        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], [0, 0],
-        [Patch("a", 1.0)], fixed=range(4),
-    )  # fmt: skip
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],
+        [[0, 1, 2], [0, 2, 3]],
+        [0, 0],
+        [Patch("a", 1.0)],
+        fixed=range(4),
+    )
     assert not refine(square).fixed[middle_of(square, 0, 2)]
 
 
 def test_interior_edge_between_sliding_vertices_is_free():
     square = Surface(
-        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], [0, 0],
-        [Patch("a", 1.0)], on_plane=range(4),
-    )  # fmt: skip
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],
+        [[0, 1, 2], [0, 2, 3]],
+        [0, 0],
+        [Patch("a", 1.0)],
+        on_plane=range(4),
+    )
     assert refine(square).free.sum() == 1
     assert refine(square).free[middle_of(square, 0, 2)]
 
@@ -108,9 +119,13 @@ def test_seam_across_the_plan_is_free_but_a_held_chain_along_a_junction_is_fixed
     assert not refine(square).fixed[middle_of(square, 0, 2)]
     base = tent()
     held = Surface(
-        base.vertices, base.faces, base.patch_of_face, base.patches,
-        fixed=[0, 1, 2, 3, 6, 7, 8, 9], on_plane=[4, 5],
-    )  # fmt: skip
+        base.vertices,
+        base.faces,
+        base.patch_of_face,
+        base.patches,
+        fixed=[0, 1, 2, 3, 6, 7, 8, 9],
+        on_plane=[4, 5],
+    )
     fine = refine(held)
     assert fine.fixed[middle_of(held, 2, 3)]
     assert fine.fixed[middle_of(held, 0, 2)]
@@ -119,9 +134,13 @@ def test_seam_across_the_plan_is_free_but_a_held_chain_along_a_junction_is_fixed
 def test_fixed_end_above_the_plane_leaves_its_wall_edge_free():
     """A wall's end edge from a raised fixed vertex to a sliding foot does not lie on Π."""
     wall = Surface(
-        [[0, 0, 1], [0, 0, 0], [1, 0, 0]], [[0, 1, 2]], [0], [Patch("wall", 1.0, pressure=0.0)],
-        fixed=[0], on_plane=[1, 2],
-    )  # fmt: skip
+        [[0, 0, 1], [0, 0, 0], [1, 0, 0]],
+        [[0, 1, 2]],
+        [0],
+        [Patch("wall", 1.0, pressure=0.0)],
+        fixed=[0],
+        on_plane=[1, 2],
+    )
     fixed, slides = held_midpoints(wall)
     foot = (wall.topology.edges == [1, 2]).all(axis=1)
     np.testing.assert_array_equal(slides, foot)
@@ -134,9 +153,14 @@ def test_sliding_on_a_tilted_plane():
     turn *= np.sign(np.linalg.det(turn))
     base, shift = tent(), np.array([3.0, -2.0, 5.0])
     tilted = Surface(
-        base.vertices @ turn.T + shift, base.faces, base.patch_of_face, base.patches,
-        base.fixed, base.on_plane, Plane(shift, turn[:, 2]),
-    )  # fmt: skip
+        base.vertices @ turn.T + shift,
+        base.faces,
+        base.patch_of_face,
+        base.patches,
+        base.fixed,
+        base.on_plane,
+        Plane(shift, turn[:, 2]),
+    )
     fine = refine(tilted, levels=2)
     assert fine.on_plane.sum() == refine(base, levels=2).on_plane.sum()
     np.testing.assert_allclose(
@@ -157,9 +181,12 @@ def test_projection_reaches_second_order_on_the_circle():
     angle = 2 * np.pi * np.arange(6) / 6
     rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     disc = Surface(
-        np.concatenate([[[0, 0, 0]], rim]), [[0, k + 1, (k + 1) % 6 + 1] for k in range(6)],
-        [0] * 6, [Patch("disc", 1.0)], fixed=range(1, 7),
-    )  # fmt: skip
+        np.concatenate([[[0, 0, 0]], rim]),
+        [[0, k + 1, (k + 1) % 6 + 1] for k in range(6)],
+        [0] * 6,
+        [Patch("disc", 1.0)],
+        fixed=range(1, 7),
+    )
     onto = lambda p: p / np.linalg.norm(p, axis=1, keepdims=True)  # noqa: E731
     missing = [np.pi - patch_areas(refine(disc, k, onto))[0] for k in range(5)]
     order = np.log2(np.array(missing[:-1]) / missing[1:])
@@ -170,12 +197,13 @@ def test_projection_reaches_second_order_on_the_circle():
 
 @pytest.mark.parametrize("levels", [-1, 1.5, "two", True])
 def test_levels_must_be_whole(levels):
-    with pytest.raises(OptionError, match="levels must be a whole number"):
+    with refused(OptionError, what="levels", found=levels, expected="a whole number ≥ 0"):
         refine(tent(), levels)
 
 
 def test_bad_projections_are_refused():
-    with pytest.raises(OptionError, match="project must return shape"):
+    with refused(OptionError, what="project", found=(6, 2), expected=(6, 3)):
         refine(tent(), project=lambda p: p[:, :2])
-    with pytest.raises(SurfaceError, match="not finite"):
+    first = int(np.flatnonzero(refine(tent()).fixed[tent().n :])[0])
+    with refused(SurfaceError, what="vertices", where=tent().n + first):
         refine(tent(), project=lambda p: np.full_like(p, np.nan))

@@ -20,6 +20,7 @@ from studies.folder import Folder
 from studies.orders import limit_order, slope
 from studies.registry import STUDIES, chosen, of_the_paper
 from studies.study import perform
+from tests.tables import last_row
 
 # ------------------------------------------------------------------------------------ registry
 
@@ -41,7 +42,7 @@ HALVES = sweep.Sweep("pcmc.sweep.examples:ratio", {"over": [1, 2, 3]}, {"under":
 
 def test_a_sweep_that_was_stopped_goes_on_and_leaves_no_store(tmp_path):
     folder = Folder(tmp_path)
-    store = tmp_path / "build" / f"halves-{HALVES.fingerprint[:8]}.jsonl"
+    store = tmp_path / "build" / f"halves-{HALVES.fingerprint[:8]}.sqlite"
     store.parent.mkdir()
 
     def stop(progress):
@@ -64,11 +65,11 @@ def test_an_incomplete_sweep_is_an_error_that_says_how_to_go_on(tmp_path, monkey
 
 def test_a_case_that_fails_stops_a_study_and_is_tried_again_by_the_next(tmp_path):
     broken = sweep.Sweep("pcmc.sweep.examples:ratio", {"over": [1, 2]}, {"under": 0})
-    for lines in (3, 5):  # a header, and two records a run
+    for last in (2, 4):  # each run replaces both records
         with pytest.raises(SweepError, match=r"2 of 2 cases failed; case 0 raised: ZeroDivision"):
             run_sweep(Folder(tmp_path), "halves", broken, workers=1)
         (store,) = (tmp_path / "build").iterdir()
-        assert len(store.read_text().splitlines()) == lines
+        assert (last_row(store), len(sweep.read_store(store))) == (last, 2)
 
 
 # -------------------------------------------------------------------------------------- orders

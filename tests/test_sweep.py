@@ -4,8 +4,10 @@ import io
 import json
 import os
 import signal
+import sqlite3
 import threading
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import closing
 from multiprocessing import get_context
 
 import numpy as np
@@ -16,7 +18,7 @@ from rich.console import Console
 from tables import same
 
 from pcmc.base.errors import FileError, SweepError
-from pcmc.sweep import Sweep, engine, provenance, read_store, run, table, write_table
+from pcmc.sweep import Sweep, provenance, read_store, run, running, table, write_table
 from pcmc.sweep.bar import bar
 
 CHAOS = Sweep(
@@ -41,12 +43,12 @@ def test_table_holds_what_the_cases_say():
 
 
 def test_any_executor_gives_the_same_table(tmp_path):
-    alone = run(CHAOS, tmp_path / "alone.jsonl", workers=1)
+    alone = run(CHAOS, tmp_path / "alone.sqlite", workers=1)
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as executor:
-        same(run(CHAOS, tmp_path / "pool.jsonl", executor=executor), alone)
+        same(run(CHAOS, tmp_path / "pool.sqlite", executor=executor), alone)
         same(run(CHAOS, executor=executor), alone)
         assert executor.submit(len, "open").result() == 4
-    same(table(read_store(tmp_path / "pool.jsonl")), alone)
+    same(table(read_store(tmp_path / "pool.sqlite")), alone)
 
 
 def test_what_a_case_may_answer():
@@ -68,15 +70,15 @@ def test_what_a_case_may_answer():
 
 def test_values_come_to_the_case_as_declared(tmp_path):
     values = [1, 1.5, "1", True, None, [1, 2], {"a": 1}]
-    result = run(Sweep("sweep_cases:echo", {"value": values}), tmp_path / "s.jsonl", workers=1)
+    result = run(Sweep("sweep_cases:echo", {"value": values}), tmp_path / "s.sqlite", workers=1)
     assert result["type"].tolist() == [type(value).__name__ for value in values]
     assert result["value"].tolist() == values
-    same(table(read_store(tmp_path / "s.jsonl")), result)
+    same(table(read_store(tmp_path / "s.sqlite")), result)
 
 
 def test_provenance_is_apart_and_complete(tmp_path):
-    run(CHAOS, tmp_path / "s.jsonl", workers=1)
-    told = provenance(read_store(tmp_path / "s.jsonl"))
+    run(CHAOS, tmp_path / "s.sqlite", workers=1)
+    told = provenance(read_store(tmp_path / "s.sqlite"))
     assert len(told) == 12
     assert (told["wall_time"] > 0.0).all()
     assert {"started", "host", "pid", "python", "numpy", "pcmc"} <= set(told)
@@ -138,7 +140,7 @@ def raise_stop():
 @pytest.mark.parametrize("stop", [raise_stop, lambda: os.kill(os.getpid(), signal.SIGINT)])
 def test_a_stop_returns_what_is_done_and_resumes(stop, tmp_path):
     sweep = Sweep("sweep_cases:noted", {"n": range(8)}, {"folder": str(tmp_path), "pause": 0.05})
-    store = tmp_path / "s.jsonl"
+    store = tmp_path / "s.sqlite"
     part = run(sweep, store, workers=2, on_record=stop_after(3, stop))
     assert 3 <= len(part) < 8
     same(table(read_store(store)), part)
@@ -163,8 +165,8 @@ def test_an_error_in_the_callback_passes_through(tmp_path):
         raise KeyError("mine")
 
     with pytest.raises(KeyError, match="mine"):
-        run(CHAOS, tmp_path / "s.jsonl", workers=1, on_record=on_record)
-    assert len(read_store(tmp_path / "s.jsonl")) == 1
+        run(CHAOS, tmp_path / "s.sqlite", workers=1, on_record=on_record)
+    assert len(read_store(tmp_path / "s.sqlite")) == 1
 
 
 def test_a_worker_that_cannot_load_the_case_stops_the_sweep(monkeypatch, tmp_path):
@@ -179,10 +181,10 @@ def test_a_worker_that_cannot_load_the_case_stops_the_sweep(monkeypatch, tmp_pat
 
 
 def test_a_worker_of_another_version_stops_the_sweep(monkeypatch, tmp_path):
-    monkeypatch.setattr(engine, "OWN_VERSION", "99.0")
+    monkeypatch.setattr(running, "OWN_VERSION", "99.0")
     with pytest.raises(SweepError, match=r"has pcmc .*, this is pcmc 99\.0; install the same"):
-        run(CHAOS, tmp_path / "s.jsonl", workers=1)
-    assert read_store(tmp_path / "s.jsonl") == []
+        run(CHAOS, tmp_path / "s.sqlite", workers=1)
+    assert read_store(tmp_path / "s.sqlite") == []
 
 
 def test_an_executor_that_breaks_stops_the_sweep(tmp_path):
@@ -196,8 +198,8 @@ def test_an_executor_that_breaks_stops_the_sweep(tmp_path):
 
     sweep = Sweep("sweep_cases:noted", {"n": range(4)}, {"folder": str(tmp_path), "pause": 0})
     with Broken(1) as executor, pytest.raises(SweepError, match="OSError: line cut"):
-        run(sweep, tmp_path / "s.jsonl", executor=executor)
-    assert run(sweep, tmp_path / "s.jsonl", workers=1)["square"].tolist() == [0, 1, 4, 9]
+        run(sweep, tmp_path / "s.sqlite", executor=executor)
+    assert run(sweep, tmp_path / "s.sqlite", workers=1)["square"].tolist() == [0, 1, 4, 9]
     with pytest.raises(SweepError, match="takes no cases"):
         run(sweep, executor=executor)  # it has been shut down
 
@@ -212,9 +214,15 @@ def test_the_bar_shows_counts():
     assert "0:00 left" in text
 
 
-def test_the_store_is_lines_of_json(tmp_path):
-    run(CHAOS, tmp_path / "s.jsonl", workers=2)
-    header, *lines = [json.loads(line) for line in (tmp_path / "s.jsonl").read_text().splitlines()]
-    assert header["case"] == "sweep_cases:chaos"
-    assert header["fixed"] == {"pause": 0.0}
-    assert sorted(line["case"] for line in lines) == list(range(12))
+def test_any_program_can_read_the_store(tmp_path):
+    result = run(CHAOS, tmp_path / "s.sqlite", workers=2)
+    with closing(sqlite3.connect(tmp_path / "s.sqlite")) as database:
+        ((declaration,),) = database.execute("SELECT declaration FROM sweep")
+        rows = database.execute(
+            "SELECT parameters, json_extract(record, '$.verdict') FROM cases"
+        ).fetchall()
+    assert json.loads(declaration) == {
+        "case": "sweep_cases:chaos", "grid": dict(CHAOS.grid), "fixed": {"pause": 0.0},
+    }  # fmt: skip
+    verdicts = {(p["rate"], p["seed"]): v for p, v in ((json.loads(p), v) for p, v in rows)}
+    assert [verdicts[row.rate, row.seed] for row in result.itertuples()] == list(result["verdict"])

@@ -10,10 +10,11 @@ import threading
 import time
 
 import pytest
-from tables import same
+from tables import last_row, same
 
 from pcmc.base.errors import OptionError, SweepError
-from pcmc.sweep import Sweep, executors, read_store, run, table
+from pcmc.sweep import Sweep, read_store, run, table
+from pcmc.sweep import workers as workers_module
 
 pytestmark = pytest.mark.slow
 GRID = {"rate": [3.6 + 0.02 * i for i in range(15)], "seed": [0.1, 0.2, 0.3]}
@@ -66,18 +67,18 @@ def cluster(tmp_path):
 def test_a_cluster_gives_the_same_table_even_if_a_worker_is_killed(cluster, tmp_path):
     workers = [cluster.start_worker(name) for name in ("one", "two")]
     local = run(SWEEP, workers=2)
-    same(run(SWEEP, tmp_path / "whole.jsonl", scheduler=cluster.address), local)
-    pids = {record.provenance["pid"] for record in read_store(tmp_path / "whole.jsonl")}
+    same(run(SWEEP, tmp_path / "whole.sqlite", scheduler=cluster.address), local)
+    pids = {record.provenance["pid"] for record in read_store(tmp_path / "whole.sqlite")}
     assert len(pids) == 2  # both worked
 
     def kill_one(progress):
         if progress.done == 15:
             workers[0].send_signal(signal.SIGKILL)
 
-    path = tmp_path / "killed.jsonl"
+    path = tmp_path / "killed.sqlite"
     same(run(SWEEP, path, scheduler=cluster.address, on_record=kill_one), local)
     same(table(read_store(path)), local)
-    assert len(path.read_text().splitlines()) == 46  # no case twice
+    assert last_row(path) == 45  # no case twice
 
 
 def test_cases_that_misbehave_on_a_cluster(cluster):
@@ -96,9 +97,9 @@ def test_a_scheduler_that_goes_away_stops_the_sweep(cluster, tmp_path):
             cluster.processes[0].kill()
 
     with pytest.raises(SweepError, match="run the same sweep again"):
-        run(SWEEP, tmp_path / "s.jsonl", scheduler=cluster.address, on_record=kill_scheduler)
-    assert 5 <= len(read_store(tmp_path / "s.jsonl")) < 45
-    same(run(SWEEP, tmp_path / "s.jsonl", workers=2), run(SWEEP, workers=2))
+        run(SWEEP, tmp_path / "s.sqlite", scheduler=cluster.address, on_record=kill_scheduler)
+    assert 5 <= len(read_store(tmp_path / "s.sqlite")) < 45
+    same(run(SWEEP, tmp_path / "s.sqlite", workers=2), run(SWEEP, workers=2))
 
 
 def test_ctrl_c_ends_the_cases_on_the_cluster(cluster, tmp_path):
@@ -126,7 +127,7 @@ def free(path):
 
 
 def test_clusters_that_cannot_be_used(cluster, monkeypatch):
-    monkeypatch.setattr(executors, "CONNECT", 1.0)
+    monkeypatch.setattr(workers_module, "CONNECT", 1.0)
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{unused.getsockname()[1]}"
@@ -137,7 +138,7 @@ def test_clusters_that_cannot_be_used(cluster, monkeypatch):
     with pytest.raises(SweepError, match=r"has no workers; start one with: dask worker tcp://"):
         run(SWEEP, scheduler=cluster.address)
     cluster.start_worker("one")
-    monkeypatch.setattr(executors, "CONNECT", 30.0)
-    monkeypatch.setattr(executors, "OWN_VERSION", "99.0")
+    monkeypatch.setattr(workers_module, "CONNECT", 30.0)
+    monkeypatch.setattr(workers_module, "OWN_VERSION", "99.0")
     with pytest.raises(SweepError, match=r"has pcmc .*, this is pcmc 99\.0; install the same"):
         run(SWEEP, scheduler=cluster.address)

@@ -1,7 +1,6 @@
 """Cases that raise, hang, die, print, fork: each is a row, and the others go on."""
 
 import os
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import sweep_cases
@@ -9,7 +8,7 @@ from tables import same
 
 from pcmc.base.compiled import threads
 from pcmc.base.errors import OptionError
-from pcmc.sweep import Sweep, child, isolate, local, provenance, read_store, run
+from pcmc.sweep import Sweep, case_process, case_script, provenance, read_store, run
 
 CHAOS = Sweep("sweep_cases:chaos", {"rate": [3.6, 3.8, 4.0], "seed": [0.1, 0.2, 0.3]})
 
@@ -29,7 +28,7 @@ def test_faults_become_rows_and_the_others_go_on(tmp_path):
         "behave",
     ]
     sweep = Sweep("sweep_cases:misbehave", {"how": faults})
-    result = run(sweep, tmp_path / "s.jsonl", workers=3, time_limit=1.0)
+    result = run(sweep, tmp_path / "s.sqlite", workers=3, time_limit=1.0)
     expected = {
         "raise": ("raised", "ArithmeticError: no root\nin sight"),
         "exit": ("raised", "SystemExit: 3"),
@@ -48,7 +47,7 @@ def test_faults_become_rows_and_the_others_go_on(tmp_path):
         else:
             assert (row.status, row.message) == expected[row.how]
     assert result["how_it_went"].count() == 1
-    told = provenance(read_store(tmp_path / "s.jsonl"))
+    told = provenance(read_store(tmp_path / "s.sqlite"))
     at = faults.index
     assert "in misbehave" in told.loc[at("raise"), "output"]  # the traceback
     assert "about to die" in told.loc[at("die"), "output"]
@@ -63,19 +62,19 @@ def test_a_fork_that_a_case_makes_answers_nothing(limit):
 
 
 def test_a_process_that_outlives_its_case_does_not_hold_up_the_sweep(tmp_path):
-    run(Sweep(sweep_cases.daemon, {"n": [1]}), tmp_path / "s.jsonl", workers=1, time_limit=1.0)
-    (record,) = read_store(tmp_path / "s.jsonl")
+    run(Sweep(sweep_cases.daemon, {"n": [1]}), tmp_path / "s.sqlite", workers=1, time_limit=1.0)
+    (record,) = read_store(tmp_path / "s.sqlite")
     assert record.status == "timed out"
     assert record.wall_time < 15.0  # the daemon sleeps 20
 
 
 def test_what_a_failed_case_says_is_kept_in_part(tmp_path):
     sweep = Sweep(sweep_cases.chatter, {"how": ["raise", "die"]})
-    result = run(sweep, tmp_path / "s.jsonl", workers=1)
-    told = provenance(read_store(tmp_path / "s.jsonl"))
+    result = run(sweep, tmp_path / "s.sqlite", workers=1)
+    told = provenance(read_store(tmp_path / "s.sqlite"))
     assert result.loc[0, "message"].startswith("ValueError: xxx")
-    assert len(result.loc[0, "message"]) == child.OUTPUT
-    assert told["output"].str.len().tolist() == [child.OUTPUT] * 2
+    assert len(result.loc[0, "message"]) == case_script.OUTPUT
+    assert told["output"].str.len().tolist() == [case_script.OUTPUT] * 2
     assert told.loc[1, "output"].endswith("the end €\n")
 
 
@@ -86,17 +85,17 @@ def test_a_case_that_is_interrupted_does_not_leave_its_answer_to_the_next(monkey
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(isolate.Child, "receive", interrupted)
+        patch.setattr(case_process.CaseProcess, "_receive", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            isolate.run_case("team", "sweep_cases:echo", {"value": 1}, 60.0)
+            case_process.run_case("team", "sweep_cases:echo", {"value": 1}, 60.0)
     try:
-        outcome = isolate.run_case("team", "sweep_cases:echo", {"value": 2}, 60.0)
+        outcome = case_process.run_case("team", "sweep_cases:echo", {"value": 2}, 60.0)
     finally:
-        isolate.retire("team")
+        case_process.retire("team")
     assert outcome["numbers"]["back"] == "2"
 
 
-def test_a_case_that_waits_for_one_that_kills_runs_on_another_child(tmp_path):
+def test_the_case_after_one_that_kills_runs_in_another_process(tmp_path):
     sweep = Sweep(sweep_cases.mortal, {"n": range(30)}, {"fatal": 12, "folder": str(tmp_path)})
     found = run(sweep, tmp_path / "cases", workers=1)
     begun = [int(line) for line in (tmp_path / "begun").read_text().split()]
@@ -107,50 +106,9 @@ def test_a_case_that_waits_for_one_that_kills_runs_on_another_child(tmp_path):
     assert output == "this is case 12\n"  # of its own output only
 
 
-def test_a_case_that_kills_while_the_answer_before_it_is_read_is_run_once(tmp_path, monkeypatch):
-    class Late(local.Child):
-        answers = 0
-
-        def receive(self, *arguments):
-            outcome = super().receive(*arguments)
-            Late.answers += 1
-            if Late.answers == 12:  # of case 11; case 12 ends the process
-                os.waitid(os.P_PID, self.process.pid, os.WEXITED | os.WNOWAIT)
-            return outcome
-
-    monkeypatch.setattr(local, "Child", Late)
-    monkeypatch.setattr(local, "BRIEF", 60.0)
-    sweep = Sweep(sweep_cases.mortal, {"n": range(15)}, {"fatal": 12, "folder": str(tmp_path)})
-    found = run(sweep, workers=1)
-    assert [int(line) for line in (tmp_path / "begun").read_text().split()] == list(range(15))
-    assert found.status.tolist() == ["killed" if n == 12 else "finished" for n in range(15)]
-
-
-@pytest.mark.parametrize(("brief", "most"), [(60.0, 2), (0.0, 1)])
-def test_only_short_cases_wait_in_a_childs_pipe(brief, most, monkeypatch):
-    given = [0]
-
-    class Counted(local.Child):
-        def send(self, *arguments):
-            given.append(given[-1] + 1)
-            super().send(*arguments)
-
-        def receive(self, *arguments):
-            outcome = super().receive(*arguments)
-            given.append(given[-1] - 1)
-            return outcome
-
-    monkeypatch.setattr(local, "Child", Counted)
-    monkeypatch.setattr(local, "BRIEF", brief)
-    with ThreadPoolExecutor(1) as plain:
-        same(run(CHAOS, workers=1), run(CHAOS, executor=plain))
-    assert max(given) == most
-    assert given[-1] == 0
-
-
 def test_failed_cases_run_again_only_when_asked(tmp_path):
     sweep = Sweep("sweep_cases:misbehave", {"how": ["raise", "behave", "die"]})
-    store = tmp_path / "s.jsonl"
+    store = tmp_path / "s.sqlite"
     first = run(sweep, store, workers=1)
     seen = []
     same(run(sweep, store, workers=1, on_record=seen.append), first)

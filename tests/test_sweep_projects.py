@@ -105,11 +105,11 @@ BAD = [
     ("plan.holes.1.curve.circle.radius", 2.0, "did you mean 'plan.holes.yard.curve"),
     ("plan.outline.5.1", 2.0, "unknown number"),
     ("plan.edge", 2.0, "unknown number"),
-    ("plan.edge_length", -1, "edge_length must be a finite number > 0, found -1"),
+    ("plan.edge_length", -1, "edge_length: expected a finite number > 0, found -1"),
     ("plan.edge_length", "x", "must be a finite number, found 'x'"),
     ("plan.edge_length", True, "must be a finite number, found True"),
     ("west.tension", float("nan"), "west.tension must be a finite number, found nan"),
-    ("west.tension", -2.0, "patch 'west': tension must be a finite number ≥ 0"),
+    ("west.tension", -2.0, "tension of 'west': expected a finite number ≥ 0"),
     ("solve.tolerance", -1.0, "tolerance"),
 ]
 
@@ -183,11 +183,11 @@ def test_a_stopped_sweep_goes_on_where_it_was(roof, capsys):
     def stop(state):
         raise StopIteration
 
-    short = run_sweep(project_sweep("roof.toml", grid), "s.jsonl", workers=1, on_record=stop)
+    short = run_sweep(project_sweep("roof.toml", grid), "s.sqlite", workers=1, on_record=stop)
     assert len(short) == 1
-    done = read_store("s.jsonl")[0]
-    assert cli.main(["sweep", "./roof.toml", *GRID, "--store", "s.jsonl", "--csv", "t.csv"]) == 0
-    records = read_store("s.jsonl")
+    done = read_store("s.sqlite")[0]
+    assert cli.main(["sweep", "./roof.toml", *GRID, "--store", "s.sqlite", "--csv", "t.csv"]) == 0
+    records = read_store("s.sqlite")
     assert records[0] == done  # not run again
     assert len(records) == 4
     assert cli.main(["sweep", "roof.toml", *GRID, "--csv", "u.csv"]) == 0
@@ -195,19 +195,19 @@ def test_a_stopped_sweep_goes_on_where_it_was(roof, capsys):
 
 
 def test_the_store_of_another_project_is_refused_and_kept(roof, capsys):
-    given = ["sweep", "roof.toml", *GRID[:1], "--store", "s.jsonl", "--workers", "1"]
+    given = ["sweep", "roof.toml", *GRID[:1], "--store", "s.sqlite", "--workers", "1"]
     assert cli.main(given) == 0
-    kept = (roof.parent / "s.jsonl").read_bytes()
+    kept = (roof.parent / "s.sqlite").read_bytes()
     roof.write_text(TEXT.replace("0.8", "0.81"), encoding="utf-8")
     capsys.readouterr()
     assert cli.main(given) == 2
     err = capsys.readouterr().err
-    assert "s.jsonl: written for another sweep (its fixed has project_digest=" in err
-    assert (roof.parent / "s.jsonl").read_bytes() == kept
+    assert "s.sqlite: written for another sweep (its fixed has project_digest=" in err
+    assert (roof.parent / "s.sqlite").read_bytes() == kept
 
 
 def test_ctrl_c_before_the_first_case_writes_no_table(roof, capsys, monkeypatch):
-    monkeypatch.setattr("pcmc.sweep.engine._next", lambda *_: None)
+    monkeypatch.setattr("pcmc.sweep.running._batches", lambda *_: iter(()))
     given = ["sweep", "roof.toml", *GRID[:1], "--csv", "t.csv", "--workers", "1"]
     assert cli.main(given) == 130
     assert capsys.readouterr().out == ""
@@ -215,7 +215,7 @@ def test_ctrl_c_before_the_first_case_writes_no_table(roof, capsys, monkeypatch)
 
 
 def test_time_limit_and_failed_cases_again(roof, capsys):
-    given = ["sweep", "roof.toml", "west.tension=3,3.2", "--store", "s.jsonl", "--workers", "1"]
+    given = ["sweep", "roof.toml", "west.tension=3,3.2", "--store", "s.sqlite", "--workers", "1"]
     assert cli.main([*given, "--time-limit", "0.001"]) == 1
     assert "timed out: stopped at its time limit of 0.001 s" in capsys.readouterr().out
     assert cli.main(given) == 1

@@ -66,7 +66,7 @@ def test_solve_case_refuses_unknown_names_before_any_case(fixed, words):
 POSTPONED = """
 import sys
 import numpy
-from pcmc.sweep.child import postpone
+from pcmc.sweep.case_script import postpone
 postpone("numpy.f2py")
 postpone("numpy.no_such_part")
 postpone("no_such_package.part")

@@ -1,18 +1,20 @@
-"""The store of a sweep: cut at any byte, damaged, foreign, on a full disk, its sweep killed."""
+"""The store of a sweep: grown, damaged, foreign, in use, on a full disk, its sweep killed."""
 
-import errno
 import fcntl
 import os
 import random
 import resource
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 
 import pytest
-from tables import same
+import sweep_cases
+from refusals import refused
+from tables import last_row, same
 
 from pcmc.base.errors import FileError, FileWarning
 from pcmc.sweep import Sweep, read_store, run, table
@@ -20,91 +22,138 @@ from pcmc.sweep import store as store_module
 from pcmc.sweep.store import open_store
 
 SWEEP = Sweep("sweep_cases:chaos", {"rate": [3.7, 3.8, 3.9], "seed": [0.1, 0.2]})
+LARGE = Sweep("sweep_cases:chaos", {"rate": [3.6 + 0.005 * i for i in range(80)], "seed": [0.1]})
 
 
 @pytest.fixture
 def stored(tmp_path):
     """A finished store, its bytes and its table."""
-    path = tmp_path / "stored.jsonl"
+    path = tmp_path / "stored.sqlite"
     frame = run(SWEEP, path, workers=1)
     return path, path.read_bytes(), frame
 
 
-def test_a_cut_store_keeps_every_whole_line(stored):
-    path, data, _ = stored
-    first = data.index(b"\n") + 1
-    ends = [at + near for at, byte in enumerate(data) if byte == 10 for near in (-1, 0, 1, 2)]
-    for cut in {*ends, *range(0, len(data), 29)}:
-        path.write_bytes(data[:cut])
-        whole = max(data[:cut].count(b"\n") - 1, 0)
-        with open_store(path, SWEEP) as store:
-            assert len(store.records) == whole
-        assert path.stat().st_size == max(data.rfind(b"\n", 0, cut) + 1, first)
+def change(path, statement):
+    """Change the database itself."""
+    with closing(sqlite3.connect(path)) as database:
+        database.execute(statement)
+        database.commit()
 
 
-def test_a_cut_store_resumes_to_the_same_table(stored):
-    path, data, frame = stored
-    for cut in [0, 40, data.index(b"\n"), *random.Random(0).sample(range(len(data)), 12)]:
-        path.write_bytes(data[:cut])
-        seen = []
-        same(run(SWEEP, path, workers=2, on_record=seen.append), frame)
-        assert len(seen) == 6 - max(data[:cut].count(b"\n") - 1, 0)
-        same(table(read_store(path)), frame)
-
-
-def test_a_store_without_its_last_newlines_can_be_read(stored):
-    path, data, _ = stored
-    path.write_bytes(data[: data.index(b"\n")])
-    assert read_store(path) == []
-
-
-def test_a_damaged_line_is_told_and_run_again(stored):
-    path, data, frame = stored
-    lines = data.split(b"\n")
-    lines[3] = lines[3].replace(b"0", b"1", 1)
-    path.write_bytes(b"\n".join(lines))
-    with pytest.warns(FileWarning, match="line 4 is damaged"):
-        assert len(read_store(path)) == 5
+def run_cases(sweep, path, **options):
+    """The table, and the parameters of the cases that were run for it."""
     seen = []
-    with pytest.warns(FileWarning, match="line 4 is damaged"):
-        same(run(SWEEP, path, workers=1, on_record=seen.append), frame)
-    assert [progress.record.case for progress in seen] == [2]
+    frame = run(sweep, path, workers=1, on_record=seen.append, **options)
+    return frame, [dict(progress.record.parameters) for progress in seen]
 
 
-def test_a_line_of_another_kind_is_told_too(stored):
-    """Two stores put together have a header in the middle."""
-    path, data, frame = stored
-    path.write_bytes(data + data)
-    with pytest.warns(FileWarning, match="line 8 is damaged"):
-        same(table(read_store(path)), frame)
+# ---- a grid that changes
 
 
-def test_every_changed_byte_is_noticed(stored):
-    _, data, _ = stored
-    line = data.split(b"\n")[2]
-    assert store_module._parse(line) is not None
-    for at in range(len(line)):
-        assert store_module._parse(line[:at] + bytes([line[at] ^ 1]) + line[at + 1 :]) is None
+def test_values_added_to_the_grid_run_only_their_cases(stored):
+    path, _, frame = stored
+    larger = Sweep(SWEEP.case, {"rate": [3.6, 3.7, 3.8, 3.9], "seed": [0.1, 0.2, 0.3]})
+    grown, ran = run_cases(larger, path)
+    assert ran == [case for case in larger if case["rate"] == 3.6 or case["seed"] == 0.3]
+    same(grown, run(larger, workers=1))
+    same(table(read_store(path)), grown)
+    old = grown[grown["rate"].isin([3.7, 3.8, 3.9]) & grown["seed"].isin([0.1, 0.2])]
+    assert old["x"].tolist() == frame["x"].tolist()
+
+
+def test_values_taken_from_the_grid_stay_in_the_store(stored):
+    path, _, frame = stored
+    smaller = Sweep(SWEEP.case, {"rate": [3.8], "seed": [0.2, 0.1]})
+    part, ran = run_cases(smaller, path)
+    assert ran == []
+    assert part["x"].tolist() == [frame.loc[3, "x"], frame.loc[2, "x"]]
+    same(table(read_store(path)), part)
+    again, ran = run_cases(SWEEP, path)
+    assert ran == []
+    same(again, frame)
+
+
+def test_the_order_of_axes_and_values_does_not_matter(stored):
+    path, _, _ = stored
+    turned = Sweep(SWEEP.case, {"seed": [0.2, 0.1], "rate": [3.9, 3.7, 3.8]})
+    frame, ran = run_cases(turned, path)
+    assert ran == []
+    same(frame, run(turned, workers=1))
+
+
+def test_equal_numbers_of_other_types_are_other_cases(tmp_path):
+    path = tmp_path / "s.sqlite"
+    run(Sweep(sweep_cases.echo, {"value": [1, {"a": 1, "b": 2}]}), path, workers=1)
+    more = Sweep(sweep_cases.echo, {"value": [1.0, True, "1", 1, {"b": 2, "a": 1}]})
+    frame, ran = run_cases(more, path)
+    assert [case["value"] for case in ran] == [1.0, True, "1"]
+    assert frame["type"].tolist() == ["float", "bool", "str", "int", "dict"]
+
+
+def test_a_store_is_one_file_while_nothing_is_written(stored, tmp_path):
+    path, _, _ = stored
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    with open_store(path, SWEEP):
+        assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+def test_a_store_can_be_read_while_its_sweep_runs(tmp_path):
+    path, seen = tmp_path / "s.sqlite", []
+    run(SWEEP, path, workers=1, on_record=lambda p: seen.append((p.done, len(read_store(path)))))
+    assert [done for done, _ in seen] == [1, 2, 3, 4, 5, 6]
+    assert all(done <= read for done, read in seen)  # a record is stored before it is shown
+
+
+# ---- stores that are damaged, or of something else
+
+
+def test_a_damaged_record_is_run_again(stored):
+    path, _, frame = stored
+    change(path, "UPDATE cases SET record = replace(record, '0', '1') WHERE rowid = 3")
+    with pytest.warns(FileWarning, match="the record of case 2 is damaged"):
+        assert [record.case for record in read_store(path)] == [0, 1, 3, 4, 5]
+    with pytest.warns(FileWarning, match="the record of case 2 is damaged"):
+        again, ran = run_cases(SWEEP, path)
+    assert ran == [list(SWEEP)[2]]
+    same(again, frame)
+
+
+def test_a_record_moved_to_another_case_is_not_believed(stored):
+    path, _, frame = stored
+    change(path, "DELETE FROM cases WHERE rowid = 2")
+    change(path, """UPDATE cases SET parameters = '{"rate": 3.7, "seed": 0.2}' WHERE rowid = 5""")
+    with pytest.warns(FileWarning, match="the record of case 1 is damaged"):
+        again, ran = run_cases(SWEEP, path)
+    assert ran == [list(SWEEP)[1], list(SWEEP)[4]]
+    same(again, frame)
+
+
+@pytest.mark.parametrize("part", [0.2, 0.5, 0.9])
+def test_a_cut_store_is_refused_and_kept(part, stored):
+    path, data, _ = stored
+    path.write_bytes(data[: int(part * len(data))])
+    cut = path.read_bytes()
+    for use in (lambda: run(SWEEP, path, workers=1), lambda: read_store(path)):
+        with refused(FileError, what=str(path)):
+            use()
+    assert path.read_bytes() == cut
 
 
 @pytest.mark.parametrize(
-    ("other", "words"),
+    ("other", "fields"),
     [
         (
-            Sweep("sweep_cases:chaos", {"rate": [3.7, 3.8], "seed": [0.1, 0.2]}),
-            "its grid has rate=",
+            Sweep(SWEEP.case, {"rate": [3.7], "seed": [0.1], "pause": [0.0]}),
+            {"where": "pause", "found": "nothing", "expected": "varied"},
         ),
-        (
-            Sweep("sweep_cases:chaos", {"seed": [0.1, 0.2], "rate": [3.7, 3.8, 3.9]}),
-            "its parameters stand in another order",
-        ),
-        (Sweep("sweep_cases:chaos", SWEEP.grid, {"pause": 0.1}), "its fixed has pause=None"),
-        (Sweep("sweep_cases:anything", SWEEP.grid), "its case is 'sweep_cases:chaos'"),
+        (Sweep(SWEEP.case, {"rate": [3.7]}, {"seed": 0.1}), {"where": "seed", "found": "varied"}),
+        (Sweep(SWEEP.case, SWEEP.grid, {"pause": 0.1}), {"where": "pause", "expected": 0.1}),
+        (Sweep("sweep_cases:anything", SWEEP.grid), {"where": "case", "found": SWEEP.case}),
     ],
 )
-def test_another_sweeps_store_is_refused_and_kept(other, words, stored):
+def test_another_sweeps_store_is_refused_and_kept(other, fields, stored):
     path, data, _ = stored
-    with pytest.raises(FileError, match=f"written for another sweep.*{words}"):
+    with refused(FileError, what=str(path), **fields):
         run(other, path, workers=1)
     assert path.read_bytes() == data
 
@@ -112,36 +161,73 @@ def test_another_sweeps_store_is_refused_and_kept(other, words, stored):
 def test_another_versions_store_is_refused_and_kept(stored, monkeypatch):
     path, data, _ = stored
     monkeypatch.setattr(store_module, "version", lambda package: "99.0")
-    with pytest.raises(FileError, match=r"written by pcmc .*, this is pcmc 99\.0"):
+    with refused(FileError, what=str(path), where="version", expected="99.0"):
         run(SWEEP, path, workers=1)
     monkeypatch.undo()
     monkeypatch.setattr(store_module, "FORMAT", 99)
     for use in (lambda: run(SWEEP, path, workers=1), lambda: read_store(path)):
-        with pytest.raises(FileError, match="store format 1, this is format 99"):
+        with refused(FileError, what=str(path), found=2, expected=99):
             use()
     assert path.read_bytes() == data
 
 
-@pytest.mark.parametrize("text", [b"a,b\n1,2\n", b"{}\n", b"\xff\xfe", b'{"pcmc sweep": 1}\n'])
+def test_a_store_in_lines_of_json_is_refused_and_kept(tmp_path):
+    path = tmp_path / "old.jsonl"
+    path.write_bytes(b'{"pcmc sweep": 1, "version": "0.1.0", "crc": "00000000"}\n')
+    data = path.read_bytes()
+    for use in (lambda: run(SWEEP, path, workers=1), lambda: read_store(path)):
+        with pytest.raises(FileError, match=r"is a store of an older pcmc.*name a new file"):
+            use()
+    assert path.read_bytes() == data
+
+
+@pytest.mark.parametrize("text", [b"a,b\n1,2\n", b"{}\n", b"\xff\xfe", b"SQLite format 4\0"])
 def test_a_file_that_is_no_store_is_refused_and_kept(text, tmp_path):
     path = tmp_path / "mine.csv"
     path.write_bytes(text)
     for use in (lambda: run(SWEEP, path, workers=1), lambda: read_store(path)):
-        with pytest.raises(FileError, match="line 1 is not the header of a sweep's store"):
+        with pytest.raises(FileError, match="is not the store of a sweep; name another file"):
             use()
     assert path.read_bytes() == text
 
 
+def test_a_database_of_another_program_is_refused_and_kept(tmp_path):
+    path = tmp_path / "photos.db"
+    change(path, "CREATE TABLE photos (name TEXT)")
+    data = path.read_bytes()
+    for use in (lambda: run(SWEEP, path, workers=1), lambda: read_store(path)):
+        with pytest.raises(FileError, match="is not the store of a sweep; name another file"):
+            use()
+    assert path.read_bytes() == data
+
+
+def test_an_empty_file_becomes_a_store(tmp_path):
+    """A sweep that was killed at its very start leaves one."""
+    path = tmp_path / "s.sqlite"
+    path.touch()
+    with refused(FileError, what=str(path)):
+        read_store(path)
+    assert len(run(SWEEP, path, workers=1)) == len(read_store(path)) == 6
+
+
 def test_paths_that_cannot_be_opened(tmp_path):
     (tmp_path / "file").write_bytes(b"")
-    with pytest.raises(FileError, match="cannot be opened for writing"):
-        run(SWEEP, tmp_path / "file" / "s.jsonl", workers=1)
+    with pytest.raises(FileError, match="cannot be opened"):
+        run(SWEEP, tmp_path / "file" / "s.sqlite", workers=1)
     with pytest.raises(FileError, match=r"cannot be opened \(File name too long\)"):
         run(SWEEP, tmp_path / ("x" * 300), workers=1)
     with pytest.raises(FileError, match="is no regular file"):
         run(SWEEP, "a\0b", workers=1)
     with pytest.raises(FileError, match="cannot be read"):
-        read_store(tmp_path / "missing.jsonl")
+        read_store(tmp_path / "missing.sqlite")
+    assert not (tmp_path / "missing.sqlite").exists()
+
+
+def test_names_with_odd_characters(tmp_path):
+    path = tmp_path / "a?mode=memory#50%25 ö.sqlite"
+    frame = run(SWEEP, path, workers=1)
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    same(table(read_store(path)), frame)
 
 
 def test_folders_pipes_and_devices_are_no_stores(tmp_path):
@@ -157,20 +243,44 @@ def test_folders_pipes_and_devices_are_no_stores(tmp_path):
                 use()
 
 
+# ---- two sweeps on one store
+
+
 def test_two_sweeps_cannot_write_to_one_store(tmp_path):
-    path = tmp_path / "folder" / "s.jsonl"
-    with open_store(path, SWEEP), pytest.raises(FileError, match="another sweep is writing to it"):
-        run(SWEEP, path, workers=1)
+    path = tmp_path / "folder" / "s.sqlite"
+    with open_store(path, SWEEP) as store:
+        with pytest.raises(FileError, match="another sweep is writing to it"):
+            run(SWEEP, path, workers=1)
+        store.append([])  # the lock is taken again after each transaction
+        with pytest.raises(FileError, match="another sweep is writing to it"):
+            run(SWEEP, path, workers=1)
     assert len(run(SWEEP, path, workers=1)) == 6
 
 
-def test_a_disk_without_locks_is_told(tmp_path, monkeypatch):
-    def refuse(*_):
-        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
-
-    monkeypatch.setattr(fcntl, "flock", refuse)
-    with pytest.raises(FileError, match=r"cannot be locked \(No locks available\)"):
-        run(SWEEP, tmp_path / "s.jsonl", workers=1)
+def test_no_second_sweep_slips_in_between_two_transactions(tmp_path):
+    """The lock is free for an instant after each of them."""
+    path, script = tmp_path / "s.sqlite", (
+        "import sys; from pcmc.sweep.store import open_store\n"
+        "from pcmc.base.errors import FileError\n"
+        "from test_sweep_store import SWEEP\n"
+        "print('ready', flush=True)\n"
+        "for _ in range(300):\n"
+        "    try:\n"
+        "        with open_store(sys.argv[1], SWEEP): print('in', flush=True)\n"
+        "    except FileError: pass\n"
+        "print('done', flush=True)\n"
+    )  # fmt: skip
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", script, str(path)]
+    with (
+        open_store(path, SWEEP) as store,
+        subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as second,
+    ):
+        assert second.stdout.readline() == "ready\n"
+        while second.poll() is None:
+            store.append([])
+            time.sleep(0.002)  # a sweep waits longer: PACE
+        assert second.stdout.read() == "done\n"
 
 
 FORKS = """
@@ -187,7 +297,10 @@ with open_store(sys.argv[1], SWEEP):
 
 def test_a_fork_of_a_killed_sweep_does_not_hold_its_store(tmp_path):
     """The workers of a process pool outlive their parent when it is killed."""
-    path, environment = tmp_path / "s.jsonl", os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    path, environment = (
+        tmp_path / "s.sqlite",
+        os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+    )
     killed = subprocess.Popen(
         [sys.executable, "-c", FORKS, str(path)], env=environment, start_new_session=True
     )
@@ -201,84 +314,55 @@ def test_a_fork_of_a_killed_sweep_does_not_hold_its_store(tmp_path):
 # ---- a full disk
 
 
-def test_a_full_disk_stops_the_sweep_with_nothing_lost(stored, monkeypatch, tmp_path):
-    _, data, frame = stored
-    path, write, room = tmp_path / "s.jsonl", os.write, len(data) // 2
+def full_after(pages):
+    """A connection to a database that has room for so many pages."""
+    connect = sqlite3.connect
 
-    def write_while_there_is_room(descriptor, data):
-        free = room - os.fstat(descriptor).st_size
-        if free <= 0:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        return write(descriptor, data[:free])
+    def limited(*arguments, **options):
+        database = connect(*arguments, **options)
+        database.execute(f"PRAGMA max_page_count = {pages}")
+        return database
 
-    monkeypatch.setattr(store_module.os, "write", write_while_there_is_room)
-    with pytest.raises(
-        FileError, match=r"No space left on device.*cases stored before it are safe"
-    ):
-        run(SWEEP, path, workers=2)
+    return limited
+
+
+def test_a_full_disk_stops_the_sweep_with_nothing_lost(monkeypatch, tmp_path):
+    path, frame = tmp_path / "s.sqlite", run(LARGE, workers=1)
+    monkeypatch.setattr(store_module.sqlite3, "connect", full_after(8))
+    monkeypatch.setattr("pcmc.sweep.running.PACE", 0.0)  # a transaction for each record
+    with pytest.raises(FileError, match=r"is full.*cases stored before it are safe") as caught:
+        run(LARGE, path, workers=2)
     monkeypatch.undo()
     kept = read_store(path)
-    assert 0 < len(kept) < 6
-    assert path.read_bytes().endswith(b"\n")
+    assert 0 < len(kept) < 80
+    assert caught.value.found == len(kept)
     same(table(kept), frame.loc[[record.case for record in kept]])
-    same(run(SWEEP, path, workers=1), frame)
+    same(run(LARGE, path, workers=1), frame)
 
 
-def test_a_disk_that_fails_later_stops_the_sweep(stored, monkeypatch, tmp_path):
-    """Some file systems find room for a line only when it is forced to the disk."""
-    path, force = tmp_path / "s.jsonl", os.fsync
-
-    def fail(descriptor):
-        raise OSError(errno.EDQUOT, os.strerror(errno.EDQUOT))
-
-    monkeypatch.setattr(store_module, "FORCE_EVERY", 0.0)
-    monkeypatch.setattr(store_module.os, "fsync", fail)
-    with pytest.raises(FileError, match=r"quota exceeded.* 0 cases stored before it are safe"):
-        run(SWEEP, path, workers=1)
-    monkeypatch.setattr(store_module.os, "fsync", force)
-    same(run(SWEEP, path, workers=1), stored[2])
-
-
-@pytest.mark.parametrize(("every", "forced"), [(0.0, 6), (3600.0, 1)])
-def test_every_record_is_forced_to_the_disk_in_the_end(
-    every, forced, stored, monkeypatch, tmp_path
-):
-    path, force, sizes = tmp_path / "s.jsonl", os.fsync, []
-    monkeypatch.setattr(store_module, "FORCE_EVERY", every)
-    monkeypatch.setattr(
-        store_module.os, "fsync", lambda d: (force(d), sizes.append(os.fstat(d).st_size))
-    )
-    with store_module.open_store(path, SWEEP) as store:
-        for record in read_store(stored[0]):
-            store.append(record)
-    assert len(sizes) == forced
-    assert sizes[-1] == path.stat().st_size
-
-
-def test_a_disk_full_at_the_header_runs_no_case(monkeypatch, tmp_path):
-    def refuse(descriptor, data):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
+def test_a_disk_full_at_the_start_runs_no_case(monkeypatch, tmp_path):
     sweep = Sweep("sweep_cases:noted", {"n": [1]}, {"folder": str(tmp_path), "pause": 0})
-    monkeypatch.setattr(store_module.os, "write", refuse)
-    with pytest.raises(FileError, match="No space left on device"):
-        run(sweep, tmp_path / "s.jsonl", workers=1)
+    monkeypatch.setattr(store_module.sqlite3, "connect", full_after(1))
+    with pytest.raises(FileError, match="is full"):
+        run(sweep, tmp_path / "s.sqlite", workers=1)
     assert not (tmp_path / "begun").exists()
+    monkeypatch.undo()
+    assert len(run(sweep, tmp_path / "s.sqlite", workers=1)) == 1
 
 
-def test_a_real_limit_on_the_files_size(tmp_path, stored):
-    """The system itself cuts a record in the middle."""
-    _, data, frame = stored
-    path = tmp_path / "s.jsonl"
+def test_a_real_limit_on_the_files_size(monkeypatch, tmp_path):
+    """The system itself cuts a transaction in the middle."""
+    path, frame = tmp_path / "s.sqlite", run(LARGE, workers=1)
+    monkeypatch.setattr("pcmc.sweep.running.PACE", 0.0)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (len(data) // 2, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8 * 4096 - 2000, hard))
     try:
-        with pytest.raises(FileError, match=r"File too large.*are safe"):
-            run(SWEEP, path, workers=1)
+        with pytest.raises(FileError, match=r"could not be written.*are safe"):
+            run(LARGE, path, workers=1)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert 0 < len(read_store(path)) < 6
-    same(run(SWEEP, path, workers=1), frame)
+    assert 0 < len(read_store(path)) < 80
+    same(run(LARGE, path, workers=1), frame)
 
 
 # ---- the sweep killed
@@ -292,15 +376,21 @@ run(Sweep("sweep_cases:chaos", grid, {"pause": 0.03}), sys.argv[1], workers=2)
 """
 
 
+def rows(path):
+    with suppress(FileError):  # it is not there, or empty
+        return len(read_store(path))
+    return 0
+
+
 @pytest.mark.slow
 def test_ten_kills_at_random_instants_change_nothing(tmp_path):
-    sweep, path = Sweep("sweep_cases:chaos", LONG, {"pause": 0.03}), tmp_path / "s.jsonl"
+    sweep, path = Sweep("sweep_cases:chaos", LONG, {"pause": 0.03}), tmp_path / "s.sqlite"
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     chance, lengths = random.Random(1), []
     for _ in range(10):
-        before = path.stat().st_size if path.exists() else 0
+        before = rows(path)
         killed = subprocess.Popen([sys.executable, "-c", SCRIPT, str(path)], env=environment)
-        while not path.exists() or path.stat().st_size <= before:
+        while rows(path) <= before:
             assert killed.poll() is None, "the sweep ended before it was killed"
             time.sleep(0.005)
         time.sleep(chance.uniform(0.0, 0.12))
@@ -311,10 +401,8 @@ def test_ten_kills_at_random_instants_change_nothing(tmp_path):
     assert 10 < lengths[-1] < 200  # every kill came while cases were running
     resumed = run(sweep, path, workers=2)
     same(resumed, run(sweep, workers=2))
-    cases = [
-        record["case"] for record in map(store_module._parse, path.read_bytes().splitlines()[1:])
-    ]
-    assert sorted(cases) == list(range(200))  # none lost, none run again
+    assert last_row(path) == 200  # none was lost, none was written twice
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
 def test_workers_leave_when_the_sweep_is_killed(tmp_path):

@@ -150,9 +150,13 @@ def test_relabelled_vertices_have_the_same_topology():
     order = np.random.default_rng(4).permutation(surface.n)  # old index of each new vertex
     new = np.argsort(order)
     other = Surface(
-        surface.vertices[order], new[surface.faces], surface.patch_of_face, surface.patches,
-        fixed=surface.fixed[order], on_plane=surface.on_plane[order],
-    ).topology  # fmt: skip
+        surface.vertices[order],
+        new[surface.faces],
+        surface.patch_of_face,
+        surface.patches,
+        fixed=surface.fixed[order],
+        on_plane=surface.on_plane[order],
+    ).topology
     t = surface.topology
     assert other.vertex_kind.tolist() == t.vertex_kind[order].tolist()
     for name in ("junctions", "boundary_loops"):

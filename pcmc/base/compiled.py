@@ -10,7 +10,7 @@ from itertools import pairwise
 import numba
 import numpy as np
 
-from .errors import OptionError
+from . import validate
 
 BLOCK = 32_768  # below this many triangles a second thread costs more than it gains
 
@@ -30,7 +30,7 @@ def threads() -> int:
     wish = os.environ.get("PCMC_THREADS", "")
     if wish:
         if not wish.isdecimal() or int(wish) < 1:
-            raise OptionError(f"PCMC_THREADS: expected a whole number ≥ 1, found {wish!r}")
+            validate.refuse("PCMC_THREADS", wish, "a whole number ≥ 1")
         return int(wish)
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return max(1, min(8, usable or 1))

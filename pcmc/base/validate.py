@@ -1,4 +1,8 @@
-"""Checks of solver options. Each error names the parameter."""
+"""The checks of single values for the whole package. Each error names the parameter.
+
+``where`` is what has the parameter, as a patch has a tension; ``hint`` ends the message with what to do;
+``error`` is the exception to raise.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +10,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import fields
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
-from .errors import OptionError, unknown
+from .errors import OptionError, PcmcError, unknown
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -23,31 +27,52 @@ def number(
     above: float | None = None,
     least: float | None = None,
     below: float | None = None,
+    most: float | None = None,
+    where: str | None = None,
+    hint: str = "",
+    error: type[PcmcError] = OptionError,
 ) -> float:
-    """A finite float within its bounds: above < value, least ≤ value, value < below.
+    """A finite float within its bounds: above < value, least ≤ value, value < below, value ≤ most.
 
     >>> number("gamma", 1.5, least=0.0, below=1.0)
     Traceback (most recent call last):
     ...
     pcmc.base.errors.OptionError: gamma: expected a finite number ≥ 0 and < 1, found 1.5
     """
-    limits = [(above, ">"), (least, "≥"), (below, "<")]
-    text = " and ".join(f"{sign} {limit:g}" for limit, sign in limits if limit is not None)
-    found = math.nan
+    given = math.nan
     if isinstance(value, Real) and not isinstance(value, bool):
-        found = float(value)
+        given = float(value)
     if not (
-        math.isfinite(found)
-        and (above is None or found > above)
-        and (least is None or found >= least)
-        and (below is None or found < below)
+        math.isfinite(given)
+        and (above is None or given > above)
+        and (least is None or given >= least)
+        and (below is None or given < below)
+        and (most is None or given <= most)
     ):
-        expected = f"expected a finite number {text}".rstrip()
-        raise OptionError(f"{name}: {expected}, found {value!r}")
-    return found
+        limits = [(above, ">"), (least, "≥"), (below, "<"), (most, "≤")]
+        bounds = " and ".join(f"{sign} {limit:g}" for limit, sign in limits if limit is not None)
+        refuse(name, value, f"a finite number {bounds}".rstrip(), where, hint, error)
+    return given
 
 
-def integer(name: str, value: object, least: int = 0) -> int:
+def positive(name: str, value: object) -> float:
+    """A finite float > 0.
+
+    >>> positive("radius", 2)
+    2.0
+    """
+    return number(name, value, above=0.0)
+
+
+def integer(
+    name: str,
+    value: object,
+    least: int = 0,
+    *,
+    where: str | None = None,
+    hint: str = "",
+    error: type[PcmcError] = OptionError,
+) -> int:
     """An int ≥ least.
 
     >>> integer("iterations", 2.5)
@@ -56,15 +81,32 @@ def integer(name: str, value: object, least: int = 0) -> int:
     pcmc.base.errors.OptionError: iterations: expected a whole number ≥ 0, found 2.5
     """
     if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
-        raise OptionError(f"{name}: expected a whole number ≥ {least}, found {value!r}")
+        refuse(name, value, f"a whole number ≥ {least}", where, hint, error)
     return int(value)
 
 
 def flag(name: str, value: object) -> bool:
     """True or False and nothing that merely looks like it."""
     if not isinstance(value, bool):
-        raise OptionError(f"{name}: expected True or False, found {value!r}")
+        refuse(name, value, "True or False")
     return value
+
+
+def vector(
+    name: str, value: Any, *, error: type[PcmcError] = OptionError
+) -> tuple[float, float, float]:
+    """Three finite numbers.
+
+    >>> vector("normal", [0, 0, 1])
+    (0.0, 0.0, 1.0)
+    """
+    try:
+        x, y, z = (float(c) for c in value)
+    except (TypeError, ValueError):
+        x = y = z = math.nan
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+        refuse(name, value, "three finite numbers", error=error)
+    return x, y, z
 
 
 def choice(name: str, value: object, known: Sequence[str]) -> str:
@@ -76,7 +118,9 @@ def choice(name: str, value: object, known: Sequence[str]) -> str:
     pcmc.base.errors.OptionError: unknown armijo 'suficient'; did you mean 'sufficient'? Known: ...
     """
     if value not in known:
-        raise OptionError(unknown(name, value, known))
+        raise OptionError(
+            unknown(name, value, known), what=name, found=value, expected=tuple(known)
+        )
     return str(value)
 
 
@@ -84,6 +128,19 @@ def build(kind: type[Options], method: str, given: dict[str, Any]) -> Options:
     """The options dataclass of a method from keyword arguments."""
     names = [f.name for f in fields(kind)]
     for name in given:
-        if name not in names:
-            raise OptionError(unknown(f"option of method {method!r}", name, names))
+        choice(f"option of method {method!r}", name, names)
     return kind(**given)
+
+
+def refuse(
+    name: str,
+    value: object,
+    expected: str,
+    where: str | None = None,
+    hint: str = "",
+    error: type[PcmcError] = OptionError,
+) -> NoReturn:
+    """Raise the error that says which parameter has a wrong value, and what was expected."""
+    owner = "" if where is None else f" of {where!r}"
+    message = f"{name}{owner}: expected {expected}, found {value!r}{hint and f'; {hint}'}"
+    raise error(message, what=name, where=where, found=value, expected=expected)

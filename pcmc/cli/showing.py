@@ -104,7 +104,7 @@ def explore(
       pcmc explore roof.pcmc
       pcmc explore --example two_caps --set edge_length=1.2
     """
-    from ..explore import attend, start
+    from ..explore import open_and_wait, start
 
     if (file is None) == (example is None):
         raise OptionError("explore: give a file or --example, one of them")
@@ -118,13 +118,13 @@ def explore(
             surface, title = _example(str(example), values), str(example)
         say("solving")
         explorer = start(surface, host, port, title)
-    attend(explorer, browser)
+    open_and_wait(explorer, browser)
     return OK
 
 
 def _example(name: str, parameters: dict[str, Any]) -> Surface:
     """The surface of a generator, found by its name when it is asked for."""
-    from ..sweep.child import resolve
+    from ..sweep.case_script import resolve
 
     try:
         if ":" not in name:

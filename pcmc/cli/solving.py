@@ -66,7 +66,7 @@ def solve_(
         options["target"] = target
     project = replace(project, method=method or project.method, options=options)
     with working() as say:
-        outcome = projects.carry_out(
+        outcome = projects.run_project(
             project, say, anyway=anyway,
             changed=partial(retensioned, tension=tension, pressure=pressure),
         )  # fmt: skip
@@ -86,7 +86,7 @@ def _with(design: Design) -> str:
 
     A sentence of ``design.message`` has them where a target is missed.
     """
-    found = (f"{label} {value:.6g}" for label, value in design.targets["found"].items())
+    found = (f"{label} {value:.6g}" for label, value in design.targets["value"].items())
     values = (f"{label} {value:.6g}" for label, value in design.parameters["value"].items())
     return f"{', '.join(found)}, with {', '.join(values)}"
 
@@ -163,7 +163,7 @@ def remesh_(
         return OK
     project = replace(_project(file, None, output, None), remeshing=(stage,), picture=None)
     with working() as say:
-        outcome = projects.carry_out(project, say)
+        outcome = projects.run_project(project, say)
     print(f"{outcome.surface.m} triangles; {outcome.result.message}")
     report(outcome.certificate, list(outcome.files))
     if outcome.files:

@@ -33,7 +33,7 @@ class Walls:
     ----------
     rows : where their other vertices lie below the top edges.
     top_edges : (k,2) the top edges.
-    tension : (k,) tension of the wall below each of them.
+    wall_below : (k,) the patch of the wall below each of them.
     top_free : (n,) bool, free vertices of top edges: these can come to rest on Π.
     corner : (n,) bool, fixed vertices of top edges on Π, where a wall ends.
     side : (n,) +1 or -1, the side of Π a vertex is on; on Π, the side the pressure pushes it to.
@@ -42,7 +42,7 @@ class Walls:
 
     rows: WallRows
     top_edges: Ints
-    tension: Floats
+    wall_below: Ints
     top_free: Bools
     corner: Bools
     side: Floats
@@ -58,7 +58,8 @@ def find_walls(surface: Surface) -> Walls:
     roof_edge[topo.edge_of_face[roof]] = True
     roof_vertex[surface.faces[roof]] = True
     pinchable = np.zeros(len(surface.patches), dtype=bool)
-    rows, top_edges, tension = [], [np.empty((0, 2), dtype=np.int64)], [np.empty(0)]
+    none = np.empty(0, dtype=np.int64)
+    rows, top_edges, wall_below = [], [none.reshape(0, 2)], [none]
     for index, patch in enumerate(surface.patches):
         if not patch.auxiliary:
             continue
@@ -70,14 +71,14 @@ def find_walls(surface: Surface) -> Walls:
         pinchable[index] = True
         rows.append(wall_rows(surface, vertices[~roof_vertex[vertices]], top, edges))
         top_edges.append(top)
-        tension.append(np.full(len(top), patch.tension))
+        wall_below.append(np.full(len(top), index))
     on_top = np.zeros(n, dtype=bool)
     on_top[np.concatenate(top_edges)] = True
     low = lying(height, surface.vertices)
     return Walls(
         rows=join_rows(rows),
         top_edges=np.concatenate(top_edges),
-        tension=np.concatenate(tension),
+        wall_below=np.concatenate(wall_below),
         top_free=on_top & ~surface.fixed & ~surface.on_plane,
         corner=on_top & surface.fixed & low,
         side=np.where(np.where(low, _pressure_push(surface), height) < 0.0, -1.0, 1.0),
@@ -232,7 +233,8 @@ def pull_and_capacity(surface: Surface, walls: Walls, resting: Bools) -> tuple[F
     force = -energy_and_gradient(surface, supports=False)[1]
     pull = np.where(resting, walls.side * (force @ np.array(surface.plane.normal)), 0.0)
     start, end = surface.vertices[walls.top_edges.T]
-    half = 0.5 * walls.tension * np.linalg.norm(surface.plane.along(end - start), axis=1)
+    tension = surface.tensions[walls.wall_below]
+    half = 0.5 * tension * np.linalg.norm(surface.plane.along(end - start), axis=1)
     capacity = np.zeros(surface.n)
     np.add.at(capacity, walls.top_edges[:, 0], half)
     np.add.at(capacity, walls.top_edges[:, 1], half)

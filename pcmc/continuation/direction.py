@@ -1,4 +1,4 @@
-"""A parameter λ of a surface: a line in the space of its tensions and pressures.
+"""A parameter λ of a surface, on which its tensions and pressures depend linearly.
 
     α_i(λ) = a_i + w_i λ,    p_i(λ) = b_i + u_i λ
 
@@ -7,13 +7,13 @@ E is linear in tensions and pressures, so ∂E/∂λ = Σ w_i A_i - Σ u_i V_i, 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from numbers import Real
+from functools import cached_property
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..energy import kernels
@@ -21,7 +21,7 @@ from ..energy.functional import apply_supports
 from ..surface import Surface
 from ..surface.wall_pressures import wall_pressure_changes
 
-EQUAL = 1e-9  # relative difference up to which two tensions give the same λ
+SAME_VALUE = 1e-9  # relative difference up to which two tensions give the same λ
 
 
 @dataclass(frozen=True)
@@ -31,15 +31,14 @@ class Direction:
     Parameters
     ----------
     tensions : weight w_i by patch name.
-    pressures : weight u_i by patch name. Walls that are not named follow the rooms that they stand
-        between, as in ``pcmc.rooms.pressed``.
-    relative : False: what is named is λ times its weight, α_i = w_i λ, so that ``{"roof": 1.0}`` is
-        the tension of "roof" itself. True: counted from where the surface starts, α_i = α_i(start)
-        + w_i λ with λ = 0 there.
+    pressures : weight u_i by patch name. The pressure of a wall that is not named changes with the
+        difference between its rooms, as in ``pcmc.surface.wall_pressures.with_pressures``.
+    relative : False: α_i = w_i λ, so that with ``{"roof": 1.0}`` λ is the tension of "roof" itself.
+        True: α_i = α_i(start) + w_i λ, so that λ = 0 at the start. The same for pressures.
 
     Examples
     --------
-    The tension of one patch; all walls together; a pressure; the ratio p/α of a patch of tension 2:
+    The tension of one patch; of two walls together; a pressure; the ratio p/α of a patch of tension 2:
 
     >>> roof, walls = Direction({"roof": 1.0}), Direction({"wall 1": 1.0, "wall 2": 1.0})
     >>> load, ratio = Direction(pressures={"roof": 1.0}), Direction(pressures={"roof": 2.0})
@@ -55,47 +54,60 @@ class Direction:
             if not isinstance(weights, Mapping):
                 raise OptionError(
                     f"Direction.{key}: expected weights by patch name, such as {{'roof': 1.0}},"
-                    f" found {weights!r}"
+                    f" found {weights!r}",
+                    what=f"Direction.{key}",
+                    found=weights,
                 )
             for name, weight in weights.items():
-                if not (isinstance(weight, Real) and math.isfinite(weight)) or weight == 0.0:
+                option = f"Direction.{key}[{name!r}]"
+                if validate.number(option, weight) == 0.0:
                     raise OptionError(
-                        f"Direction.{key}[{name!r}]: expected a finite weight, not 0, found"
-                        f" {weight!r}"
+                        f"{option}: expected a weight other than 0", what=option, found=0.0
                     )
         if not self.tensions and not self.pressures:
-            raise OptionError("Direction: name at least one patch whose tension or pressure varies")
+            raise OptionError(
+                "Direction: name at least one patch whose tension or pressure varies",
+                what="Direction",
+            )
 
     @classmethod
     def ratio(cls, surface: Surface, upper: str, lower: str) -> Direction:
-        """λ = α_upper / α_lower, the tension of ``lower`` staying what it is in ``surface``."""
-        below = surface.patches[surface.patch_index(lower)].tension
+        """λ = α_upper / α_lower; the tension of ``lower`` stays as it is in ``surface``."""
+        denominator = surface.patches[surface.patch_index(lower)].tension
         surface.patch_index(upper)
-        if below == 0.0:
-            raise OptionError(f"Direction.ratio: patch {lower!r} has tension 0, so no ratio to it")
-        return cls({upper: below})
+        if denominator == 0.0:
+            raise OptionError(
+                f"Direction.ratio: the tension of {lower!r} is 0, so no ratio to it exists",
+                what="lower",
+                found=lower,
+            )
+        return cls({upper: denominator})
 
-    def line(self, surface: Surface) -> Line:
-        """The line through the tensions and pressures of a surface."""
+    def line(self, surface: Surface) -> ParameterLine:
+        """The tensions and pressures along this direction, starting from those of a surface."""
         w = _rates(surface, self.tensions)
         u = _rates(surface, self.pressures)
         value = 0.0 if self.relative else _common_value(surface, w, u)
         u = u + wall_pressure_changes(
             surface, u, {surface.patch_index(name) for name in self.pressures}
         )
-        line = Line(value, surface.tensions - w * value, surface.pressures - u * value, w, u)
         if not (surface.tensions[w != 0.0] > 0.0).all():
             name = surface.patches[int(np.argmax((w != 0.0) & (surface.tensions <= 0.0)))].name
             raise OptionError(
                 f"the tension of {name!r} is 0, where its triangles stop pulling; start from a"
-                " tension > 0"
+                " tension > 0",
+                what="parameter",
+                where=name,
+                found=0.0,
             )
-        return line
+        return ParameterLine(
+            value, surface.tensions - w * value, surface.pressures - u * value, w, u
+        )
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
-    """A ``Direction`` bound to a surface.
+class ParameterLine:
+    """The tensions and pressures of a surface as functions of λ: a ``Direction`` with its start.
 
     Attributes
     ----------
@@ -110,9 +122,9 @@ class Line:
     tension_rates: Floats
     pressure_rates: Floats
 
-    @property
+    @cached_property
     def scale(self) -> float:
-        """A natural size of λ: the varied tensions and pressures over their weights."""
+        """The size of λ in the metric of arclength: the varied tensions and pressures over their weights."""
         w, u = self.tension_rates, self.pressure_rates
         tensions = (self.tensions + w * self.value)[w != 0.0]
         pressures = (self.pressures + u * self.value)[u != 0.0]
@@ -124,27 +136,29 @@ class Line:
         w = self.tension_rates
         return bool(((self.tensions + w * value)[w != 0.0] > 0.0).all())
 
-    def applied(self, surface: Surface, value: float) -> Surface:
+    def surface_at(self, surface: Surface, value: float) -> Surface:
         """The surface with its tensions and pressures at λ."""
         names = [p.name for p in surface.patches]
-        walls = [n for i, n in enumerate(names) if surface.walls[i] and self.pressure_rates[i]]
+        w, u = self.tension_rates, self.pressure_rates
         return surface.retensioned(
-            {n: self.tensions[i] + w * value for i, n in enumerate(names) if (w := self.tension_rates[i])},
-            {n: self.pressures[i] + u * value for i, n in enumerate(names) if (u := self.pressure_rates[i])},
-            walls,
-        )  # fmt: skip
+            {names[i]: self.tensions[i] + w[i] * value for i in np.flatnonzero(w)},
+            {names[i]: self.pressures[i] + u[i] * value for i in np.flatnonzero(u)},
+            walls=[names[i] for i in np.flatnonzero(surface.walls & (u != 0.0))],
+        )
 
     def columns(self, surface: Surface, value: float) -> dict[str, float]:
         """The varied tensions and pressures at λ, as columns of a table."""
-        found = {}
+        columns = {}
         for i, patch in enumerate(surface.patches):
             if self.tension_rates[i]:
-                found[f"tension {patch.name}"] = self.tensions[i] + self.tension_rates[i] * value
+                columns[f"tension {patch.name}"] = self.tensions[i] + self.tension_rates[i] * value
             if self.pressure_rates[i]:
-                found[f"pressure {patch.name}"] = self.pressures[i] + self.pressure_rates[i] * value
-        return found
+                columns[f"pressure {patch.name}"] = (
+                    self.pressures[i] + self.pressure_rates[i] * value
+                )
+        return columns
 
-    def energy_rate(self, surface: Surface, X: Floats) -> float:
+    def energy_derivative(self, surface: Surface, X: Floats) -> float:
         """∂E/∂λ = Σ w_i A_i - Σ u_i V_i at X (n,3)."""
         areas, volumes, _ = _measured(surface, X, self.tension_rates, self.pressure_rates)
         return float(self.tension_rates @ areas - self.pressure_rates @ volumes)
@@ -175,18 +189,20 @@ def _rates(surface: Surface, weights: Mapping[str, float]) -> Floats:
 
 def _common_value(surface: Surface, w: Floats, u: Floats) -> float:
     """λ of the surface; every named tension and pressure must agree on it."""
-    found = [
+    sources = (("tension", surface.tensions, w), ("pressure", surface.pressures, u))
+    (first, value), *others = [
         (f"{kind} of {surface.patches[i].name!r}", values[i] / rates[i])
-        for kind, values, rates in (
-            ("tension", surface.tensions, w), ("pressure", surface.pressures, u),
-        )
+        for kind, values, rates in sources
         for i in np.flatnonzero(rates)
-    ]  # fmt: skip
-    first, value = found[0]
-    for name, other in found[1:]:
-        if abs(other - value) > EQUAL * max(abs(value), abs(other)):
+    ]
+    for name, other in others:
+        if abs(other - value) > SAME_VALUE * max(abs(value), abs(other)):
             raise OptionError(
                 f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}: give"
-                " weights in proportion to the surface's own values, or relative=True"
+                " weights in proportion to the surface's own values, or relative=True",
+                what="parameter",
+                where=name,
+                found=float(other),
+                expected=float(value),
             )
     return float(value)

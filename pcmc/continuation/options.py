@@ -14,9 +14,9 @@ CONTROLS = ("arclength", "parameter", "volume", "height")
 class Ending(Enum):
     """Why a branch ends. The value is a sentence."""
 
-    REACHED = "the branch reached the value asked for"
-    FOLDS = "the branch passed as many folds as asked for"
-    STEPS = "stopped after the number of steps allowed; raise steps to go on"
+    REACHED = "the branch reached the requested value"
+    FOLDS = "the branch passed the requested number of folds"
+    STEPS = "stopped at the limit of steps; raise steps to go on"
     LOST = "the branch could not be followed further: the steps became too short"
     DEGENERATE = (
         "the branch could not be followed further: triangles collapse; try remesh=, or a finer mesh"
@@ -30,19 +30,19 @@ class FollowOptions:
 
     Parameters
     ----------
-    control : what a step prescribes: ``"arclength"``; ``"volume"`` or ``"height"`` of the highest
-        vertex, which end where that turns; ``"parameter"``, which ends at a fold.
-    step : length of the first step; the branch starts towards smaller λ where it is negative. A
-        relative change of λ by 1 has length 1, as has a mean displacement by the surface's size.
-    smallest, largest : the shortest and the longest step.
-    steps : the most steps.
+    control : the quantity that each step prescribes: ``"arclength"``; ``"volume"`` or ``"height"`` of
+        the highest vertex, which end where it turns; ``"parameter"``, which ends at a fold.
+    step : length of the first step. If it is negative, the branch starts towards smaller λ. A relative
+        change of λ by 1 has length 1; so has a mean displacement by the surface's size.
+    smallest, largest : shortest and longest step.
+    steps : largest number of steps.
     tolerance : relative residual of each point.
     folds : end after this many folds; None for any number.
-    min_quality : triangles are spread along the shape while the worst has less than this quality.
-    remesh : edge length of a new mesh (`pcmc.remesh`) where spreading leaves a triangle below that
-        quality; None keeps the triangles.
-    keep : every so many points the surface is kept; the last one is in any case.
-    backend : factorisation, ``"pardiso"`` or ``"superlu"``; None for the fastest here.
+    min_quality : vertices are redistributed along the shape while the worst triangle has less quality.
+    remesh : edge length of a new mesh (`pcmc.remesh`), made where redistribution leaves a triangle
+        below that quality; None: never remesh.
+    keep : store the surface of every ``keep``-th point; the last one is always stored.
+    backend : factorisation, ``"pardiso"`` or ``"superlu"``; None for the fastest one installed.
     """
 
     control: str = "arclength"
@@ -60,7 +60,11 @@ class FollowOptions:
     def __post_init__(self) -> None:
         validate.choice("control", self.control, CONTROLS)
         if validate.number("step", self.step) == 0.0:
-            raise OptionError("step: expected a number that is not 0; its sign is the first dλ's")
+            raise OptionError(
+                "step: expected a number other than 0; its sign is that of the first change of λ",
+                what="step",
+                found=self.step,
+            )
         validate.number("smallest", self.smallest, above=0.0)
         validate.number("largest", self.largest, least=self.smallest)
         validate.integer("steps", self.steps)

@@ -1,8 +1,8 @@
-"""From point to point along a branch: steps, events between them, and the mesh.
+"""From point to point along a branch: steps, the events between them, and the mesh.
 
-A step goes along the tangent, and Newton's method brings it back onto the branch (`point`). Steps
-shorten where the branch bends. Where a goal, a fold or a change of index lies between two points, the
-branch is searched there (`between`).
+A step goes along the tangent, and Newton's method brings it back onto the branch (``correction``).
+Steps shorten where the branch bends. Where a goal, a fold or a change of index lies between two points,
+the branch is searched there (``segment``).
 """
 
 from __future__ import annotations
@@ -12,46 +12,43 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..base.arrays import Floats
 from ..base.errors import OptionError, SurfaceError
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.remeshing import remesh
 from ..solvers import solve
 from ..solvers.result import Callback, Progress, Status
 from ..surface import Surface
-from .between import EXACT, Stretch, passes, quantity
-from .direction import Line
-from .options import Ending, FollowOptions
-from .point import (
-    Border,
-    Collapsed,
-    Lost,
-    Solution,
-    Station,
-    Touched,
-    across,
-    at_height,
-    at_parameter,
-    at_volume,
+from .branch_point import BranchPoint, Tangent, branch_point
+from .correction import (
+    Constraint,
+    ContactChanged,
+    MeshCollapsed,
+    NotOnBranch,
     correct,
-    examine,
-    transferred,
+    fixed_arclength,
+    fixed_height,
+    fixed_parameter,
+    fixed_volume,
 )
-from .shape import Shape
+from .direction import ParameterLine
+from .mesh import BranchMesh
+from .options import Ending, FollowOptions
+from .segment import EVENT_ACCURACY, Segment, crosses_goal
+from .state import State
 
-AT_REST = 1e-4  # relative residual up to which a surface counts as near enough to start from
-SPOILT = 0.7  # ratio of triangle qualities, new to old, below which a step is refused
-NEAR = 0.02  # length of a step at which new contact, solved for by itself, still counts as the same
-BEND = 0.1  # correction over step length that sets the next step
-BENT = 0.5  # correction over step length above which a step is refused
-WEARY = 7  # Newton steps of a correction: one that took more may have ended on another branch
+START_RESIDUAL = 1e-4  # relative residual up to which a surface is near enough to a branch to start
+QUALITY_LOSS = 0.7  # ratio of triangle qualities, new to old, below which a step is refused
+CONTACT_STEP = 0.02  # length of a step at which a new contact, solved for by itself, is near enough
+BEND = 0.1  # correction over step length that the next step aims at
+MAX_BEND = 0.5  # correction over step length above which a step is refused
+MANY_ITERATIONS = 7  # a correction that took more Newton steps may have ended on another branch
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A step that succeeded: the stretch gone, the correction over its length, what lies between."""
+    """A step that succeeded: its segment, its correction over its length, and the events on it."""
 
-    stretch: Stretch
+    segment: Segment
     bend: float
     at_goal: bool
     events: list[dict[str, Any]]
@@ -63,55 +60,64 @@ class Tracer:
     def __init__(
         self,
         surface: Surface,
-        line: Line,
+        line: ParameterLine,
         goals: Mapping[str, float],
         options: FollowOptions,
         callback: Callback | None,
     ) -> None:
         self.line, self.goals, self.options, self.callback = line, goals, options, callback
-        self.scale = line.scale
         self.rows: list[dict[str, Any]] = []
         self.events: list[dict[str, Any]] = []
         self.surfaces: dict[int, Surface] = {}
         self.arclength = 0.0
-        self.here = self.start(Shape(surface, options.backend))
+        self.here = self.first_point(self.mesh(surface))
 
-    def start(self, shape: Shape) -> Station:
-        """The first point, on the branch to the tolerance."""
-        X, value = shape.surface.vertices, self.line.value
-        space = shape.space(X)
-        drifts = rigid_modes(space, rigid_motions(shape.surface), X).shape[1]
-        if drifts:
+    def mesh(self, surface: Surface) -> BranchMesh:
+        """A mesh of the branch."""
+        return BranchMesh(surface, self.line, self.options.backend)
+
+    def first_point(self, mesh: BranchMesh) -> BranchPoint:
+        """The surface given, corrected to the tolerance."""
+        start = State(mesh, mesh.surface.vertices, self.line.value)
+        free = rigid_modes(start.space, rigid_motions(mesh.surface), start.X).shape[1]
+        if free:
             raise SurfaceError(
-                f"follow: nothing holds the surface against {drifts} rigid motions, and it would"
-                " drift instead of following the parameter; hold it with fixed= or on_plane="
+                f"follow: nothing holds the surface against {free} rigid motions, so it would"
+                " drift instead of following the parameter; hold it with fixed= or on_plane=",
+                what="surface",
+                found=free,
+                expected=0,
             )
-        moves = space.to_coordinates(self.line.gradient(shape.surface, X)).any()
-        if not (moves or shape.resting.any()):  # a wall that is gone may come back
+        if not (start.parameter_derivative.any() or mesh.resting.any()):  # a wall may come back
             raise OptionError(
-                "the parameter moves nothing: no vertex of what it names is free, or a change of it"
-                " leaves every force as it is, as that of a flat patch's tension does"
+                "the parameter changes no force: its patches have no free vertex, or they are flat"
+                " and only their tension varies",
+                what="parameter",
             )
         try:
-            residual = shape.residual(X)
-            if not residual <= AT_REST:
-                raise Lost(f"relative residual {residual:.1e}")
-            if shape.unheld(self.line, value, X).any():
-                raise Lost("a junction is pulled off the plane harder than its wall can hold")
-            border = at_parameter(value, self.scale)
-            found = correct(shape, self.line, X, value, border, self.options.tolerance)
-            return examine(found, self.line, self.scale, math.copysign(1.0, self.options.step))
-        except Lost as why:
+            if not start.residual <= START_RESIDUAL:
+                raise NotOnBranch(f"relative residual {start.residual:.1e}")
+            if start.overpulled:
+                raise NotOnBranch(
+                    "a junction is pulled off the plane harder than its wall can hold"
+                )
+            constraint = fixed_parameter(start.parameter, self.line.scale)
+            corrected = correct(start, constraint, self.options.tolerance)
+            return branch_point(corrected, math.copysign(1.0, self.options.step))
+        except NotOnBranch as reason:
             raise SurfaceError(
-                f"follow: the surface is not at rest ({why}); solve it first, with"
-                " pcmc.solve(surface, target='stationary').surface where it is a saddle"
+                f"follow: the surface is not at rest ({reason}); solve it first, with"
+                " pcmc.solve(surface, target='stationary').surface where it is a saddle",
+                what="surface",
+                found=start.residual,
+                expected=START_RESIDUAL,
             ) from None
 
     def run(self) -> tuple[Ending, str]:
-        """Follow to the end; why it ended, and the last difficulty."""
+        """Follow the branch to its end; why it ends, and the last difficulty."""
         try:
             self.record()
-            if any(quantity(self.here, name) == goal for name, goal in self.goals.items()):
+            if any(getattr(self.here.state, name) == goal for name, goal in self.goals.items()):
                 return Ending.REACHED, ""
             return self.advance()
         except (StopIteration, KeyboardInterrupt):
@@ -119,209 +125,233 @@ class Tracer:
 
     def advance(self) -> tuple[Ending, str]:
         """Step after step."""
-        length, why = min(abs(self.options.step), self.options.largest), ""
+        length, difficulty = min(abs(self.options.step), self.options.largest), ""
         for _ in range(self.options.steps):
             step = None
             while step is None:
                 try:
                     step = self.step(length)
-                except Lost as lost:
-                    length, why = 0.5 * length, str(lost)
+                except NotOnBranch as reason:
+                    length, difficulty = 0.5 * length, str(reason)
                     if length < self.options.smallest:
-                        collapsed = isinstance(lost, Collapsed)
-                        return Ending.DEGENERATE if collapsed else Ending.LOST, why
+                        collapsed = isinstance(reason, MeshCollapsed)
+                        return Ending.DEGENERATE if collapsed else Ending.LOST, difficulty
             self.events += step.events
-            self.arclength += step.stretch.length
-            self.here = step.stretch.there
+            self.arclength += step.segment.length
+            self.here = step.segment.end
             self.record()
             if step.at_goal:
                 return Ending.REACHED, ""
             folds = sum(event["kind"] == "fold" for event in self.events)
             if self.options.folds is not None and folds >= self.options.folds:
                 return Ending.FOLDS, ""
-            self.tend()
+            self.maintain_mesh()
             longer = min(2.0, max(0.5, BEND / max(step.bend, 1e-9)))
             length = min(longer * length, self.options.largest)
-        return Ending.STEPS, why
+        return Ending.STEPS, difficulty
 
     # -- one step ------------------------------------------------------------------------------
 
     def step(self, length: float) -> Step:
-        """The next point, at this length or nearer where a goal is."""
-        here = self.here
+        """The next point, at this length, or nearer if a goal is."""
+        here = self.here.state
         try:
-            found = self.solution(length)
-            if found.shape.unheld(self.line, found.value, found.X).any():
-                raise Touched(found.X, found.value)
-        except Touched as touched:
-            found = self.resettled(touched)
-        bend = self.bend(found, length)
-        if found.iterations > WEARY and found.shape is here.shape:
-            raise Lost("the correction hardly converges")
-        if here.shape.turned(here.X, found.X):
-            raise Collapsed("triangles turn over")
-        if found.shape.quality(found.X) < SPOILT * min(here.quality, self.options.min_quality):
-            raise Collapsed("triangles collapse")
-        there = examine(found, self.line, self.scale, here)
-        stretch = Stretch(self.line, self.scale, here, there, length, self.solution)
-        goal = stretch.goal(self.goals)
+            there = self.solve_at(length)
+            if there.overpulled:
+                raise ContactChanged(there)
+        except ContactChanged as change:
+            there = self.solve_contact(change.near)
+        bend = self.bend(there, length)
+        if there.iterations > MANY_ITERATIONS and there.mesh is here.mesh:
+            raise NotOnBranch("the correction hardly converges")
+        if here.mesh.flips(here.X, there.X):
+            raise MeshCollapsed("triangles turn over")
+        if there.quality < QUALITY_LOSS * min(here.quality, self.options.min_quality):
+            raise MeshCollapsed("triangles collapse")
+        end = branch_point(there, self.here.tangent)
+        segment = Segment(self.here, end, length, self.solve_at)
+        goal = segment.first_goal(self.goals)
         if goal is not None:
-            if not stretch.same_mesh:
-                raise Lost("the contact of a wall with the plane changes just before the goal")
-            stretch = stretch.cut(goal)
-        return Step(stretch, bend, goal is not None, self.search(stretch))
+            if not segment.same_mesh:
+                raise NotOnBranch(
+                    "the contact of a wall with the plane changes just before the goal"
+                )
+            segment = segment.up_to(goal)
+        return Step(segment, bend, goal is not None, self.events_on(segment))
 
-    def bend(self, found: Solution, length: float) -> float:
-        """How far the point found is from the tangent, over the length of the step."""
-        X, value = self.ahead(length)
-        apart = self.here.length(found.X - X, found.value - value, self.scale)
-        if found.shape is not self.here.shape and apart < BENT * NEAR:
+    def bend(self, there: State, length: float) -> float:
+        """Distance of a state from the tangent, over the length of the step."""
+        ahead = self.predict(length)
+        distance = self.here.tangent.length(there.X - ahead.X, there.parameter - ahead.parameter)
+        if there.mesh is not self.here.state.mesh and distance < MAX_BEND * CONTACT_STEP:
             return BEND
-        if apart > BENT * length:
-            raise Lost("the branch bends too sharply for the step")
-        return apart / length
+        if distance > MAX_BEND * length:
+            raise NotOnBranch("the branch bends too sharply for the step")
+        return distance / length
 
-    def ahead(self, t: float) -> tuple[Floats, float]:
-        """The point of the tangent at arclength t from here."""
-        here = self.here
-        X = here.shape.swept(here.X + t * here.direction, here.shape.space(here.X))
-        return X, here.value + t * here.slope
+    def predict(self, t: float) -> State:
+        """The state on the tangent at arclength t from here."""
+        here, tangent = self.here.state, self.here.tangent
+        X = here.moved(t * tangent.direction)
+        return State(here.mesh, X, here.parameter + t * tangent.slope)
 
-    def solution(self, t: float) -> Solution:
-        """The point of the branch at arclength t from here."""
-        X, value = self.ahead(t)
-        return correct(
-            self.here.shape, self.line, X, value, self.border(t, X, value), self.options.tolerance
-        )
+    def solve_at(self, t: float) -> State:
+        """The state on the branch at arclength t from here."""
+        ahead = self.predict(t)
+        return correct(ahead, self.constraint(t, ahead), self.options.tolerance)
 
-    def border(self, t: float, X: Floats, value: float) -> Border:
+    def constraint(self, t: float, ahead: State) -> Constraint:
         """What the control prescribes at arclength t from here."""
-        here, shape = self.here, self.here.shape
+        here, tangent = self.here.state, self.here.tangent
         if self.options.control == "parameter":
-            return at_parameter(value, self.scale)
+            return fixed_parameter(ahead.parameter, self.line.scale)
         if self.options.control == "volume":
-            growth = float((shape.volume_gradient(here.X) * here.direction).sum())
-            return at_volume(shape, here.volume + t * growth)
+            growth = float((here.volume_gradient * tangent.direction).sum())
+            return fixed_volume(here.mesh, here.volume + t * growth)
         if self.options.control == "height":
-            return at_height(shape, shape.top(X), shape.height(X))
-        return across(X, value, *here.row(self.scale))
+            return fixed_height(here.mesh, ahead.highest_vertex, ahead.height)
+        return fixed_arclength(ahead, tangent.row, tangent.rate)
 
-    def resettled(self, touched: Touched) -> Solution:
-        """Another contact with Π: solved at a fixed parameter, with a shape of its own."""
-        shape = self.here.shape
-        surface = self.line.applied(shape.landed(touched.X), touched.value)
+    def solve_contact(self, near: State) -> State:
+        """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
+        surface = self.line.surface_at(near.mesh.surface_in_contact(near.X), near.parameter)
         result = solve(
-            surface, "newton", target="stationary", tolerance=self.options.tolerance,
+            surface,
+            "newton",
+            target="stationary",
+            tolerance=self.options.tolerance,
             backend=self.options.backend,
-        )  # fmt: skip
-        if result.status is Status.STOPPED:  # solvers keep Ctrl-C to themselves
+        )
+        if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
             raise KeyboardInterrupt
         if not result.converged:
-            raise Lost(f"contact of a wall with the plane changes, and {result.message}")
-        again = Shape(result.surface, self.options.backend)
-        X = again.surface.vertices
-        return Solution(again, X, touched.value, again.residual(X), result.iterations)
+            raise NotOnBranch(f"contact of a wall with the plane changes, and {result.message}")
+        mesh = self.mesh(result.surface)
+        return State(mesh, mesh.surface.vertices, near.parameter, result.iterations)
 
-    def tend(self) -> None:
-        """Spread the triangles where they are poor, or remesh, and return to the branch."""
-        aim = self.options.min_quality
-        if self.here.quality < aim:
-            X = self.here.shape.redistribute(self.here.X, aim)
+    # -- the mesh ------------------------------------------------------------------------------
+
+    def maintain_mesh(self) -> None:
+        """Redistribute the vertices where triangles are poor, or remesh, and return to the branch."""
+        here, tangent, wanted = self.here.state, self.here.tangent, self.options.min_quality
+        if here.quality < wanted:
+            X = here.mesh.redistribute(here.X, wanted)
             if X is not None:
-                self.settle(self.here, X)
-        if self.options.remesh is not None and self.here.quality < aim:
+                self.continue_from(State(here.mesh, X, here.parameter), tangent)
+        here, tangent = self.here.state, self.here.tangent
+        if self.options.remesh is not None and here.quality < wanted:
             try:
-                shape = Shape(remesh(self.surface(), self.options.remesh), self.options.backend)
+                mesh = self.mesh(remesh(self.surface(), self.options.remesh))
             except SurfaceError:
                 return
-            self.settle(transferred(self.here, shape), shape.surface.vertices)
+            start = State(mesh, mesh.surface.vertices, here.parameter)
+            self.continue_from(start, tangent.on(here, mesh))
 
-    def settle(self, near: Station, X: Floats) -> None:
-        """Go to the point of the branch at X, across the tangent of a station of the same mesh.
+    def continue_from(self, start: State, tangent: Tangent) -> None:
+        """Go on from the point of the branch near a state, on the plane across a tangent.
 
-        Not past a goal; and not where that is an event in itself, unless the mesh is very poor. On the
-        old mesh both will be found in their places.
+        Stay on the old mesh if a goal lies between, or an event unless the mesh is very poor: on the
+        old mesh they are located.
         """
         here = self.here
-        border = across(X, near.value, *near.row(self.scale))
+        constraint = fixed_arclength(start, tangent.row, tangent.rate)
         try:
-            found = correct(near.shape, self.line, X, near.value, border, self.options.tolerance)
-            after = examine(found, self.line, self.scale, near)
-        except Lost:
+            corrected = correct(start, constraint, self.options.tolerance)
+            after = branch_point(corrected, tangent)
+        except NotOnBranch:
             return
-        if passes(here, after, self.goals):
+        if crosses_goal(here.state, after.state, self.goals):
             return
-        events = self.unlocated(here, after, 0.0)
-        if after.quality > here.quality and not (
-            events and here.quality > 0.5 * self.options.min_quality
-        ):
+        events = self.events_between(here, after, 0.0)
+        very_poor = here.state.quality <= 0.5 * self.options.min_quality
+        if after.state.quality > here.state.quality and (very_poor or not events):
             self.events += events
             self.here = after
 
     # -- events --------------------------------------------------------------------------------
 
-    def search(self, stretch: Stretch) -> list[dict[str, Any]]:
-        """The events on a stretch, in their order."""
-        here, there, length = stretch.here, stretch.there, stretch.length
-        if not stretch.same_mesh:
-            events = self.unlocated(here, there, length)
-            if (here.shape.resting != there.shape.resting).any():
-                events.insert(0, self.event("contact", there, length, here.index, there.index))
+    def events_on(self, segment: Segment) -> list[dict[str, Any]]:
+        """The events on a segment, in their order."""
+        start, end, length = segment.start, segment.end, segment.length
+        if not segment.same_mesh:
+            events = self.events_between(start, end, length)
+            if (start.state.mesh.resting != end.state.mesh.resting).any():
+                contact = self.event("contact", end.state, length, start.index, end.index)
+                events.insert(0, contact)
             return events
-        if length <= 2.0 * EXACT:
-            return self.unlocated(here, there, length)
-        found = []
-        if stretch.fold is not None:
-            at = stretch.station(stretch.fold)
-            event = self.event("fold", at, stretch.fold, here.index, there.index)
-            found.append((stretch.fold, event))
-        sign = 1 if there.index > here.index else -1
-        index = here.index
-        for t, count in stretch.index_changes():
-            at = stretch.station(t)
-            found.append((t, self.event("index", at, t, index, index + sign * count)))
+        if length <= 2.0 * EVENT_ACCURACY:
+            return self.events_between(start, end, length)
+        located = []
+        if segment.fold is not None:
+            at = segment.point(segment.fold).state
+            event = self.event("fold", at, segment.fold, start.index, end.index)
+            located.append((segment.fold, event))
+        sign = 1 if end.index > start.index else -1
+        index = start.index
+        for t, count in segment.index_changes():
+            event = self.event("index", segment.point(t).state, t, index, index + sign * count)
+            located.append((t, event))
             index += sign * count
-        return [event for _, event in sorted(found, key=lambda pair: pair[0])]
+        return [event for _, event in sorted(located, key=lambda pair: pair[0])]
 
-    def unlocated(self, before: Station, after: Station, length: float) -> list[dict[str, Any]]:
-        """Events between two points too near to each other, or too different, to search between."""
-        found = []
-        if before.slope * after.slope < 0.0:
-            found.append(self.event("fold", after, length, before.index, after.index))
-        if before.index != after.index:
-            found.append(self.event("index", after, length, before.index, after.index))
-        return found
+    def events_between(
+        self, before: BranchPoint, after: BranchPoint, length: float
+    ) -> list[dict[str, Any]]:
+        """Events between two points that are too near, or too different, to search between them."""
+        kinds = {
+            "fold": before.tangent.slope * after.tangent.slope < 0.0,
+            "index": before.index != after.index,
+        }
+        return [
+            self.event(kind, after.state, length, before.index, after.index)
+            for kind, occurs in kinds.items()
+            if occurs
+        ]
 
     # -- tables --------------------------------------------------------------------------------
 
-    def event(self, kind: str, at: Station, t: float, before: int, after: int) -> dict[str, Any]:
-        """A row of the table of events."""
+    def event(self, kind: str, at: State, t: float, before: int, after: int) -> dict[str, Any]:
+        """A row of the table of events, t from here."""
         return {
-            "kind": kind, **self.common(at), "arclength": self.arclength + t,
-            "index_before": before, "index_after": after,
-        }  # fmt: skip
+            "kind": kind,
+            **self.columns(at),
+            "arclength": self.arclength + t,
+            "index_before": before,
+            "index_after": after,
+        }
 
     def record(self) -> None:
-        """Write here down as a row of the table of points, and tell the callback."""
+        """Add the last point to the table of points, and call the callback."""
         here, number = self.here, len(self.rows)
-        self.rows.append({
-            **self.common(here), "arclength": self.arclength, "index": here.index,
-            "lowest_eigenvalue": here.eigenvalues[0], "residual": here.residual,
-            "quality": here.quality, "slope": here.slope, "iterations": here.iterations,
-        })  # fmt: skip
+        self.rows.append(
+            {
+                **self.columns(here.state),
+                "arclength": self.arclength,
+                "index": here.index,
+                "lowest_eigenvalue": here.eigenvalues[0],
+                "residual": here.state.residual,
+                "quality": here.state.quality,
+                "slope": here.tangent.slope,
+                "iterations": here.state.iterations,
+            }
+        )
         if (number - 1) % self.options.keep:
             self.surfaces.pop(number - 1, None)
         self.surfaces[number] = self.surface()
         if self.callback is not None:
             self.callback(Progress(number, self.surface, self.rows[-1]))
 
-    def common(self, at: Station) -> dict[str, Any]:
-        """What both tables show."""
+    def columns(self, at: State) -> dict[str, Any]:
+        """The columns of both tables."""
         return {
-            "parameter": at.value, **self.line.columns(at.shape.full, at.value),
-            "energy": at.energy, "volume": at.volume, "height": at.height,
-        }  # fmt: skip
+            "parameter": at.parameter,
+            **self.line.columns(at.mesh.full, at.parameter),
+            "energy": at.energy,
+            "volume": at.volume,
+            "height": at.height,
+        }
 
     def surface(self) -> Surface:
         """The surface at the last point."""
-        return self.line.applied(self.here.shape.whole(self.here.X), self.here.value)
+        here = self.here.state
+        return self.line.surface_at(here.mesh.full_surface(here.X), here.parameter)

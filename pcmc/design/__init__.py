@@ -1,8 +1,8 @@
-"""Meeting a goal: the tensions and pressures that give a surface what is wanted of it."""
+"""Design: the tensions and pressures with which a surface meets its targets."""
 
 from .meeting import meet
-from .outcome import Design, Reach
-from .quantities import Parameter, Target
+from .outcome import Design, DesignStatus
 from .sensitivity import sensitivities
+from .targets import Parameter, Target
 
-__all__ = ["Design", "Parameter", "Reach", "Target", "meet", "sensitivities"]
+__all__ = ["Design", "DesignStatus", "Parameter", "Target", "meet", "sensitivities"]

@@ -1,4 +1,4 @@
-"""`meet`: which tensions and pressures give a roof the heights, volumes, ... that are wanted."""
+"""``meet``: find the tensions and pressures that give a surface the heights, volumes, ... wanted."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ import pandas as pd
 
 from ..base import validate
 from ..base.errors import OptionError, SurfaceError
-from ..certificate.certificate import TOLERANCE
 from ..surface import Surface
 from .outcome import Design
-from .quantities import Parameter, Target, measure
 from .search import Search
-from .sensitivity import as_parameters, as_targets
+from .targets import Parameter, Target, as_parameters, as_targets, measure
 
 
 def meet(
@@ -31,24 +29,24 @@ def meet(
 
     Parameters
     ----------
-    surface : where to start from; it need not be at rest.
-    targets : one or several, with a value or limits each.
-    vary : the parameters, or names of patches for their tensions. All others stay as they are.
-    tolerance : a target is met when it is missed by at most this part of its value.
-    solves : the most surfaces to solve for.
+    surface : where to start; it need not be at rest.
+    targets : one or several, each with a value or limits.
+    vary : the parameters, or names of patches for their tensions. All others stay the same.
+    tolerance : largest relative misfit of a target that counts as met.
+    solves : largest number of solves.
     callback : called with each new row of the history. Raise StopIteration in it to stop with the best
-        so far, as Ctrl-C does; any other exception passes through.
+        surface so far, as Ctrl-C does; any other exception passes through.
     options : of the solver, as in ``pcmc.solve`` with ``method="newton"``.
 
     Returns
     -------
     Design
-        Targets out of reach are a verdict there, not an exception.
+        If the targets are out of reach, its ``status`` says so; that is no exception.
 
     Raises
     ------
-    OptionError : a patch that does not exist, a target without value, bad bounds, a quantity that
-        cannot be measured.
+    OptionError : an unknown patch, a target without a value, bad bounds, a quantity that cannot be
+        measured.
     SurfaceError : no equilibrium was found to start from, however high the tensions.
 
     Examples
@@ -64,16 +62,19 @@ def meet(
     (True, 0.555556)
     """
     if not isinstance(surface, Surface):
-        raise SurfaceError(f"meet: expected a Surface, found {type(surface).__name__}")
+        found = type(surface).__name__
+        raise SurfaceError(f"meet: expected a Surface, found {found}", what="surface", found=found)
     aims, parameters = as_targets(targets), as_parameters(vary)
     for target in aims:
-        if not target.aimed:
-            raise OptionError(f"{target.label}: give value, at_most or at_least")
+        if not target.limits:
+            raise OptionError(f"{target.label}: give value, at_most or at_least", what=target.label)
         measure(surface, target)
     if callback is not None and not callable(callback):
-        raise OptionError(f"callback: expected a function of a row, found {callback!r}")
+        raise OptionError(
+            f"callback: expected a function of a row, found {callback!r}",
+            what="callback",
+            found=callback,
+        )
     validate.number("tolerance", tolerance, above=0.0)
     validate.integer("solves", solves, least=1)
-    if options.get("tolerance", 0.0) > TOLERANCE:
-        raise OptionError(f"meet: the solver's tolerance must be at most {TOLERANCE:g}")
     return Search(surface, aims, parameters, tolerance, solves, callback, options).run()

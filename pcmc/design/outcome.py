@@ -1,4 +1,4 @@
-"""How a search for targets ended, and what it found."""
+"""How a search for targets ended, and the surface that it found."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..solvers.result import Result
 from ..surface import Surface
 
 
-class Reach(Enum):
+class DesignStatus(Enum):
     """How a search for targets ended. The value is a sentence."""
 
     MET = "met: every target is reached"
@@ -30,20 +30,20 @@ class Design:
 
     Attributes
     ----------
-    reach : how it ended.
-    result : of the solve that gave ``surface``; that is the one given where the search was stopped
-        before any equilibrium was found.
-    targets : a row per target: ``found``, ``wanted``, relative ``misfit``, ``met``, and ``limit``, the
-        nearest reachable value (at a fold, where it is only approached, extrapolated; NaN where the
-        search was stopped before it knew).
+    status : how the search ended.
+    result : of the solve that gave ``surface``. If the search was stopped before any equilibrium was
+        found, ``surface`` is the one given.
+    targets : a row per target: ``value``, ``wanted``, relative ``misfit``, ``met``, and ``limit``, the
+        nearest reachable value (at a fold, which is only approached, extrapolated; NaN where the search
+        stopped before it was known).
     parameters : a row per parameter: ``start``, ``value``, ``low``, ``high``.
-    solves : how many surfaces were solved for.
+    solves : number of solves.
     history : a row per point tried: parameters, quantities, status, misfit. The status is the solve's
-        in small letters, or ``"overloaded"`` where none was tried: the load is more than the
-        boundary's tension could carry.
+        in small letters, or ``"overloaded"`` if the load is more than the tension of the boundary could
+        carry and no solve was tried.
     """
 
-    reach: Reach
+    status: DesignStatus
     result: Result
     targets: pd.DataFrame
     parameters: pd.DataFrame
@@ -53,7 +53,7 @@ class Design:
     @property
     def met(self) -> bool:
         """Whether every target is met."""
-        return self.reach is Reach.MET
+        return self.status is DesignStatus.MET
 
     @property
     def surface(self) -> Surface:
@@ -68,12 +68,12 @@ class Design:
     @property
     def message(self) -> str:
         """A sentence, with the nearest reachable value of each target that is not met."""
-        text = self.reach.value
+        text = self.status.value
         missed = self.targets[~self.targets["met"]]
         for label, row in missed.iterrows():
             known = not math.isnan(row["limit"])
             reached = (
-                f"nearest reachable {row['limit']:.6g}" if known else f"so far {row['found']:.6g}"
+                f"nearest reachable {row['limit']:.6g}" if known else f"so far {row['value']:.6g}"
             )
             text += f"; {label}: wanted {row['wanted']:.6g}, {reached}"
         if len(missed):

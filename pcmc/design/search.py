@@ -1,11 +1,12 @@
 """The search for targets: least misfit by Gauss-Newton steps with exact sensitivities and bounds.
 
-The misfit is φ = ‖r‖, r the relative distances of the quantities from what is wanted; every point tried
-is a solve, started from the last solution. Sheets are nearly linear in 1/α, so that is what varies for a
-patch under pressure.
+The misfit is φ = ‖r‖, r the relative distances of the quantities from the values wanted; every point
+tried is a solve that starts from the last solution. Sheets are nearly linear in 1/α, so 1/α is the
+unknown for a patch under pressure.
 
 At a fold solutions end: the quantity still changes but the parameter does not, λ_fold - λ ~ (q_fold - q)².
-The slopes at two points show it coming: they give the step's right length, and the reachable limit.
+The slopes at two points show the fold before it is reached: they give the right length of the step, and
+the reachable limit.
 """
 
 from __future__ import annotations
@@ -26,264 +27,291 @@ from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
-from .outcome import Design, Reach
-from .quantities import Parameter, Target, measure
+from .outcome import Design, DesignStatus
 from .sensitivity import sensitivities
+from .targets import Parameter, Target, measure
 
-LEAST = 1e-3  # part of an unknown that a step must change to be worth a solve near failing ones
-CLOSE = 1e-3  # relative gap of the misfit to a fold at which the search ends there
-NEARLY = 0.97  # of the parameters' way to a fold is tried next
-TRIES = 6  # points tried along a step, ever nearer, before it is given up
-GAIN = 1e-6  # part of φ below which a further step is not worth a solve
-DAMPING = 1e-6  # of the largest singular value: among equal steps the best by ``_metric`` is taken
-ALIKE = 0.9  # how much cheaper changing all tensions in proportion is than changing a single one
+LEAST_CHANGE = (
+    1e-3  # part of an unknown that a step must change to be worth a solve near failing ones
+)
+FOLD_GAP = 1e-3  # relative distance of the misfit from its value at a fold where the search ends
+FOLD_SHARE = 0.97  # of the parameters' way to a fold is tried next
+TRIES = 6  # points tried along a step, each nearer, before it is given up
+LEAST_GAIN = 1e-6  # part of φ below which a further step is not worth a solve
+DAMPING = 1e-6  # of the largest singular value: ``_metric`` chooses among steps of equal misfit
+PROPORTIONAL = 0.9  # how much less it costs to change all tensions in proportion than a single one
 STIFFEN = 1.5  # factor on tensions while the surface given has no equilibrium
-STARTS = 7  # solves on that way: 1.5⁶ is 11, and what that does not help has another reason
-INFLATION = 4.0  # starts are near solutions: growing beyond this is running away
-ITERATIONS = 60  # for the same reason
-STILL = 0.02  # of an unknown: below it the mesh is left alone, for quantities feel it a little
-OVERLOADED = "overloaded"  # in place of a solve's status, where none was tried
+STARTS = (
+    7  # solves with stiffer tensions: 1.5⁶ is 11; if that does not help, tension is not the reason
+)
+INFLATION = 4.0  # of a solve, which starts near its solution: a surface that grows more runs away
+ITERATIONS = 60  # of a solve, for the same reason
+SMALL_CHANGE = (
+    0.02  # of an unknown: below it the mesh is not improved, as quantities depend on it a little
+)
+OVERLOADED = "overloaded"  # in place of a solve's status where none was tried
 
 
 @dataclass(frozen=True, eq=False)
-class Tried:
-    """A surface on the way: unknowns x, quantities found, relative misfits r and φ = ‖r‖."""
+class Trial:
+    """A surface at rest: unknowns x, quantities, relative misfits r and φ = ‖r‖."""
 
     x: Floats
     result: Result
-    found: Floats
+    quantities: Floats
     r: Floats
     phi: float
 
 
 @dataclass(frozen=True, eq=False)
-class Point(Tried):
-    """A surface at rest on the way, with J = ∂r/∂x."""
+class Iterate(Trial):
+    """A trial with its derivatives J = ∂r/∂x."""
 
     jacobian: Floats
 
 
+@dataclass(eq=False)
 class Search:
-    """The search as it stands. Unknowns x are tensions, their reciprocals, or pressures."""
+    """The state of a search. The unknowns x are tensions, reciprocal tensions, or pressures."""
 
-    def __init__(
-        self, surface: Surface, targets: list[Target], parameters: list[Parameter],
-        tolerance: float, solves: int, callback: Callable[[pd.Series], object] | None,
-        options: dict[str, Any],
-    ) -> None:  # fmt: skip
-        self.surface, self.targets, self.parameters = surface, targets, parameters
-        self.tolerance, self.limit, self.callback = tolerance, solves, callback
-        self.options = {"inflation": INFLATION, "iterations": ITERATIONS, **options}
-        self.low_high = [p.bounds(surface) for p in parameters]
-        self.inverse = np.array([_reciprocal(surface, p) for p in parameters])
-        self.bounds = np.sort(self.turned(np.array(self.low_high, dtype=float).T), axis=0)
-        self.metric = _metric(parameters, self.inverse)
-        self.scale = np.array([_scale(surface, t) for t in targets])
-        self.trust = 1.0  # the longest step, as a part of the unknowns' sizes
+    surface: Surface
+    targets: list[Target]
+    parameters: list[Parameter]
+    tolerance: float
+    max_solves: int
+    callback: Callable[[pd.Series], object] | None
+    options: dict[str, Any]
+
+    def __post_init__(self) -> None:
+        surface, parameters = self.surface, self.parameters
+        self.options = {"inflation": INFLATION, "iterations": ITERATIONS, **self.options}
+        self.limits = np.array([p.bounds(surface) for p in parameters], dtype=float)
+        self.reciprocal = np.array([p.tension_under_pressure(surface) for p in parameters])
+        self.bounds = np.sort(self.converted(self.limits.T), axis=0)
+        self.metric = _metric(parameters, self.reciprocal)
+        self.scale = np.array([t.scale(surface) for t in self.targets])
+        self.trust = 1.0  # longest step, as a part of the unknowns' sizes
         self.solves = 0
-        self.best: Tried | None = None
+        self.best: Trial | None = None
         self.rows: list[dict[str, Any]] = []
 
-    def turned(self, values: Floats) -> Floats:
-        """Parameters to unknowns and back: reciprocals where a sheet's tension varies."""
-        safe = np.where(self.inverse, values, 1.0)
-        return np.where(self.inverse, 1.0 / safe, values)
-
-    @property
-    def spent(self) -> bool:
-        """Whether no further solve is allowed."""
-        return self.solves >= self.limit
+    def converted(self, values: Floats) -> Floats:
+        """Parameters to unknowns, or back: reciprocals of the tensions of patches under pressure."""
+        safe = np.where(self.reciprocal, values, 1.0)
+        return np.where(self.reciprocal, 1.0 / safe, values)
 
     def run(self) -> Design:
-        """Search to one of the ends; asked to stop, end with the best so far."""
+        """Search to the end; if asked to stop, end with the best so far."""
         try:
             return self.search()
         except (StopIteration, KeyboardInterrupt):
             if self.best is None:
-                return self.ended(Reach.STOPPED, self.tried(self.first(), _as_it_is(self.surface)))
-            return self.ended(Reach.MET if self.met(self.best) else Reach.STOPPED, self.best)
+                given = self.trial(self.initial_unknowns(), _unsolved(self.surface))
+                return self.design(DesignStatus.STOPPED, given)
+            status = DesignStatus.MET if self.is_met(self.best) else DesignStatus.STOPPED
+            return self.design(status, self.best)
 
     def search(self) -> Design:
-        """Step after step to the targets, or as near to them as can be."""
-        here, before = self.start(), None
+        """Step after step to the targets, or as near to them as possible."""
+        here, before = self.first_iterate(), None
         while True:
-            if self.met(here):
-                return self.ended(Reach.MET, here)
-            step, hopeless = self.gauss_newton(here)
-            if hopeless:
-                held = (here.x + step <= self.bounds[0]) | (here.x + step >= self.bounds[1])
-                return self.ended(Reach.AT_BOUND if held.any() else Reach.CONFLICT, here)
-            way = Way.of(before, here, step)
-            if way.at_fold:
-                limit = here.found + way.to_limit * (here.jacobian @ way.step) * self.scale
-                return self.ended(Reach.AT_FOLD, here, limit)
-            there, why = self.along(here, way)
-            if there is None:
-                return self.ended(why, here)
+            if self.is_met(here):
+                return self.design(DesignStatus.MET, here)
+            step, misfit = self.gauss_newton(here)
+            if here.phi - misfit <= LEAST_GAIN * here.phi:
+                end = here.x + step
+                bounded = ((end <= self.bounds[0]) | (end >= self.bounds[1])).any()
+                return self.design(
+                    DesignStatus.AT_BOUND if bounded else DesignStatus.CONFLICT, here
+                )
+            plan = StepPlan.of(before, here, step)
+            if plan.at_fold:
+                change = plan.to_limit * (here.jacobian @ plan.step) * self.scale
+                return self.design(DesignStatus.AT_FOLD, here, here.quantities + change)
+            there = self.line_search(here, plan)
+            if isinstance(there, DesignStatus):
+                return self.design(there, here)
             here, before = there, here
 
-    # -- points --------------------------------------------------------------------------------
+    # -- solves --------------------------------------------------------------------------------
 
-    def first(self) -> Floats:
+    def initial_unknowns(self) -> Floats:
         """The unknowns of the surface given, within their bounds."""
-        values = np.array([p.of(self.surface) for p in self.parameters])
-        return np.clip(self.turned(values), *self.bounds)
+        values = np.array([p.value(self.surface) for p in self.parameters])
+        return np.clip(self.converted(values), *self.bounds)
 
-    def start(self) -> Point:
+    def first_iterate(self) -> Iterate:
         """The first solution; tensions are raised until there is one."""
-        x, point = self.first(), None
-        while self.solves < min(STARTS, self.limit):
-            point = self.solved(x, self.surface, {})
-            stiffer = np.clip(np.where(self.inverse, x / STIFFEN, x), *self.bounds)
-            if point is not None or np.array_equal(stiffer, x):
+        x, first = self.initial_unknowns(), None
+        while self.solves < min(STARTS, self.max_solves):
+            first = self.solve_from(self.surface, x, {})
+            stiffer = np.clip(np.where(self.reciprocal, x / STIFFEN, x), *self.bounds)
+            if first is not None or np.array_equal(stiffer, x):
                 break
             x = stiffer
-        if point is None:
+        if first is None:
             raise SurfaceError(
                 "meet: no equilibrium was found to start from; raise the tensions that do not vary,"
-                " or the bounds of those that do"
+                " or the bounds of those that do",
+                what="surface",
             )
-        return point
+        return first
 
-    def at(self, x: Floats, near: Point) -> Point | None:
+    def solve_near(self, here: Iterate, x: Floats) -> Iterate | None:
         """The solution with these unknowns, from one nearby; None where none is found."""
-        still = bool((np.abs(x - near.x) < STILL * self.sizes(near)).all())
-        return self.solved(x, near.result.surface, {"min_quality": 0.0} if still else {})
+        small = (np.abs(x - here.x) < SMALL_CHANGE * self.sizes(here)).all()
+        return self.solve_from(here.result.surface, x, {"min_quality": 0.0} if small else {})
 
-    def solved(self, x: Floats, start: Surface, quality: dict[str, float]) -> Point | None:
+    def solve_from(self, start: Surface, x: Floats, quality: dict[str, float]) -> Iterate | None:
         """Solve once, from a surface, unless its boundary cannot carry the load.
 
-        None where no equilibrium is found, or at a fold, where nothing can be said of what is ahead.
+        None where no equilibrium is found, or where it is at a fold and has no derivatives.
         """
-        trial = self.with_unknowns(start, x)
-        if load_ratio(trial) > 1.0 + coarseness(trial):
+        surface = self.with_unknowns(start, x)
+        if load_ratio(surface) > 1.0 + coarseness(surface):
             self.record(x, OVERLOADED)
             return None
-        result = solve(trial, "newton", **{**quality, **self.options})
+        result = solve(surface, "newton", **{**quality, **self.options})
         self.solves += 1
-        tried = self.tried(x, result) if result.converged else None
-        if tried is not None and (self.best is None or tried.phi < self.best.phi):
-            self.best = tried
-        self.record(x, result.status.name.lower(), tried)
+        trial = self.trial(x, result) if result.converged else None
+        if trial is not None and (self.best is None or trial.phi < self.best.phi):
+            self.best = trial
+        self.record(x, result.status.name.lower(), trial)
         if result.status is Status.STOPPED:
             raise StopIteration
-        return None if tried is None else self.point(tried)
+        return None if trial is None else self.with_jacobian(trial)
 
     def with_unknowns(self, surface: Surface, x: Floats) -> Surface:
         """The surface with the tensions and pressures that the unknowns stand for."""
-        chosen: dict[str, dict[str, float]] = {"tension": {}, "pressure": {}}
-        for parameter, value in zip(self.parameters, self.turned(x).tolist(), strict=True):
-            chosen[parameter.kind][parameter.patch] = value
-        return with_pressures(surface, chosen["tension"], chosen["pressure"])
+        values: dict[str, dict[str, float]] = {"tension": {}, "pressure": {}}
+        for parameter, value in zip(self.parameters, self.converted(x).tolist(), strict=True):
+            values[parameter.kind][parameter.patch] = value
+        return with_pressures(surface, values["tension"], values["pressure"])
 
-    def tried(self, x: Floats, result: Result) -> Tried:
-        """What a solve has given."""
-        found = np.array([measure(result.surface, t).value for t in self.targets])
-        wanted = np.array([t.nearest(q) for t, q in zip(self.targets, found, strict=True)])
-        r = (found - wanted) / self.scale
-        return Tried(x, result, found, r, float(np.linalg.norm(r)))
+    def trial(self, x: Floats, result: Result) -> Trial:
+        """The quantities and misfits of a solve."""
+        quantities = np.array([measure(result.surface, t).value for t in self.targets])
+        r = (quantities - self.wanted(quantities)) / self.scale
+        return Trial(x, result, quantities, r, float(np.linalg.norm(r)))
 
-    def point(self, at: Tried) -> Point | None:
-        """With the derivatives; None at a fold."""
+    def wanted(self, quantities: Floats) -> Floats:
+        """(targets,) the wanted values nearest to these."""
+        return np.array([t.nearest(q) for t, q in zip(self.targets, quantities, strict=True)])
+
+    def with_jacobian(self, at: Trial) -> Iterate | None:
+        """The trial with its derivatives; None at a fold."""
         try:
             slopes = sensitivities(at.result.surface, self.targets, self.parameters).to_numpy()
         except SurfaceError:
             return None
-        jacobian = slopes * np.where(self.inverse, -(self.turned(at.x) ** 2), 1.0)
+        jacobian = slopes * np.where(self.reciprocal, -(self.converted(at.x) ** 2), 1.0)
         jacobian = jacobian * (at.r != 0.0)[:, None] / self.scale[:, None]
-        return Point(at.x, at.result, at.found, at.r, at.phi, jacobian)
+        return Iterate(at.x, at.result, at.quantities, at.r, at.phi, jacobian)
 
-    def met(self, at: Tried) -> bool:
-        """Whether every target is."""
+    def is_met(self, at: Trial) -> bool:
+        """Whether every target is met."""
         return bool(np.abs(at.r).max() <= self.tolerance)
 
     # -- steps ---------------------------------------------------------------------------------
 
-    def gauss_newton(self, here: Point) -> tuple[Floats, bool]:
-        """The step to the least misfit within the bounds, as far as slopes tell; whether it is 0."""
+    def gauss_newton(self, here: Iterate) -> tuple[Floats, float]:
+        """The step to the least linearised misfit within the bounds, at most ``trust`` long; that misfit.
+
+        The misfit is that of the whole step.
+        """
         size = self.sizes(here)
         A = here.jacobian * size
         mu = DAMPING * float(np.linalg.norm(A, 2)) or 1.0
         room = (self.bounds - here.x) / size
         room[1] = np.maximum(room[1], room[0] + 1e-14)
-        found = lsq_linear(
-            np.vstack([A, mu * self.metric]), np.append(-here.r, np.zeros(len(size))),
-            bounds=(room[0], room[1]), method="bvls", tol=1e-14,
-        )  # fmt: skip
-        d = np.clip(found.x, *room)
-        left = float(np.linalg.norm(here.r + A @ d))
-        hopeless = here.phi - left <= GAIN * here.phi
+        least = lsq_linear(
+            np.vstack([A, mu * self.metric]),
+            np.append(-here.r, np.zeros(len(size))),
+            bounds=(room[0], room[1]),
+            method="bvls",
+            tol=1e-14,
+        )
+        d = np.clip(least.x, *room)
+        misfit = float(np.linalg.norm(here.r + A @ d))
         d *= min(1.0, self.trust / (np.abs(d).max() or 1.0))
-        return d * size, hopeless
+        return d * size, misfit
 
-    def along(self, here: Point, way: Way) -> tuple[Point | None, Reach]:
-        """A point with less misfit on the way; None, and why, where there is none."""
-        t, longest = way.first, float((np.abs(way.step) / self.sizes(here)).max())
-        why = Reach.SOLVES
+    def line_search(self, here: Iterate, plan: StepPlan) -> Iterate | DesignStatus:
+        """An iterate with less misfit along the step, or why there is none."""
+        t, longest = plan.first, float((np.abs(plan.step) / self.sizes(here)).max())
+        reason = DesignStatus.SOLVES
         for attempt in range(TRIES):
-            if self.spent:
-                return None, Reach.SOLVES
-            there = self.at(here.x + t * way.step, here)
+            if self.solves >= self.max_solves:
+                return DesignStatus.SOLVES
+            there = self.solve_near(here, here.x + t * plan.step)
             if there is not None and there.phi < here.phi:
                 self.trust = max(t * longest, min(1.0, 2.0 * t * longest) if not attempt else 0.0)
-                return there, Reach.MET
-            why = Reach.AT_FOLD if there is None else Reach.CONFLICT
+                return there
+            reason = DesignStatus.AT_FOLD if there is None else DesignStatus.CONFLICT
             t *= 0.3 if there is None else 0.5
-            if there is None and t * longest < LEAST:
+            if there is None and t * longest < LEAST_CHANGE:
                 break
-        return None, why
+        return reason
 
-    def sizes(self, here: Point) -> Floats:
-        """(parameters,) what a change of each unknown is measured by."""
+    def sizes(self, here: Iterate) -> Floats:
+        """(parameters,) the unit for changes of each unknown."""
         return np.maximum(np.abs(here.x), 0.05 * (self.bounds[1] - self.bounds[0]))
 
     # -- tables --------------------------------------------------------------------------------
 
-    def record(self, x: Floats, status: str, tried: Tried | None = None) -> None:
-        """Write a row of the history, and show it to the callback."""
-        row = dict(zip((p.label for p in self.parameters), self.turned(x).tolist(), strict=True))
-        if tried is not None:
-            row |= zip((t.label for t in self.targets), tried.found.tolist(), strict=True)
-        misfit = math.nan if tried is None else tried.phi
+    def record(self, x: Floats, status: str, trial: Trial | None = None) -> None:
+        """Add a row to the history, and call the callback with it."""
+        row = dict(zip((p.label for p in self.parameters), self.converted(x).tolist(), strict=True))
+        if trial is not None:
+            row |= zip((t.label for t in self.targets), trial.quantities.tolist(), strict=True)
+        misfit = math.nan if trial is None else trial.phi
         self.rows.append({**row, "status": status, "misfit": misfit})
         if self.callback is not None:
             self.callback(pd.Series(self.rows[-1]))
 
-    def ended(self, reach: Reach, here: Tried, limit: Floats | None = None) -> Design:
-        """The design that ends here; ``limit`` (targets,) is what is found here where none is given."""
+    def design(self, status: DesignStatus, here: Trial, limit: Floats | None = None) -> Design:
+        """The design that ends here; ``limit`` (targets,) if it is not the quantities here."""
         if limit is None:
-            unknown = reach in (Reach.SOLVES, Reach.STOPPED)
-            limit = np.full_like(here.found, math.nan) if unknown else here.found
+            unknown = status in (DesignStatus.SOLVES, DesignStatus.STOPPED)
+            limit = np.full_like(here.quantities, math.nan) if unknown else here.quantities
         missed = np.abs(here.r) > self.tolerance
-        wanted = [t.nearest(q) for t, q in zip(self.targets, here.found, strict=True)]
         targets = pd.DataFrame(
-            {"found": here.found, "wanted": wanted, "misfit": here.r, "met": ~missed,
-             "limit": np.where(missed, limit, here.found)},
+            {
+                "value": here.quantities,
+                "wanted": self.wanted(here.quantities),
+                "misfit": here.r,
+                "met": ~missed,
+                "limit": np.where(missed, limit, here.quantities),
+            },
             index=[t.label for t in self.targets],
-        )  # fmt: skip
+        )
         parameters = pd.DataFrame(
-            {"start": [p.of(self.surface) for p in self.parameters],
-             "value": [p.of(here.result.surface) for p in self.parameters],
-             "low": [b[0] for b in self.low_high], "high": [b[1] for b in self.low_high]},
+            {
+                "start": [p.value(self.surface) for p in self.parameters],
+                "value": [p.value(here.result.surface) for p in self.parameters],
+                "low": self.limits[:, 0],
+                "high": self.limits[:, 1],
+            },
             index=[p.label for p in self.parameters],
-        )  # fmt: skip
+        )
         history = pd.DataFrame(self.rows)
-        return Design(reach, here.result, targets, parameters, self.solves, history)
+        return Design(status, here.result, targets, parameters, self.solves, history)
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """The way ahead from a point, and how it bends.
+class StepPlan:
+    """A Gauss-Newton step, and how the misfit bends along it.
 
-    With g = dt/dφ linear in φ, as slopes here and at the point before give it, and
-    ρ = φ (g_before/g - 1) / (φ_before - φ): the misfit vanishes after 1 - ρ/2 of the way that the
-    slope alone tells; where ρ > 1 there is a fold after 1/(2ρ) of it, and φ/ρ less misfit.
+    Along the step let g = dt/dφ be linear in φ, from the slopes here and at the iterate before, and
+    ρ = φ (g_before/g - 1) / (φ_before - φ). Then the misfit vanishes after 1 - ρ/2 of the way that the
+    slope alone predicts. If ρ > 1, a fold comes first, after 1/(2ρ) of that way, where the misfit has
+    fallen by φ/ρ.
 
     Attributes
     ----------
     step : the Gauss-Newton step, t = 1.
     first : t to try first.
-    to_limit : φ/ρ over the slope: linear in t, quantities have the values of the fold there.
+    to_limit : φ/ρ over the slope; quantities linear in t have their values at the fold there.
     at_fold : whether the fold is so near that it is not worth a further solve.
     """
 
@@ -293,7 +321,8 @@ class Way:
     at_fold: bool = False
 
     @classmethod
-    def of(cls, before: Point | None, here: Point, step: Floats) -> Way:
+    def of(cls, before: Iterate | None, here: Iterate, step: Floats) -> StepPlan:
+        """The plan for a step from here; ``before`` is the last iterate."""
         if before is None or not before.phi > here.phi:
             return cls(step)
         run = here.x - before.x
@@ -306,10 +335,11 @@ class Way:
         if bend <= 1.0:
             return cls(step, min(1.0, full * (1.0 - 0.5 * bend)) if bend > 0.0 else 1.0)
         gap = here.phi / bend
-        return cls(step, min(1.0, NEARLY * 0.5 * full / bend), gap / slope, gap < CLOSE)
+        first = min(1.0, FOLD_SHARE * 0.5 * full / bend)
+        return cls(step, first, gap / slope, gap < FOLD_GAP)
 
 
-def _as_it_is(surface: Surface) -> Result:
+def _unsolved(surface: Surface) -> Result:
     """The result of a solve that takes no step."""
 
     def stop(_: Progress) -> None:
@@ -318,27 +348,12 @@ def _as_it_is(surface: Surface) -> Result:
     return solve(surface, "newton", stop)
 
 
-def _metric(parameters: Sequence[Parameter], inverse: Bools) -> Floats:
-    """(p,p) of which steps among equals is shortest: one that changes all tensions alike.
+def _metric(parameters: Sequence[Parameter], reciprocal: Bools) -> Floats:
+    """(p,p) the norm by which the shortest of equal steps is chosen: all tensions change alike.
 
     Sheets and walls that pull at a junction stay nearly in balance while their tensions keep their
-    ratios; where only some of them change, the junction moves away.
+    ratios; if only some of them change, the junction moves away.
     """
-    alike = np.array([p.kind == "tension" for p in parameters]) * np.where(inverse, 1.0, -1.0)
-    return np.eye(len(alike)) - ALIKE * np.outer(alike, alike) / max(1.0, float(alike @ alike))
-
-
-def _reciprocal(surface: Surface, parameter: Parameter) -> bool:
-    loaded = surface.patches[surface.patch_index(parameter.patch)].pressure != 0.0
-    return loaded and parameter.kind == "tension"
-
-
-def _scale(surface: Surface, target: Target) -> float:
-    """By what a misfit is divided: the value wanted, or where that is 0 what is natural."""
-    given = (target.value, target.at_most, target.at_least)
-    largest = max(abs(v) for v in given if v is not None)
-    natural = {
-        "volume": surface.size**3, "area": surface.size**2, "curvature": 1.0 / surface.size,
-        "reaction": float(surface.tensions.max()),
-    }  # fmt: skip
-    return largest or natural.get(target.quantity, surface.size)
+    alike = np.array([p.kind == "tension" for p in parameters]) * np.where(reciprocal, 1.0, -1.0)
+    square = max(1.0, float(alike @ alike))
+    return np.eye(len(alike)) - PROPORTIONAL * np.outer(alike, alike) / square

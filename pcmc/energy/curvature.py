@@ -40,7 +40,12 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     [nan, nan, nan, nan, 1.06066]
     """
     if method not in METHODS:
-        raise OptionError(unknown("mean curvature method", method, METHODS))
+        raise OptionError(
+            unknown("mean curvature method", method, METHODS),
+            what="method",
+            found=method,
+            expected=METHODS,
+        )
     area_gradient, area_vector, star_area = _star(surface)
     along = np.einsum("ij,ij->i", area_gradient, area_vector)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,7 +1,7 @@
-"""A page in the browser to try tensions and pressures on a surface, and the same in JupyterLab.
+"""A page in the browser, or in JupyterLab, that moves a surface by sliders for its tensions and pressures.
 
 ``pcmc.explore.serve(surface)`` opens the page and waits until Ctrl-C; ``pcmc.explore.show(surface)`` is the
-page as the output of a notebook's cell. Both need nothing but the core install and a browser with WebGL 2.
+page as the output of a notebook's cell. Both need only the core install and a browser with WebGL 2.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from ..surface import Surface
 if TYPE_CHECKING:
     from .server import Explorer, View
 
-__all__ = ["attend", "serve", "show", "start"]
+__all__ = ["open_and_wait", "serve", "show", "start"]
 
 
 def serve(
@@ -25,8 +25,8 @@ def serve(
 ) -> None:
     """Explore a surface in the browser; returns when Ctrl-C is pressed.
 
-    Every page that is opened, in however many browsers, gets a draft of its own. The surface is solved
-    first, unless it is at rest already.
+    Every page, in any number of browsers, has its own session. The surface is solved first, unless it is
+    at rest already.
 
     Parameters
     ----------
@@ -35,20 +35,20 @@ def serve(
         on the network in.
     port : 0 for any that is free.
     open_browser : open the page at once.
-    title : shown at the page's head, such as the name of a file.
+    title : at the top of the page, such as the name of a file.
 
     Raises
     ------
-    OptionError : when the address cannot be listened on.
+    OptionError : if the server cannot listen on the address.
     """
-    attend(start(surface, host, port, title), open_browser)
+    open_and_wait(start(surface, host, port, title), open_browser)
 
 
-def attend(explorer: Explorer, open_browser: bool = True) -> None:
-    """Say where a running server is, open its page, and wait; Ctrl-C closes it."""
+def open_and_wait(explorer: Explorer, open_browser: bool = True) -> None:
+    """Print the address of a running server, open its page, and wait; Ctrl-C closes the server."""
     import webbrowser
 
-    print(f"Exploring at {explorer.url}  (Ctrl-C ends it)", flush=True)
+    print(f"Exploring at {explorer.url}  (press Ctrl-C to stop)", flush=True)
     try:
         if open_browser:
             webbrowser.open(explorer.url)
@@ -60,7 +60,7 @@ def attend(explorer: Explorer, open_browser: bool = True) -> None:
 
 
 def start(surface: Surface, host: str = "127.0.0.1", port: int = 0, title: str = "") -> Explorer:
-    """The same server in the background: an Explorer with ``.url`` and ``.close()``."""
+    """Start the server in the background; the Explorer returned has ``.url`` and ``.close()``."""
     from .server import Explorer
 
     return Explorer(surface, host, port, title)
@@ -69,14 +69,14 @@ def start(surface: Surface, host: str = "127.0.0.1", port: int = 0, title: str =
 def show(surface: Surface, height: int = 680, title: str = "") -> View:
     """The page as the output of a cell in JupyterLab.
 
-    ``.surface`` of what is returned is the surface as it is shown now, with the tensions and pressures
-    chosen, to work on in the next cell. The browser must run on the machine of the notebook's kernel.
+    The View returned has ``.surface``, the surface with the tensions and pressures now chosen, for the
+    next cell. The browser must run on the machine of the notebook's kernel.
 
     Parameters
     ----------
     surface : the surface to start from; it is not changed.
     height : of the page in pixels.
-    title : shown at the page's head.
+    title : at the top of the page.
     """
     from .server import View
 

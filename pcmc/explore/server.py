@@ -1,4 +1,7 @@
-"""The server behind the page: files, and a draft for each page that asks for one."""
+"""The server behind the page: its files, and a session for each page.
+
+It is the standard library's, so that exploring needs the core install alone.
+"""
 
 from __future__ import annotations
 
@@ -22,11 +25,11 @@ from ..certificate.certificate import Certificate
 from ..io import FORMATS, write
 from ..project.output import fields as written_fields
 from ..surface import Patch, Surface
-from .draft import Draft, State, begin
-from .drawing import centre, fields, findings, outline
-from .packing import pack, plain
+from .messages import pack, plain
+from .page_data import centre, fields, findings, outline
+from .session import Session, State, solved_start
 
-DRAFTS_KEPT = 32  # the least recently used is put away when another page opens
+MOST_SESSIONS = 32  # more pages than this end the least recently used session
 SOLVES_AT_ONCE = 2
 LONGEST_REQUEST = 1_000_000  # bytes
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
@@ -39,8 +42,8 @@ TYPES = {
 ACTS = ("follow", "settle", "stabilise", "undo", "redo", "reset", "state")
 
 
-class Refused(Exception):
-    """A request that is answered with one line."""
+class RequestError(Exception):
+    """A request that the server answers with one line of error."""
 
     def __init__(self, status: HTTPStatus, line: str) -> None:
         super().__init__(line)
@@ -50,19 +53,24 @@ class Refused(Exception):
 class Explorer:
     """A running server. ``url`` is the page; ``close`` ends it.
 
-    Each page has a draft of its own; ``drafts`` are those of the pages opened last.
+    Each page has its own session in ``sessions``, the most recently used last.
     """
 
     def __init__(self, surface: Surface, host: str, port: int, title: str) -> None:
         if not isinstance(surface, Surface):
-            raise SurfaceError(f"explore: expected a Surface, found {type(surface).__name__}")
+            raise SurfaceError(
+                f"explore: expected a Surface, found {type(surface).__name__}",
+                what="surface",
+                found=type(surface).__name__,
+                expected="Surface",
+            )
         self._server = _listen(host, port)
         self._server.explorer = self
         self.title = title
         self.local = host in LOOPBACK
         self.origin = centre(surface)
-        self.beginning = begin(surface)
-        self.drafts: OrderedDict[str, Draft] = OrderedDict()
+        self.start = solved_start(surface)
+        self.sessions: OrderedDict[str, Session] = OrderedDict()
         self._turn = threading.Semaphore(SOLVES_AT_ONCE)
         self._lock = threading.Lock()
         self.port = int(self._server.server_address[1])
@@ -71,29 +79,28 @@ class Explorer:
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self._thread.start()
 
-    def open(self) -> tuple[str, Draft]:
-        """A new draft and the name it is asked for by."""
-        name, draft = secrets.token_urlsafe(12), Draft(self.beginning, self._turn)
+    def open(self) -> tuple[str, Session]:
+        """A new session and its name in addresses."""
+        name, session = secrets.token_urlsafe(12), Session(self.start, self._turn)
         with self._lock:
-            self.drafts[name] = draft
-            while len(self.drafts) > DRAFTS_KEPT:
-                self.drafts.popitem(last=False)
-        return name, draft
+            self.sessions[name] = session
+            while len(self.sessions) > MOST_SESSIONS:
+                self.sessions.popitem(last=False)
+        return name, session
 
-    def draft(self, name: str) -> Draft:
-        """The draft of that name."""
+    def session(self, name: str) -> Session:
+        """The session of that name."""
         with self._lock:
-            if name not in self.drafts:
-                raise Refused(
+            if name not in self.sessions:
+                raise RequestError(
                     HTTPStatus.GONE,
-                    f"this draft was put away, as {DRAFTS_KEPT} others were opened since or the"
-                    " server was started anew; reload the page to begin again",
+                    "this session has expired; reload the page",
                 )
-            self.drafts.move_to_end(name)
-            return self.drafts[name]
+            self.sessions.move_to_end(name)
+            return self.sessions[name]
 
     def wait(self) -> None:
-        """Until the server is closed."""
+        """Return when the server is closed."""
         while self._thread.is_alive():
             self._thread.join(0.5)
 
@@ -101,27 +108,27 @@ class Explorer:
         """Stop listening."""
         self._server.shutdown()
         self._server.server_close()
-        self._server.hang_up()
+        self._server.close_connections()
         self._thread.join()
 
 
 class View:
-    """The page as a notebook shows it. ``surface`` is the one that it shows now."""
+    """The page in a notebook; ``surface`` is the one it shows now."""
 
     def __init__(self, surface: Surface, height: int, title: str) -> None:
         self.explorer = Explorer(surface, "127.0.0.1", 0, title)
-        self._name, self._draft = self.explorer.open()
+        self._name, self._session = self.explorer.open()
         self.height = int(height)
 
     @property
     def surface(self) -> Surface:
-        """The surface as it is shown now."""
-        return self._draft.surface
+        """The surface that the page shows now."""
+        return self._session.surface
 
     @property
     def url(self) -> str:
-        """The page's address, for a window of its own."""
-        return f"{self.explorer.url}?draft={self._name}"
+        """The page's address, to open it in a window."""
+        return f"{self.explorer.url}?session={self._name}"
 
     def close(self) -> None:
         """End the server behind the page."""
@@ -139,26 +146,26 @@ class _Server(ThreadingHTTPServer):
     explorer: Explorer
 
     def __init__(self, address: tuple[str, int]) -> None:
-        self._lines: set[socket.socket] = set()
+        self._connections: set[socket.socket] = set()
         super().__init__(address, _Handler)
 
     def get_request(self) -> tuple[socket.socket, Any]:
-        line, address = super().get_request()
-        self._lines.add(line)
-        return line, address
+        connection, address = super().get_request()
+        self._connections.add(connection)
+        return connection, address
 
     def shutdown_request(self, request: Any) -> None:
-        self._lines.discard(request)
+        self._connections.discard(request)
         super().shutdown_request(request)
 
-    def hang_up(self) -> None:
-        """End the connections that browsers keep open."""
-        for line in list(self._lines):
+    def close_connections(self) -> None:
+        """Close the connections that browsers leave open."""
+        for connection in list(self._connections):
             with suppress(OSError):
-                line.shutdown(socket.SHUT_RDWR)
+                connection.shutdown(socket.SHUT_RDWR)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that goes away in the middle of an answer is no error."""
+        """Say nothing: a browser may leave in the middle of an answer."""
 
 
 def _listen(host: str, port: int) -> _Server:
@@ -167,48 +174,50 @@ def _listen(host: str, port: int) -> _Server:
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
         raise OptionError(
-            f"cannot listen on {host!r}, port {port}: {reason}; port 0 takes any that is free"
+            f"cannot listen on {host!r}, port {port}: {reason}; with port 0 pcmc takes a free one",
+            what="port" if host in LOOPBACK else "host",
+            found=(host, port),
         ) from None
 
 
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
-    disable_nagle_algorithm = (
-        True  # else the body waits up to 40 ms until the header is acknowledged
-    )
+    disable_nagle_algorithm = True  # else the body waits up to 40 ms for the header
     wbufsize = -1  # header and body leave together
     server: _Server
 
     def do_GET(self) -> None:
-        self._answered(self._get)
+        self._answer(self._get)
 
     def do_POST(self) -> None:
-        self._answered(self._post)
+        self._answer(self._post)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Nothing: the terminal is the user's."""
 
     # -- requests ----------------------------------------------------------------------------------
 
-    def _answered(self, act: Any) -> None:
+    def _answer(self, act: Any) -> None:
         try:
             self._check_origin()
             act()
-        except Refused as error:
+        except RequestError as error:
             self._send_error_line(error.status, str(error))
         except (PcmcError, MissingExtra) as error:
             self._send_error_line(HTTPStatus.BAD_REQUEST, str(error))
 
     def _check_origin(self) -> None:
-        """Only this page's own scripts, under this machine's own name: no other site may ask."""
+        """Refuse requests from pages of other sites, and under other names of this machine."""
         host = self.headers.get("Host", "")
         origin = self.headers.get("Origin")
         explorer = self.server.explorer
         name = host.rsplit(":", 1)[0].strip("[]")
         if explorer.local and name not in LOOPBACK:
-            raise Refused(HTTPStatus.FORBIDDEN, f"this page is served on {explorer.url} only")
+            raise RequestError(HTTPStatus.FORBIDDEN, f"open this page at {explorer.url}")
         if origin is not None and urlsplit(origin).netloc != host:
-            raise Refused(HTTPStatus.FORBIDDEN, "a page of another site may not ask")
+            raise RequestError(
+                HTTPStatus.FORBIDDEN, "requests from pages of other sites are refused"
+            )
 
     def _get(self) -> None:
         parts = urlsplit(self.path)
@@ -219,38 +228,41 @@ class _Handler(BaseHTTPRequestHandler):
             self._send_file(steps[1])
         elif steps[0] == "api" and len(steps) == 3 and steps[2] == "export":
             suffix = parse_qs(parts.query).get("suffix", [""])[0]
-            self._export(self.server.explorer.draft(steps[1]), suffix)
+            self._export(self.server.explorer.session(steps[1]), suffix)
         else:
-            raise Refused(HTTPStatus.NOT_FOUND, f"there is nothing at {parts.path}")
+            raise RequestError(HTTPStatus.NOT_FOUND, f"there is nothing at {parts.path}")
 
     def _post(self) -> None:
         asked = self._json()
         steps = urlsplit(self.path).path.strip("/").split("/")
         explorer = self.server.explorer
         if steps == ["api", "open"]:
-            name = asked.get("draft")
-            name, draft = (name, explorer.draft(name)) if name else explorer.open()
-            header, arrays = outline(draft.surface)
-            first = {"draft": name, "title": explorer.title, "formats": list(FORMATS), **header}
-            self._send_state(draft.state(), first, arrays)
+            name = asked.get("session")
+            name, session = (name, explorer.session(name)) if name else explorer.open()
+            header, arrays = outline(session.surface)
+            first = {"session": name, "title": explorer.title, "formats": list(FORMATS), **header}
+            self._send_state(session.state(), first, arrays)
         elif len(steps) == 3 and steps[0] == "api" and steps[2] in ACTS:
-            draft = explorer.draft(steps[1])
+            session = explorer.session(steps[1])
             given = (_values(asked),) if steps[2] in ("follow", "settle") else ()
-            self._send_state(getattr(draft, steps[2])(*given))
+            self._send_state(getattr(session, steps[2])(*given))
         else:
-            raise Refused(HTTPStatus.NOT_FOUND, f"there is nothing at {self.path}")
+            raise RequestError(HTTPStatus.NOT_FOUND, f"there is nothing at {self.path}")
 
     def _json(self) -> dict[str, Any]:
         length = self.headers.get("Content-Length", "")
         if not length.isdigit() or int(length) > LONGEST_REQUEST:
             self.close_connection = True
-            raise Refused(HTTPStatus.BAD_REQUEST, "the request has no length, or is too long")
+            raise RequestError(
+                HTTPStatus.BAD_REQUEST,
+                f"a request needs a length of at most {LONGEST_REQUEST} bytes",
+            )
         try:
             asked = json.loads(self.rfile.read(int(length)) or b"{}")
         except ValueError as error:
-            raise Refused(HTTPStatus.BAD_REQUEST, f"not JSON: {error}") from None
+            raise RequestError(HTTPStatus.BAD_REQUEST, f"not JSON: {error}") from None
         if not isinstance(asked, dict):
-            raise Refused(HTTPStatus.BAD_REQUEST, "expected a JSON object")
+            raise RequestError(HTTPStatus.BAD_REQUEST, "expected a JSON object")
         return asked
 
     # -- answers -----------------------------------------------------------------------------------
@@ -267,26 +279,30 @@ class _Handler(BaseHTTPRequestHandler):
             header |= {
                 "asked": _patches(state.asked),
                 "shown": _patches(state.surface.patches),
-                "verdict": _verdict(state.trouble or state.found),
-                "at_rest": state.trouble is None,
-                "findings": findings(state.surface, state.found),
+                "verdict": _verdict(state.failure or state.certificate),
+                "at_rest": state.failure is None,
+                "findings": findings(state.surface, state.certificate),
                 "undo": state.undo,
                 "redo": state.redo,
             }
-            drawn |= fields(state.surface, state.found, self.server.explorer.origin)
+            drawn |= fields(state.surface, state.certificate, self.server.explorer.origin)
         self._send(pack(header, drawn), "application/octet-stream")
 
-    def _export(self, draft: Draft, suffix: str) -> None:
-        state = draft.state()
+    def _export(self, session: Session, suffix: str) -> None:
+        state = session.state()
         if suffix not in FORMATS:
-            raise Refused(HTTPStatus.BAD_REQUEST, f"no format {suffix!r}")
+            raise RequestError(
+                HTTPStatus.BAD_REQUEST, f"unknown format {suffix!r}; known: {', '.join(FORMATS)}"
+            )
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore"
-            )  # what a format cannot carry, every format of its kind says
+            warnings.simplefilter("ignore")  # the page says which formats carry the numbers
             path = Path(folder) / f"surface{suffix}"
-            write(path, state.surface, scalars=written_fields(state.surface, state.found),
-                  certificate=plain(state.found.numbers()))  # fmt: skip
+            write(
+                path,
+                state.surface,
+                scalars=written_fields(state.surface, state.certificate),
+                certificate=plain(state.certificate.numbers()),
+            )
             body = path.read_bytes()
         self._send(body, "application/octet-stream", f'attachment; filename="surface{suffix}"')
 
@@ -294,7 +310,7 @@ class _Handler(BaseHTTPRequestHandler):
         kind = TYPES.get(Path(name).suffix)
         file = files(__package__).joinpath("page", name)
         if kind is None or "\\" in name or not file.is_file():
-            raise Refused(HTTPStatus.NOT_FOUND, f"there is no page {name!r}")
+            raise RequestError(HTTPStatus.NOT_FOUND, f"there is no file {name!r}")
         self._send(file.read_bytes(), f"{kind}; charset=utf-8")
 
     def _send_error_line(self, status: HTTPStatus, line: str) -> None:
@@ -319,15 +335,17 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _values(asked: dict[str, Any]) -> dict[str, dict[str, float]]:
-    """Tensions and pressures by patch, refused unless they are numbers."""
+    """Tensions and pressures by patch; RequestError unless they are numbers."""
     values: dict[str, dict[str, float]] = {}
     for key in ("tensions", "pressures"):
         given = asked.get(key, {})
         if not isinstance(given, dict):
-            raise Refused(HTTPStatus.BAD_REQUEST, f"{key}: expected numbers by patch")
+            raise RequestError(HTTPStatus.BAD_REQUEST, f"{key}: expected numbers by patch")
         for name, value in given.items():
             if not isinstance(value, int | float) or isinstance(value, bool):
-                raise Refused(HTTPStatus.BAD_REQUEST, f"{key}: {name!r} is not a number: {value!r}")
+                raise RequestError(
+                    HTTPStatus.BAD_REQUEST, f"{key}: {name!r}: expected a number, found {value!r}"
+                )
         values[key] = given
     return values
 
@@ -339,12 +357,12 @@ def _patches(patches: tuple[Patch, ...]) -> list[dict[str, Any]]:
     ]
 
 
-def _verdict(found: Certificate) -> dict[str, str]:
-    sentence = found.verdict.value
+def _verdict(certificate: Certificate) -> dict[str, str]:
+    sentence = certificate.verdict.value
     word, _, rest = sentence.partition(": ")
     return {
-        "name": found.verdict.name.lower(),
+        "name": certificate.verdict.name.lower(),
         "word": word,
         "sentence": rest,
-        "detail": found.detail,
+        "detail": certificate.detail,
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -19,27 +19,60 @@ from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknow
 from ..base.files import atomic_write
 from ..contact.pinching import standing_part
 from ..surface import Plane, Surface
-from .contents import Contents, merged, to_surface, without_unused
-from .suspect import suspicions
+from .import_warnings import import_warnings
+from .mesh_data import MeshData, merged, to_surface, without_unused
+
+
+@dataclass(frozen=True)
+class Format:
+    """What a file format can hold besides the triangles and the patches' names.
+
+    Attributes
+    ----------
+    module : the module here that reads and writes it.
+    scalars : "" for none, "vertices", or "both" vertices and faces.
+    certificate : whether it holds the certificate.
+    shared : whether patches certainly share their vertices, so that reading needs no merging.
+    separate : whether it has a mesh per patch, which cannot have triangles without area.
+    walls : whether such triangles go with a separate format as text.
+    loses : what it never holds.
+    """
+
+    module: str
+    scalars: str = ""
+    certificate: bool = False
+    shared: bool = False
+    separate: bool = False
+    walls: bool = False
+    loses: tuple[str, ...] = ()
+
+    def holds(self, scalar: Floats, n: int) -> bool:
+        """Whether the format holds this scalar, of n vertices or of the faces."""
+        return self.scalars == "both" or (self.scalars == "vertices" and len(scalar) == n)
+
+
+_EVOLVER = Format("evolver", shared=True)
+_VTK = Format("vtk", scalars="both")
+_GLTF = Format("gltf", scalars="vertices", separate=True, walls=True)
 
 FORMATS = {
-    ".pcmc": "native",
-    ".fe": "evolver",
-    ".dmp": "evolver",
-    ".obj": "obj",
-    ".ply": "ply",
-    ".stl": "stl",
-    ".vtp": "vtk",
-    ".vtu": "vtk",
-    ".glb": "gltf",
-    ".gltf": "gltf",
-    ".3dm": "rhino",
+    ".pcmc": Format("native", scalars="both", certificate=True, shared=True),
+    ".fe": _EVOLVER,
+    ".dmp": _EVOLVER,
+    ".obj": Format("obj"),
+    ".ply": Format("ply", scalars="both"),
+    ".stl": Format("stl", separate=True, loses=("supports", "tensions", "pressures")),
+    ".vtp": _VTK,
+    ".vtu": _VTK,
+    ".glb": _GLTF,
+    ".gltf": _GLTF,
+    ".3dm": Format("rhino", separate=True, walls=True),
 }
-"""Suffix and the module here that reads and writes it."""
+"""The formats by suffix."""
 
-BARE = (
-    "it tells of no supports: its boundary is held, and tensions and pressures are 1 where none are"
-    " given"
+NO_SUPPORTS = (
+    "the file has no supports: its boundary is taken as fixed; tensions and pressures are 1 unless"
+    " you give them"
 )
 
 
@@ -59,68 +92,72 @@ def read(
     path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
     tensions, pressures : by patch name, or one number for all, in place of the file's. Formats that
         carry neither give 1 for both.
-    fixed, on_plane : as in Surface, in place of the file's; ``fixed="boundary"`` holds all boundary
-        vertices, and is what happens where the format carries no supports.
-    plane : Π in place of the file's, or the plane z = 0 where it has none.
+    fixed, on_plane : as in Surface, in place of the file's; ``fixed="boundary"`` fixes all boundary
+        vertices, and is the default for formats without supports.
+    plane : Π in place of the file's, or the plane z = 0 if it has none.
 
     Warns
     -----
-    FileWarning : once, saying what was changed (polygons cut into triangles, unused vertices left
-        out, ...), and what is probably not meant in a mesh from another program (a seam left open,
-        patches turned against each other, an axis up that is not z).
+    FileWarning : once, with all that was changed (polygons cut into triangles, unused vertices left
+        out, ...) and all probable mistakes in a mesh from another program (an open seam, patches
+        turned against each other, an axis up that is not z).
 
     Raises
     ------
-    FileError : in one line, naming file and line or element, for a file that is missing, cut off,
-        not of its suffix's format, or not a surface.
+    FileError : for a file that is missing, cut off or not of its suffix's format. ``what`` is the
+        file, ``where`` the line or element.
+    SurfaceError : for a mesh that is not a surface.
     MissingExtra : when the format needs a library that is not installed.
     """
     return _read(path, load(path), (tensions, pressures, fixed, on_plane, plane), ())
 
 
 def read_bare(path: str | os.PathLike[str]) -> Surface:
-    """``read``, for who has not said what a file lacks: that it tells of no supports is warned of too."""
-    contents = load(path)
-    return _read(path, contents, (), (BARE,) if contents.support is None else ())
+    """``read`` without arguments, with a warning also if the file has no supports."""
+    data = load(path)
+    return _read(path, data, (), (NO_SUPPORTS,) if data.support is None else ())
 
 
 def _read(
-    path: str | os.PathLike[str], contents: Contents, given: tuple[Any, ...], notes: tuple[str, ...]
+    path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...], notes: tuple[str, ...]
 ) -> Surface:
     try:
-        surface = to_surface(contents, *given)
+        surface = to_surface(data, *given)
     except PcmcError as error:
-        raise type(error)(f"{os.fspath(path)}: {error}") from None
-    notes = (*contents.notes, *suspicions(contents), *notes)
+        raise _in_file(path, error, type(error)) from None
+    notes = (*data.notes, *import_warnings(data), *notes)
     if notes:
         warnings.warn(f"{os.fspath(path)}: {'; '.join(notes)}", FileWarning, stacklevel=3)
     return surface
 
 
-def load(path: str | os.PathLike[str]) -> Contents:
-    """All that a file holds, scalars and certificate too; see Contents. Errors as in ``read``."""
+def load(path: str | os.PathLike[str]) -> MeshData:
+    """Everything in a file, scalars and certificate too. Errors as in ``read``."""
     path = Path(path)
-    module = _module(path)
+    form = _format(path)
     try:
         with path.open("rb"):
             pass
-        contents = without_unused(module.read(path))
-        if not getattr(module, "MERGE", False):
-            return contents
-        contents = merged(contents)
-        if contents.walls is not None:
-            from .flat import with_walls  # needs scipy.spatial, as merging does
+        data = without_unused(_module(form).read(path))
+        if form.shared:
+            return data
+        data = merged(data)
+        if data.walls is not None:
+            from .flat_walls import restore_walls  # needs scipy.spatial, as merging does
 
-            contents = with_walls(contents)
-        return contents
+            data = restore_walls(data)
+        return data
     except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror or error})") from None
+        reason = error.strerror or error
+        raise FileError(f"{path}: cannot be read ({reason})", what=str(path)) from None
     except UnicodeDecodeError as error:
         raise FileError(
-            f"{path}: byte {error.start} is not text; is it a {path.suffix} file?"
+            f"{path}: byte {error.start} is not text; is it a {path.suffix} file?",
+            what=str(path),
+            where=error.start,
         ) from None
     except PcmcError as error:
-        raise _located(path, error) from None
+        raise _in_file(path, error, FileError) from None
 
 
 def write(
@@ -132,70 +169,90 @@ def write(
 ) -> None:
     """Write a surface as the suffix says; the file appears whole or not at all.
 
-    A wall below a junction that rests on Π has triangles without area. Formats that write every patch
-    apart (.stl, .glb, .gltf, .3dm) show the surface as it stands, without them; .glb, .gltf and .3dm say
-    beside it how those walls are, which ``read`` puts back. From .stl, and where the surface was changed
-    in between, the junction comes back sliding on Π.
+    A wall below a junction on Π has triangles without area. Formats with a mesh per patch (.stl, .glb,
+    .gltf, .3dm) leave them out; .glb, .gltf and .3dm hold these walls as text, and ``read`` puts them
+    back. From .stl, and if another program changed the surface, the junction comes back sliding on Π.
 
     Parameters
     ----------
     path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
-    scalars : (n,) or (m,) arrays by name (curvature, error, ...), kept where the format can.
-    certificate : a Certificate, or values by name, kept where the format can (.pcmc).
+    scalars : (n,) or (m,) arrays by name (curvature, error, ...), for formats that hold them.
+    certificate : a Certificate, or values by name, for the format that holds it (.pcmc).
 
     Warns
     -----
     LostWarning : once, naming what the format cannot carry.
-    FileWarning : where coordinates are written relative to another origin (.stl).
+    FileWarning : if the coordinates are written relative to another origin (.stl).
     """
     path = Path(path)
-    module = _module(path)
-    broken = [p.name for p in surface.patches if "\n" in p.name or "\r" in p.name]
-    if broken:
-        raise FileError(f"{path}: the patch name {broken[0]!r} has a line break in it; rename it")
+    form = _format(path)
+    for patch in surface.patches:
+        if "\n" in patch.name or "\r" in patch.name:
+            raise FileError(
+                f"{path}: the patch name {patch.name!r} contains a line break; rename the patch",
+                what=str(path),
+                where="patches",
+                found=patch.name,
+            )
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
-    kept = (getattr(module, "SCALARS", False), getattr(module, "FACE_SCALARS", True))
-    lost = [k for k, v in scalars.items() if not (kept[0] and (kept[1] or len(v) == surface.n))]
-    if certificate is not None and not getattr(module, "CERTIFICATE", False):
+    lost = [name for name, scalar in scalars.items() if not form.holds(scalar, surface.n)]
+    if certificate is not None and not form.certificate:
         lost.append("certificate")
-    told = None
-    if getattr(module, "APART", False):
+    shown, walls = surface, None
+    if form.separate:
         shown = standing_part(surface).surface
-        if shown.m < surface.m and getattr(module, "WALLS", False):
-            from .flat import walls_told
+        if shown.m < surface.m and form.walls:
+            from .flat_walls import encode_walls
 
-            told = walls_told(surface, shown)
+            walls = encode_walls(surface, shown)
         elif shown.m < surface.m:
             lost.append(f"{surface.m - shown.m} triangles of walls without height")
-        surface = shown
+    values = _values(certificate)
     try:
         with atomic_write(path) as temporary:
-            moved = module.write(
-                temporary, surface, scalars=scalars, certificate=_values(certificate), walls=told
+            note = _module(form).write(
+                temporary, shown, scalars=scalars, certificate=values, walls=walls
             )
     except OSError as error:
-        raise FileError(f"{path}: cannot be written ({error.strerror or error})") from None
+        reason = error.strerror or error
+        raise FileError(f"{path}: cannot be written ({reason})", what=str(path)) from None
     except PcmcError as error:
-        raise _located(path, error) from None
+        raise _in_file(path, error, FileError) from None
     if lost:
-        lost += getattr(module, "NEVER", ())
-        text = f"{path}: a {path.suffix} file cannot carry {', '.join(lost)}; left out"
+        text = (
+            f"{path}: a {path.suffix} file cannot carry {', '.join([*lost, *form.loses])}; left out"
+        )
         warnings.warn(text, LostWarning, stacklevel=2)
-    if moved:
-        warnings.warn(f"{path}: {moved}", FileWarning, stacklevel=2)
+    if note:
+        warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
 
 
-def _located(path: Path, error: PcmcError) -> FileError:
-    """The error with the file's name in front."""
-    text = str(error)
-    return FileError(text if text.startswith(str(path)) else f"{path}: {text}")
+def _in_file(path: str | os.PathLike[str], error: PcmcError, kind: type[PcmcError]) -> PcmcError:
+    """The error with the file's name in front, as one of this kind."""
+    what = os.fspath(path) if kind is FileError else error.what
+    return kind(
+        f"{os.fspath(path)}: {error}",
+        what=what,
+        where=error.where,
+        found=error.found,
+        expected=error.expected,
+    )
 
 
-def _module(path: Path) -> ModuleType:
+def _format(path: Path) -> Format:
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
-        raise FileError(f"{path}: {unknown('suffix', suffix, FORMATS)}")
-    return import_module(f".{FORMATS[suffix]}", __name__)
+        raise FileError(
+            f"{path}: {unknown('suffix', suffix, FORMATS)}",
+            what=str(path),
+            found=suffix,
+            expected=list(FORMATS),
+        )
+    return FORMATS[suffix]
+
+
+def _module(form: Format) -> ModuleType:
+    return import_module(f".{form.module}", __name__)
 
 
 def _values(certificate: Any) -> Mapping[str, Any]:
@@ -203,7 +260,12 @@ def _values(certificate: Any) -> Mapping[str, Any]:
     if certificate is None or isinstance(certificate, Mapping):
         return certificate or {}
     if not is_dataclass(certificate):
-        raise FileError(f"certificate: expected a Certificate, found {type(certificate).__name__}")
+        raise FileError(
+            f"certificate: expected a Certificate, found {type(certificate).__name__}",
+            what="certificate",
+            found=type(certificate).__name__,
+            expected="Certificate",
+        )
     shown = [f.name for f in fields(certificate) if f.repr and not f.name.startswith("_")]
     return {name: getattr(certificate, name) for name in shown}
 
@@ -213,6 +275,9 @@ def _scalar(surface: Surface, name: str, value: npt.ArrayLike) -> Floats:
     if array.shape not in ((surface.n,), (surface.m,)):
         raise FileError(
             f"scalars[{name!r}]: expected shape ({surface.n},) for vertices or ({surface.m},) for"
-            f" faces, found {array.shape}"
+            f" faces, found {array.shape}",
+            what="scalars",
+            where=name,
+            found=array.shape,
         )
     return array

@@ -6,8 +6,8 @@ Evolver measures volumes from the origin (``symmetric_content``: det/6 per face,
 coordinates are relative to the point of Π, and a comment says where that is. Then the program's
 ``total_energy`` is E of Eq. (20).
 
-Read are datafiles of this kind, those that the program's ``dump`` writes, and others whose sections
-list elements by number. A body with a prescribed volume counts with its Lagrange multiplier as the
+The reader takes datafiles of this kind, those that the program's ``dump`` writes, and others whose
+sections list elements by number. For a body with a prescribed volume the Lagrange multiplier is the
 pressure.
 """
 
@@ -27,10 +27,10 @@ import pandas as pd
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..surface import Patch, Plane, Surface
-from .contents import FIXED, FREE, SLIDING, Contents, support_of
 from .expressions import constant, linear
+from .mesh_data import FIXED, FREE, SLIDING, MeshData, support_of
 from .polygons import triangulate
-from .text import rows
+from .text import format_rows
 
 HEADER = """\
 // Piecewise constant-mean-curvature surface, written by pcmc.
@@ -61,13 +61,15 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write(header)
         file.write("\nVERTICES\n")
-        file.write(rows("%d %r %r %r%s\n", _count(X), *X.T, tag[support]))
+        file.write(format_rows("%d %r %r %r%s\n", _count(X), *X.T, tag[support]))
         file.write("\nEDGES\n")
-        file.write(rows("%d %d %d%s\n", _count(edges), *edges.T, tag[_edge_support(surface)]))
+        file.write(
+            format_rows("%d %d %d%s\n", _count(edges), *edges.T, tag[_edge_support(surface)])
+        )
         file.write("\nFACES\n")
         sides = _signed_edges(surface)
         file.write(
-            rows("%d %d %d %d%s\n", _count(sides), *sides.T, face_tag[surface.patch_of_face])
+            format_rows("%d %d %d %d%s\n", _count(sides), *sides.T, face_tag[surface.patch_of_face])
         )
         file.write("\nBODIES\n" + _bodies(surface) + "\nREAD\n")
 
@@ -110,11 +112,11 @@ def _bodies(surface: Surface) -> str:
 # Reading
 
 
-def read(path: Path, **_: Any) -> Contents:
+def read(path: Path, **_: Any) -> MeshData:
     """The mesh, tensions, pressures and supports of a datafile; errors name the line."""
     file = _open(path)
     if "written by pcmc" in file.header:
-        file.section("read")  # its last line: what is cut off in the bodies would go unnoticed
+        file.section("read")  # its last line: without it the file is cut off
     top = file.section("top")
     known = _parameters(top)
     ids, X, support, constraint = _vertices(file, known)
@@ -125,7 +127,7 @@ def read(path: Path, **_: Any) -> Contents:
     given = re.search(r"^// origin (\S+) (\S+) (\S+)$", file.header, re.M)
     origin = np.array([float(c) for c in given.groups()]) if given else np.zeros(3)
     plane = _plane(file, constraint, origin, known)
-    return Contents(
+    return MeshData(
         X + origin, F, patch_of_face[source], patches, support, plane, notes=(*notes, *more)
     )
 
@@ -134,7 +136,6 @@ def read(path: Path, **_: Any) -> Contents:
 class _Section:
     """A part of the file. A form feed stands for a line end that does not end an element."""
 
-    path: Path
     name: str
     text: str
     first_line: int
@@ -146,22 +147,21 @@ class _Section:
             offset = starts[min(row, len(starts) - 1)]
         before = self.text[:offset]
         line = self.first_line + before.count("\n") + before.count("\f")
-        return FileError(f"{self.path}: line {line}: {text}")
+        return FileError(f"line {line}: {text}", where=line)
 
     def elements(self, pattern: str, what: str) -> list[tuple[str, ...]]:
         """Groups of the pattern for each line that is not blank."""
-        found = re.findall(rf"^[^\S\n]*{pattern}$", self.text, re.M)
+        matches = re.findall(rf"^[^\S\n]*{pattern}$", self.text, re.M)
         lines = re.findall(r"^[^\S\n]*\S[^\n]*$", self.text, re.M)
-        if len(found) != len(lines):
+        if len(matches) != len(lines):
             one = re.compile(rf"[^\S\n]*{pattern}")
             row = next(k for k, line in enumerate(lines) if not one.fullmatch(line))
             raise self.error(f"expected {what}, found {' '.join(lines[row].split())[:60]!r}", row)
-        return found
+        return matches
 
 
 @dataclass(frozen=True)
 class _File:
-    path: Path
     header: str
     sections: Mapping[str, _Section]
 
@@ -169,8 +169,10 @@ class _File:
         if name not in self.sections:
             known = ", ".join(k for k in self.sections if k != "top") or "none"
             raise FileError(
-                f"{self.path}: no {name} section (found: {known}); the file is cut off or is not a"
-                " Surface Evolver datafile"
+                f"no {name} section (found: {known}); the file is cut off or is not a Surface Evolver"
+                " datafile",
+                where=name,
+                found=known,
             )
         return self.sections[name]
 
@@ -189,17 +191,24 @@ def _open(path: Path) -> _File:
     sections: dict[str, _Section] = {}
     for name, start, end in zip(names, starts, ends, strict=True):
         line = 1 + bare[:start].count("\n") + bare[:start].count("\f")
-        sections.setdefault(name, _Section(path, name, bare[start:end], line))
+        sections.setdefault(name, _Section(name, bare[start:end], line))
         if name == "read":
             break  # what follows are commands
     header = re.split(r"^[^\S\n]*vertices\b", text, maxsplit=1, flags=re.I | re.M)[0]
-    return _File(path, header, sections)
+    return _File(header, sections)
 
 
 UNREADABLE = (
-    "string", "quadratic", "lagrange", "simplex_representation", "torus", "torus_filled",
-    "symmetry_group", "#include", "#define",
-)  # fmt: skip
+    "string",
+    "quadratic",
+    "lagrange",
+    "simplex_representation",
+    "torus",
+    "torus_filled",
+    "symmetry_group",
+    "#include",
+    "#define",
+)
 
 
 def _parameters(top: _Section) -> dict[str, float]:
@@ -208,7 +217,7 @@ def _parameters(top: _Section) -> dict[str, float]:
         hit = re.search(rf"^[^\S\n]*{word}\b", top.text, re.I | re.M)
         if hit:
             raise top.error(
-                f"{word} is not supported; load the file in the program, `dump` it, and read that",
+                f"{word} is not supported; load the file in Surface Evolver, `dump` it, and read the dump",
                 offset=hit.start(),
             )
     known = {"pi": math.pi}
@@ -221,9 +230,9 @@ def _vertices(file: _File, known: Mapping[str, float]) -> tuple[Ints, Floats, In
     """Ids, positions, support, and the number of the constraint each vertex lies on (0: none)."""
     section = file.section("vertices")
     what = "a vertex number and three coordinates"
-    found = section.elements(r"(\d+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)([^\n]*)", what)
-    columns = list(zip(*found, strict=True)) or [()] * 5
-    X = np.empty((len(found), 3))
+    listed = section.elements(r"(\d+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)([^\n]*)", what)
+    columns = list(zip(*listed, strict=True)) or [()] * 5
+    X = np.empty((len(listed), 3))
     for d in range(3):
         X[:, d] = _numbers(columns[1 + d], known, section)
     code, kinds = pd.factorize(np.array(columns[4], dtype=object))
@@ -233,8 +242,8 @@ def _vertices(file: _File, known: Mapping[str, float]) -> tuple[Ints, Floats, In
         words = rest.lower()
         if re.search(r"\bboundary\b", words):
             raise section.error("a vertex on a parametric boundary is not supported", row)
-        listed = re.search(r"\bconstraints?((?:\s+\d+)+)", words)
-        numbers = [int(w) for w in listed[1].split()] if listed else []
+        named = re.search(r"\bconstraints?((?:\s+\d+)+)", words)
+        numbers = [int(w) for w in named[1].split()] if named else []
         support[k] = FIXED if re.search(r"\bfixed\b", words) else SLIDING if numbers else FREE
         if support[k] == SLIDING:
             if len(numbers) > 1:
@@ -254,13 +263,13 @@ class _Faces:
 def _faces(file: _File, vertex_ids: Ints) -> _Faces:
     edges, faces = file.section("edges"), file.section("faces")
     what = "an edge number and two vertices"
-    listed = edges.elements(r"(\d+)[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)[^\n]*", what)
-    numbers = np.array(listed, dtype=np.int64).reshape(-1, 3)
+    edge_rows = edges.elements(r"(\d+)[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)[^\n]*", what)
+    numbers = np.array(edge_rows, dtype=np.int64).reshape(-1, 3)
     ends = np.stack([_places(vertex_ids, numbers[:, k], edges, "vertex") for k in (1, 2)], axis=1)
-    found = faces.elements(r"(\d+)((?:[^\S\n]+-?\d+)+)([^\n]*)", "a face number and its edges")
-    counts = np.array([len(f[1].split()) for f in found], dtype=np.int64)
-    signed = np.array(" ".join(f[1] for f in found).split(), dtype=np.int64)
-    row = np.repeat(np.arange(len(found)), counts)
+    listed = faces.elements(r"(\d+)((?:[^\S\n]+-?\d+)+)([^\n]*)", "a face number and its edges")
+    counts = np.array([len(f[1].split()) for f in listed], dtype=np.int64)
+    signed = np.array(" ".join(f[1] for f in listed).split(), dtype=np.int64)
+    row = np.repeat(np.arange(len(listed)), counts)
     place = _places(numbers[:, 0], np.abs(signed), faces, "edge", row)
     tail = np.where(signed > 0, ends[place, 0], ends[place, 1])
     head = np.where(signed > 0, ends[place, 1], ends[place, 0])
@@ -271,8 +280,8 @@ def _faces(file: _File, vertex_ids: Ints) -> _Faces:
     if len(open_at):
         text = "the edges of the face do not follow each other head to tail"
         raise faces.error(text, row[open_at[0]])
-    ids = np.array([f[0] for f in found], dtype=np.int64)
-    return _Faces(ids, tail, counts, [f[2] for f in found])
+    ids = np.array([f[0] for f in listed], dtype=np.int64)
+    return _Faces(ids, tail, counts, [f[2] for f in listed])
 
 
 def _places(ids: Ints, wanted: Ints, section: _Section, what: str, row: Ints | None = None) -> Ints:
@@ -293,18 +302,18 @@ def _pressures(
     pressure = np.zeros(len(face_ids))
     if "bodies" not in file.sections:
         return pressure, ("the file has no bodies, so no patch is under pressure",)
-    section, guessed = file.section("bodies"), []
+    section, without = file.section("bodies"), []
     listed = section.elements(r"(\d+)((?:[^\S\n]+-?\d+)*)([^\n]*)", "a body number and its faces")
     for row, (number, members, rest) in enumerate(listed):
         signed = np.array(members.split(), dtype=np.int64)
         place = _places(face_ids, np.abs(signed), section, "face", np.full(len(signed), row))
         given = re.search(r"\b(?:pressure|lagrange_multiplier)\s+(\S+)", rest, re.I)
         if given is None:
-            guessed.append(number)
+            without.append(number)
         p = 1.0 if given is None else float(_numbers((given[1],), known, section, row)[0])
         np.add.at(pressure, place, np.sign(signed) * p)
-    note = f"body {', '.join(guessed)} has no pressure in the file; 1 was taken"
-    return pressure, (note,) if guessed else ()
+    note = f"body {', '.join(without)} has no pressure in the file; 1 is used"
+    return pressure, (note,) if without else ()
 
 
 def _patches(
@@ -340,8 +349,8 @@ def _plane(
     used = np.unique(constraint[constraint > 0])
     if len(used) > 1:
         raise top.error(
-            f"sliding vertices lie on constraints {', '.join(map(str, used))}; only one plane can"
-            " carry them"
+            f"sliding vertices lie on constraints {', '.join(map(str, used))}; pcmc supports one plane"
+            " for all of them"
         )
     wanted = int(used[0]) if len(used) else 1
     pattern = rf"^[^\S\n]*constraint\s+{wanted}\b[^\n]*\s+(?:formula|function)\s*:?\s*([^\n]+)"

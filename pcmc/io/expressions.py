@@ -1,4 +1,4 @@
-"""Constant and linear expressions, as they stand in datafiles: "sqrt(2)/2", "z - 0.5*x"."""
+"""Constant and linear expressions in datafiles: "sqrt(2)/2", "z - 0.5*x"."""
 
 from __future__ import annotations
 

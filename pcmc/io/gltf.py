@@ -1,9 +1,9 @@
 """glTF 2.0 (.glb, .gltf in one file): a mesh per patch, in single precision.
 
-glTF's y axis points up and ours is z: coordinates are turned on the way out and back. A surface far from
-the origin, as in a survey's coordinates, is written around its middle, where the nodes place it: single
-precision keeps seven digits only. Supports and scalars at vertices are attributes of the vertices,
-tensions, pressures, plane and walls without height metadata of the scene.
+In glTF y is up, in pcmc z: writer and reader rotate the coordinates. Single precision keeps seven digits
+only, so a surface far from the origin, as in a survey's coordinates, is written about its middle, and the
+nodes place it. Supports and scalars at vertices are attributes of the vertices; tensions, pressures, plane
+and walls without height are metadata of the scene.
 """
 
 from __future__ import annotations
@@ -22,21 +22,20 @@ from ..base.errors import FileError
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.surface import FAR
-from .contents import Contents, described, description, support_of
-from .flat import KEY
-from .optional import library, reading
-from .scenes import from_meshes
+from .flat_walls import KEY
+from .libraries import load_library, translated_errors
+from .mesh_data import MeshData, support_of
+from .metadata import metadata_text, parse_metadata
+from .trimesh_scene import from_meshes
 
-SCALARS = MERGE = APART = WALLS = True
-FACE_SCALARS = False
 SUPPORT = "_SUPPORT"
 
 
 def write(
     path: Path, surface: Surface, scalars: Mapping[str, Floats], walls: str | None, **_: Any
 ) -> None:
-    """One file, buffers within."""
-    trimesh = library("trimesh")
+    """One file, with its buffers inside."""
+    trimesh = load_library("trimesh")
     data = {SUPPORT: support_of(surface).astype(np.float32)}
     for name, values in scalars.items():
         if len(values) == surface.n:
@@ -56,12 +55,15 @@ def write(
         mesh = trimesh.Trimesh(turned[used], local.reshape(-1, 3), process=False)
         mesh.vertex_attributes.update({key: values[used] for key, values in data.items()})
         material = trimesh.visual.material.PBRMaterial(
-            name=patch.name, baseColorFactor=[*color, 1.0], metallicFactor=0.0,
-            roughnessFactor=0.9, doubleSided=True,
-        )  # fmt: skip
+            name=patch.name,
+            baseColorFactor=[*color, 1.0],
+            metallicFactor=0.0,
+            roughnessFactor=0.9,
+            doubleSided=True,
+        )
         mesh.visual = trimesh.visual.TextureVisuals(material=material)
         scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name, transform=place)
-    scene.metadata["pcmc"] = description(surface)
+    scene.metadata["pcmc"] = metadata_text(surface)
     if walls is not None:
         scene.metadata[KEY] = walls
     if path.suffix.lower() == ".glb":
@@ -71,25 +73,29 @@ def write(
         path.write_bytes(files["model.gltf"])
 
 
-def read(path: Path) -> Contents:
+def read(path: Path) -> MeshData:
     """Meshes as patches, by the names of their nodes."""
-    trimesh = library("trimesh")
-    with reading("glTF"):
+    trimesh = load_library("trimesh")
+    with translated_errors("glTF"):
         if path.suffix.lower() == ".gltf":
-            json.loads(path.read_bytes())  # trimesh asks for another file where this one is cut off
+            json.loads(
+                path.read_bytes()
+            )  # in a file that is cut off, trimesh would look for another file
         try:
             scene = trimesh.load_scene(path, process=False)
         except FileNotFoundError as error:
             raise FileError(
-                f"its part {error} is not beside it; keep a .gltf's files together"
+                f"its part {error} is missing; keep the files of a .gltf in one folder",
+                where=str(error),
             ) from None
-    told = scene.metadata.get("pcmc")
-    found = from_meshes(scene, path.stem, described(told))
-    X = found.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
-    scalars = {k[1:]: v for k, v in found.scalars.items() if k.startswith("_") and k != SUPPORT}
-    support = found.scalars.get(SUPPORT)
+    mesh = from_meshes(scene, path.stem, parse_metadata(scene.metadata.get("pcmc")))
+    X = mesh.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
+    scalars = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_") and k != SUPPORT}
+    support = mesh.scalars.get(SUPPORT)
     return replace(
-        found, vertices=X, scalars=scalars,
+        mesh,
+        vertices=X,
+        scalars=scalars,
         support=None if support is None else np.round(support).astype(np.int8),
         walls=scene.metadata.get(KEY),
-    )  # fmt: skip
+    )

@@ -1,4 +1,4 @@
-"""Vertices at one place become one, so that patches written apart share their junctions."""
+"""Merge vertices at one place, so that patches from separate meshes share their junctions."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ TOLERANCE = 1e-7  # of the size; single precision keeps this much
 
 
 def coincident(X: Floats, tolerance: float = TOLERANCE) -> tuple[Ints, Ints]:
-    """Which vertices to keep, and the place among them of every vertex.
+    """Which vertices to keep, and the index among them of every vertex.
 
-    Vertices closer than ``tolerance`` times the diagonal of the bounding box are one, the first of
-    them in order; where none coincide all are kept in their order.
+    Vertices closer than ``tolerance`` times the diagonal of the bounding box become one, the first of
+    them in order.
 
     >>> keep, place = coincident(np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1e-9], [0, 1, 0.0]]))
     >>> keep.tolist(), place.tolist()

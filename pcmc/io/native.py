@@ -20,56 +20,80 @@ import pandas as pd
 from ..base.arrays import Floats
 from ..base.errors import FileError
 from ..surface import Surface
-from .contents import Contents, described, description, support_of
-from .optional import reading
+from .libraries import translated_errors
+from .mesh_data import MeshData, support_of
+from .metadata import metadata_text, parse_metadata
 
 VERSION = 1
-SCALARS = CERTIFICATE = True
 FORMAT = "pcmc surface"
 
 
 def write(
-    path: Path, surface: Surface, scalars: Mapping[str, Floats], certificate: Mapping[str, Any], **_: Any,
-) -> None:  # fmt: skip
+    path: Path,
+    surface: Surface,
+    scalars: Mapping[str, Floats],
+    certificate: Mapping[str, Any],
+    **_: Any,
+) -> None:
     """The archive; the same surface gives the same bytes."""
-    found = {
+    tables = {
         k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object
     }
     meta = {
         "format": FORMAT,
         "version": VERSION,
-        "description": description(surface),
-        "certificate": {k: v for k, v in certificate.items() if k not in found},
+        "description": metadata_text(surface),
+        "certificate": {k: v for k, v in certificate.items() if k not in tables},
     }
     arrays: dict[str, Any] = {f"scalar {name}": value for name, value in scalars.items()}
-    arrays |= {f"certificate {name}": value for name, value in found.items()}
+    arrays |= {f"certificate {name}": value for name, value in tables.items()}
     with path.open("wb") as file:
         np.savez_compressed(
-            file, meta=np.array(json.dumps(meta, default=_plain)), vertices=surface.vertices,
-            faces=surface.faces, patch_of_face=surface.patch_of_face,
-            support=support_of(surface), **arrays,
-        )  # fmt: skip
+            file,
+            meta=np.array(json.dumps(meta, default=_plain)),
+            vertices=surface.vertices,
+            faces=surface.faces,
+            patch_of_face=surface.patch_of_face,
+            support=support_of(surface),
+            **arrays,
+        )
 
 
-def read(path: Path) -> Contents:
+def read(path: Path) -> MeshData:
     """All of it."""
-    with reading("pcmc"), path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+    with (
+        translated_errors("pcmc"),
+        path.open("rb") as file,
+        np.load(file, allow_pickle=False) as archive,
+    ):
         arrays = {name: archive[name] for name in archive.files}
         meta = json.loads(str(arrays.pop("meta")))
         if meta["format"] != FORMAT:
-            raise FileError(f"expected the format {FORMAT!r}, found {meta['format']!r}")
+            raise FileError(
+                f"expected the format {FORMAT!r}, found {meta['format']!r}",
+                where="format",
+                found=meta["format"],
+                expected=FORMAT,
+            )
         if meta["version"] > VERSION:
             raise FileError(
                 f"written by a newer pcmc (format {meta['version']}, this one reads up to"
-                f" {VERSION}); update pcmc"
+                f" {VERSION}); update pcmc",
+                where="version",
+                found=meta["version"],
+                expected=VERSION,
             )
-        told = described(meta["description"])
-        return Contents(
-            arrays.pop("vertices"), arrays.pop("faces"), arrays.pop("patch_of_face"),
-            tuple(told.patches.values()), arrays.pop("support"), told.plane,
+        metadata = parse_metadata(meta["description"])
+        return MeshData(
+            arrays.pop("vertices"),
+            arrays.pop("faces"),
+            arrays.pop("patch_of_face"),
+            tuple(metadata.patches.values()),
+            arrays.pop("support"),
+            metadata.plane,
             scalars=_under("scalar ", arrays),
             certificate={**meta["certificate"], **_under("certificate ", arrays)},
-        )  # fmt: skip
+        )
 
 
 def _under(prefix: str, arrays: Mapping[str, Any]) -> dict[str, Any]:
@@ -77,11 +101,15 @@ def _under(prefix: str, arrays: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """What JSON can hold of a certificate's values."""
+    """A value of the certificate that JSON can hold."""
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, Enum):
         return value.name.lower()
     if isinstance(value, pd.DataFrame):
         return value.to_dict(orient="records")
-    raise FileError(f"certificate: a {type(value).__name__} cannot be written; give plain values")
+    raise FileError(
+        f"certificate: cannot write a {type(value).__name__}; use numbers, texts, arrays and tables",
+        where="certificate",
+        found=type(value).__name__,
+    )

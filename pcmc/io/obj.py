@@ -13,11 +13,11 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..surface import Surface
-from .contents import FIXED, FREE, SLIDING, Contents, described, description, support_of
+from .mesh_data import FIXED, FREE, SLIDING, MeshData, support_of
+from .metadata import metadata_text, parse_metadata
 from .polygons import triangulate
-from .text import rows
+from .text import format_rows
 
-MERGE = True
 MARK = "# pcmc "
 HELD = {"fixed": FIXED, "sliding": SLIDING}
 VERTEX = re.compile(r"^[^\S\n]*v[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\n]*$", re.M)
@@ -26,25 +26,27 @@ POINT = re.compile(r"^[^\S\n]*p[^\S\n]+([\d \t]+)$", re.M)
 
 
 def write(path: Path, surface: Surface, **_: Any) -> None:
-    """Vertices as they print exactly, supports, then the faces group by group."""
+    """Vertices with all digits, supports, then the faces group by group."""
     support = support_of(surface)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"{MARK}{description(surface)}\n")
-        file.write(rows("v %r %r %r\n", *surface.vertices.T))
+        file.write(f"{MARK}{metadata_text(surface)}\n")
+        file.write(format_rows("v %r %r %r\n", *surface.vertices.T))
         for name, kind in HELD.items():
             held = np.flatnonzero(support == kind) + 1
             if len(held):
-                file.write(f"g {name}\n" + rows("p %d\n", held))
+                file.write(f"g {name}\n" + format_rows("p %d\n", held))
         for k, patch in enumerate(surface.patches):
             file.write(f"g {patch.name}\n")
-            file.write(rows("f %d %d %d\n", *(surface.faces[surface.patch_of_face == k].T + 1)))
+            file.write(
+                format_rows("f %d %d %d\n", *(surface.faces[surface.patch_of_face == k].T + 1))
+            )
 
 
-def read(path: Path) -> Contents:
+def read(path: Path) -> MeshData:
     """Groups (``g``, else ``o``, else ``usemtl``) as patches."""
     text = re.sub(r"\\[^\S\n]*\n", " \f", path.read_text(encoding="utf-8"))
-    told = re.search(rf"^{MARK}(.*)$", text, re.M)
-    about = described(told[1] if told else None)
+    comment = re.search(rf"^{MARK}(.*)$", text, re.M)
+    metadata = parse_metadata(comment[1] if comment else None)
     X = _vertices(text)
     key = next((k for k in ("g", "o", "usemtl") if re.search(rf"^[^\S\n]*{k}\s", text, re.M)), "g")
     names: list[str] = []
@@ -62,22 +64,28 @@ def read(path: Path) -> Contents:
             _within(points, len(X), text, offset)
             support[points - 1] = HELD[name]
     if not names:
-        raise FileError("it holds no faces")
+        raise FileError("the file has no faces", where="faces", found=0)
     F, source, notes = triangulate(X, np.concatenate(corners), np.concatenate(counts))
-    about.check_counts(len(X), len(F))
-    known = told is not None or bool(support.any())
-    return Contents(
-        X, F, np.concatenate(groups)[source], about.named(names), support if known else None,
-        about.plane, notes=notes, joined=about.counts is not None,
-    )  # fmt: skip
+    metadata.check_counts(len(X), len(F))
+    known = comment is not None or bool(support.any())
+    return MeshData(
+        X,
+        F,
+        np.concatenate(groups)[source],
+        metadata.named(names),
+        support if known else None,
+        metadata.plane,
+        notes=notes,
+        joined=metadata.counts is not None,
+    )
 
 
 def _vertices(text: str) -> Floats:
-    found = VERTEX.findall(text)
+    coordinates = VERTEX.findall(text)
     lines = len(re.findall(r"^[^\S\n]*v(?=\s)", text, re.M))
     try:
-        if len(found) == lines:
-            return np.array(found, dtype=np.float64).reshape(-1, 3)
+        if len(coordinates) == lines:
+            return np.array(coordinates, dtype=np.float64).reshape(-1, 3)
     except ValueError:
         pass
     for line in re.finditer(r"^[^\S\n]*v(?=\s)[^\n]*$", text, re.M):
@@ -85,7 +93,7 @@ def _vertices(text: str) -> Floats:
             [float(c) for c in line[0].split()[1:4]][2]
         except (ValueError, IndexError):
             raise _error(text, line.start(), "expected three coordinates", line[0]) from None
-    raise FileError("its vertices cannot be read")
+    raise FileError("its vertices cannot be read", where="vertices")
 
 
 def _parts(text: str, key: str, default: str) -> Iterator[tuple[str, str, int]]:
@@ -100,8 +108,8 @@ def _parts(text: str, key: str, default: str) -> Iterator[tuple[str, str, int]]:
 
 def _faces(text: str, part: str, offset: int, n: int) -> tuple[Ints, Ints]:
     """Corners per face, and the vertex index at each."""
-    found = FACE.findall(part)
-    bare = re.sub(r"/[^\s]*", "", "\n".join(found)).split("\n") if found else []
+    faces = FACE.findall(part)
+    bare = re.sub(r"/[^\s]*", "", "\n".join(faces)).split("\n") if faces else []
     counts = np.array([len(face.split()) for face in bare], dtype=np.int64)
     try:
         corner = np.array(" ".join(bare).split(), dtype=np.int64)
@@ -133,4 +141,5 @@ def _within(points: Ints, n: int, text: str, offset: int) -> None:
 def _error(text: str, offset: int, wrong: str, found: str) -> FileError:
     before = text[:offset]
     line = 1 + before.count("\n") + before.count("\f")
-    return FileError(f"line {line}: {wrong}, found {' '.join(found.split())[:60]!r}")
+    found = " ".join(found.split())[:60]
+    return FileError(f"line {line}: {wrong}, found {found!r}", where=line, found=found)

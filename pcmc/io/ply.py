@@ -1,8 +1,9 @@
-"""Stanford PLY (.ply), written binary in double precision, read in any form.
+"""Stanford PLY (.ply): written binary in double precision, read in any form.
 
 Faces carry ``patch``, vertices ``support`` (0 free, 1 sliding, 2 fixed) and both the scalars, as
-properties; names, tensions, pressures and plane are a comment. Own code, because the libraries at hand
-lose one or another of: double precision, properties of faces, polygons of different sizes.
+properties; names, tensions, pressures and plane are a comment. The usual libraries lose double precision
+and properties (VTK), cannot read properties of faces (meshio), or refuse polygons of different sizes in
+binary files and accept a text file that is cut off (trimesh).
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..surface import Surface
-from .cells import from_polygons
-from .contents import Contents, described, description, support_of
+from .mesh_data import MeshData, support_of
+from .metadata import metadata_text, parse_metadata
+from .polygons import from_polygons
 
-SCALARS = MERGE = True
 MARK = "comment pcmc "
 RESERVED = ("x", "y", "z", "support", "patch", "vertex_indices")
 TYPES = {
@@ -40,14 +41,23 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any)
     for name, values in scalars.items():
         key = re.sub(r"\s+", "_", name)
         if key in RESERVED:
-            raise FileError(f"scalars: the name {name!r} is taken in a .ply file; rename it")
+            raise FileError(
+                f"scalars: .ply files use the name {name!r} themselves; rename the scalar",
+                where=name,
+                found=name,
+            )
         (vertex if len(values) == surface.n else face)[key] = np.asarray(values, dtype="<f8")
     header = [
-        "ply", "format binary_little_endian 1.0", f"{MARK}{description(surface)}",
-        f"element vertex {surface.n}", *_announced(vertex),
-        f"element face {surface.m}", "property list uchar int vertex_indices", *_announced(face),
+        "ply",
+        "format binary_little_endian 1.0",
+        f"{MARK}{metadata_text(surface)}",
+        f"element vertex {surface.n}",
+        *_announced(vertex),
+        f"element face {surface.m}",
+        "property list uchar int vertex_indices",
+        *_announced(face),
         "end_header\n",
-    ]  # fmt: skip
+    ]
     three = {"corners": np.full(surface.m, 3, dtype="u1")}
     corners = {f"corner {k}": surface.faces[:, k].astype("<i4") for k in range(3)}
     with path.open("wb") as file:
@@ -73,7 +83,7 @@ def _table(columns: Mapping[str, Any]) -> Any:
 
 @dataclass(frozen=True)
 class _Element:
-    """What the header announces: single properties before and after at most one list."""
+    """An element of the header: single properties before and after at most one list."""
 
     name: str
     size: int
@@ -92,17 +102,17 @@ class _Element:
         return row + [(name, kind, ()) for name, kind in self.after]
 
 
-def read(path: Path) -> Contents:
+def read(path: Path) -> MeshData:
     """Binary or text, with triangles, quads or polygons."""
     data = path.read_bytes()
     header, form, start = _header(data)
-    told = re.search(rf"^{MARK}(.*)$", header, re.M)
+    comment = re.search(rf"^{MARK}(.*)$", header, re.M)
     elements = _elements(header, {"binary_big_endian": ">"}.get(form, "<"))
     if form == "ascii":
         try:
             body = np.array(data[start:].split(), dtype=np.float64)
         except ValueError as error:
-            raise FileError(f"its body is not all numbers ({error})") from None
+            raise FileError(f"its body is not all numbers ({error})", where="body") from None
         elements = [_as_numbers(e) for e in elements]
         data, start = body.tobytes(), 0
     tables: dict[str, dict[str, Any]] = {}
@@ -114,21 +124,23 @@ def read(path: Path) -> Contents:
     X = np.stack([np.asarray(vertex.pop(c, None), dtype=np.float64) for c in "xyz"], axis=1)
     key = next((k for k in ("vertex_indices", "vertex_index") if k in face), None)
     if key is None:
-        raise FileError("its faces list no vertex_indices")
+        raise FileError("its faces have no property vertex_indices", where="face")
     corners, counts = face.pop(key), face.pop(f"{key} count")
-    about = described(told[1] if told else None)
-    return from_polygons(X, corners, counts, vertex, face, about, path.stem)
+    metadata = parse_metadata(comment[1] if comment else None)
+    return from_polygons(X, corners, counts, vertex, face, metadata, path.stem)
 
 
 def _header(data: bytes) -> tuple[str, str, int]:
     """Header, "ascii" or "binary_..._endian", and where the body starts."""
     end = re.search(rb"end_header[^\S\n]*\n", data[: 1 << 20])
     if not data.startswith(b"ply") or end is None:
-        raise FileError("not a PLY file, or cut off within its header")
+        raise FileError("not a PLY file, or cut off in its header", where="header")
     header = data[: end.start()].decode("utf-8", "replace").replace("\r", "")
     form = re.search(r"^format (ascii|binary_little_endian|binary_big_endian) ", header, re.M)
     if form is None:
-        raise FileError("its header has no format that is known")
+        raise FileError(
+            "its header names no known format", where="header", expected="ascii or binary_…_endian"
+        )
     return header, form[1], end.end()
 
 
@@ -143,7 +155,10 @@ def _elements(header: str, order: str) -> list[_Element]:
                 case ["property", "list", of_count, of_items, name]:
                     last = elements.pop()
                     if last.items is not None:
-                        raise FileError(f"line {number}: a second list in one element is not read")
+                        raise FileError(
+                            f"line {number}: pcmc reads one list per element, this is a second",
+                            where=number,
+                        )
                     items = (name, order + TYPES[of_count], order + TYPES[of_items])
                     elements.append(_Element(last.name, last.size, last.before, items, []))
                 case ["property", kind, name]:
@@ -153,15 +168,21 @@ def _elements(header: str, order: str) -> list[_Element]:
         except FileError:
             raise
         except (KeyError, IndexError, ValueError):
-            raise FileError(f"line {number}: cannot be understood: {line[:60]!r}") from None
+            raise FileError(
+                f"line {number}: not a line of a PLY header: {line[:60]!r}",
+                where=number,
+                found=line,
+            ) from None
     names = [e.name for e in elements]
     if "vertex" not in names or "face" not in names[names.index("vertex") :]:
         raise FileError(
-            f"its header announces no vertices and faces, but {', '.join(names) or '-'}"
+            f"its header must list vertices, then faces; found {', '.join(names) or 'none'}",
+            where="header",
+            found=names,
         )
     missing = set("xyz") - {name for name, _ in elements[names.index("vertex")].before}
     if missing:
-        raise FileError(f"its vertices have no property {min(missing)}")
+        raise FileError(f"its vertices have no property {min(missing)}", where="vertex")
     return elements
 
 
@@ -215,7 +236,9 @@ def _list_counts(element: _Element, data: bytes, start: int) -> tuple[Ints, Ints
     for k in range(element.size):  # each row says only where the next one starts
         offsets[k], counts[k] = start, count_at(start)
         if counts[k] < 0:
-            raise FileError(f"{element.name} {k} lists {counts[k]} items")
+            raise FileError(
+                f"{element.name} {k} lists {counts[k]} items", where=k, found=int(counts[k])
+            )
         start += base.itemsize + int(counts[k]) * item
     offsets[-1] = start
     return counts, offsets
@@ -241,5 +264,7 @@ def _mixed(element: _Element, data: Any, counts: Ints, offsets: Ints) -> dict[st
 def _enough(element: _Element, data: bytes, end: int) -> None:
     if end > len(data):
         raise FileError(
-            f"cut off: the file ends before its {element.size} {element.name} elements do"
+            f"cut off: the file ends before its {element.size} {element.name} elements do",
+            where=element.name,
+            expected=element.size,
         )

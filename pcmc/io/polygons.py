@@ -1,6 +1,9 @@
-"""Polygons to triangles, by a fan from the corner that makes the best ones."""
+"""Polygons with data on points and cells, as PLY and VTK files hold them, become triangles."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -8,6 +11,11 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..meshing.quality import triangle_quality
 from ..surface.geometry import area_vectors
+from .mesh_data import MeshData
+from .metadata import Metadata
+
+LABELS = ("patch", "PatchId", "RegionId", "GroupIds", "MaterialIds", "medit:ref", "gmsh:physical")
+"""Cell data that may hold the patch of each face; the first of these in the file counts."""
 
 
 def triangulate(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tuple[str, ...]]:
@@ -24,7 +32,10 @@ def triangulate(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tup
     few = np.flatnonzero(counts < 3)
     if len(few):
         raise FileError(
-            f"face {few[0] + 1} has {counts[few[0]]} corners; a face needs three or more"
+            f"face {few[0]} has {counts[few[0]]} corners; a face needs three or more",
+            where=int(few[0]),
+            found=int(counts[few[0]]),
+            expected="three or more corners",
         )
     if (counts == 3).all():
         return corners.reshape(-1, 3), np.arange(len(counts)), ()
@@ -55,8 +66,10 @@ def _best_fans(X: Floats, polygon: Ints, number: Ints) -> Ints:
     bad = np.flatnonzero(worst.max(axis=0) <= 0.0)
     if len(bad):
         raise FileError(
-            f"face {number[bad[0]] + 1} is a polygon of {k} corners that no fan of triangles fills;"
-            " cut it into triangles in the program that wrote it"
+            f"face {number[bad[0]]} is a polygon of {k} corners that no fan of triangles fills;"
+            " cut it into triangles in the program that wrote it",
+            where=int(number[bad[0]]),
+            found=int(k),
         )
     return fans[best, np.arange(len(polygon))]
 
@@ -71,3 +84,75 @@ def _note(counts: Ints) -> str:
     quads, more = np.count_nonzero(counts == 4), np.count_nonzero(counts > 4)
     parts = [f"{quads} quads" if quads else "", f"{more} polygons" if more else ""]
     return f"{' and '.join(filter(None, parts))} were cut into triangles"
+
+
+def from_polygons(
+    X: Floats,
+    corners: Ints,
+    counts: Ints,
+    point_data: Mapping[str, Any],
+    cell_data: Mapping[str, Any],
+    metadata: Metadata,
+    default: str,
+) -> MeshData:
+    """The mesh of polygons, with supports, patches and scalars from the data on its points and cells.
+
+    Parameters
+    ----------
+    X : (n,3) points. corners : vertex indices, polygon after polygon. counts : corners of each polygon.
+    point_data : "support" holds supports; other data of one number each are scalars.
+    cell_data : the first of LABELS holds patches; other data of one number each are scalars.
+    metadata : names the patches; else they are "patch 1", "patch 2", ...
+    default : the name of the only patch where there are no labels.
+    """
+    if not len(counts):
+        raise FileError("the file has no faces", where="faces", found=0)
+    if corners.min() < 0 or corners.max() >= len(X):
+        bad = int(np.flatnonzero((corners < 0) | (corners >= len(X)))[0])
+        face = int(np.searchsorted(np.cumsum(counts), bad, side="right"))
+        raise FileError(
+            f"face {face} names vertex {corners[bad]}, which is outside 0..{len(X) - 1}",
+            where=face,
+            found=int(corners[bad]),
+            expected=f"0..{len(X) - 1}",
+        )
+    X = np.array(X, dtype=np.float64)
+    F, source, notes = triangulate(X, corners.astype(np.int64), counts.astype(np.int64))
+    metadata.check_counts(len(X), len(F))
+    label = next((key for key in LABELS if key in cell_data), None)
+    names, patch = [default], np.zeros(len(counts), dtype=np.int64)
+    if label is not None:
+        values, patch = np.unique(np.asarray(cell_data[label]).ravel(), return_inverse=True)
+        described = list(metadata.patches)
+        known = label == "patch" and values.min() >= 0 and values.max() < len(described)
+        names = [described[int(v)] if known else f"patch {v}" for v in values.tolist()]
+    support = point_data.get("support")
+    scalars = {
+        **{k: _column(v) for k, v in point_data.items() if k != "support" and _one(v, len(X))},
+        **{
+            k: _column(v)[source]
+            for k, v in cell_data.items()
+            if k != label and _one(v, len(counts))
+        },
+    }
+    return MeshData(
+        X,
+        F,
+        patch[source],
+        metadata.named(names),
+        None if support is None else np.asarray(support).ravel().astype(np.int8),
+        metadata.plane,
+        scalars,
+        notes=notes,
+        joined=metadata.counts is not None,
+    )
+
+
+def _one(values: Any, size: int) -> bool:
+    """Whether there is one number for each."""
+    array = np.asarray(values)
+    return array.size == size and np.issubdtype(array.dtype, np.number)
+
+
+def _column(values: Any) -> Floats:
+    return np.asarray(values, dtype=np.float64).ravel()

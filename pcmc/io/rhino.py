@@ -17,22 +17,13 @@ from ..base.errors import FileError
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.geometry import bounding_size
-from . import flat
-from .contents import (
-    FIXED,
-    FREE,
-    SLIDING,
-    Contents,
-    Description,
-    described,
-    description,
-    support_of,
-)
+from . import flat_walls
+from .libraries import load_library, translated_errors
 from .merge import TOLERANCE
-from .optional import library, reading
+from .mesh_data import FIXED, FREE, SLIDING, MeshData, support_of
+from .metadata import Metadata, metadata_text, parse_metadata
 from .polygons import triangulate
 
-MERGE = APART = WALLS = True
 KEY = "pcmc"
 HELD = {"fixed": FIXED, "sliding": SLIDING}
 VERSION = 7  # of Rhino's format
@@ -40,11 +31,11 @@ COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255)}
 
 
 def write(path: Path, surface: Surface, walls: str | None, **_: Any) -> None:
-    """Layers "patches::<name>" in metres; the plan's lengths are what they are."""
-    rhino = library("rhino3dm")
+    """A layer per patch; the unit is metres."""
+    rhino = load_library("rhino3dm")
     model = rhino.File3dm()
     model.Settings.ModelUnitSystem = rhino.UnitSystem.Meters
-    text = description(surface)
+    text = metadata_text(surface)
     for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
         faces = surface.faces[surface.patch_of_face == k]
         if not len(faces):
@@ -61,7 +52,7 @@ def write(path: Path, surface: Surface, walls: str | None, **_: Any) -> None:
         mesh.Normals.ComputeNormals()
         model.Objects.AddMesh(mesh, attributes)
     if walls is not None:
-        model.Layers[0].SetUserString(flat.KEY, walls)  # of the whole model, so once
+        model.Layers[0].SetUserString(flat_walls.KEY, walls)  # of the whole model, so once
     support = support_of(surface)
     for name, kind in HELD.items():
         held = surface.vertices[support == kind]
@@ -71,7 +62,9 @@ def write(path: Path, surface: Surface, walls: str | None, **_: Any) -> None:
                 cloud.Add(rhino.Point3d(*point))
             model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], text))
     if not model.Write(str(path), VERSION):
-        raise FileError("cannot be written by rhino3dm; is there such a folder, and space?")
+        raise FileError(
+            "rhino3dm cannot write it; check that the folder exists and the disk has space"
+        )
 
 
 def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str) -> Any:
@@ -84,26 +77,26 @@ def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str)
     return attributes
 
 
-def read(path: Path) -> Contents:
-    """Layers as patches; curves, surfaces and other objects are passed over, and said."""
-    rhino = library("rhino3dm")
-    with reading("3DM"):
+def read(path: Path) -> MeshData:
+    """Layers as patches; curves, surfaces and other objects are left out, with a note."""
+    rhino = load_library("rhino3dm")
+    with translated_errors("3DM"):
         model = rhino.File3dm.Read(str(path))
     if model is None:
         raise FileError("not a Rhino file, or cut off")
     X, corners, counts, label = [], [], [], []
     names: list[str] = []
     held: dict[int, list[Floats]] = {FIXED: [], SLIDING: []}
-    about, others, start = Description(), 0, 0
+    metadata, others, start = Metadata(), 0, 0
     walls: str | None = None
     for item in model.Objects:
         place, geometry = item.Attributes.LayerIndex, item.Geometry
         layer = model.Layers[place] if 0 <= place < len(model.Layers) else None
         name = path.stem if layer is None else layer.Name
-        told = None if layer is None else layer.GetUserString(KEY)
-        if layer is not None and told:
-            about = described(told)
-            walls = layer.GetUserString(flat.KEY) or walls
+        text = None if layer is None else layer.GetUserString(KEY)
+        if layer is not None and text:
+            metadata = parse_metadata(text)
+            walls = layer.GetUserString(flat_walls.KEY) or walls
         if isinstance(geometry, rhino.Mesh):
             points = _coordinates(geometry.Vertices.ToPoint3dArray())
             faces = np.array([geometry.Faces[k] for k in range(geometry.Faces.Count)]).reshape(
@@ -123,19 +116,23 @@ def read(path: Path) -> Contents:
         else:
             others += 1
     if not X:
-        raise FileError(f"it holds no meshes ({others} other objects); mesh the surfaces in Rhino")
+        raise FileError(
+            f"the file has no meshes ({others} other objects); mesh the surfaces in Rhino",
+            where="meshes",
+            found=0,
+        )
     points = np.concatenate(X)
     F, source, notes = triangulate(points, np.concatenate(corners), np.concatenate(counts))
     if others:
         notes = (*notes, f"{others} objects that are not meshes were left out")
-    support = _supports(points, held) if about.plane is not None or any(held.values()) else None
-    return Contents(
+    support = _supports(points, held) if metadata.plane is not None or any(held.values()) else None
+    return MeshData(
         points,
         F,
         np.concatenate(label)[source],
-        about.named(names),
+        metadata.named(names),
         support,
-        about.plane,
+        metadata.plane,
         notes=notes,
         walls=walls,
     )

@@ -1,8 +1,8 @@
 """STL (.stl): written as text with one solid per patch, read in either form.
 
-Nothing but triangles and names: supports, tensions, pressures and scalars are lost. Programs read the
+It holds only triangles and names: supports, tensions, pressures and scalars are lost. Programs read the
 coordinates in single precision, seven digits. So a surface far from the origin, as in a survey's
-coordinates, is written about its middle; the format has no place to say where that is.
+coordinates, is written about its middle, which the format has no place for.
 """
 
 from __future__ import annotations
@@ -16,13 +16,11 @@ from ..base.errors import FileError
 from ..surface import Surface
 from ..surface.geometry import area_vectors
 from ..surface.surface import FAR
-from .contents import Contents
-from .optional import library, reading
-from .scenes import from_meshes
-from .text import rows
+from .libraries import load_library, translated_errors
+from .mesh_data import MeshData
+from .text import format_rows
+from .trimesh_scene import from_meshes
 
-MERGE = APART = True
-NEVER = ("supports", "tensions", "pressures")
 FACET = (
     "facet normal %.6g %.6g %.6g\nouter loop\nvertex %.9g %.9g %.9g\nvertex %.9g %.9g %.9g\n"
     "vertex %.9g %.9g %.9g\nendloop\nendfacet\n"
@@ -30,7 +28,7 @@ FACET = (
 
 
 def write(path: Path, surface: Surface, **_: Any) -> str:
-    """Coordinates to nine digits, more than readers of STL keep; a sentence where they are moved."""
+    """Coordinates with nine digits, more than readers of STL keep; returns a note if they are shifted."""
     middle = np.round(surface.vertices.mean(axis=0))
     moved = bool(np.linalg.norm(middle) > FAR * surface.size)
     middle[np.abs(middle) <= surface.size] = 0.0  # heights stay what they are
@@ -42,36 +40,46 @@ def write(path: Path, surface: Surface, **_: Any) -> str:
         for k, patch in enumerate(surface.patches):
             chosen = lines[surface.patch_of_face == k]
             if len(chosen):
-                file.write(f"solid {patch.name}\n{rows(FACET, *chosen.T)}endsolid {patch.name}\n")
+                file.write(
+                    f"solid {patch.name}\n{format_rows(FACET, *chosen.T)}endsolid {patch.name}\n"
+                )
     if not moved:
         return ""
     return (
-        f"its coordinates are relative to {[int(c) for c in middle]}, as a .stl file keeps seven digits;"
-        " move it back by that where it is read, or write a format that keeps all (.obj, .3dm)"
+        f"its coordinates are relative to {[int(c) for c in middle]}, because .stl keeps seven digits;"
+        " add this point where you read the file, or write .obj or .3dm, which keep all digits"
     )
 
 
-def read(path: Path) -> Contents:
+def read(path: Path) -> MeshData:
     """Solids as patches."""
-    trimesh = library("trimesh")
+    trimesh = load_library("trimesh")
     _complete(path)
-    with reading("STL"):
+    with translated_errors("STL"):
         scene = trimesh.load_scene(path, file_type="stl", process=False)
     return from_meshes(scene, path.stem)
 
 
 def _complete(path: Path) -> None:
-    """Text must end with ``endsolid``, binary hold the triangles it announces: readers do not look."""
+    """Text must end with ``endsolid``, binary must have all its triangles: trimesh checks neither."""
     data = path.read_bytes()
     if data[:5] == b"solid" and b"facet" in data[:2000]:
         last = data.rstrip().rsplit(b"\n", 1)[-1].strip()
         if not last.startswith(b"endsolid"):
             line = data.rstrip().count(b"\n") + 1
-            raise FileError(f"line {line}: cut off before 'endsolid', found {last[:40].decode()!r}")
+            raise FileError(
+                f"line {line}: cut off before 'endsolid', found {last[:40].decode()!r}",
+                where=line,
+                found=last[:40].decode(),
+                expected="endsolid",
+            )
         return
     count = int.from_bytes(data[80:84], "little")
     if len(data) < 84 or len(data) < 84 + 50 * count:
         raise FileError(
             f"not an STL file, or cut off: {count} triangles need {84 + 50 * count} bytes, found"
-            f" {len(data)}"
+            f" {len(data)}",
+            where=count,
+            found=len(data),
+            expected=84 + 50 * count,
         )

@@ -1,4 +1,4 @@
-"""Many like lines of text at once, without a Python statement per line."""
+"""Lines of text from columns of numbers, without a Python statement per line."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 CHUNK = 1 << 16
 
 
-def rows(template: str, *columns: np.ndarray) -> str:
-    """``template`` filled once per row of the columns; ``%r`` prints a float so that it reads back.
+def format_rows(template: str, *columns: np.ndarray) -> str:
+    """The template filled with each row of the columns; ``%r`` writes a float exactly.
 
-    >>> rows("v %r %d\\n", np.array([0.1, 2.0]), np.array([3, 4]))
+    >>> format_rows("v %r %d\\n", np.array([0.1, 2.0]), np.array([3, 4]))
     'v 0.1 3\\nv 2.0 4\\n'
     """
     parts = []

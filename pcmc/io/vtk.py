@@ -1,4 +1,4 @@
-"""VTK's XML files (.vtp, .vtu), as ParaView reads them: nothing but the certificate is lost.
+"""VTK's XML files (.vtp, .vtu), which ParaView reads: only the certificate is lost.
 
 Cells carry ``patch``, points ``support`` (0 free, 1 sliding, 2 fixed), both the scalars; names,
 tensions, pressures and plane are field data.
@@ -16,11 +16,11 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..surface import Surface
-from .cells import from_polygons
-from .contents import Contents, described, description, support_of
-from .optional import library, reading
+from .libraries import load_library, translated_errors
+from .mesh_data import MeshData, support_of
+from .metadata import metadata_text, parse_metadata
+from .polygons import from_polygons
 
-SCALARS = MERGE = True
 RESERVED = ("support", "patch")
 FLAT = (5, 7, 9)  # VTK_TRIANGLE, VTK_POLYGON, VTK_QUAD
 FIRST_SOLID = 10  # VTK_TETRA; the kinds above it are solid or curved
@@ -28,38 +28,44 @@ FIRST_SOLID = 10  # VTK_TETRA; the kinds above it are solid or curved
 
 def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any) -> None:
     """Polygons in a .vtp, cells in a .vtu."""
-    pyvista = library("pyvista")
+    pyvista = load_library("pyvista")
     mesh = pyvista.PolyData.from_regular_faces(surface.vertices, surface.faces)
     mesh.point_data["support"] = support_of(surface)
     mesh.cell_data["patch"] = surface.patch_of_face
     for name, values in scalars.items():
         if name in RESERVED:
             raise FileError(
-                f"scalars: the name {name!r} is taken in a {path.suffix} file; rename it"
+                f"scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar",
+                where=name,
+                found=name,
             )
         (mesh.point_data if len(values) == surface.n else mesh.cell_data)[name] = values
-    mesh.field_data["pcmc"] = [description(surface)]
+    mesh.field_data["pcmc"] = [metadata_text(surface)]
     if path.suffix.lower() == ".vtu":
         mesh = mesh.cast_to_unstructured_grid()
     mesh.save(path)
 
 
-def read(path: Path) -> Contents:
-    """Triangles, quads and polygons of either; lines and points are passed over."""
-    pyvista = library("pyvista")
+def read(path: Path) -> MeshData:
+    """Triangles, quads and polygons of either; lines and points are left out."""
+    pyvista = load_library("pyvista")
     if not path.read_bytes()[-64:].rstrip().endswith(b"</VTKFile>"):
-        raise FileError("not a VTK XML file, or cut off before '</VTKFile>'")
-    with reading(path.suffix[1:]), pyvista.vtk_verbosity("off"), warnings.catch_warnings():
+        raise FileError("not a VTK XML file, or cut off before '</VTKFile>'", expected="</VTKFile>")
+    with (
+        translated_errors(path.suffix[1:]),
+        pyvista.vtk_verbosity("off"),
+        warnings.catch_warnings(),
+    ):
         warnings.simplefilter("error")  # VTK's errors come as warnings
         mesh = pyvista.read(path)
         corners, counts, chosen = (_polygons if isinstance(mesh, pyvista.PolyData) else _cells)(
             mesh
         )
-        points, told = np.asarray(mesh.points), mesh.field_data.get("pcmc")
+        points, text = np.asarray(mesh.points), mesh.field_data.get("pcmc")
         point_data = {k: np.asarray(v) for k, v in mesh.point_data.items()}
         cell_data = {k: np.asarray(v)[chosen] for k, v in mesh.cell_data.items()}
-    about = described(None if told is None else str(told[0]))
-    return from_polygons(points, corners, counts, point_data, cell_data, about, path.stem)
+    metadata = parse_metadata(None if text is None else str(text[0]))
+    return from_polygons(points, corners, counts, point_data, cell_data, metadata, path.stem)
 
 
 def _polygons(mesh: Any) -> tuple[Ints, Ints, Ints]:
@@ -67,7 +73,7 @@ def _polygons(mesh: Any) -> tuple[Ints, Ints, Ints]:
     if mesh.n_strips:
         mesh = mesh.triangulate()
     polys = mesh.GetPolys()
-    convert = library("pyvista").convert_array
+    convert = load_library("pyvista").convert_array
     counts = np.diff(convert(polys.GetOffsetsArray()))
     first = mesh.n_verts + mesh.n_lines
     return convert(polys.GetConnectivityArray()), counts, first + np.arange(len(counts))
@@ -77,8 +83,11 @@ def _cells(mesh: Any) -> tuple[Ints, Ints, Ints]:
     solid = np.flatnonzero(mesh.celltypes >= FIRST_SOLID)
     if len(solid):
         raise FileError(
-            f"cell {solid[0]} is of VTK's type {mesh.celltypes[solid[0]]}; only triangles, quads and"
-            " polygons can be read"
+            f"cell {solid[0]} is of VTK's type {mesh.celltypes[solid[0]]}; pcmc reads triangles, quads"
+            " and polygons",
+            where=int(solid[0]),
+            found=int(mesh.celltypes[solid[0]]),
+            expected=FLAT,
         )
     chosen = np.flatnonzero(np.isin(mesh.celltypes, FLAT))
     offsets = np.asarray(mesh.cell_offsets)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse import csr_array
 
+from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..contact.pinching import midpoints
@@ -31,8 +32,8 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     - edge inside a sheet, both ends fixed and off the boundary (a held line in a patch): fixed;
     - every other edge, such as one across a sheet between two fixed boundary vertices: free.
 
-    A new vertex is the middle of its edge, but beside a junction that rests on Π the rows of the wall,
-    which coincide there, are taken apart.
+    A new vertex is the middle of its edge, except beside a junction that rests on Π: there the rows of
+    the wall coincide, and their new vertices are placed apart.
 
     Parameters
     ----------
@@ -56,9 +57,7 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     >>> fine.n, fine.m, int(fine.fixed.sum())  # the diagonal's midpoint is free
     (9, 8, 8)
     """
-    if isinstance(levels, bool) or not isinstance(levels, int | np.integer) or levels < 0:
-        raise OptionError(f"refine: levels must be a whole number ≥ 0, found {levels!r}")
-    for _ in range(levels):
+    for _ in range(validate.integer("levels", levels)):
         surface = _refine_once(surface, project)
     return surface
 
@@ -123,10 +122,13 @@ def _children(F: Ints, edge_of_face: Ints, n: int) -> Ints:
 
 
 def _projected(project: Projection, points: Floats) -> Floats:
-    found = np.asarray(project(points.copy()), dtype=float)
-    if found.shape != points.shape:
+    projected = np.asarray(project(points.copy()), dtype=float)
+    if projected.shape != points.shape:
         raise OptionError(
-            f"refine: project must return shape {points.shape} for {len(points)} points, returned"
-            f" {found.shape}"
+            f"project: expected a function that returns shape {points.shape} for {len(points)}"
+            f" points, it returned {projected.shape}",
+            what="project",
+            found=projected.shape,
+            expected=points.shape,
         )
-    return found
+    return projected

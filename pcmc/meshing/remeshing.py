@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..contact.pinching import lift, standing_part
@@ -20,7 +21,7 @@ from .quality import edge_lengths
 from .refinement import held_midpoints, refine
 
 CHORD = 0.1  # of the edge length
-MOST = 20_000_000  # triangles; more are taken for a slip in the edge length
+MOST = 20_000_000  # triangles; more mean a mistake in the edge length
 PASSES = 3  # of MMG at most, each on the result of the one before; a patch takes its best
 GOOD_ANGLE = 25.0  # degrees; no further pass is made when all angles reach it
 LEAST_ANGLE = 20.0  # degrees; a patch that stays below it ...
@@ -89,7 +90,7 @@ def remesh(
 
 
 def _raised(surface: Surface) -> Surface:
-    """The surface with the walls standing again that had vanished below a junction at rest."""
+    """The surface with walls of height > 0 below the junctions that rest on Π."""
     part = standing_part(surface)
     return lift(surface, part.walls, part.resting, RAISED)
 
@@ -98,7 +99,7 @@ def _raised(surface: Surface) -> Surface:
 class _Mesh:
     """Vertices, faces with a patch each, the edges (c,2) of curves, and supports.
 
-    ``source`` (n,) tells which vertex of the mesh before MMG each one is, or -1.
+    ``source`` (n,): the number of each vertex in the mesh before MMG, or -1.
     """
 
     X: Floats
@@ -116,33 +117,30 @@ def check_lengths(
     growth: float = 1.2,
     chord: float | None = None,
 ) -> None:
-    """Refuse arguments of ``remesh`` that no surface could be remeshed with.
+    """Check the arguments of ``remesh``.
 
     >>> check_lengths(0.5, growth=1)
     Traceback (most recent call last):
-    pcmc.base.errors.OptionError: growth must be a finite number > 1, found 1
+    pcmc.base.errors.OptionError: growth: expected a finite number > 1, found 1
     """
-    lengths = {"edge_length": edge_length, "near_curves": near_curves, "chord": chord}
-    for name, value in lengths.items():
-        if not (value is None and name != "edge_length") and not _above(0.0, value):
-            raise OptionError(f"{name} must be a finite number > 0, found {value!r}")
-    if not _above(1.0, growth):
-        raise OptionError(f"growth must be a finite number > 1, found {growth!r}")
-
-
-def _above(least: float, value: Any) -> bool:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and math.isfinite(value) and value > least
+    validate.positive("edge_length", edge_length)
+    for name, value in {"near_curves": near_curves, "chord": chord}.items():
+        if value is not None:
+            validate.positive(name, value)
+    validate.number("growth", growth, above=1.0)
 
 
 def _check_count(surface: Surface, edge_length: float) -> None:
-    """Refuse a slip in the edge length before it fills the memory."""
+    """Refuse an edge length so small that its triangles would fill the memory."""
     area = face_areas(surface.vertices[surface.faces]).sum()
     count = area / (math.sqrt(3.0) / 4.0 * edge_length**2)
     if count > MOST:
         raise OptionError(
-            f"edge_length={edge_length:g} would make about {count:.2g} triangles; at most {MOST}"
-            " are allowed"
+            f"edge_length: {edge_length:g} makes about {count:.2g} triangles; choose a length that"
+            f" makes at most {MOST}",
+            what="edge_length",
+            found=edge_length,
+            expected=f"at most {MOST} triangles",
         )
 
 
@@ -162,9 +160,14 @@ def _cut_curves(surface: Surface, length: float) -> _Mesh:
     topo, stay = surface.topology, _curve_edges(surface)
     fixed_edge, sliding_edge = held_midpoints(surface)
     mesh = _Mesh(
-        surface.vertices, surface.faces, surface.patch_of_face, topo.edges[stay],
-        surface.fixed, surface.on_plane, np.arange(surface.n),
-    )  # fmt: skip
+        surface.vertices,
+        surface.faces,
+        surface.patch_of_face,
+        topo.edges[stay],
+        surface.fixed,
+        surface.on_plane,
+        np.arange(surface.n),
+    )
     support = np.stack([fixed_edge[stay], sliding_edge[stay]], axis=1)
     while (counts > 1).any():
         mesh, counts, support = _cut_once(mesh, counts, support)
@@ -225,11 +228,14 @@ def _cut_once(mesh: _Mesh, counts: Ints, support: Bools) -> tuple[_Mesh, Ints, B
         [mesh.curves[~cut], np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)]
     )
     new = _Mesh(
-        np.concatenate([mesh.X, start + share * (end - start)]), F, patch, curves,
+        np.concatenate([mesh.X, start + share * (end - start)]),
+        F,
+        patch,
+        curves,
         np.concatenate([mesh.fixed, support[cut, 0]]),
         np.concatenate([mesh.sliding, support[cut, 1]]),
         np.arange(len(mesh.X) + len(ends)),
-    )  # fmt: skip
+    )
     counts = np.concatenate([counts[~cut], first, pieces - first])
     return new, counts, np.concatenate([support[~cut], support[cut], support[cut]])
 
@@ -297,13 +303,18 @@ def _by_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> _Mesh:
     tool["metric"] = size[:, None]
     try:
         tool.remesh(
-            hmin=0.3 * float(size.min()), hmax=1.3 * float(size.max()), hausd=chord, hgrad=growth,
-            angle=0, verbose=-1,
-        )  # fmt: skip
+            hmin=0.3 * float(size.min()),
+            hmax=1.3 * float(size.max()),
+            hausd=chord,
+            hgrad=growth,
+            angle=0,
+            verbose=-1,
+        )
     except RuntimeError as error:
         raise SurfaceError(
-            f"the remesher gave up ({error}); repair degenerate triangles first, or choose another"
-            " edge length"
+            f"MMG cannot remesh this surface ({error}); repair degenerate triangles first, or choose"
+            " another edge length",
+            what="surface",
         ) from None
     X, reference = tool.get_vertices_with_refs()
     F, patch = tool.get_triangles_with_refs()
@@ -312,12 +323,16 @@ def _by_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> _Mesh:
     number = np.full(len(mesh.X), -1)
     number[place[known]] = np.flatnonzero(known)
     curves = number[mesh.curves]
-    _check_kept(mesh, curves, F, len(X))
+    _check_curves(mesh, curves, F, len(X))
     return _Mesh(
-        X, F.astype(np.int64), patch - 1, curves,
-        known & mesh.fixed[place], known & mesh.sliding[place],
+        X,
+        F.astype(np.int64),
+        patch - 1,
+        curves,
+        known & mesh.fixed[place],
+        known & mesh.sliding[place],
         np.where(known, mesh.source[place], -1),
-    )  # fmt: skip
+    )
 
 
 def _corners_to_keep(mesh: _Mesh) -> Ints:
@@ -329,16 +344,20 @@ def _corners_to_keep(mesh: _Mesh) -> Ints:
     return between[(second >= BLUNT) & (largest <= OBTUSE)]
 
 
-def _check_kept(before: _Mesh, curves: Ints, F: Ints, n: int) -> None:
+def _check_curves(before: _Mesh, curves: Ints, F: Ints, n: int) -> None:
     """Every curve edge must still be an edge of triangles."""
     side = F[:, [[1, 2], [2, 0], [0, 1]]].astype(np.int64)
-    found = side.min(axis=2) * n + side.max(axis=2)
+    edges = side.min(axis=2) * n + side.max(axis=2)
     lost = (curves < 0).any(axis=1)
-    lost |= ~np.isin(curves.min(axis=1) * n + curves.max(axis=1), found)
+    lost |= ~np.isin(curves.min(axis=1) * n + curves.max(axis=1), edges)
     if lost.any():
+        place = before.X[before.curves[np.argmax(lost), 0]].tolist()
         raise SurfaceError(
-            f"the remesher lost {lost.sum()} edges of curves, the first at"
-            f" {before.X[before.curves[np.argmax(lost), 0]].tolist()}; choose a smaller edge length"
+            f"MMG lost {lost.sum()} edges of curves, the first at {place}; choose a smaller edge length",
+            what="surface",
+            where=place,
+            found=int(lost.sum()),
+            expected=0,
         )
 
 

@@ -1,9 +1,12 @@
-"""From the lines of a plan, or from a mesh with labels, to a Surface with its walls."""
+"""A Surface with walls, from the lines of a plan or from a mesh with labelled faces.
+
+``plan`` holds Plan, ``curves`` its curves, ``parts`` dividers, holes and patches; ``build`` makes the
+Surface from ``lines`` and their ``arrangement``, ``planar`` meshes, ``heights`` and ``walls``."""
 
 from .curves import Curve, arc, bezier, circle, curve, join, polyline
 from .labelled import surface_from_labels
 from .parts import Area, Divider, Hole
-from .roof import Plan, plan_from
+from .plan import Plan, plan_from
 from .walls import add_walls
 
 __all__ = [

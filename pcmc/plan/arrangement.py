@@ -1,4 +1,4 @@
-"""How the lines of a plan meet: cut at their meetings, and divided into edges."""
+"""The lines of a plan cut where they meet, and divided into edges."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from .lines import (
     inside,
     lines_at,
     overlap,
-    spot,
+    point_text,
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Vertices (k,) along a line from one meeting or corner to the next; closed: first = last."""
+    """Vertices (k,) along a line from one meeting or corner to the next; first = last if it is closed."""
 
     line: int
     vertices: Ints
@@ -45,9 +45,9 @@ class Arrangement:
     Attributes
     ----------
     points : (n,2) coordinates on Π.
-    heights : (n,) above Π; NaN where only dividers pass, whose height is free.
-    chains : every line's chains, in order along it.
-    spots : (p,) the vertex of each point that was asked for.
+    heights : (n,) above Π; NaN at points that are on dividers only, whose height is free.
+    chains : of each line, in order along it.
+    spots : (p,) the vertex of each required point.
     """
 
     points: Floats
@@ -69,20 +69,20 @@ def arrange(
     spots: Floats | None = None,
     stops: Floats | None = None,
 ) -> Arrangement:
-    """Cut the lines where they meet and at their corners, and divide them into edges.
+    """Cut the lines at corners and where they meet, and divide them into edges.
 
     Parameters
     ----------
     lines : the outline first; then holes, dividers, supports, in any order.
-    edge_length : near which the edges are; shorter where corners or meetings are close together.
-    spots : (p,3) points to be vertices; on a line where one passes, else by themselves.
-    stops : (q,2) further points at which lines that pass there are cut.
+    edge_length : of the edges, about; shorter if corners or meetings are close together.
+    spots : (p,3) required points: on a line if one passes there, otherwise single vertices.
+    stops : (q,2) points at which the lines through them are cut.
 
     Raises
     ------
     PlanError
-        Naming the line: open or self-crossing outlines and holes, a hole that is not inside the
-        outline, lines that run along each other, a divider that ends nowhere or is all outside.
+        If an outline or hole is open or crosses itself, a hole is not inside the outline, lines run
+        along each other, or a divider ends inside a patch or is all outside. ``what`` is the line.
     """
     drawn = [Drawn(line) for line in lines]
     snap = SNAP * edge_length
@@ -90,35 +90,32 @@ def arrange(
         check_line(one)
     check_holes(drawn)
     meetings = _Meetings()
-    for number, one in enumerate(drawn):
-        last = float(len(one.curve.pieces))
-        ends = [] if one.curve.closed else [0.0, last]
+    for k, one in enumerate(drawn):
+        ends = [] if one.curve.closed else [0.0, float(len(one.curve.pieces))]
         for t in [*ends, *one.curve.corners.tolist()]:
-            meetings.add([(number, t)])
-    _findcrossings(drawn, meetings)
+            meetings.add([(k, t)])
+    _find_crossings(drawn, meetings)
     _find_ends(drawn, meetings, snap)
     spots = np.zeros((0, 3)) if spots is None else spots
     passing = [lines_at(drawn, xy, snap) for xy in spots[:, :2]]
     contains = inside(drawn)
-    for xy, found in zip(spots[:, :2], passing, strict=True):
-        if not found and not contains(xy):
-            raise PlanError(f"the support at {spot(xy)} lies outside the plan, or in a hole")
+    for xy, places in zip(spots[:, :2], passing, strict=True):
+        if not places and not contains(xy):
+            raise PlanError(
+                f"the support at {point_text(xy)} is outside the plan or in a hole",
+                what="supports",
+                where=tuple(xy.tolist()),
+            )
     for xy in np.zeros((0, 2)) if stops is None else stops:
         meetings.add(lines_at(drawn, xy, snap))
-    first_spot = len(meetings.line)
-    alone = [place for place, found in enumerate(passing) if not found]
-    for found in passing:
-        meetings.add(found)
+    number = np.array([meetings.add(places) for places in passing], dtype=np.int64)
+    alone = np.array([not places for places in passing], dtype=bool)
     node, points, heights = _nodes(drawn, meetings, snap)
     chains, points, heights = _chains(drawn, meetings, node, points, heights, edge_length)
-    chains = _kept(drawn, chains, points, edge_length)
+    chains = _inside_plan(drawn, chains, points, edge_length)
     vertex = np.empty(len(spots), dtype=np.int64)
-    vertex[alone] = len(points) + np.arange(len(alone))
-    cursor = first_spot
-    for place, found in enumerate(passing):
-        if found:
-            vertex[place] = node[cursor]
-            cursor += len(found)
+    vertex[~alone] = node[number[~alone]]
+    vertex[alone] = len(points) + np.arange(alone.sum())
     points = np.concatenate([points, spots[alone, :2]])
     heights = np.concatenate([heights, spots[alone, 2]])
     return _compact(Arrangement(points, heights, tuple(chains), vertex))
@@ -126,32 +123,34 @@ def arrange(
 
 def hole_points(drawn: Arrangement, lines: Sequence[Line]) -> list[tuple[float, float]]:
     """A point inside each hole, as its edges enclose it."""
-    found = []
+    points = []
     for number, line in enumerate(lines):
         if line.kind is Kind.HOLE:
             rim = np.concatenate([c.vertices[:-1] for c in drawn.chains if c.line == number])
             inside = shapely.Polygon(drawn.points[rim]).representative_point()
-            found.append((inside.x, inside.y))
-    return found
+            points.append((inside.x, inside.y))
+    return points
 
 
 @dataclass
 class _Meetings:
-    """Places on lines that become vertices, and which of them are one vertex."""
+    """Places on lines that become vertices, and the pairs of them that are the same vertex."""
 
     line: list[int] = field(default_factory=list)
     t: list[float] = field(default_factory=list)
     same: list[tuple[int, int]] = field(default_factory=list)
 
-    def add(self, places: Sequence[tuple[int, float]]) -> None:
+    def add(self, places: Sequence[tuple[int, float]]) -> int:
+        """Add places that are one vertex; returns the number of the first."""
         first = len(self.line)
         for line, t in places:
             self.same.append((first, len(self.line)))
             self.line.append(line)
             self.t.append(t)
+        return first
 
 
-def _findcrossings(drawn: Sequence[Drawn], meetings: _Meetings) -> None:
+def _find_crossings(drawn: Sequence[Drawn], meetings: _Meetings) -> None:
     for j, two in enumerate(drawn):
         for i, one in enumerate(drawn[:j]):
             if one.line.bounds and two.line.bounds:
@@ -161,33 +160,34 @@ def _findcrossings(drawn: Sequence[Drawn], meetings: _Meetings) -> None:
                     continue
                 if part.geom_type != "Point":
                     start, end = np.array(part.coords)[[0, -1]]
-                    raise overlap(two, one, f"from {spot(start)} to {spot(end)}")
+                    raise overlap(two, one, f"from {point_text(start)} to {point_text(end)}")
                 xy = np.array(part.coords)[0]
                 s, t = crossing(one, one.nearest(xy)[0], two, two.nearest(xy)[0])
                 meetings.add([(i, s), (j, t)])
 
 
 def _find_ends(drawn: Sequence[Drawn], meetings: _Meetings, snap: float) -> None:
-    """Dividers end on other lines, or beyond the plan's boundary; supports may end anywhere."""
+    """Dividers end on other lines or outside the plan; supports may end anywhere."""
     contains = inside(drawn)
     for number, one in enumerate(drawn):
         if one.curve.closed or one.line.bounds:
             continue
         for t in (0.0, float(len(one.curve.pieces))):
             xy = one.curve.at(t)[0, :2]
-            found = lines_at(drawn, xy, snap, leave_out=number)
-            if one.kind is Kind.DIVIDER and not found and contains(xy):
+            passing = lines_at(drawn, xy, snap, leave_out=number)
+            if one.kind is Kind.DIVIDER and not passing and contains(xy):
                 gaps = [(other.nearest(xy)[1], other) for other in drawn if other is not one]
                 gap, other = min(gaps, key=lambda pair: pair[0])
-                raise PlanError(
-                    f"{one.name} ends at {spot(xy)} without reaching another line; {other.name} is"
-                    f" nearest, {gap:.3g} away: extend the divider to it"
+                problem = (
+                    f"ends at {point_text(xy)} without reaching another line; {other.name} is nearest,"
+                    f" {gap:.3g} away: extend the divider to it"
                 )
-            meetings.add([(number, t), *found])
+                raise one.error(problem, tuple(xy.tolist()), gap)
+            meetings.add([(number, t), *passing])
 
 
 def _nodes(drawn: Sequence[Drawn], meetings: _Meetings, snap: float) -> tuple[Ints, Floats, Floats]:
-    """The node of each meeting; position and height of the nodes."""
+    """The node of each meeting; positions and heights of the nodes."""
     line, t = np.array(meetings.line, dtype=np.int64), np.array(meetings.t)
     if not len(line):
         return line, np.zeros((0, 2)), np.zeros(0)
@@ -226,7 +226,7 @@ def _chains(
         for (low, first), (high, last) in pairwise(stops):
             inner = one.curve.between(low, high, edge_length)
             ends = (min(first, last), max(first, last))
-            # the chord of a bend already drawn, and a divider from support to support, must bend
+            # a second chord between the same nodes, or a divider between supports, needs a point
             stiff = one.kind is Kind.DIVIDER and _on_edges(heights, first, last)
             if not len(inner) and (stiff or ends in direct):
                 inner = one.curve.between(low, high, one.curve.length / 1e6)
@@ -242,12 +242,12 @@ def _chains(
 
 
 def _on_edges(heights: Floats, first: int, last: int) -> bool:
-    """Whether both nodes have a height of their own: a wall between them would have no room."""
+    """Whether both nodes have a given height: a wall below a single edge would have no room."""
     return max(first, last) < len(heights) and not np.isnan(heights[[first, last]]).any()
 
 
 def _stops(t: Floats, node: Ints, curve: Curve) -> list[tuple[float, int]]:
-    """Nodes along a line in order, no two in a row the same; a closed line comes back."""
+    """Nodes along a line in order, without repetition; a closed line returns to its first."""
     order = np.lexsort((node, t))
     stops = [(float(t[k]), int(node[k])) for k in order]
     stops = [stop for k, stop in enumerate(stops) if k == 0 or stop[1] != stops[k - 1][1]]
@@ -262,10 +262,10 @@ def _heights(one: Drawn, where: Floats) -> Floats:
     return np.full(len(where), np.nan) if one.kind is Kind.DIVIDER else where[:, 2]
 
 
-def _kept(
+def _inside_plan(
     drawn: Sequence[Drawn], chains: list[Chain], points: Floats, edge_length: float
 ) -> list[Chain]:
-    """The chains without what passes outside the plan or through its holes."""
+    """The chains inside the plan; the parts of lines outside or in holes are left out."""
     contains = inside(drawn)
     kept = []
     for chain in chains:
@@ -277,11 +277,11 @@ def _kept(
         if not one.line.bounds:
             along = lines_at(drawn, middle, SNAP * edge_length, leave_out=chain.line)
             if along:
-                raise overlap(one, drawn[along[0][0]], f"near {spot(middle)}")
+                raise overlap(one, drawn[along[0][0]], f"near {point_text(middle)}")
         kept.append(chain)
     gone = set(range(len(drawn))) - {chain.line for chain in kept}
     if gone:
-        raise PlanError(f"{drawn[min(gone)].name} lies outside the plan, or in a hole")
+        raise drawn[min(gone)].error("is outside the plan or in a hole")
     _check_chords(drawn, kept, points, edge_length)
     return kept
 
@@ -289,7 +289,7 @@ def _kept(
 def _check_chords(
     drawn: Sequence[Drawn], chains: Sequence[Chain], points: Floats, edge_length: float
 ) -> None:
-    """Straight edges instead of bends must not make lines cross."""
+    """Refuse lines that cross only because their bends are replaced by straight edges."""
     ends = np.concatenate([np.stack([c.vertices[:-1], c.vertices[1:]], axis=1) for c in chains])
     owner = np.repeat([c.line for c in chains], [len(c.vertices) - 1 for c in chains])
     edges = shapely.linestrings(points[ends])
@@ -298,12 +298,14 @@ def _check_chords(
         first, second = owner[i[0]], owner[j[0]]
         raise PlanError(
             f"with edges of length {edge_length:g}, {drawn[first].name} and {drawn[second].name}"
-            f" cross near {spot(points[ends[i[0]]].mean(axis=0))}; use a smaller edge_length"
+            f" cross near {point_text(points[ends[i[0]]].mean(axis=0))}; use a smaller edge_length",
+            what=drawn[first].name,
+            found=drawn[second].name,
         )
 
 
 def _compact(a: Arrangement) -> Arrangement:
-    """Without points that only dropped chains used."""
+    """The arrangement without unused points."""
     used: Bools = np.zeros(len(a.points), dtype=bool)
     for chain in a.chains:
         used[chain.vertices] = True

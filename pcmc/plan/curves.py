@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError, unknown
 from ..surface import Plane
+from .coordinates import to_local
 
-CORNER = math.radians(10.0)  # a path that turns by more at a joint has a corner there
-EDGE_TURN = math.radians(45.0)  # no edge spans more of a bend than this
-DENSE = 64  # places per curved piece at which lengths and crossings are computed
+CORNER = math.radians(10.0)  # a joint that turns by more is a corner
+EDGE_TURN = math.radians(45.0)  # largest turn of a bend along one edge
+DENSE = 64  # points per curved piece, for lengths and crossings
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +73,8 @@ class Piece:
 class Curve:
     """Pieces joined end to end. Its parameter t runs from 0 to the number of pieces.
 
-    Plane points (x, y) are coordinates on Π (for the standard Π, the plane z = 0); space points
-    (x, y, z) are where they are. Make curves with ``polyline``, ``bezier``, ``arc``, ``circle``,
+    Plane points (x, y) are coordinates on Π (by default the plane z = 0); points (x, y, z) are
+    positions in space. Make curves with ``polyline``, ``bezier``, ``arc``, ``circle``,
     ``join``.
     """
 
@@ -91,7 +93,7 @@ class Curve:
 
     @cached_property
     def dense(self) -> Floats:
-        """(k,) ascending parameters, close enough together to measure lengths by chords."""
+        """(k,) ascending parameters, dense enough to measure lengths by chords."""
         steps = [1 if piece.straight else DENSE for piece in self.pieces]
         parts = [i + np.arange(count) / count for i, count in enumerate(steps)]
         return np.append(np.concatenate(parts), float(len(self.pieces)))
@@ -167,16 +169,23 @@ def polyline(points: npt.ArrayLike, closed: bool = False) -> Curve:
     if closed and len(P) > 2 and np.array_equal(P[0], P[-1]):
         P = P[:-1]
     if closed and len(P) < 3:
-        raise OptionError(f"polyline: a closed one needs 3 points, found {len(P)}")
+        raise OptionError(
+            f"polyline: a closed polyline needs 3 points, found {len(P)}",
+            what="polyline",
+            found=len(P),
+            expected=3,
+        )
     following = np.roll(P, -1, axis=0) if closed else P[1:]
     double = np.flatnonzero((P[: len(following)] == following).all(axis=1))
     if len(double):
         raise OptionError(
             f"polyline: points {double[0]} and {(double[0] + 1) % len(P)} are both"
-            f" {P[double[0]].tolist()}; remove one"
+            f" {P[double[0]].tolist()}; remove one",
+            what="polyline",
+            where=int(double[0]),
         )
     pieces = tuple(Piece(np.stack(ends)) for ends in zip(P, following, strict=False))
-    return _marked(Curve(pieces, closed))
+    return _closed_if_ends_meet(Curve(pieces, closed))
 
 
 def bezier(control: npt.ArrayLike) -> Curve:
@@ -187,8 +196,8 @@ def bezier(control: npt.ArrayLike) -> Curve:
     """
     P = _points(control, "bezier", 2)
     if np.ptp(P, axis=0).max() == 0.0:
-        raise OptionError(f"bezier: all control points are {P[0].tolist()}")
-    return _marked(Curve((Piece(P),)))
+        raise OptionError(f"bezier: all control points are {P[0].tolist()}", what="bezier")
+    return _closed_if_ends_meet(Curve((Piece(P),)))
 
 
 def arc(start: npt.ArrayLike, through: npt.ArrayLike, end: npt.ArrayLike) -> Curve:
@@ -202,7 +211,7 @@ def arc(start: npt.ArrayLike, through: npt.ArrayLike, end: npt.ArrayLike) -> Cur
     uu, uv, vv = u @ u, u @ v, v @ v
     area = uu * vv - uv * uv  # squared area of the parallelogram
     if area <= 1e-24 * max(uu, vv) ** 2:
-        raise OptionError("arc: its three points lie on one line; use a polyline")
+        raise OptionError("arc: its three points lie on one line; use a polyline", what="arc")
     centre = a + (0.5 * vv * (uu - uv) * u + 0.5 * uu * (vv - uv) * v) / area
     first = a - centre
     across = (b - centre) - ((b - centre) @ first) / (first @ first) * first
@@ -221,8 +230,7 @@ def circle(centre: npt.ArrayLike, radius: float) -> Curve:
     6.28
     """
     c = _points([centre], "circle", 1)[0]
-    if not (math.isfinite(radius) and radius > 0):
-        raise OptionError(f"circle: radius must be a finite number > 0, found {radius}")
+    validate.number("circle: radius", radius, above=0.0)
     u, v = np.zeros_like(c), np.zeros_like(c)
     u[0] = v[1] = radius
     return Curve((Piece(np.stack([c, u, v]), 2.0 * math.pi),), closed=True)
@@ -235,22 +243,30 @@ def join(*curves: Curve) -> Curve:
     True
     """
     if not curves:
-        raise OptionError("join: no curves were given")
+        raise OptionError("join: give at least one curve", what="join")
     closed = [number for number, curve in enumerate(curves) if curve.closed]
     if closed and len(curves) > 1:
-        raise OptionError(f"join: curve {closed[0]} is closed; only open curves can be joined")
+        raise OptionError(
+            f"join: curve {closed[0]} is closed; only open curves can be joined",
+            what="join",
+            where=closed[0],
+        )
     dimensions = {curve.pieces[0].points.shape[1] for curve in curves}
     if len(dimensions) > 1:
-        raise OptionError("join: some curves are plane and some in space; give all in space")
+        raise OptionError(
+            "join: some curves are plane and some in space; give all in space", what="join"
+        )
     tolerance = 1e-9 * max(curve.length for curve in curves)
     for number in range(1, len(curves)):
         before, after = _end(curves[number - 1], 1), _end(curves[number], 0)
         if np.linalg.norm(after - before) > tolerance:
             raise OptionError(
                 f"join: curve {number} starts at {after.tolist()}, but curve {number - 1} ends at"
-                f" {before.tolist()}"
+                f" {before.tolist()}",
+                what="join",
+                where=number,
             )
-    return _marked(Curve(tuple(piece for curve in curves for piece in curve.pieces)))
+    return _closed_if_ends_meet(Curve(tuple(piece for curve in curves for piece in curve.pieces)))
 
 
 def curve(spec: Any, closed: bool = False) -> Curve:
@@ -276,28 +292,6 @@ def curve(spec: Any, closed: bool = False) -> Curve:
     return polyline(spec, closed=closed)
 
 
-def frame(plane: Plane) -> Floats:
-    """(3,3) rows: two unit vectors along Π and its normal. The identity for the standard Π."""
-    normal = np.array(plane.normal)
-    axis = np.eye(3)[1 if abs(normal[0]) > 0.9 else 0]
-    first = axis - (axis @ normal) * normal
-    first /= np.linalg.norm(first)
-    second = np.cross(normal, first)
-    return np.stack([first, second, normal])
-
-
-def to_local(points: Floats, plane: Plane) -> Floats:
-    """(n,3) coordinates on Π and heights above it, of plane (n,2) or space points (n,3)."""
-    if points.shape[-1] == 2:
-        return np.concatenate([points, np.zeros((*points.shape[:-1], 1))], axis=-1)
-    return (points - np.array(plane.point)) @ frame(plane).T
-
-
-def to_space(local: Floats, plane: Plane) -> Floats:
-    """(n,3) positions of points given by coordinates on Π and height."""
-    return local @ frame(plane) + np.array(plane.point)
-
-
 def _from_mapping(spec: Mapping[str, Any]) -> Curve:
     makers: dict[str, Any] = {
         "polyline": polyline,
@@ -307,13 +301,21 @@ def _from_mapping(spec: Mapping[str, Any]) -> Curve:
     }
     extra = [key for key in spec if key not in makers and key != "closed"]
     if extra:
-        raise OptionError(unknown("curve", extra[0], makers))
+        raise OptionError(
+            unknown("curve", extra[0], makers), what="curve", found=extra[0], expected=tuple(makers)
+        )
     kinds = [key for key in spec if key in makers]
     if len(kinds) != 1:
-        raise OptionError(f"a curve needs exactly one of {', '.join(makers)}; found {list(spec)}")
+        raise OptionError(
+            f"a curve needs exactly one of {', '.join(makers)}; found {list(spec)}",
+            what="curve",
+            found=list(spec),
+            expected=tuple(makers),
+        )
     if "closed" in spec and kinds != ["polyline"]:
         raise OptionError(
-            f"closed is for polylines; a {kinds[0]} is closed if it ends at its start"
+            f"only a polyline has the key closed; a {kinds[0]} is closed if it ends at its start",
+            what="closed",
         )
     if kinds == ["polyline"]:
         return polyline(spec["polyline"], closed=bool(spec.get("closed", False)))
@@ -323,12 +325,14 @@ def _from_mapping(spec: Mapping[str, Any]) -> Curve:
 
 def _circle_keys(spec: Any) -> dict[str, Any]:
     if not isinstance(spec, Mapping) or set(spec) != {"centre", "radius"}:
-        raise OptionError(f"circle: expected centre and radius, found {spec!r}")
+        raise OptionError(
+            f"circle: expected centre and radius, found {spec!r}", what="circle", found=spec
+        )
     return dict(spec)
 
 
-def _marked(path: Curve) -> Curve:
-    """The path, marked as closed if it ends where it starts."""
+def _closed_if_ends_meet(path: Curve) -> Curve:
+    """The path as a closed one if it ends where it starts."""
     gap = float(np.linalg.norm(_end(path, 1) - _end(path, 0)))
     return replace(path, closed=path.closed or gap <= 1e-9 * path.length)
 
@@ -343,22 +347,37 @@ def _points(points: Any, what: str, least: int, exactly: bool = False) -> Floats
         if P.dtype.kind not in "iuf":  # numpy would take the text "8" for a number
             raise ValueError
     except (TypeError, ValueError):
-        raise OptionError(f"{what}: expected points [x, y] or [x, y, z], all alike") from None
+        raise OptionError(
+            f"{what}: expected points, all [x, y] or all [x, y, z]", what=what, found=points
+        ) from None
     P = P.astype(float)
     if P.ndim != 2 or P.shape[1] not in (2, 3):
-        raise OptionError(f"{what}: expected points [x, y] or [x, y, z], found shape {P.shape}")
+        raise OptionError(
+            f"{what}: expected points [x, y] or [x, y, z], found shape {P.shape}",
+            what=what,
+            found=P.shape,
+        )
     if len(P) < least or (exactly and len(P) != least):
-        raise OptionError(f"{what}: expected {least} points, found {len(P)}")
+        raise OptionError(
+            f"{what}: expected {least} points, found {len(P)}",
+            what=what,
+            found=len(P),
+            expected=least,
+        )
     bad = np.flatnonzero(~np.isfinite(P).all(axis=1))
     if len(bad):
-        raise OptionError(f"{what}: point {bad[0]} = {P[bad[0]].tolist()} is not finite")
+        raise OptionError(
+            f"{what}: point {bad[0]} = {P[bad[0]].tolist()} is not finite",
+            what=what,
+            where=int(bad[0]),
+        )
     return P
 
 
 def _local(piece: Piece, plane: Plane) -> Piece:
     if piece.points.shape[1] == 2 or not piece.sweep:
         return Piece(to_local(piece.points, plane), piece.sweep)
-    turned = piece.points @ frame(plane).T
+    turned = piece.points @ plane.axes.T
     turned[0] = to_local(piece.points[0], plane)
     return Piece(turned, piece.sweep)
 

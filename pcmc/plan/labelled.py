@@ -1,4 +1,4 @@
-"""From any triangle mesh with face labels to a Surface: patches, supports, walls."""
+"""A Surface from any triangle mesh with face labels: patches, supports, walls."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError, unknown
 from ..surface import Patch, Plane, Surface, checks
@@ -33,37 +34,36 @@ def surface_from_labels(
     plane: Plane | None = None,
     weld: float = 0.0,
 ) -> Surface:
-    """A Surface whose patches are the labels of a triangle mesh.
+    """A Surface from a triangle mesh; each label of its faces is a patch.
 
-    Faces of a label are turned to agree with each other, and outwards: towards Π's normal; in a
-    mesh without boundary, away from its middle. Vertices that no face uses are left out.
+    The faces of a patch are oriented alike, and outwards: towards the normal of Π, or, in a mesh
+    without boundary, away from its centre. Unused vertices are left out.
 
     Parameters
     ----------
     vertices, faces : (n,3) and (m,3).
-    labels : (m,) one per face, of any kind; a patch is named by ``str`` of its label. Without them
-        the mesh is one patch, "surface".
-    tension, pressure : of all patches, or by name.
-    boundary : what holds the mesh's boundary: "fixed", "sliding" on Π, or "free".
-    walls : tension of walls to put under the borders between labels (see ``add_walls``).
+    labels : (m,) one per face, of any type; the name of a patch is ``str`` of its label. Without
+        labels the mesh is one patch, "surface".
+    tension, pressure : of all patches, or a mapping from their names.
+    boundary : the support of the boundary: "fixed", "sliding" on Π, or "free".
+    walls : tension of walls under the borders between patches (see ``add_walls``).
     bottom : of those walls.
     plane : Π; z = 0 by default.
-    weld : vertices nearer to each other than this become one, length.
+    weld : vertices nearer than this to each other are merged, length.
 
     Raises
     ------
     OptionError
         For an unknown name or option.
     SurfaceError
-        For arrays that are no such mesh, naming the first offending index.
+        If the arrays are no such mesh; names the first wrong index.
 
     >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     >>> s = surface_from_labels(square, [[0, 1, 2], [0, 3, 2]], ["a", "b"], tension=2.0)
     >>> [p.name for p in s.patches], s.faces.tolist()
     (['a', 'b'], [[0, 1, 2], [2, 3, 0]])
     """
-    if boundary not in EDGES:
-        raise OptionError(unknown("boundary", boundary, EDGES))
+    validate.choice("boundary", boundary, EDGES)
     plane = Plane() if plane is None else plane
     X = checks.positions(vertices)
     F: Ints = checks.face_array(faces, len(X)).astype(np.int64)
@@ -79,9 +79,8 @@ def surface_from_labels(
 
 
 def _welded(X: Floats, F: Ints, distance: float) -> tuple[Floats, Ints]:
-    """Without unused vertices, and with those nearer than ``distance`` made one."""
-    if not (np.isfinite(distance) and distance >= 0.0):
-        raise OptionError(f"weld must be a finite number ≥ 0, found {distance}")
+    """The mesh without unused vertices; vertices nearer than ``distance`` are merged."""
+    validate.number("weld", distance, least=0.0)
     group = np.arange(len(X))
     if distance > 0.0:
         pairs = cKDTree(X).query_pairs(distance, output_type="ndarray")
@@ -93,20 +92,27 @@ def _welded(X: Floats, F: Ints, distance: float) -> tuple[Floats, Ints]:
     if flat.any():
         raise SurfaceError(
             f"faces[{np.argmax(flat)}] vanishes when vertices nearer than weld={distance:g} are"
-            " made one; use a smaller weld"
+            " merged; use a smaller weld",
+            what="faces",
+            where=int(np.argmax(flat)),
         )
     used, inverse = np.unique(F, return_inverse=True)
     return X[used], inverse.reshape(-1, 3)
 
 
 def _names(labels: npt.ArrayLike | None, m: int) -> tuple[list[str], Ints]:
-    """Patch names in the order in which they first come, and each face's."""
+    """Patch names in order of first appearance, and the patch of each face."""
     if labels is None:
         return ["surface"], np.zeros(m, dtype=np.int64)
-    found = np.asarray(labels)
-    if found.shape != (m,):
-        raise SurfaceError(f"labels: expected shape ({m},), one per face, found {found.shape}")
-    known, first, inverse = np.unique(found, return_index=True, return_inverse=True)
+    given = np.asarray(labels)
+    if given.shape != (m,):
+        raise SurfaceError(
+            f"labels: expected shape ({m},), one per face, found {given.shape}",
+            what="labels",
+            found=given.shape,
+            expected=(m,),
+        )
+    known, first, inverse = np.unique(given, return_index=True, return_inverse=True)
     order = np.argsort(first)
     return [str(known[k]) for k in order], np.argsort(order)[inverse]
 
@@ -116,22 +122,24 @@ def _by_name(value: Any, names: list[str], what: str) -> dict[str, float]:
         return dict.fromkeys(names, float(value))
     for name in value:
         if name not in names:
-            raise OptionError(unknown("patch", name, names))
+            raise OptionError(
+                unknown("patch", name, names), what=what, found=name, expected=tuple(names)
+            )
     missing = [name for name in names if name not in value]
     if missing:
-        raise OptionError(f"{what}: no value for patch {missing[0]!r}")
+        raise OptionError(f"{what}: no value for patch {missing[0]!r}", what=what, where=missing[0])
     return {name: float(value[name]) for name in names}
 
 
 def _oriented(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Ints:
-    """Faces turned so that neighbours in a patch agree, and the patch faces outwards.
+    """Faces oriented so that neighbours in a patch agree, and the patch faces outwards.
 
-    Every face has two sides; sides that are the same side of the patch are connected in a graph of
-    2 m nodes, so that its parts are the patch's sides.
+    Every face has two sides: a graph of 2 m nodes connects the sides that belong to the same side of
+    a patch, so its components are the sides of patches.
     """
     m = len(F)
     one, two, same = _neighbours(F, patch, len(X))
-    # running along the shared edge the same way, one of the two is turned over
+    # two faces that run along their edge the same way are oriented differently
     start = np.concatenate([one, one + m])
     end = np.concatenate([np.where(same, two + m, two), np.where(same, two, two + m)])
     graph = coo_array((np.ones(len(start)), (start, end)), shape=(2 * m, 2 * m))
@@ -140,7 +148,9 @@ def _oriented(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Ints:
     if len(both):
         raise SurfaceError(
             f"the patch of face {both[0]} has only one side (like a Möbius strip); cut it into two"
-            " patches"
+            " patches",
+            what="faces",
+            where=int(both[0]),
         )
     part = np.minimum(side[:m], side[m:])
     turned = side[:m] != part
@@ -150,7 +160,7 @@ def _oriented(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Ints:
 
 
 def _neighbours(F: Ints, patch: Ints, n: int) -> tuple[Ints, Ints, Bools]:
-    """Pairs of faces at an edge of theirs alone in their patch; whether both run along it alike."""
+    """Pairs of faces that share an edge within a patch, and whether both run along it the same way."""
     edge = F[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
     face = np.repeat(np.arange(len(F)), 3)
     key = (patch[face] * n + edge.min(axis=1)) * n + edge.max(axis=1)
@@ -161,7 +171,7 @@ def _neighbours(F: Ints, patch: Ints, n: int) -> tuple[Ints, Ints, Bools]:
 
 
 def _outwardness(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Floats:
-    """(m,) area seen along Π's normal; in a closed mesh, volume seen from its middle."""
+    """(m,) area projected along the normal of Π; in a closed mesh, volume seen from its centre."""
     corner = X[F] - X.mean(axis=0)
     vector = area_vectors(corner)
     if topology(F, patch, len(X)).boundary_edge.any():

@@ -1,4 +1,4 @@
-"""The lines of a plan, drawn on Π: what each must be, and where two of them meet."""
+"""The lines of a plan in the plane Π: checks of each, and where two of them meet."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from ..base.errors import PlanError
 from ..surface.geometry import cross_2d
 from .curves import Curve
 
-SNAP = 0.01  # of the edge length: lines that miss each other by less are taken to meet
+SNAP = 0.01  # of the edge length: lines nearer to each other than this meet
 
 
 class Kind(IntEnum):
-    """What a line is. Where lines meet, the first kind among them says where the point is."""
+    """Kinds of lines. Where lines meet, the one with the lowest kind gives the position of the point."""
 
     OUTLINE = 0
     HOLE = 1
@@ -29,7 +29,7 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A named curve of a plan, in the coordinates of Π (two along it, and the height)."""
+    """A named curve of a plan, in the coordinates of Π: two in the plane, and the height."""
 
     name: str
     kind: Kind
@@ -42,7 +42,7 @@ class Line:
 
 
 class Drawn:
-    """A line with its dense drawing on Π."""
+    """A line with its projection on Π as a dense polyline."""
 
     def __init__(self, line: Line) -> None:
         self.line, self.curve = line, line.curve
@@ -50,9 +50,13 @@ class Drawn:
         self.xy = self.curve.at(self.curve.dense)[:, :2]
         steps = np.linalg.norm(np.diff(self.xy, axis=0), axis=1)
         if not steps.any():
-            raise PlanError(f"{self.name} has no length on the plane")
+            raise self.error("has no length in plan")
         self.reach = np.concatenate([[0.0], np.cumsum(steps)])
         self.shape: Any = shapely.LineString(self.xy)
+
+    def error(self, problem: str, where: object = None, found: object = None) -> PlanError:
+        """The error about this line: its name, and what is wrong with it."""
+        return PlanError(f"{self.name} {problem}", what=self.name, where=where, found=found)
 
     def nearest(self, xy: Floats) -> tuple[float, float]:
         """The parameter of the curve's point nearest to xy, and its distance."""
@@ -66,29 +70,28 @@ class Drawn:
         return t, float(distance[best])
 
 
-def spot(xy: Floats) -> str:
-    """A place, for messages."""
+def point_text(xy: Floats) -> str:
+    """A point, for messages."""
     return f"({xy[0]:.6g}, {xy[1]:.6g})"
 
 
 def overlap(one: Drawn, other: Drawn, where: str) -> PlanError:
-    """The error for two lines that coincide along a part."""
-    return PlanError(f"{one.name} runs along {other.name} {where}; leave that part out")
+    """The error for two lines that coincide along some length."""
+    return one.error(f"runs along {other.name} {where}; leave that part out", where, other.name)
 
 
 def check_line(one: Drawn) -> None:
     """Boundaries are closed, and no line crosses itself."""
     if one.line.bounds and not one.curve.closed:
         gap = float(np.linalg.norm(one.xy[-1] - one.xy[0]))
-        raise PlanError(
-            f"{one.name} is open: it starts at {spot(one.xy[0])} and ends at {spot(one.xy[-1])},"
-            f" {gap:.3g} apart; close it"
-        )
+        ends = f"it starts at {point_text(one.xy[0])} and ends at {point_text(one.xy[-1])}"
+        raise one.error(f"is open: {ends}, {gap:.3g} apart; close it", found=gap)
     if not one.shape.is_simple:
         pieces = shapely.get_parts(shapely.node(one.shape))
-        ends = np.concatenate([np.array(p.coords)[[0, -1]] for p in pieces])
-        where, count = np.unique(ends.round(9), axis=0, return_counts=True)
-        raise PlanError(f"{one.name} crosses itself at {spot(where[np.argmax(count)])}")
+        joints = np.concatenate([np.array(p.coords)[[0, -1]] for p in pieces])
+        places, count = np.unique(joints.round(9), axis=0, return_counts=True)
+        place = places[np.argmax(count)]
+        raise one.error(f"crosses itself at {point_text(place)}", tuple(place.tolist()))
 
 
 def check_holes(drawn: Sequence[Drawn]) -> None:
@@ -98,31 +101,29 @@ def check_holes(drawn: Sequence[Drawn]) -> None:
     for place, (one, area) in enumerate(holes):
         if not outline.contains_properly(area):
             where = "crosses or touches" if outline.intersects(area) else "lies outside"
-            raise PlanError(f"{one.name} {where} the outline; a hole must lie inside it")
+            raise one.error(f"{where} the outline; a hole must be inside the outline")
         for other, other_area in holes[:place]:
             if area.intersects(other_area):
-                raise PlanError(f"{other.name} and {one.name} touch or overlap; join them into one")
+                problem = f"and {one.name} touch or overlap; join them into one"
+                raise other.error(problem, found=one.name)
 
 
 def inside(drawn: Sequence[Drawn]) -> Callable[[Floats], bool]:
-    """Whether a point is inside the outline and outside all holes."""
-    area = shapely.Polygon(drawn[0].xy)
-    for one in drawn:
-        if one.kind is Kind.HOLE:
-            area = area.difference(shapely.Polygon(one.xy))
+    """A function that tests whether a point is inside the outline and outside all holes."""
+    area = shapely.Polygon(drawn[0].xy, [one.xy for one in drawn if one.kind is Kind.HOLE])
     return lambda xy: bool(shapely.contains_xy(area, *xy))
 
 
 def lines_at(
     drawn: Sequence[Drawn], xy: Floats, snap: float, leave_out: int = -1
 ) -> list[tuple[int, float]]:
-    """Lines that pass a point, with the parameter there."""
+    """Lines that pass through a point, with their parameter there."""
     near = [(number, *one.nearest(xy)) for number, one in enumerate(drawn) if number != leave_out]
     return [(number, t) for number, t, distance in near if distance <= snap]
 
 
 def crossing(one: Drawn, s: float, two: Drawn, t: float) -> tuple[float, float]:
-    """The parameters at which two curves cross, by Newton's method from near there."""
+    """The parameters at which two curves cross, by Newton's method from initial guesses."""
 
     def apart(s: float, t: float) -> Floats:
         return (two.curve.at([t]) - one.curve.at([s]))[0, :2]

@@ -1,13 +1,16 @@
-"""The parts of a plan: the lines between its patches, its openings, its patches."""
+"""The parts of a plan: dividers between patches, holes, patches; made from plain data and checked."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from ..base.errors import OptionError
+from ..base import validate
+from ..base.errors import OptionError, unknown
+from .curves import Curve, curve
 
 EDGES = ("fixed", "sliding", "free")
 BOTTOMS = ("sliding", "held", "sloped")
@@ -15,22 +18,22 @@ BOTTOMS = ("sliding", "held", "sloped")
 
 @dataclass(frozen=True, eq=False)
 class Divider:
-    """A line between patches, with the wall that stands under it.
+    """A line between patches, with a wall below it.
 
-    Only its course in plan counts: the height is the surface's.
+    Only its course in plan counts: the height is that of the surface.
 
     Attributes
     ----------
-    curve : a Curve or its plain data; each end on the outline, a hole or another divider. What is
-        drawn beyond the outline or across a hole is left out.
-    wall : tension of the wall, force/length, ≥ 0; None for no wall. Between areas of different
-        pressures the difference acts on it, so that the shape is that of rooms under those pressures.
+    curve : the line. Each end is on the outline, a hole or another divider; parts outside the outline
+        or inside a hole are left out.
+    wall : tension of the wall, force/length, ≥ 0; None for no wall. Between patches of different
+        pressures the wall takes the difference.
     name : of the wall's patch; by default "wall 1", "wall 2", … in order. Where the difference of
         pressure changes along the divider, each part is a patch of its own: "wall 1-1", "wall 1-2".
-    bottom : "sliding" on Π; "held" on Π in all directions; or "sloped": held in all directions on
-        the surface that the boundary curves span (for boundaries that leave Π). A sliding wall
-        that ends on a straight edge tends to slip along it to where it is shorter; hold it, or end
-        it in re-entrant corners.
+    bottom : "sliding" on Π; "held" on Π in all directions; or "sloped": held in all directions on the
+        surface that the boundary curves span (for boundaries that leave Π). A sliding wall that ends
+        on a straight edge tends to slip along it to where it is shorter; hold it, or end it in
+        re-entrant corners.
     """
 
     curve: Any
@@ -45,9 +48,9 @@ class Hole:
 
     Attributes
     ----------
-    curve : a closed Curve or its plain data.
-    edge : "fixed", at the height of its curve; "sliding" on Π; or "free" (see ``Plan.edge``).
-    name : used in messages.
+    curve : its closed edge.
+    edge : the support of the edge: "fixed" at the height of the curve, "sliding" on Π, or "free".
+    name : for messages.
     """
 
     curve: Any
@@ -62,9 +65,10 @@ class Area:
     Attributes
     ----------
     name : of the patch.
-    tension, pressure : α, force/length, and p, force/area.
-    at : a point (x, y) inside it, or several points if several parts are to be one patch. If no
-        area of a plan has one, they are given to its parts from left to right (by centroid).
+    tension : α, force/length.
+    pressure : p, force/area.
+    at : a point [x, y] inside the patch, or a point in each of its parts. If no patch has one, the
+        patches are given to the parts from left to right (by centroid).
     """
 
     name: str
@@ -81,5 +85,89 @@ class Area:
             points = np.empty(0)
         if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
             raise OptionError(
-                f"patch {self.name!r}: at must be a point [x, y] or a list of such, found {self.at!r}"
+                f"patch {self.name!r}: at must be a point [x, y] or a list of points, found {self.at!r}",
+                what="at",
+                where=self.name,
+                found=self.at,
+            )
+
+
+def curve_of(spec: Any, what: str, closed: bool = False) -> Curve:
+    """A Curve from plain data; ``what`` names it in errors."""
+    try:
+        return curve(spec, closed=closed)
+    except OptionError as error:
+        raise OptionError(
+            f"{what}: {error}",
+            what=what,
+            where=error.where,
+            found=error.found,
+            expected=error.expected,
+        ) from None
+
+
+def divider_of(spec: Any, number: int) -> Divider:
+    """A Divider from a mapping of its attributes or a curve; ``number`` counts from 1."""
+    what = f"divider {number}"
+    part = _part_of(Divider, spec, what)
+    validate.choice(f"bottom of {what}", part.bottom, BOTTOMS)
+    return Divider(
+        curve_of(part.curve, what), part.wall, part.name or f"wall {number}", part.bottom
+    )
+
+
+def hole_of(spec: Any, number: int) -> Hole:
+    """A Hole from a mapping of its attributes or a curve; ``number`` counts from 1."""
+    what = f"hole {number}"
+    part = _part_of(Hole, spec, what)
+    validate.choice(f"edge of {what}", part.edge, EDGES)
+    name = f"hole {part.name!r}" if part.name else what
+    return Hole(curve_of(part.curve, what, closed=True), part.edge, name)
+
+
+def _part_of(kind: Any, spec: Any, what: str) -> Any:
+    if isinstance(spec, kind):
+        return spec
+    if isinstance(spec, Mapping) and "curve" in spec:
+        check_keys(spec, kind, what)
+        return kind(**spec)
+    return kind(spec)
+
+
+def areas_of(spec: Any) -> tuple[Area, ...]:
+    """Areas from a mapping from names to their attributes, or from a sequence of Areas."""
+    if not isinstance(spec, Mapping):
+        return tuple(spec)
+    areas = []
+    for name, values in spec.items():
+        check_keys(values, Area, f"patch {name!r}")
+        if "tension" not in values:
+            raise OptionError(f"patch {name!r} needs a tension", what="tension", where=name)
+        areas.append(Area(name, **values))
+    return tuple(areas)
+
+
+def support_of(spec: Any, number: int) -> Any:
+    """A point (2,) or (3,), or a Curve; ``number`` counts from 1."""
+    if isinstance(spec, Sequence | np.ndarray) and len(spec) in (2, 3) and np.ndim(spec) == 1:
+        point = np.array(spec, dtype=float)
+        if not np.isfinite(point).all():
+            raise OptionError(
+                f"support {number}: the point {point.tolist()} is not finite",
+                what=f"support {number}",
+                found=point.tolist(),
+            )
+        return point
+    return curve_of(spec, f"support {number}")
+
+
+def check_keys(values: Any, kind: Any, what: str) -> None:
+    """Refuse a mapping with a key that is no attribute of the class ``kind``."""
+    if not isinstance(values, Mapping):
+        raise OptionError(f"{what}: expected a table, found {values!r}", what=what, found=values)
+    known = tuple(f.name for f in fields(kind))
+    for key in values:
+        if key not in known:
+            raise OptionError(
+                unknown(f"{what} key", key, known), what=what, where=key, found=key, expected=known
             )

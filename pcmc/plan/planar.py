@@ -1,4 +1,4 @@
-"""Plane triangle meshes inside given segments: lattice points, Delaunay, relaxation."""
+"""Plane triangle meshes with given vertices and edges: a lattice, Delaunay, relaxation."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
+from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..meshing.angles import improve_angles
 from ..surface.geometry import angles, cross_2d
 
-CLEARANCE = 0.62  # of the edge length: nearer to a segment, a free point would crowd it
-GOOD_ANGLE = 30.0  # degrees; where it is not reached, points are added and moved
+CLEARANCE = 0.62  # of the edge length: distance of free points from the segments
+CROWDED = 0.6  # of the edge length: free points nearer to another point are removed
+GOOD_ANGLE = 30.0  # degrees; sharper triangles get more points
 OUTSIDE = -1
 
 
@@ -26,9 +28,9 @@ class PlanarMesh:
 
     Attributes
     ----------
-    points : (n,2); the given points come first and have not moved.
+    points : (n,2); the given points come first, unchanged.
     triangles : (t,3) counter-clockwise.
-    region : (t,) int, 0, 1, …: the parts into which the segments cut the plane.
+    region : (t,) int from 0: the region of each triangle; segments separate regions.
     """
 
     points: Floats
@@ -43,29 +45,30 @@ def triangulate(
     holes: Sequence[Sequence[float]] = (),
     rounds: int = 12,
 ) -> PlanarMesh:
-    """Near-equilateral triangles in everything that the segments enclose.
+    """Nearly equilateral triangles in the area that the segments enclose.
 
-    A triangular lattice fills the inside, a Delaunay triangulation that keeps every segment
-    connects it, and the free points are relaxed to the area-weighted mean of their triangles'
-    centroids (the centroidal patch triangulation of Chen and Holst, 2011), with circumcentres added
-    where an angle is small and points removed where they crowd. The given points stay, and no
-    segment is split: their spacing should be near ``edge_length`` or below, and then the mesh is
-    finer there. The same input gives the same mesh.
+    A triangular lattice fills the area. A Delaunay triangulation constrained to the segments connects
+    the points. In each round of relaxation the free points move to the area-weighted mean of the
+    centroids of their triangles (centroidal patch triangulation, Chen and Holst, 2011); every fourth
+    round instead removes points that crowd, or adds circumcentres of large or sharp triangles.
+
+    The given points do not move, and no segment is split. Segments should be about ``edge_length``
+    long; near shorter ones the triangles are smaller. The same input gives the same mesh.
 
     Parameters
     ----------
-    points : (k,2) points that must be vertices.
-    segments : (s,2) int, pairs of them that must be edges; they meet only at their ends.
-    edge_length : of the triangles inside, length.
+    points : (k,2) required vertices.
+    segments : (s,2) int, required edges between them, which meet only at their ends.
+    edge_length : of the triangles, length.
     holes : a point (x, y) inside each region to leave out.
     rounds : of relaxation.
 
     Raises
     ------
     OptionError
-        If ``edge_length`` is not positive, or a hole's point lies outside.
+        If ``edge_length`` is not positive, or the point of a hole is outside.
     SurfaceError
-        If points coincide, segments cross, or they enclose nothing.
+        If points coincide, if segments cross, or if they enclose no area.
 
     >>> corners = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2.0]])
     >>> sides = np.stack([np.arange(6), (np.arange(6) + 1) % 6], axis=1)
@@ -75,8 +78,7 @@ def triangulate(
     """
     fixed = np.asarray(points, dtype=float)
     segments = np.asarray(segments, dtype=np.int64)
-    if not (np.isfinite(edge_length) and edge_length > 0):
-        raise OptionError(f"edge_length must be a finite number > 0, found {edge_length}")
+    validate.number("edge_length", edge_length, above=0.0)
     _check(fixed, segments, edge_length)
     spacing = _spacing(fixed, segments, edge_length)
     everything = np.concatenate([fixed, _lattice(fixed, segments, edge_length)])
@@ -84,11 +86,10 @@ def triangulate(
     for step in range(rounds):
         X = mesh.points
         if step % 4 == 0 and step < rounds - 4:
-            X = _crowd_removed(mesh, len(fixed), spacing, edge_length)
+            wanted = _wanted(X, fixed, spacing, edge_length)
+            X = X[_spaced_out(X, CROWDED * wanted, len(fixed))]
             if len(X) == len(mesh.points):
-                X = np.concatenate(
-                    [X, _additions(mesh, segments, len(fixed), spacing, edge_length)]
-                )
+                X = np.concatenate([X, _additions(mesh, segments, fixed, spacing, edge_length)])
         else:
             X = _relaxed(mesh, len(fixed))
         mesh = _inside(X, segments, holes, len(fixed))
@@ -105,29 +106,36 @@ def signed_areas(points: Floats, triangles: Ints) -> Floats:
 
 def locate(mesh: PlanarMesh, points: Floats) -> Ints:
     """(p,) a triangle that contains each of a few points (p,2), or -1."""
-    found = np.full(len(points), OUTSIDE)
+    triangle = np.full(len(points), OUTSIDE)
     corner = mesh.points[mesh.triangles]
     side = corner[:, [1, 2, 0]] - corner
     slack = -1e-12 * np.einsum("tij,tij->t", side, side).max(initial=0.0)
     for place, point in enumerate(points):
         hit = np.flatnonzero((cross_2d(side, point - corner) >= slack).all(axis=1))
-        found[place] = hit[0] if len(hit) else OUTSIDE
-    return found
+        triangle[place] = hit[0] if len(hit) else OUTSIDE
+    return triangle
 
 
 def _check(points: Floats, segments: Ints, edge_length: float) -> None:
     near = cKDTree(points).query_pairs(1e-9 * edge_length)
     if near:
         i, j = min(near)
-        raise SurfaceError(f"points {i} and {j} coincide at {points[i].tolist()}; merge them")
+        raise SurfaceError(
+            f"points {i} and {j} coincide at {points[i].tolist()}; merge them",
+            what="points",
+            where=(i, j),
+        )
     if len(segments) < 3:
         raise SurfaceError(
-            f"segments: at least 3 are needed to enclose an area, found {len(segments)}"
+            f"segments: at least 3 are needed to enclose an area, found {len(segments)}",
+            what="segments",
+            found=len(segments),
+            expected=3,
         )
 
 
 def _spacing(points: Floats, segments: Ints, edge_length: float) -> Floats:
-    """(k,) the length wanted near each given point: its shortest segment, or the goal."""
+    """(k,) the edge length near each given point: its shortest segment, or ``edge_length``."""
     length = np.linalg.norm(points[segments[:, 1]] - points[segments[:, 0]], axis=1)
     spacing = np.full(len(points), float(edge_length))
     np.minimum.at(spacing, segments.ravel(), np.repeat(length, 2))
@@ -135,7 +143,7 @@ def _spacing(points: Floats, segments: Ints, edge_length: float) -> Floats:
 
 
 def _lattice(points: Floats, segments: Ints, h: float) -> Floats:
-    """(p,2) lattice points, symmetric about the box around the points, clear of the segments."""
+    """(p,2) lattice points clear of the segments, symmetric about the middle of the bounding box."""
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     step = np.array([h, h * np.sqrt(0.75)])
     i, j = (np.arange(-k, k + 1) for k in np.ceil(0.5 * np.ptp(points, axis=0) / step).astype(int))
@@ -145,7 +153,7 @@ def _lattice(points: Floats, segments: Ints, h: float) -> Floats:
 
 
 def _clear(candidates: Floats, points: Floats, segments: Ints, clearance: Floats) -> Bools:
-    """(p,) which candidates (p,2) keep their distance from the given points and segments."""
+    """(p,) whether candidates (p,2) are far enough from the given points and segments."""
     if not len(candidates):
         return np.zeros(0, dtype=bool)
     start, end = segments.T
@@ -156,43 +164,46 @@ def _clear(candidates: Floats, points: Floats, segments: Ints, clearance: Floats
 
 
 def _inside(points: Floats, segments: Ints, holes: Sequence[Sequence[float]], k: int) -> PlanarMesh:
-    """The triangulation without what lies outside or in holes, and the points only there."""
+    """The triangulation inside the outline and outside the holes; points used elsewhere only go."""
     T = _constrained(points, segments)
     part, outer = _parts(T, segments, len(points))
     mesh = PlanarMesh(points, T, part)
     dropped = set(outer.tolist())
-    for place, found in zip(
-        holes, locate(mesh, np.reshape(holes, (-1, 2)).astype(float)), strict=True
-    ):
-        if found == OUTSIDE or part[found] in outer:
-            raise OptionError(f"the hole's point {list(place)} lies outside the outline")
-        dropped.add(int(part[found]))
+    located = locate(mesh, np.reshape(holes, (-1, 2)).astype(float))
+    for place, triangle in enumerate(located):
+        if triangle == OUTSIDE or part[triangle] in outer:
+            raise OptionError(
+                f"the point {list(holes[place])} of hole {place} lies outside the outline",
+                what="holes",
+                where=place,
+            )
+        dropped.add(int(part[triangle]))
     kept = ~np.isin(part, sorted(dropped))
     if not kept.any():
-        raise SurfaceError("the segments enclose no area; close the outline")
+        raise SurfaceError("the segments enclose no area; close the outline", what="segments")
     used = np.zeros(len(points), dtype=bool)
     used[T[kept].ravel()] = True
     used[:k] = True
-    number = np.cumsum(used) - 1
+    renumbered = np.cumsum(used) - 1
     region = np.unique(part[kept], return_inverse=True)[1]
-    return PlanarMesh(points[used], number[T[kept]], region)
+    return PlanarMesh(points[used], renumbered[T[kept]], region)
 
 
 def _parts(T: Ints, segments: Ints, n: int) -> tuple[Ints, Ints]:
-    """(t,) the part that each triangle belongs to, and the numbers of the parts outside."""
+    """(t,) the part of each triangle, where segments separate parts, and the parts outside."""
     key = _edge_keys(T[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), n)
     triangle = np.repeat(np.arange(len(T)), 3)
-    wall = np.isin(key, _edge_keys(segments, n))
+    on_segment = np.isin(key, _edge_keys(segments, n))
     order = np.argsort(key, kind="stable")
     paired = np.flatnonzero(key[order][1:] == key[order][:-1])
     one, two = order[paired], order[paired + 1]
     single = np.ones(len(key), dtype=bool)
     single[one] = single[two] = False
-    joined = ~wall[one]
+    joined = ~on_segment[one]
     pairs = (triangle[one[joined]], triangle[two[joined]])
     graph = coo_array((np.ones(len(pairs[0])), pairs), shape=(len(T), len(T)))
     part = connected_components(graph, directed=False)[1]
-    return part, np.unique(part[triangle[single & ~wall]])
+    return part, np.unique(part[triangle[single & ~on_segment]])
 
 
 def _edge_keys(edges: Ints, n: int) -> Ints:
@@ -204,14 +215,16 @@ def _constrained(points: Floats, segments: Ints) -> Ints:
     try:
         T: Ints = Delaunay(points).simplices.astype(np.int64)
     except QhullError:
-        raise SurfaceError("the points lie on one line; they enclose no area") from None
+        raise SurfaceError(
+            "the points lie on one line and enclose no area", what="points"
+        ) from None
     area = signed_areas(points, T)
     T[area < 0] = T[area < 0][:, ::-1]
     for a, b in segments[_absent(segments, T, len(points))]:
         T = _with_segment(points, T, int(a), int(b))
     lost = _absent(segments, T, len(points))
     if len(lost):
-        raise _crossing(points, *segments[lost[0]])
+        raise _crossing(points, *segments[lost[0]].tolist())
     return T
 
 
@@ -224,12 +237,14 @@ def _absent(segments: Ints, T: Ints, n: int) -> Ints:
 def _crossing(X: Floats, a: int, b: int) -> SurfaceError:
     return SurfaceError(
         f"segment {X[a].tolist()} - {X[b].tolist()} crosses another segment or passes through a"
-        " point; cut it there"
+        " point; split it there",
+        what="segments",
+        where=(a, b),
     )
 
 
 def _with_segment(X: Floats, T: Ints, a: int, b: int) -> Ints:
-    """The triangulation with edge (a, b): the triangles it crosses are replaced (Anglada, 1997)."""
+    """The triangulation with edge (a, b); the triangles that it crosses are replaced (Anglada, 1997)."""
     E = T[:, [[1, 2], [2, 0], [0, 1]]]
     u, v = X[E[..., 0]], X[E[..., 1]]
     foreign = ~np.isin(E, [a, b]).any(axis=2)
@@ -251,27 +266,22 @@ def _with_segment(X: Floats, T: Ints, a: int, b: int) -> Ints:
             at = follow.get(at)
         if at != end or not rim:
             raise _crossing(X, a, b)
-        _fill(X, end, start, rim[::-1], new)
+        new += _delaunay_below(X, end, start, rim[::-1])
     return np.concatenate([T[~crossed], np.array(new, dtype=np.int64)])
 
 
-def _fill(X: Floats, a: int, b: int, rim: list[int], out: list[tuple[int, int, int]]) -> None:
-    """Delaunay triangles between edge (a, b) and the vertices of the rim to its left, a to b."""
+def _delaunay_below(X: Floats, a: int, b: int, rim: list[int]) -> list[tuple[int, int, int]]:
+    """Delaunay triangles between edge (a, b) and the vertices of the rim to its left, a to b.
+
+    The apex over (a, b) is the vertex that sees it under the largest angle: its circle is empty.
+    """
     if not rim:
-        return
-    apex = 0
-    for place in range(1, len(rim)):
-        if _in_circle(X[a], X[b], X[rim[apex]], X[rim[place]]):
-            apex = place
+        return []
+    u, v = X[a] - X[rim], X[b] - X[rim]
+    apex = int(np.argmax(np.arctan2(cross_2d(u, v), (u * v).sum(axis=1))))
     c = rim[apex]
-    out.append((a, b, c))
-    _fill(X, a, c, rim[:apex], out)
-    _fill(X, c, b, rim[apex + 1 :], out)
-
-
-def _in_circle(a: Floats, b: Floats, c: Floats, d: Floats) -> bool:
-    rows = np.array([a, b, c]) - d
-    return bool(np.linalg.det(np.column_stack([rows, (rows**2).sum(axis=1)])) > 0)
+    left, right = rim[:apex], rim[apex + 1 :]
+    return [(a, b, c), *_delaunay_below(X, a, c, left), *_delaunay_below(X, c, b, right)]
 
 
 def _relaxed(mesh: PlanarMesh, k: int) -> Floats:
@@ -288,12 +298,14 @@ def _relaxed(mesh: PlanarMesh, k: int) -> Floats:
 
 
 def _wanted(points: Floats, fixed: Floats, spacing: Floats, h: float) -> Floats:
-    """(p,) edge length wanted at each point: the nearest given point's, growing away from it."""
+    """(p,) edge length wanted at each point: that of the nearest given point, growing with distance."""
     distance, nearest = cKDTree(fixed).query(points)
     return np.minimum(h, spacing[nearest] + 0.3 * distance)
 
 
-def _additions(mesh: PlanarMesh, segments: Ints, k: int, spacing: Floats, h: float) -> Floats:
+def _additions(
+    mesh: PlanarMesh, segments: Ints, fixed: Floats, spacing: Floats, h: float
+) -> Floats:
     """(p,2) circumcentres of triangles that are too large or too sharp, apart from each other."""
     X, T = mesh.points, mesh.triangles
     a, b, c = (X[T[:, i]] for i in range(3))
@@ -304,40 +316,27 @@ def _additions(mesh: PlanarMesh, segments: Ints, k: int, spacing: Floats, h: flo
     flat = np.abs(twice) <= 1e-12 * (uu + vv)
     centre = a + offset / np.where(flat, 1.0, twice)[:, None]
     radius = np.linalg.norm(centre - a, axis=1)
-    wanted = _wanted(X[T].mean(axis=1), X[:k], spacing, h)
+    wanted = _wanted(X[T].mean(axis=1), fixed, spacing, h)
     sharp = angles(X[T]).min(axis=1) < GOOD_ANGLE
     chosen = np.flatnonzero(~flat & ((radius > wanted) | (sharp & (radius > 0.8 * wanted))))
     order = chosen[np.argsort(-radius[chosen] / wanted[chosen], kind="stable")]
     place, need = centre[order], 0.7 * wanted[order]
     clear = cKDTree(X).query(place)[0] >= need if len(place) else np.zeros(0, dtype=bool)
-    clear &= _clear(place, X[:k], segments, spacing)
-    place, need = place[clear], need[clear]
-    return place[_apart(place, need)]
+    clear &= _clear(place, fixed, segments, spacing)
+    return place[clear][_spaced_out(place[clear], need[clear])]
 
 
-def _apart(points: Floats, need: Floats) -> Bools:
-    """(p,) a choice of points, earlier ones first, none nearer to a chosen one than it needs."""
+def _spaced_out(points: Floats, need: Floats, given: int = 0) -> Bools:
+    """(p,) a choice of points, earlier ones first: pairs are not nearer than both points need.
+
+    The first ``given`` points are always chosen.
+    """
     chosen = np.ones(len(points), dtype=bool)
-    if len(points) < 2:
-        return chosen
-    pairs = cKDTree(points).query_pairs(float(need.max()), output_type="ndarray")
-    close = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) < need[pairs[:, 1]]
-    for i, j in pairs[close][np.lexsort(pairs[close].T[::-1])]:
-        if chosen[i]:
-            chosen[j] = False
+    if len(points) > 1:
+        pairs = cKDTree(points).query_pairs(float(need.max()), output_type="ndarray")
+        distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+        close = pairs[distance < need[pairs].min(axis=1)]
+        for i, j in close[np.lexsort(close.T[::-1])]:
+            if chosen[i] and j >= given:
+                chosen[j] = False
     return chosen
-
-
-def _crowd_removed(mesh: PlanarMesh, k: int, spacing: Floats, h: float) -> Floats:
-    """The points without the free ones that sit much closer to a neighbour than wanted."""
-    X = mesh.points
-    wanted = _wanted(X, X[:k], spacing, h)
-    pairs = cKDTree(X).query_pairs(0.6 * h, output_type="ndarray")
-    close = np.linalg.norm(X[pairs[:, 0]] - X[pairs[:, 1]], axis=1) < 0.6 * wanted[pairs].min(
-        axis=1
-    )
-    gone = np.zeros(len(X), dtype=bool)
-    for i, j in pairs[close][np.lexsort(pairs[close].T[::-1])]:  # the later of a pair is a free one
-        if j >= k and not gone[i]:
-            gone[j] = True
-    return X[~gone]

@@ -1,4 +1,4 @@
-"""Walls: auxiliary patches that stand under the borders between patches and reach down to Π."""
+"""Walls: auxiliary patches from the borders between patches down to Π."""
 
 from __future__ import annotations
 
@@ -7,20 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError, unknown
 from ..meshing.quality import edge_lengths
 from ..surface import Patch, Plane, Surface
 from ..surface.geometry import bounding_size
 from ..surface.topology import Curve
-from .curves import to_local, to_space
+from .coordinates import to_local, to_space
 from .planar import triangulate
 
 BOTTOMS = ("sliding", "held")
 
 
 @dataclass(frozen=True, eq=False)
-class WallTop:
+class UpperEdge:
     """The upper edge of a wall.
 
     Attributes
@@ -36,8 +37,8 @@ class WallTop:
 
 
 @dataclass(frozen=True, eq=False)
-class Added:
-    """What walls add to a mesh: vertices after its own, faces with a label each, supports."""
+class WallMesh:
+    """Walls to append to a mesh: new vertices, faces with a label each, supports of the new vertices."""
 
     vertices: Floats
     faces: Ints
@@ -52,24 +53,24 @@ def add_walls(
     bottom: str = "sliding",
     edge_length: float | None = None,
 ) -> Surface:
-    """Put a wall, down to Π, under every border between two patches that has none.
+    """Add a wall, down to Π, under every border between two patches that has none.
 
-    The walls share a vertical line where borders meet, and have rows as fine as the mesh. The wall
-    under the border of "a" and "b" is the patch "wall-a-b"; its normals point from a to b, and its
-    pressure is that of a less that of b: what acts on a wall between the two rooms.
+    Walls share a vertical line where borders meet. The wall under the border of "a" and "b" is the
+    patch "wall-a-b"; its normals point from a to b, and its pressure is that of a less that of b.
 
     Parameters
     ----------
-    tension : of all walls, force/length; or by pair of patch names, for those borders only.
+    tension : of all walls, force/length; or a mapping from pairs of patch names, for those borders
+        only.
     bottom : "sliding" on Π, or "held" there in all directions.
     edge_length : of the walls' triangles; by default the mean length of the borders' edges.
 
     Raises
     ------
     OptionError
-        For a pair of names without a border, or an unknown ``bottom``.
+        For a pair of patches without a border, or an unknown ``bottom``.
     SurfaceError
-        Where a border does not lie above Π, so that there is no room for a wall.
+        If a border is not above Π, so that there is no room for a wall.
 
     >>> from pcmc.plan import Divider, Plan
     >>> seam = Divider([[2, 0], [2, 2]], wall=None)
@@ -78,8 +79,7 @@ def add_walls(
     >>> [p.name for p in add_walls(bare).patches]
     ['patch 1', 'patch 2', 'wall-patch 1-patch 2']
     """
-    if bottom not in BOTTOMS:
-        raise OptionError(unknown("bottom", bottom, BOTTOMS))
+    validate.choice("bottom", bottom, BOTTOMS)
     names = [p.name for p in surface.patches]
     borders = [c for c in surface.topology.junctions if len(set(c.sheets)) == len(c.sheets) == 2]
     pair_of = [(names[c.sheets[0]], names[c.sheets[1]]) for c in borders]
@@ -90,13 +90,13 @@ def add_walls(
     pressure = {p.name: p.pressure for p in surface.patches}
     label, patches = _labels([c for c, _ in walled], [pair for _, pair in walled], chosen, pressure)
     tops = [
-        WallTop(_directed(surface, c), label[place], bottom == "held")
+        UpperEdge(_directed(surface, c), label[place], bottom == "held")
         for place, (c, _) in enumerate(walled)
     ]
     if edge_length is None:
         seam = surface.topology.seam_edge
         edge_length = float(edge_lengths(surface)[seam].mean())
-    walls = stand(surface.vertices, tops, edge_length, surface.plane, surface.fixed)
+    walls = build_walls(surface.vertices, tops, edge_length, surface.plane, surface.fixed)
     return Surface(
         np.concatenate([surface.vertices, walls.vertices]),
         np.concatenate([surface.faces, walls.faces]),
@@ -108,31 +108,31 @@ def add_walls(
     )
 
 
-def stand(
+def build_walls(
     vertices: Floats,
-    tops: Sequence[WallTop],
+    tops: Sequence[UpperEdge],
     edge_length: float,
     plane: Plane,
     fixed: Bools,
     floor: Floats | None = None,
-) -> Added:
+) -> WallMesh:
     """The walls under the given upper edges.
 
-    A wall is developed into the plane (length along its foot, height), meshed there with its upper
-    edge kept, and stood up again. Its ends are vertical lines, shared by all walls that end there;
-    where the end already lies on the floor, the line is that vertex alone. A line under a fixed
-    vertex is fixed, all others are free above their foot.
+    A wall is developed into the plane (length along its foot, height), meshed there without moving
+    its upper edge, and placed upright again. Its ends are vertical lines, shared by all walls that end
+    there; an end on the floor is a single vertex. A line under a fixed vertex is fixed; other lines
+    are free above their foot.
 
     Parameters
     ----------
     vertices : (n,3) of the mesh, in space.
     fixed : (n,) bool, its fixed vertices.
-    floor : (n,) the height above Π at which a wall ends below each vertex; 0 by default.
+    floor : (n,) the height above Π of the wall's bottom below each vertex; 0 by default.
 
     Raises
     ------
     SurfaceError
-        Where an upper edge does not lie above the floor.
+        If an upper edge is not above the floor.
     """
     local = to_local(vertices, plane)
     floor = np.zeros(len(vertices)) if floor is None else floor
@@ -147,11 +147,11 @@ def stand(
     held, sliding = (np.zeros(len(new), dtype=bool) for _ in range(2))
     held[sorted(builder.fixed_new)] = True
     sliding[sorted(builder.sliding_new)] = True
-    return Added(to_space(new, plane), faces, label, held, sliding & ~held)
+    return WallMesh(to_space(new, plane), faces, label, held, sliding & ~held)
 
 
 class _Builder:
-    """Walls so far, in the coordinates of Π: new vertices are numbered after the mesh's own."""
+    """The walls built so far, in the coordinates of Π; new vertices are numbered after the mesh's own."""
 
     def __init__(
         self, local: Floats, floor: Floats, fixed: Bools, edge_length: float, tolerance: float
@@ -165,7 +165,7 @@ class _Builder:
         self.sliding_new: set[int] = set()
         self.lines: dict[int, list[int]] = {}
 
-    def check(self, top: WallTop) -> None:
+    def check(self, top: UpperEdge) -> None:
         height = self.local[top.vertices, 2] - self.floor[top.vertices]
         inner = np.ones(len(height), dtype=bool)
         inner[[0, -1]] = False
@@ -176,7 +176,10 @@ class _Builder:
             raise SurfaceError(
                 f"no room for a wall under vertex {vertex}, {height[bad[0]]:.3g} above the wall's"
                 f" bottom, at {self.local[vertex].round(6).tolist()} ({len(bad)} such vertices);"
-                " raise it, or use shorter edges if both ends of the wall are held"
+                " raise it, or use shorter edges if both ends of the wall are held",
+                what="vertices",
+                where=int(vertex),
+                found=float(height[bad[0]]),
             )
 
     def line(self, vertex: int, held: bool) -> list[int]:
@@ -199,7 +202,7 @@ class _Builder:
             (self.fixed_new if held else self.sliding_new).add(ids[0] - len(self.local))
         return ids
 
-    def add_wall(self, top: WallTop) -> None:
+    def add_wall(self, top: UpperEdge) -> None:
         chain = top.vertices
         along = self._along(chain)
         left, right = self.line(int(chain[0]), top.held), self.line(int(chain[-1]), top.held)
@@ -278,7 +281,7 @@ def _labels(
 
 
 def _directed(surface: Surface, border: Curve) -> Ints:
-    """The border's vertices, its first patch to the left; first = last if closed."""
+    """The vertices of a border with its first patch on the left; first = last if closed."""
     chain = border.vertices
     if border.closed:
         chain = np.append(chain, chain[:1])
@@ -293,11 +296,16 @@ def _tensions(
     """The tension of each border's wall, by its pair of names."""
     if not isinstance(tension, Mapping):
         return dict.fromkeys(borders, float(tension))
-    found = {}
+    by_pair = {}
     for (a, b), value in tension.items():
         pair = (a, b) if (a, b) in borders else (b, a)
         if pair not in borders:
             known = [f"{p}-{q}" for p, q in sorted(borders)]
-            raise OptionError(unknown("border", f"{a}-{b}", known))
-        found[pair] = float(value)
-    return found
+            raise OptionError(
+                unknown("border", f"{a}-{b}", known),
+                what="tension",
+                where=(a, b),
+                expected=tuple(sorted(borders)),
+            )
+        by_pair[pair] = float(value)
+    return by_pair

@@ -1,12 +1,12 @@
 """Pictures of surfaces (pyvista) and of curves (matplotlib); needs the extra ``plot``, no display.
 
-Every function writes a PNG when given a path, and returns the picture as an (h,w,3) array of bytes.
+With a path every function writes a PNG; each returns the picture as an (h,w,3) array of bytes.
 """
 
+from .arrows import reactions, vectors
 from .curves import convergence, heatmap, histories, lines
 from .diagrams import diagram
-from .pictures import draw, panel, vectors
-from .supports import reactions
+from .pictures import draw, panel
 
 __all__ = [
     "convergence",

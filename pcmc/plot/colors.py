@@ -1,4 +1,4 @@
-"""Numbers as colours, and the scale that says which."""
+"""Numbers as colours, and the scale that explains them."""
 
 from __future__ import annotations
 
@@ -28,32 +28,43 @@ class ColorScale:
         colors[np.isnan(values)] = np.nan
         return colors
 
-    def bar(self, figure: Any, above: float, height: float, label: str) -> None:
-        """The scale at the foot of a figure, ``above`` pixels from its lower edge."""
+    def bar(self, figure: Any, axes: Sequence[Any], label: str) -> None:
+        """Draw the scale below the axes."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
 
-        axes = figure.add_axes((0.25, (above + 56.0) / height, 0.5, 14.0 / height))
-        bar = figure.colorbar(
-            ScalarMappable(Normalize(self.low, self.high), self.cmap), cax=axes,
-            orientation="horizontal",
-        )  # fmt: skip
-        bar.outline.set(linewidth=0.5)
-        bar.ax.tick_params(labelsize=SMALL, width=0.5, length=2.0, pad=1.5, colors=INK)
+        bar = color_bar(
+            figure, ScalarMappable(Normalize(self.low, self.high), self.cmap), axes, label
+        )
         bar.ax.locator_params(nbins=5)
         bar.formatter.set_powerlimits((-3, 4))
-        bar.ax.xaxis.get_offset_text().set(size=SMALL)
-        bar.set_label(label, size=SMALL, color=INK, labelpad=2.0)
+
+
+def color_bar(figure: Any, mappable: Any, axes: Sequence[Any], label: str) -> Any:
+    """A horizontal scale below the axes, half as wide as they are together."""
+    bar = figure.colorbar(mappable, ax=axes, location="bottom", shrink=0.5, aspect=34)
+    bar.outline.set(linewidth=0.5)
+    bar.ax.tick_params(labelsize=SMALL, width=0.5, length=2.0, pad=1.5, colors=INK)
+    bar.ax.xaxis.get_offset_text().set(size=SMALL)
+    bar.set_label(label, size=SMALL, color=INK, labelpad=2.0)
+    return bar
+
+
+def color_map(name: str) -> Any:
+    """The matplotlib colour map of this name."""
+    try:
+        from matplotlib import colormaps
+    except ImportError:
+        raise MissingExtra("matplotlib", "plot") from None
+    if name not in colormaps:
+        raise OptionError(unknown("cmap", name, sorted(colormaps)), what="cmap", found=name)
+    return colormaps[name]
 
 
 def color_scale(
     values: Sequence[Floats | None], limits: tuple[float, float] | None, cmap: str | None
 ) -> ColorScale | None:
     """The scale for all the values together, or None when there are none."""
-    try:
-        from matplotlib import colormaps
-    except ImportError:
-        raise MissingExtra("matplotlib", "plot") from None
     if all(v is None for v in values):
         return None
     every = np.concatenate([v for v in values if v is not None])
@@ -63,12 +74,14 @@ def color_scale(
     if limits is not None:
         low, high = (float(v) for v in limits)
         if not (np.isfinite([low, high]).all() and low < high):
-            raise OptionError(f"limits: expected two finite numbers, low < high, found {limits!r}")
+            raise OptionError(
+                f"limits: expected two finite numbers, low < high, found {limits!r}",
+                what="limits",
+                found=limits,
+                expected="low < high",
+            )
     elif signed:
         low, high = -max(-least, most), max(-least, most)
     else:
         low, high = least, most
-    name = cmap or ("RdBu_r" if signed else "viridis")
-    if name not in colormaps:
-        raise OptionError(unknown("cmap", name, sorted(colormaps)))
-    return ColorScale(low, high, colormaps[name])
+    return ColorScale(low, high, color_map(cmap or ("RdBu_r" if signed else "viridis")))

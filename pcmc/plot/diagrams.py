@@ -10,14 +10,14 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import OptionError, unknown
-from .curves import _axes, _key
+from .curves import add_legend, new_axes
 from .figure import CURVES, Image, finish
 
 if TYPE_CHECKING:
     from ..continuation import Branch
 
-SIGNS = {"fold": "o", "index": "D", "contact": "x"}
-WORDS = {"fold": "fold", "index": "change of index", "contact": "change of contact"}
+MARKERS = {"fold": "o", "index": "D", "contact": "x"}
+MEANINGS = {"fold": "fold", "index": "change of index", "contact": "change of contact"}
 
 
 def diagram(
@@ -36,24 +36,38 @@ def diagram(
 
     Folds, changes of index and changes of contact are marked.
     """
-    figure, axes = _axes(width, height, title, xlabel or x, ylabel or y)
+    figure, axes = new_axes(width, height, title, xlabel or x, ylabel or y)
     marked: set[str] = set()
     for k, (label, branch) in enumerate(branches.items()):
         for column in (x, y):
             if column not in branch.events.columns:
-                raise OptionError(f"branch {label!r}: {unknown('column', column, _shown(branch))}")
+                raise OptionError(
+                    f"branch {label!r}: {unknown('column', column, _columns(branch))}",
+                    what="branches",
+                    where=label,
+                    found=column,
+                )
         color = CURVES[k % len(CURVES)]
         named = label
         for stable, (px, py) in _pieces(branch, x, y):
-            axes.plot(px, py, color=color, linewidth=1.1, linestyle="-" if stable else "--",
-                      label=named)  # fmt: skip
+            axes.plot(
+                px, py, color=color, linewidth=1.1, linestyle="-" if stable else "--", label=named
+            )
             named = ""
         for kind, rows in branch.events.groupby("kind", sort=False):
-            text = "" if kind in marked else WORDS[str(kind)]
+            text = "" if kind in marked else MEANINGS[str(kind)]
             marked.add(str(kind))
-            axes.plot(rows[x], rows[y], SIGNS[str(kind)], color=color, markersize=3.6,
-                      markerfacecolor="white", markeredgewidth=0.8, label=text)  # fmt: skip
-    _key(axes, len(branches) + len(marked))
+            axes.plot(
+                rows[x],
+                rows[y],
+                MARKERS[str(kind)],
+                color=color,
+                markersize=3.6,
+                markerfacecolor="white",
+                markeredgewidth=0.8,
+                label=text,
+            )
+    add_legend(axes, len(branches) + len(marked))
     return finish(figure, path)
 
 
@@ -74,5 +88,5 @@ def _pieces(branch: Branch, x: str, y: str) -> list[tuple[bool, tuple[Floats, Fl
     return pieces
 
 
-def _shown(branch: Branch) -> list[Any]:
+def _columns(branch: Branch) -> list[Any]:
     return [name for name in branch.events.columns if name in branch.points.columns]

@@ -1,9 +1,10 @@
-"""One look for every figure: fonts, sizes, and how it becomes a file."""
+"""The common style of all figures, their layout, and their PNG files."""
 
 from __future__ import annotations
 
 import io
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,16 +23,51 @@ CURVES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#00
 Image = npt.NDArray[np.uint8]
 
 
-def new(width: float, height: float) -> Any:
-    """A figure of the given size in pixels, drawn by Agg; no global state."""
+def new(width: float, height: float, pad: float = 4.0) -> Any:
+    """A figure of the given size in pixels, drawn by Agg; no global state.
+
+    Matplotlib's constrained layout places its parts, ``pad`` pixels apart.
+    """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
+        from matplotlib.layout_engine import ConstrainedLayoutEngine
     except ImportError:
         raise MissingExtra("matplotlib", "plot") from None
-    figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
+    gap = pad / DPI
+    layout = ConstrainedLayoutEngine(w_pad=gap, h_pad=gap, wspace=0.0, hspace=0.0)
+    size = (width / DPI, height / DPI)
+    figure = Figure(figsize=size, dpi=DPI, facecolor="white", layout=layout)
     FigureCanvasAgg(figure)
     return figure
+
+
+def grid(figure: Any, count: int, columns: int, **options: Any) -> tuple[list[Any], int]:
+    """``count`` axes in rows of ``columns``, and the number of rows."""
+    rows = -(-count // columns)
+    axes = figure.subplots(rows, columns, squeeze=False, **options).ravel().tolist()
+    for unused in axes[count:]:
+        unused.remove()
+    return axes[:count], rows
+
+
+def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
+    """Choose the figure's height so that each row of axes has its ratio of height to width.
+
+    Parameters
+    ----------
+    ratios : height / width by axes, one of each row. Titles, labels, scales and legends take the
+        space that the layout finds for them. The layout is then final: nothing moves any more.
+    """
+    for _ in range(4):
+        figure.draw_without_rendering()
+        boxes = {axes: axes.get_window_extent() for axes in ratios}
+        missing = sum(
+            ratio * boxes[axes].width - boxes[axes].height for axes, ratio in ratios.items()
+        )
+        figure.set_figheight(round(figure.get_figheight() * DPI + missing) / DPI)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
 
 
 def style(axes: Any) -> Any:
@@ -47,8 +83,8 @@ def style(axes: Any) -> Any:
     return axes
 
 
-def apart(k: int, count: int) -> dict[str, Any]:
-    """How to draw curve ``k`` of ``count`` so that those drawn before it are seen where it covers them.
+def overlap_style(k: int, count: int) -> dict[str, Any]:
+    """Line style of curve ``k`` of ``count`` by which curves that lie on each other all stay visible.
 
     The first is wide and solid, the others are thinner and thinner, dashed in each other's gaps.
     """
@@ -61,8 +97,8 @@ def apart(k: int, count: int) -> dict[str, Any]:
 def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
     """The figure as an (h,w,3) image, written as a PNG if there is a path.
 
-    The file says nothing of when and by what it was made: the same figure gives the same bytes.
-    Above 145 kB it is written again in 256 colours.
+    The file has no date and no program's name: the same figure gives the same bytes.
+    Above 145 kB it has 256 colours only.
     """
     from PIL import Image as Pillow
 
@@ -71,7 +107,12 @@ def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
     if path is None:
         return image
     if os.path.splitext(path)[1].lower() != ".png":
-        raise FileError(f"{os.fspath(path)}: pictures are PNG files; end the name with .png")
+        raise FileError(
+            f"{os.fspath(path)}: pictures are PNG files; end the name with .png",
+            what=os.fspath(path),
+            found=os.path.splitext(path)[1],
+            expected=".png",
+        )
     picture = Pillow.fromarray(image)
     stream = io.BytesIO()
     picture.save(stream, format="PNG", optimize=True)
@@ -85,5 +126,5 @@ def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
             temporary.write_bytes(stream.getvalue())
     except OSError as error:
         text = f"{os.fspath(path)}: cannot be written ({error.strerror or error})"
-        raise FileError(text) from None
+        raise FileError(text, what=os.fspath(path)) from None
     return image

@@ -1,4 +1,4 @@
-"""Surfaces: one, several side by side, and vector fields on one."""
+"""Pictures of surfaces: one, or several side by side."""
 
 from __future__ import annotations
 
@@ -14,23 +14,20 @@ import numpy.typing as npt
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..surface import Surface
-from ..surface.colours import patch_colors
 from ..surface.geometry import area_vectors
 from .colors import color_scale
-from .figure import DPI, INK, SMALL, TEXT, Image, finish, new
+from .figure import INK, SMALL, TEXT, Image, finish, fit_height, grid, new
+from .legend import add_legend, shown_vertices
 from .raster import paint
-from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, View, mean_edge, scene, view_of
+from .scene import View, mean_edge, scene, view_of
 
 Path = str | os.PathLike[str]
 ViewName = str | tuple[float, float]
 
 MARGIN = 10.0  # pixels around each picture, for lines and dots that stick out
-TITLE, BAR, LEGEND = 34.0, 92.0, 34.0  # pixels of height
 EDGES_FROM = 9.0  # pixels: a mesh edge shorter than this is not drawn
 DOTS_FROM = 7.0  # pixels: nor are supports closer together than this
-NAMES = 6  # in a line of the legend
 TALLEST = 1.1  # height of a picture at most, as a part of its width
-ARROW = "#B2182B"
 
 
 def draw(
@@ -63,10 +60,10 @@ def draw(
     limits : range of the scale; by default that of the values, symmetric if they have both signs.
     cmap : a matplotlib colour map; by default "viridis", or "RdBu_r" if the values have both signs.
     supports : dots, red at fixed vertices and blue at sliding ones.
-    edges : the mesh's edges; by default where they are long enough to be told apart.
+    edges : the mesh's edges; by default if they are long enough to be distinguished.
     numbers : (n,) values printed at the vertices that face the viewer, NaN not.
     form : the format of the numbers.
-    legend : what the colours mean: patches, or places without a value; supports.
+    legend : explain the colours of patches, supports, and places without a value.
     patches : names of those to draw, such as the walls; by default all.
     width : of the picture in pixels.
     renderer : "pyvista", "matplotlib", or "auto": pyvista where the system has OpenGL.
@@ -81,11 +78,23 @@ def draw(
     MissingExtra : when pyvista or matplotlib is not installed.
     """
     return panel(
-        [surface], path, views=[view], scalars=None if scalars is None else [scalars], label=label,
-        limits=limits, cmap=cmap, supports=supports, edges=edges, patches=patches,
-        numbers=None if numbers is None else [numbers], form=form, legend=legend,
-        titles=[title] if title else (), width=width, renderer=renderer,
-    )  # fmt: skip
+        [surface],
+        path,
+        views=[view],
+        scalars=None if scalars is None else [scalars],
+        label=label,
+        limits=limits,
+        cmap=cmap,
+        supports=supports,
+        edges=edges,
+        patches=patches,
+        numbers=None if numbers is None else [numbers],
+        form=form,
+        legend=legend,
+        titles=[title] if title else (),
+        width=width,
+        renderer=renderer,
+    )
 
 
 def panel(
@@ -113,161 +122,152 @@ def panel(
 
     ``views``, ``scalars``, ``numbers`` and ``patches`` are one per surface (``views`` and ``patches``
     may be one for all).
-    ``one_scale`` draws a length equally long everywhere; without it what is drawn of each surface
-    fills its place.
+    ``one_scale`` draws a length equally long everywhere; without it each surface fills its place.
     The rest is as in ``draw``.
     """
-    if not len(surfaces):
-        raise OptionError("panel: expected at least one surface, found none")
-    count = len(surfaces)
-    given = _per_surface("views", [views] * count if _is_view(views) else views, count)
-    named = _per_surface("titles", titles, count) if len(titles) else [""] * count
-    values = _arrays("scalars", scalars, surfaces, faces=True)
-    printed = _arrays("numbers", numbers, surfaces, faces=False)
-    parts = _parts(patches, count)
-    scale = color_scale(values, limits, cmap)
-    seen = [view_of(s, v) for s, v in zip(surfaces, given, strict=True)]
-    flat = [
-        v.project(s.vertices if one_scale else s.vertices[_shown(s, part)])
-        for s, v, part in zip(surfaces, seen, parts, strict=True)
-    ]
-    tiles, height = _arrange(flat, columns, width, TITLE if len(titles) else 0.0, one_scale)
-    spacings = [mean_edge(s) * tile.scale for s, tile in zip(surfaces, tiles, strict=True)]
-    dotted = [supports and spacing >= DOTS_FROM for spacing in spacings]
-    names = _meanings(surfaces, parts, values, dotted) if legend else []
-    key = LEGEND * math.ceil(len(names) / NAMES)
-    foot = (BAR if scale else 0.0) + key
-    figure = new(width, height + foot)
-    for k, tile in enumerate(tiles):
-        value, number = values[k], printed[k]
-        one = scene(
-            surfaces[k],
-            seen[k],
-            None if scale is None or value is None else scale.rgb(value),
+    drawings = _drawings(surfaces, views, titles, scalars, numbers, patches)
+    columns = min(columns or (3 if len(drawings) not in (1, 2, 4) else 2), len(drawings))
+    frames = frames_of(
+        [drawing.points(one_scale) for drawing in drawings], columns, width, one_scale
+    )
+    edge = [mean_edge(d.surface) * f.scale for d, f in zip(drawings, frames, strict=True)]
+    dotted = [supports and length >= DOTS_FROM for length in edge]
+    colors = color_scale([drawing.values for drawing in drawings], limits, cmap)
+    figure, axes = frame_axes(frames, columns, width)
+    for place, drawing in zip(axes, drawings, strict=True):
+        place.set_title(drawing.title, fontsize=TEXT, color=INK, pad=5.0)
+    if colors is not None:
+        colors.bar(figure, axes, label)
+    if legend:
+        shown = [
+            (d.surface, d.patches, d.values, dots) for d, dots in zip(drawings, dotted, strict=True)
+        ]
+        add_legend(figure, shown)
+    fit_frames(figure, axes, frames, columns)
+    for k, drawing in enumerate(drawings):
+        painted = scene(
+            drawing.surface,
+            drawing.view,
+            None if colors is None or drawing.values is None else colors.rgb(drawing.values),
             supports=dotted[k],
-            edges=spacings[k] >= EDGES_FROM if edges is None else edges,
-            patches=parts[k],
+            edges=edge[k] >= EDGES_FROM if edges is None else edges,
+            patches=drawing.patches,
         )
-        axes = _axes(figure, tile, height + foot)
-        axes.imshow(paint(one, tile.low, tile.scale, tile.size, renderer), extent=tile.extent)
-        axes.set_title(named[k], fontsize=TEXT, color=INK, pad=5.0)
-        if number is not None:
-            _print_numbers(axes, surfaces[k], seen[k], number, form)
-    if scale is not None:
-        scale.bar(figure, key, height + foot, label)
-    if names:
-        _legend(figure, names)
-    return finish(figure, path)
-
-
-def vectors(
-    surface: Surface,
-    field: npt.ArrayLike,
-    path: Path | None = None,
-    *,
-    length: float = 0.12,
-    most: int = 400,
-    view: ViewName = "diagonal",
-    label: str = "",
-    title: str = "",
-    supports: bool = True,
-    edges: bool | None = None,
-    width: int = 900,
-    renderer: str = "auto",
-) -> Image:
-    """Vectors at the vertices (a mode, the reactions, the forces) as arrows on the surface.
-
-    Parameters
-    ----------
-    field : (n,3).
-    length : of the longest arrow, as a part of the surface's size.
-    most : number of arrows; where there would be more, the longest of each neighbourhood shows.
-    label : beside the arrow of unit (or round) length that tells the scale.
-    view, title, supports, edges, width, renderer : as in ``draw``.
-    """
-    arrows = np.asarray(field, dtype=float)
-    if arrows.shape != (surface.n, 3) or not np.isfinite(arrows).all():
-        raise OptionError(
-            f"field: expected finite numbers of shape ({surface.n}, 3), found {arrows.shape}"
+        frames[k].show(
+            axes[k], paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer)
         )
-    seen = view_of(surface, view)
-    longest = float(np.linalg.norm(arrows, axis=1).max())
-    stretch = length * surface.size / longest if longest > 0.0 else 0.0
-    at = seen.project(surface.vertices)
-    tips = at + stretch * seen.project(arrows)
-    tiles, height = _arrange([np.concatenate([at, tips])], 1, width, TITLE if title else 0.0)
-    tile = tiles[0]
-    spacing = mean_edge(surface) * tile.scale
-    one = scene(
-        surface, seen, None, supports=supports and spacing >= DOTS_FROM,
-        edges=spacing >= EDGES_FROM if edges is None else edges,
-    )  # fmt: skip
-    figure = new(width, height + (LEGEND if label else 0.0))
-    axes = _axes(figure, tile, height + (LEGEND if label else 0.0))
-    axes.imshow(paint(one, tile.low, tile.scale, tile.size, renderer), extent=tile.extent)
-    axes.set_title(title, fontsize=TEXT, color=INK, pad=5.0)
-    if longest > 0.0:
-        chosen = _thinned(at, np.linalg.norm(arrows, axis=1), most)
-        quiver = axes.quiver(
-            *at[chosen].T, *(tips - at)[chosen].T, angles="xy", scale_units="xy", scale=1.0,
-            color=ARROW, width=2.2 / width, headwidth=4.0, headlength=5.0, headaxislength=4.5,
-        )  # fmt: skip
-        if label:
-            unit = float(f"{longest:.1g}")
-            axes.quiverkey(
-                quiver, 0.5, -LEGEND / 2.0 / tile.size[1], unit * stretch,
-                f"{unit:g} {label}", labelpos="E", fontproperties={"size": SMALL}, labelcolor=INK,
-            )  # fmt: skip
+        if drawing.numbers is not None:
+            _print_numbers(axes[k], drawing.surface, drawing.view, drawing.numbers, form)
     return finish(figure, path)
 
 
 @dataclass(frozen=True, eq=False)
-class _Tile:
-    """A rectangle of pixels (from the upper left) and the picture coordinates in it."""
+class Drawing:
+    """One surface of a picture: where it is seen from and what is shown on it."""
 
-    corner: tuple[int, int]
+    surface: Surface
+    view: View
+    title: str
+    values: Floats | None  # (n,) or (m,), shown as colours
+    numbers: Floats | None  # (n,), printed at the vertices
+    patches: Sequence[str] | None  # the names of those to draw; None: all
+
+    def points(self, every: bool) -> Floats:
+        """(k,2) picture coordinates of every vertex, or of those on the patches drawn."""
+        X = self.surface.vertices
+        return self.view.project(X if every else X[shown_vertices(self.surface, self.patches)])
+
+
+def _drawings(
+    surfaces: Sequence[Surface], views: Any, titles: Any, scalars: Any, numbers: Any, patches: Any
+) -> list[Drawing]:
+    """One for each surface, from the arguments of ``panel``."""
+    count = len(surfaces)
+    if not count:
+        raise OptionError(
+            "panel: expected at least one surface, found none", what="surfaces", found=0
+        )
+    if _is_view(views):
+        views = [views] * count
+    if patches is None or all(isinstance(entry, str) for entry in patches):
+        patches = [patches] * count
+    columns = (
+        list(surfaces),
+        [
+            view_of(*pair)
+            for pair in zip(surfaces, _per_surface("views", views, count), strict=True)
+        ],
+        _per_surface("titles", titles, count) if len(titles) else [""] * count,
+        _arrays("scalars", scalars, surfaces, faces=True),
+        _arrays("numbers", numbers, surfaces, faces=False),
+        _per_surface("patches", patches, count),
+    )
+    return [Drawing(*row) for row in zip(*columns, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A rectangle of pixels and the picture coordinates in it.
+
+    Attributes
+    ----------
+    size : width and height in pixels.
+    low : (2,) picture coordinates of the lower left corner.
+    scale : pixels per unit of length.
+    """
+
     size: tuple[int, int]
     low: Floats
     scale: float
 
-    @property
-    def extent(self) -> tuple[float, float, float, float]:
+    def show(self, axes: Any, image: Floats) -> None:
+        """Show an image of this size on the axes, pixel on pixel."""
         right, top = self.low + np.array(self.size) / self.scale
-        return (float(self.low[0]), float(right), float(self.low[1]), float(top))
+        figure, box = axes.figure.bbox, axes.get_window_extent()
+        corner = (
+            round(box.x0) / figure.width,
+            (figure.height - round(figure.height - box.y1) - self.size[1]) / figure.height,
+        )
+        axes.set_position((*corner, self.size[0] / figure.width, self.size[1] / figure.height))
+        axes.imshow(image, extent=(self.low[0], right, self.low[1], top), aspect="auto")
 
 
-def _arrange(
-    flat: Sequence[Floats], columns: int | None, width: int, title: float, one_scale: bool = True
-) -> tuple[list[_Tile], int]:
-    """Tiles around the given points (k,2), row by row, and the height of all."""
-    count = len(flat)
-    columns = min(columns or (count if count <= 3 else 2 if count == 4 else 3), count)
-    lows = np.array([f.min(axis=0) for f in flat])
-    spans = np.array([np.ptp(f, axis=0) for f in flat])
+def frames_of(
+    points: Sequence[Floats], columns: int, width: int, one_scale: bool = True
+) -> list[Frame]:
+    """Frames around the given points (k,2), row by row; those of a row are of one height."""
+    lows = np.array([p.min(axis=0) for p in points])
+    spans = np.array([np.ptp(p, axis=0) for p in points])
     wide = width // columns
     room = np.array([wide, TALLEST * wide]) - 2 * MARGIN
     scales = (room / np.maximum(spans, 1e-9 * spans.max())).min(axis=1)
     if one_scale:
         scales[:] = scales.min()
-    tiles, top = [], 0.0
-    for start in range(0, count, columns):
-        row = range(start, min(start + columns, count))
+    frames = []
+    for start in range(0, len(points), columns):
+        row = range(start, min(start + columns, len(points)))
         high = math.ceil(max(spans[k][1] * scales[k] for k in row) + 2 * MARGIN)
         for k in row:
             beside = (wide / scales[k] - spans[k][0]) / 2.0
             low = lows[k] - np.array([beside, MARGIN / scales[k]])
-            corner = ((k - start) * wide, int(top + title))
-            tiles.append(_Tile(corner, (wide, high), low, float(scales[k])))
-        top += title + high
-    return tiles, math.ceil(top)
+            frames.append(Frame((wide, high), low, float(scales[k])))
+    return frames
 
 
-def _axes(figure: Any, tile: _Tile, height: float) -> Any:
-    width = figure.get_figwidth() * DPI
-    (x, y), (w, h) = tile.corner, tile.size
-    axes = figure.add_axes((x / width, 1.0 - (y + h) / height, w / width, h / height))
-    axes.set_axis_off()
-    return axes
+def frame_axes(frames: Sequence[Frame], columns: int, width: int) -> tuple[Any, list[Any]]:
+    """A figure with axes for the frames, without ticks and lines."""
+    heights = [frame.size[1] for frame in frames[::columns]]
+    figure = new(width, sum(heights) + 100.0, pad=0.0)
+    axes, _ = grid(figure, len(frames), columns, height_ratios=heights)
+    for one in axes:
+        one.set_axis_off()
+    return figure, axes
+
+
+def fit_frames(figure: Any, axes: Sequence[Any], frames: Sequence[Frame], columns: int) -> None:
+    """Give the figure the height that its frames need."""
+    first = zip(axes[::columns], frames[::columns], strict=True)
+    fit_height(figure, {one: frame.size[1] / frame.size[0] for one, frame in first})
 
 
 def _print_numbers(axes: Any, surface: Surface, view: View, numbers: Floats, form: str) -> None:
@@ -276,9 +276,15 @@ def _print_numbers(axes: Any, surface: Surface, view: View, numbers: Floats, for
     shown = np.flatnonzero(np.isfinite(numbers) & _facing(surface, view))
     for (x, y), number in zip(view.project(surface.vertices[shown]), numbers[shown], strict=True):
         axes.text(
-            x, y, format(number, form), fontsize=SMALL, color=INK, ha="center", va="center",
+            x,
+            y,
+            format(number, form),
+            fontsize=SMALL,
+            color=INK,
+            ha="center",
+            va="center",
             path_effects=[withStroke(linewidth=1.4, foreground="white")],
-        )  # fmt: skip
+        )
 
 
 def _facing(surface: Surface, view: View) -> Bools:
@@ -290,74 +296,6 @@ def _facing(surface: Surface, view: View) -> Bools:
     return np.bincount(F.ravel(), towards, surface.n) > 0.0
 
 
-def _parts(patches: Any, count: int) -> list[Sequence[str] | None]:
-    """The names of the patches to draw, or None for all, for each surface."""
-    if patches is None or all(isinstance(entry, str) for entry in patches):
-        return [patches] * count
-    return _per_surface("patches", patches, count)
-
-
-def _shown(surface: Surface, patches: Sequence[str] | None) -> Bools:
-    """(n,) vertices of the patches drawn."""
-    shown = np.full(surface.n, patches is None)
-    faces = surface.patch_faces([surface.patch_index(name) for name in patches or ()])
-    shown[surface.faces[faces]] = True
-    return shown
-
-
-def _meanings(
-    surfaces: Sequence[Surface],
-    parts: Sequence[Sequence[str] | None],
-    values: Sequence[Floats | None],
-    dotted: Sequence[bool],
-) -> list[tuple[str, Any, bool]]:
-    """Name, colour and whether it is a dot, of all that a picture's colours can mean."""
-    colors: dict[str, Any] = {}
-    dots: dict[str, Any] = {}
-    for surface, part, value, supports in zip(surfaces, parts, values, dotted, strict=True):
-        shown = _shown(surface, part)
-        for patch, color in zip(surface.patches, patch_colors(surface), strict=True):
-            if value is None and (part is None or patch.name in part):
-                colors.setdefault(patch.name, tuple(color))
-        if value is not None and np.isnan(value[shown] if len(value) == surface.n else value).any():
-            colors["no value"] = NO_VALUE
-        if supports and surface.fixed[shown].any():
-            dots["fixed"] = FIXED_DOT
-        if supports and surface.on_plane[shown].any():
-            dots["sliding"] = SLIDING_DOT
-    return [(n, c, False) for n, c in colors.items()] + [(n, c, True) for n, c in dots.items()]
-
-
-def _legend(figure: Any, names: Sequence[tuple[str, Any, bool]]) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch as Swatch
-
-    drawn: list[Any] = [
-        Line2D([], [], linestyle="", marker="o", markersize=2.6, color=color, label=name)
-        if dot
-        else Swatch(facecolor=color, edgecolor=INK, linewidth=0.4, label=name)
-        for name, color, dot in names
-    ]
-    figure.legend(
-        handles=drawn, loc="lower center", ncols=min(len(names), NAMES), fontsize=SMALL,
-        frameon=False, labelcolor=INK, handlelength=1.2, handleheight=1.0, borderaxespad=0.3,
-    )  # fmt: skip
-
-
-def _thinned(at: Floats, size: Floats, most: int) -> npt.NDArray[np.intp]:
-    """Indices of the longest arrow in each square of a grid of about ``most`` squares."""
-    keep = np.flatnonzero(size > 1e-6 * size.max())
-    if len(keep) <= most:
-        return keep
-    span = np.ptp(at[keep], axis=0)
-    cell = np.sqrt(max(span[0] * span[1], 1e-12 * span.max() ** 2) / most)
-    square = np.floor((at[keep] - at[keep].min(axis=0)) / cell).astype(np.int64)
-    order = np.lexsort((-size[keep], square[:, 1], square[:, 0]))
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = (np.diff(square[order], axis=0) != 0).any(axis=1)
-    return keep[order[first]]
-
-
 def _is_view(view: object) -> bool:
     return isinstance(view, str) or (
         isinstance(view, Sequence) and len(view) == 2 and not isinstance(view[0], str | Sequence)
@@ -366,7 +304,12 @@ def _is_view(view: object) -> bool:
 
 def _per_surface(name: str, entries: Any, count: int) -> list[Any]:
     if len(entries) != count:
-        raise OptionError(f"{name}: expected {count}, one per surface, found {len(entries)}")
+        raise OptionError(
+            f"{name}: expected {count}, one per surface, found {len(entries)}",
+            what=name,
+            found=len(entries),
+            expected=count,
+        )
     return list(entries)
 
 
@@ -385,6 +328,11 @@ def _arrays(
         shapes = [(surface.n,), (surface.m,)] if faces else [(surface.n,)]
         if array is not None and array.shape not in shapes:
             wanted = " or ".join(map(str, shapes))
-            raise OptionError(f"{name}: expected shape {wanted}, found {array.shape}")
+            raise OptionError(
+                f"{name}: expected shape {wanted}, found {array.shape}",
+                what=name,
+                found=array.shape,
+                expected=shapes,
+            )
         result.append(array)
     return result

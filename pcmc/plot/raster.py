@@ -1,5 +1,4 @@
-"""Two painters of a Scene. pyvista where the system can open an OpenGL window off screen, else
-matplotlib, triangle over triangle from back to front."""
+"""Two painters of a Scene: pyvista if the system has OpenGL, else matplotlib, from back to front."""
 
 from __future__ import annotations
 
@@ -27,7 +26,7 @@ def paint(
     ``scale`` is pixels per unit of length, ``size`` (w, h) in pixels.
     """
     if renderer not in RENDERERS:
-        raise OptionError(unknown("renderer", renderer, RENDERERS))
+        raise OptionError(unknown("renderer", renderer, RENDERERS), what="renderer", found=renderer)
     if renderer == "pyvista" or (renderer == "auto" and opengl()):
         return _with_pyvista(scene, low, scale, size)
     return _with_matplotlib(scene, low, scale, size)
@@ -35,7 +34,7 @@ def paint(
 
 @cache
 def opengl() -> bool:
-    """Whether VTK can draw here. A child tries it: without a driver VTK ends the process."""
+    """Whether VTK can draw here. A child process tries it: without a driver VTK aborts the process."""
     _pyvista()
     probe = (
         "import vtkmodules.vtkRenderingOpenGL2\n"
@@ -78,9 +77,14 @@ def _with_pyvista(scene: Scene, low: Floats, scale: float, size: tuple[int, int]
             dots = pyvista.PolyData(scene.dots)
             dots["rgb"] = np.round(scene.dot_colors * 255.0).astype(np.uint8)
             plotter.add_mesh(
-                dots, scalars="rgb", rgb=True, lighting=False, style="points",
-                render_points_as_spheres=True, point_size=SAMPLES * DOT,
-            )  # fmt: skip
+                dots,
+                scalars="rgb",
+                rgb=True,
+                lighting=False,
+                style="points",
+                render_points_as_spheres=True,
+                point_size=SAMPLES * DOT,
+            )
         _aim(plotter, scene, low, scale, size)
         image = plotter.screenshot(return_img=True)
         plotter.close()
@@ -126,10 +130,16 @@ def _with_matplotlib(scene: Scene, low: Floats, scale: float, size: tuple[int, i
     axes.set_axis_off()
     axes.set_xlim(low[0], low[0] + size[0] / scale)
     axes.set_ylim(low[1], low[1] + size[1] / scale)
-    axes.add_collection(PolyCollection(
-        [shapes[k] for k in order], facecolors=fills[order], edgecolors=fills[order],
-        linewidths=widths[order], closed=True, joinstyle="round",
-    ))  # fmt: skip
+    axes.add_collection(
+        PolyCollection(
+            [shapes[k] for k in order],
+            facecolors=fills[order],
+            edgecolors=fills[order],
+            linewidths=widths[order],
+            closed=True,
+            joinstyle="round",
+        )
+    )
     canvas.draw()
     image = np.asarray(canvas.buffer_rgba())[..., :3]
     image = image[: size[1] * SAMPLES, : size[0] * SAMPLES]

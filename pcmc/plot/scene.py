@@ -1,7 +1,7 @@
-"""A surface as coloured triangles, lines and dots, seen from somewhere: all but the painting.
+"""A surface as coloured triangles, lines and dots, in a view: everything except the painting.
 
 Projection is parallel throughout, so lengths can be compared between pictures and text can be
-placed on the vertices. Light and colour are settled here, and so the same whatever paints.
+placed on the vertices. Light and colour are computed here, so both painters show the same.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LIFT = 2e-3  # of the size: lines and dots stand this much before the surface th
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Where from: unit vectors to the right, upwards and towards the viewer, as rows of (3,3)."""
+    """The direction of view: unit vectors right, up and towards the viewer, as rows of (3,3)."""
 
     axes: Floats
 
@@ -50,7 +50,7 @@ def view_of(surface: Surface, view: str | tuple[float, float]) -> View:
     """
     if isinstance(view, str):
         if view not in VIEWS:
-            raise OptionError(unknown("view", view, VIEWS))
+            raise OptionError(unknown("view", view, VIEWS), what="view", found=view)
         view = VIEWS[view]
     azimuth, elevation = (math.radians(a) for a in view)
     up = np.array(surface.plane.normal)
@@ -66,7 +66,7 @@ def view_of(surface: Surface, view: str | tuple[float, float]) -> View:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What to paint.
+    """Everything that a painter needs.
 
     Attributes
     ----------
@@ -129,9 +129,16 @@ def scene(
         _nearest_vertex(surface, F, near)[held],
     ]
     return Scene(
-        view, P, np.clip(colors, 0.0, 1.0), ends, widths, shades, points, kinds,
+        view,
+        P,
+        np.clip(colors, 0.0, 1.0),
+        ends,
+        widths,
+        shades,
+        points,
+        kinds,
         np.argsort(np.concatenate(depth), kind="stable"),
-    )  # fmt: skip
+    )
 
 
 def _nearest(surface: Surface, shown: Bools, near: Floats) -> Floats:

@@ -1,18 +1,18 @@
-"""A whole design in one TOML file: plan, solver, remeshing, targets and what is written.
+"""A whole design in one TOML file: plan, solver, remeshing, targets, output.
 
-::
+``sections()`` lists every section and key of a project file; ``reference()`` prints the list::
 
-    [plan]                    # keys as of pcmc.plan.Plan
+    [plan]
     edge_length = 1.0
     outline = [[0, 0], [8, 0], [8, 4], [0, 4]]
     patches = {roof = {tension = 3.0}}
 
-    [solve]                   # method, and the options of the method
+    [solve]                   # the solver and its options
     target = "minimum"
 
-    [remesh]                  # optional: keys as of pcmc.remesh.remesh, and when
+    [remesh]                  # optional
     edge_length = 0.5
-    when = "after"            # solved, remeshed, solved again; or "before" it is solved
+    when = "after"            # solved, remeshed, solved again; or "before" solving
 
     [targets]                 # optional
     meet = [{quantity = "apex", of = "roof", value = 1.0}]
@@ -24,18 +24,21 @@
 """
 
 from .file import Project, build, load, surface_of
+from .keys import REQUIRED, Key, Section, reference, sections
 from .output import COLOURS, check_names, check_outputs, check_picture, paint, save, write_all
 from .remeshing import Remeshing
-from .running import Outcome, carry_out, reporter, run, settle, uninterrupted
+from .running import Outcome, raise_if_stopped, reporter, run, run_project, solve_project
 from .varied import check_varied, digest, is_project, varied
 
 __all__ = [
     "COLOURS",
+    "REQUIRED",
+    "Key",
     "Outcome",
     "Project",
     "Remeshing",
+    "Section",
     "build",
-    "carry_out",
     "check_names",
     "check_outputs",
     "check_picture",
@@ -44,12 +47,15 @@ __all__ = [
     "is_project",
     "load",
     "paint",
+    "raise_if_stopped",
+    "reference",
     "reporter",
     "run",
+    "run_project",
     "save",
-    "settle",
+    "sections",
+    "solve_project",
     "surface_of",
-    "uninterrupted",
     "varied",
     "write_all",
 ]

@@ -1,4 +1,4 @@
-"""What a project file says, read and checked."""
+"""Reading a project file: every key and value is checked before any work."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 from .. import io
 from ..base.errors import FileError, OptionError, PcmcError
 from ..plan import Plan, plan_from
+from ..solvers import find_method
 from ..surface import Surface
-from .keys import check_keys, entries, options_of, tables
+from .checking import check_keys
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
 
@@ -22,26 +23,21 @@ if TYPE_CHECKING:
     from ..design import Parameter, Target
 
 PathLike = str | os.PathLike[str]
-WRONG_KIND = (
-    TypeError,
-    ValueError,
-    AttributeError,
-)  # what a text for a number and the like lead to
 
 
 @dataclass(frozen=True, eq=False)
 class Project:
-    """What a project file says.
+    """The contents of a project file.
 
     Attributes
     ----------
     path : the file.
-    plan : where the surface comes from; None where ``path`` is a surface itself.
-    method, options : as of ``pcmc.solve``.
-    remeshing : in the order in which it is done.
-    targets, vary : as of ``pcmc.meet``; both empty where nothing is aimed at.
-    files, picture : what is written.
-    folder : where to, made if it is missing; None where the names say it all.
+    plan : of the surface; None if ``path`` holds a surface itself.
+    method, options : as in ``pcmc.solve``.
+    remeshing : in order.
+    targets, vary : as in ``pcmc.meet``; empty without targets.
+    files, picture : the output.
+    folder : made for the output if it is missing; None if the names include their folders.
     view, colour : of the picture; ``colour`` is one of ``COLOURS``.
     """
 
@@ -60,11 +56,11 @@ class Project:
 
     @property
     def outputs(self) -> list[Path]:
-        """All that is written."""
+        """All files to write."""
         return [Path(f) for f in (*self.files, *([] if self.picture is None else [self.picture]))]
 
     def in_folder(self, folder: PathLike) -> Project:
-        """The same with its output in a folder."""
+        """The same project with its output in a folder."""
         base = Path(folder)
         picture = None if self.picture is None else base / self.picture
         files = [base / name for name in self.files]
@@ -76,50 +72,71 @@ def load(path: PathLike) -> Project:
 
     Raises
     ------
-    FileError : in one line, naming file and line, for a file that cannot be read, is not TOML, or has an
-        unknown key (with the nearest known one); naming file and element for a bad value.
+    FileError
+        If the file cannot be read or is not TOML; for an unknown key (the message names its line and
+        the nearest known key), a missing key or a bad value. ``what`` is the key.
     """
     path = Path(path)
     return project_of(path, read_data(path)[1])
 
 
 def read_data(path: Path) -> tuple[str, dict[str, Any]]:
-    """The text of a project file and what it says, every key known. Errors as in ``load``."""
+    """The text of a project file and its data, all keys checked. Errors as in ``load``."""
     try:
-        text = path.read_text(encoding="utf-8-sig")  # editors on Windows begin a file with a mark
+        text = path.read_text(encoding="utf-8-sig")  # skips the byte-order mark of Windows editors
         data = tomllib.loads(text)
     except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror or error})") from None
+        raise FileError(
+            f"{path}: cannot be read ({error.strerror or error})", what=str(path)
+        ) from None
     except UnicodeDecodeError as error:
         raise FileError(
-            f"{path}: byte {error.start} is not text in UTF-8; save it as that"
+            f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8",
+            what=str(path),
+            where=error.start,
         ) from None
     except tomllib.TOMLDecodeError as error:
-        raise FileError(f"{path}: not TOML: {error}{_quotes(text, str(error))}") from None
-    check_keys(path, text, data)
+        line, hint = _toml_error(text, str(error))
+        raise FileError(f"{path}: not TOML: {error}{hint}", what=str(path), where=line) from None
+    try:
+        check_keys(text, data)
+    except PcmcError as error:
+        raise in_file(path, error, FileError) from None
     return text, data
 
 
-def _quotes(text: str, said: str) -> str:
-    """What to do where TOML stops at a letter beyond a-z."""
-    place = re.search(r"at line (\d+), column (\d+)", said)
-    if place is None or text.split("\n")[int(place[1]) - 1][int(place[2]) - 1 :][:1].isascii():
-        return ""
-    return "; names with letters beyond a-z stand in quotes"
+def _toml_error(text: str, message: str) -> tuple[int | None, str]:
+    """The line where TOML fails, and a hint if it fails at a letter beyond a-z."""
+    place = re.search(r"at line (\d+), column (\d+)", message)
+    if place is None:
+        return None, ""
+    line, column = int(place[1]), int(place[2])
+    if text.split("\n")[line - 1][column - 1 :][:1].isascii():
+        return line, ""
+    return line, "; put names with letters beyond a-z in quotes"
+
+
+def in_file(path: Path, error: PcmcError, kind: type[PcmcError] | None = None) -> PcmcError:
+    """The same error, or one of another kind, with the file at the start of its message."""
+    return (kind or type(error))(
+        f"{path}: {error}",
+        what=error.what,
+        where=error.where,
+        found=error.found,
+        expected=error.expected,
+    )
 
 
 def project_of(path: Path, data: Mapping[str, Any]) -> Project:
-    """The project in a file that says ``data``. Errors as in ``load``."""
+    """The project with the given data. Errors as in ``load``."""
     try:
         return _project(path, data)
     except PcmcError as error:
-        raise FileError(f"{path}: {error}") from None
-    except WRONG_KIND as error:
-        raise FileError(f"{path}: a value of the wrong kind ({error})") from None
+        raise in_file(path, error, FileError) from None
 
 
 def build(path: PathLike) -> Surface:
-    """The surface that a project starts from: the mesh of its plan, not solved. Errors as in ``load``."""
+    """The mesh of a project's plan, before solving. Errors as in ``load``."""
     return surface_of(load(path))
 
 
@@ -130,34 +147,26 @@ def surface_of(project: Project) -> Surface:
     try:
         return project.plan.surface()
     except PcmcError as error:
-        raise type(error)(f"{project.path}: {error}") from None
-    except WRONG_KIND as error:
-        raise FileError(f"{project.path}: a value of the wrong kind ({error})") from None
+        raise in_file(project.path, error) from None
 
 
 def _project(path: Path, data: Mapping[str, Any]) -> Project:
-    if "plan" not in data:
-        raise OptionError("a project needs a [plan]")
     output = data.get("output", {})
     options = dict(data.get("solve", {}))
     method = options.pop("method", "newton")
-    options_of(method)(**options)  # refuses bad values before the plan is meshed
-    aims = data.get("targets", {})
+    find_method(method).options(**options)  # refuses bad values before the plan is meshed
     files, picture = output.get("files", []), output.get("picture")
-    if not isinstance(files, list) or not all(isinstance(f, str) for f in files):
-        raise OptionError(f"output files: expected a list of names, found {files!r}")
-    if not isinstance(picture, str | None):
-        raise OptionError(f"output picture: expected a name, found {picture!r}")
     check_names(files, picture)
     view, colour = output.get("view", "diagonal"), output.get("colour", "patches")
     check_picture(view, colour)
+    stages = data.get("remesh", [])
     return Project(
         path=path,
         plan=plan_from(data["plan"]),
         method=method,
         options=options,
-        remeshing=tuple(remeshing(entry) for entry in entries(data.get("remesh", []))),
-        **(_aims(aims) if aims else {}),
+        remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
+        **(_search(data["targets"]) if "targets" in data else {}),
         files=files,
         picture=picture,
         view=tuple(view) if isinstance(view, list) else view,
@@ -165,16 +174,13 @@ def _project(path: Path, data: Mapping[str, Any]) -> Project:
     )
 
 
-def _aims(table: Mapping[str, Any]) -> dict[str, Any]:
-    """The targets of a project, and what may vary."""
+def _search(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The targets of a project, and the parameters that may vary."""
     from ..design import Parameter, Target
 
-    if not table.get("meet") or not table.get("vary"):
-        raise OptionError("[targets] needs both: meet, what is wanted, and vary, what may change")
-    for key in ("quantity", "patch"):
-        for entry in tables(table["meet" if key == "quantity" else "vary"]):
-            if key not in entry:
-                raise OptionError(f"targets: {entry!r} needs the key {key!r}")
+    for key in ("meet", "vary"):
+        if not table[key]:
+            raise OptionError(f"targets.{key} is empty; give at least one", what=f"targets.{key}")
     return {
         "targets": [Target(**entry) for entry in table["meet"]],
         "vary": [Parameter(v) if isinstance(v, str) else Parameter(**v) for v in table["vary"]],

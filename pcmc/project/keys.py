@@ -1,133 +1,298 @@
-"""The keys that a project file may have; unknown ones are refused with their line."""
+"""Every section and key of a project file: the table behind the checks and the manual."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import fields
-from pathlib import Path
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from functools import cache
+from inspect import cleandoc
 from typing import Any
 
-from ..base.errors import FileError, unknown
 from ..plan import Area, Divider, Hole, Plan
+from ..plan.parts import BOTTOMS, EDGES
 from ..solvers import METHODS, find_method
 from ..surface import Plane
-from .remeshing import Remeshing
+from .output import COLOURS
+from .remeshing import WHEN, Remeshing
+
+REQUIRED = MISSING  # the default of a key that must be given
 
 
-def options_of(method: str) -> Any:
-    """The class of a method's options, such as NewtonOptions."""
-    return find_method(method).options
+@dataclass(frozen=True)
+class Key:
+    """A key of a project file.
 
-
-def _keys(kind: Any) -> list[str]:
-    return [f.name for f in fields(kind)]
-
-
-def check_keys(path: Path, text: str, data: Mapping[str, Any]) -> None:
-    """Refuse every unknown key of the file, with its line."""
-
-    def check(place: tuple[str, ...], table: Any, known: list[str]) -> None:
-        if not isinstance(table, Mapping):
-            line = _line(text, place[:-1], place[-1]) if place else 1
-            raise FileError(
-                f"{path}: line {line}: {'.'.join(place)} must be a table, found {table!r}"
-            )
-        for key in table:
-            if key not in known:
-                line, where = (
-                    _line(text, place, key),
-                    f"key of [{'.'.join(place)}]" if place else "key",
-                )
-                raise FileError(f"{path}: line {line}: {unknown(where, key, known)}")
-
-    check((), data, ["plan", "solve", "remesh", "targets", "output"])
-    for section in data:
-        for table in entries(data[section]) if section == "remesh" else [data[section]]:
-            check((section,), table, _section_keys(section, table))
-    plan = data.get("plan", {})
-    for name in ("dividers", "holes", "supports"):
-        _check_list(path, text, ("plan",), plan, name)
-    for name in ("meet", "vary"):
-        _check_list(path, text, ("targets",), data.get("targets", {}), name)
-    if "patches" in plan:
-        check(
-            ("plan", "patches"),
-            plan["patches"],
-            list(plan["patches"]) if isinstance(plan["patches"], Mapping) else [],
-        )
-    for name, kind in (("dividers", Divider), ("holes", Hole)):
-        for entry in tables(plan.get(name)):
-            if "curve" in entry:  # else it is a curve itself
-                check(("plan", name), entry, _keys(kind))
-    for name, area in plan.get("patches", {}).items():
-        check(("plan", "patches", name), area, [k for k in _keys(Area) if k != "name"])
-    if "plane" in plan:
-        check(("plan", "plane"), plan["plane"], _keys(Plane))
-    if "targets" in data:
-        from ..design import Parameter, Target
-
-        for name, aim in (("meet", Target), ("vary", Parameter)):
-            for entry in tables(data["targets"].get(name)):
-                check(("targets", name), entry, _keys(aim))
-
-
-def _check_list(
-    path: Path, text: str, place: tuple[str, ...], table: Mapping[str, Any], key: str
-) -> None:
-    if not isinstance(table.get(key, []), list):
-        line = _line(text, place, key)
-        hint = f"; write [[{'.'.join((*place, key))}]]" if isinstance(table[key], Mapping) else ""
-        raise FileError(
-            f"{path}: line {line}: {key} must be a list, found {table[key]!r:.60}{hint}"
-        )
-
-
-def _section_keys(section: str, table: Any) -> list[str]:
-    if section == "plan":
-        return _keys(Plan)
-    if section == "solve":
-        method = table.get("method", "newton") if isinstance(table, Mapping) else "newton"
-        return ["method", *(_keys(options_of(method)) if method in METHODS else table)]
-    if section == "remesh":
-        return _keys(Remeshing)
-    if section == "targets":
-        return ["meet", "vary"]
-    return ["files", "picture", "view", "colour"]
-
-
-def entries(value: Any) -> list[Any]:
-    """A list, or what stands where one may: its only entry."""
-    return value if isinstance(value, list) else [value]
-
-
-def tables(value: Any) -> list[Any]:
-    """Those of a list's entries that are tables."""
-    return [e for e in value if isinstance(e, Mapping)] if isinstance(value, list) else []
-
-
-def _line(text: str, place: tuple[str, ...], key: str) -> int:
-    """The number of the line where a key stands, in the table at ``place`` or written out in full.
-
-    >>> _line("[plan]\\nrise = 2\\n[solve]\\nrise = 1", ("solve",), "rise")
-    4
+    Attributes
+    ----------
+    name : in its section.
+    kind : what its value may be, such as "a number"; one of ``KINDS``.
+    default : the value where the key is left out; ``REQUIRED`` if it must not be, None for none.
+    help : what it means.
+    choices : the texts that are allowed; empty if any is.
     """
-    named = re.compile(rf"(^|[\s{{,.\[]){_quoted(key)}\s*([=.\]])")
-    last = re.compile(rf"(^|[\s{{,.\[]){_quoted(place[-1])}\s*[=.\]]") if place else None
-    header: tuple[str, ...] = ()
-    best = 0
-    for number, line in enumerate(text.splitlines(), 1):
-        if head := re.match(r"\s*\[\[?([^\[\]]+)\]\]?\s*(#|$)", line):
-            header = tuple(part.strip(" \"'") for part in head[1].split("."))
-            if header == (*place, key):
-                return number
-            continue
-        if named.search(line.split("#")[0]) and header == place[: len(header)]:
-            if header == place or (last and last.search(line)):
-                return number
-            best = best or number
-    return best or 1
+
+    name: str
+    kind: str
+    default: Any
+    help: str
+    choices: tuple[str, ...] = ()
 
 
-def _quoted(key: str) -> str:
-    return rf"[\"']?{re.escape(key)}[\"']?"
+@dataclass(frozen=True)
+class Section:
+    """A table of a project file.
+
+    Attributes
+    ----------
+    name : as in TOML, such as "plan.holes"; NAME stands for any name, "" is the file itself.
+    help : what it is for.
+    keys : all that it may have.
+    condition : when these are its keys; empty for always.
+    """
+
+    name: str
+    help: str
+    keys: tuple[Key, ...] = field(repr=False)
+    condition: str = ""
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _list_of(*kinds: type) -> Callable[[Any], bool]:
+    return lambda value: isinstance(value, list) and all(isinstance(v, kinds) for v in value)
+
+
+KINDS: dict[str, Callable[[Any], bool]] = {
+    "a value": lambda value: True,
+    "a number": _number,
+    "a whole number": lambda value: _number(value) and isinstance(value, int),
+    "true or false": lambda value: isinstance(value, bool),
+    "a text": lambda value: isinstance(value, str),
+    "a table": lambda value: isinstance(value, Mapping),
+    "a table or a list of tables": lambda value: (
+        isinstance(value, Mapping) or _list_of(Mapping)(value)
+    ),
+    "a list of tables": _list_of(Mapping),
+    "a list of curves or tables": _list_of(list, Mapping),
+    "a list of points and curves": _list_of(list, Mapping),
+    "a list of names": _list_of(str),
+    "a list of names or tables": _list_of(str, Mapping),
+    "a list of points": _list_of(list),
+    "a curve": lambda value: isinstance(value, list | Mapping),
+    "a point [x, y, z]": lambda value: _list_of(int, float)(value) and len(value) == 3,
+    "a point [x, y] or a list of points": lambda value: isinstance(value, list),
+    "a name or a point [x, y]": lambda value: isinstance(value, str | list),
+    "a name or two angles": lambda value: isinstance(value, str | list),
+}
+
+_KIND_OF_TYPE = {
+    "float": "a number",
+    "int": "a whole number",
+    "bool": "true or false",
+    "str": "a text",
+}
+
+
+def _of_class(
+    cls: Any,
+    kinds: Mapping[str, str] | None = None,
+    choices: Mapping[str, tuple[str, ...]] | None = None,
+) -> tuple[Key, ...]:
+    """A key for each field of a dataclass: its default, and its sentence from the docstring."""
+    help_of = {}
+    for entry in re.finditer(r"^([\w, ]+) : (.*(?:\n    .*)*)", cleandoc(cls.__doc__ or ""), re.M):
+        help_of.update(dict.fromkeys(entry[1].split(", "), " ".join(entry[2].split())))
+    return tuple(
+        Key(
+            f.name,
+            (kinds or {}).get(f.name)
+            or _KIND_OF_TYPE.get(str(f.type).removesuffix(" | None"), "a value"),
+            None if f.default_factory is not MISSING else f.default,
+            help_of.get(f.name, ""),
+            (choices or {}).get(f.name, ()),
+        )
+        for f in fields(cls)
+    )
+
+
+@cache
+def main_sections() -> tuple[Section, ...]:
+    """The file itself, and all sections but [solve] and [targets]."""
+    curve, curves = {"curve": "a curve"}, "a list of curves or tables"
+    plan = {
+        "outline": "a curve",
+        "dividers": curves,
+        "holes": curves,
+        "patches": "a table",
+        "supports": "a list of points and curves",
+        "plane": "a table",
+    }
+    area = _of_class(Area, {"at": "a point [x, y] or a list of points"})
+    return (
+        Section(
+            "",
+            "The file: a plan and what to do with it.",
+            (
+                Key("plan", "a table", REQUIRED, "the roof, by the lines of its plan"),
+                Key("solve", "a table", None, "the solver and its options"),
+                Key("remesh", "a table or a list of tables", None, "other triangles, once or more"),
+                Key("targets", "a table", None, "heights, areas or volumes to be met"),
+                Key("output", "a table", None, "the files and the picture to write"),
+            ),
+        ),
+        Section(
+            "plan", "The roof, by the lines of its plan.", _of_class(Plan, plan, {"edge": EDGES})
+        ),
+        Section(
+            "plan.patches.NAME",
+            "A patch; NAME is its name.",
+            tuple(key for key in area if key.name != "name"),
+        ),
+        Section(
+            "plan.dividers",
+            "A line between patches, with a wall below it. A curve alone is a divider, too.",
+            _of_class(Divider, curve, {"bottom": BOTTOMS}),
+        ),
+        Section(
+            "plan.holes",
+            "An opening. A curve alone is a hole, too.",
+            _of_class(Hole, curve, {"edge": EDGES}),
+        ),
+        Section(
+            "plan.plane",
+            "The plane Π.",
+            (
+                Key("point", "a point [x, y, z]", Plane().point, "a point of Π"),
+                Key("normal", "a point [x, y, z]", Plane().normal, "its normal, of any length"),
+            ),
+        ),
+        Section(
+            "remesh",
+            "Other triangles, before or after solving; [[remesh]] if there are several.",
+            _of_class(Remeshing, choices={"when": WHEN}),
+        ),
+        Section(
+            "output",
+            "What to write. Without it nothing is written.",
+            (
+                Key(
+                    "files",
+                    "a list of names",
+                    [],
+                    "of the files with the surface; the suffix names the format",
+                ),
+                Key("picture", "a text", None, "name of a picture, .png"),
+                Key(
+                    "view",
+                    "a name or two angles",
+                    "diagonal",
+                    "of the picture: diagonal, elevation, plan, or [azimuth, elevation] in degrees",
+                ),
+                Key("colour", "a text", "patches", "of the picture", COLOURS),
+            ),
+        ),
+    )
+
+
+@cache
+def solve_section(method: str) -> Section:
+    """The keys of [solve] for a method; for one that does not exist ``method`` alone."""
+    known = Key("method", "a text", "newton", "the solver", tuple(METHODS))
+    if method not in METHODS:
+        return Section("solve", "The solver and its options.", (known,))
+    limits = {
+        "newton": {"target": ("minimum", "stationary")},
+        "nesterov": {"armijo": ("printed", "sufficient")},
+    }
+    options = _of_class(find_method(method).options, choices=limits.get(method))
+    return Section(
+        "solve", "The solver and its options.", (known, *options), f'method = "{method}"'
+    )
+
+
+@cache
+def target_sections() -> tuple[Section, ...]:
+    """[targets] and its tables."""
+    from ..design import Parameter, Target  # needed by projects with targets only
+    from ..design.quantities import QUANTITIES
+
+    wanted = _of_class(Target, {"of": "a name or a point [x, y]"}, {"quantity": tuple(QUANTITIES)})
+    return (
+        Section(
+            "targets",
+            "Quantities to be met by changing tensions or pressures.",
+            (
+                Key("meet", "a list of tables", REQUIRED, "the quantities and their values"),
+                Key(
+                    "vary",
+                    "a list of names or tables",
+                    REQUIRED,
+                    "what may change; a name alone is a patch whose tension may",
+                ),
+            ),
+        ),
+        Section("targets.meet", "A quantity and what it is to be.", wanted),
+        Section(
+            "targets.vary",
+            "What may change.",
+            _of_class(Parameter, choices={"kind": ("tension", "pressure")}),
+        ),
+    )
+
+
+_CURVE = Section(
+    "CURVE",
+    "Any curve is a list of points, or a table with one of these keys, or a list of such tables, each"
+    " starting where the one before ends. Points [x, y] are on Π, points [x, y, z] in space.",
+    (
+        Key("polyline", "a list of points", None, "straight segments from point to point"),
+        Key("closed", "true or false", False, "whether a polyline returns to its first point"),
+        Key("bezier", "a list of points", None, "the control points of a Bézier curve"),
+        Key(
+            "arc", "a list of points", None, "start, a point on the way, and end of a circular arc"
+        ),
+        Key("circle", "a table", None, "{centre = [x, y], radius = r}"),
+    ),
+)  # its keys are checked where curves are made
+
+
+def sections() -> tuple[Section, ...]:
+    """Every section that a project file may have, with its keys.
+
+    >>> [key.name for key in sections()[0].keys]
+    ['plan', 'solve', 'remesh', 'targets', 'output']
+    """
+    solve = (solve_section(method) for method in METHODS)
+    return (*main_sections(), *solve, *target_sections(), _CURVE)
+
+
+def reference() -> str:
+    """All sections and keys as Markdown, a table for each section."""
+    lines = []
+    for section in sections()[1:]:
+        condition = f" with `{section.condition}`" if section.condition else ""
+        lines += [
+            f"## `{section.name if section is _CURVE else f'[{section.name}]'}`{condition}",
+            "",
+            section.help,
+            "",
+        ]
+        lines += ["| key | value | default | meaning |", "|---|---|---|---|"]
+        for key in section.keys:
+            value = ", ".join(f'`"{c}"`' for c in key.choices) or key.kind
+            none = key.default is None or key.default == ()
+            default = "required" if key.default is REQUIRED else "" if none else _toml(key.default)
+            meaning = key.help.replace("``", "`").replace("|", "\\|")
+            lines.append(f"| `{key.name}` | {value} | {default} | {meaning} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    shown = list(value) if isinstance(value, tuple) else value
+    return f"`{shown!r}`".replace("'", '"')

@@ -1,4 +1,4 @@
-"""What a project writes: files and a picture, all of them or none."""
+"""The output of a project: files and a picture, all of them or none."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import io
+from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, OptionError, PcmcError, unknown
 from ..base.files import atomic_writes
@@ -23,27 +24,32 @@ from ..solvers.result import Result
 from ..surface import Surface
 
 PathLike = str | os.PathLike[str]
-Say = Callable[[str], object]
+OnStep = Callable[[str], object]  # called with a few words at each step of a project
 COLOURS = ("patches", "curvature", "error", "reactions")
 
 
-def silent(words: str) -> None:
-    """Say nothing."""
+def ignore(step: str) -> None:
+    """An ``OnStep`` that shows nothing."""
 
 
 def save(
-    result: Result, files: Iterable[PathLike], picture: PathLike | None = None, *,
-    view: Any = "diagonal", colour: str = "patches", progress: Say | None = None,
-) -> list[Path]:  # fmt: skip
-    """Write a result to files and a picture of it: all of them, or none.
+    result: Result,
+    files: Iterable[PathLike],
+    picture: PathLike | None = None,
+    *,
+    view: Any = "diagonal",
+    colour: str = "patches",
+    progress: OnStep | None = None,
+) -> list[Path]:
+    """Write a result to files, and a picture of it: all of them, or none.
 
-    ``fields`` and the certificate go where the format can carry them.
+    ``fields`` and the certificate are written if the format can hold them.
     """
-    surface, found = result.surface, result.certificate
-    scalars = fields(surface, found)
+    surface, certificate = result.surface, result.certificate
+    scalars = fields(surface, certificate)
 
     def write(path: Path) -> None:
-        io.write(path, surface, scalars=scalars, certificate=found)
+        io.write(path, surface, scalars=scalars, certificate=certificate)
 
     def draw(path: Path) -> None:
         paint(surface, path, view, colour)
@@ -54,56 +60,57 @@ def save(
     return write_all(works, progress)
 
 
-def fields(surface: Surface, found: Certificate) -> dict[str, Floats]:
-    """What travels with a surface, by vertex: mean curvature (1/length), its relative error, and the size
-    of the reaction where it is supported (force)."""
+def fields(surface: Surface, certificate: Certificate) -> dict[str, Floats]:
+    """Values (n,) by vertex: mean curvature (1/length), its relative error, and the size of the
+    reaction at supports (force)."""
     return {
         "mean curvature": mean_curvature(surface),
         "error": curvature_error(surface),
-        "reaction": np.linalg.norm(found.reactions, axis=1),
+        "reaction": np.linalg.norm(certificate.reactions, axis=1),
     }
 
 
 def write_all(
-    works: Iterable[tuple[Path, Callable[[Path], None]]], progress: Say | None = None
+    works: Iterable[tuple[Path, Callable[[Path], None]]], progress: OnStep | None = None
 ) -> list[Path]:
-    """Files and what writes each, given where to; all appear together, or none does.
+    """Write files, each by its own function of a path; all of them appear together, or none.
 
-    Errors name the file itself and not the temporary one in its place.
+    The functions write to temporary files; errors and warnings name the final ones.
     """
-    say, works = progress or silent, list(works)
+    report, works = progress or ignore, list(works)
     paths = [path for path, _ in works]
     check_outputs(paths)
     with atomic_writes(paths) as temporaries:
         for (path, write), temporary in zip(works, temporaries, strict=True):
-            say(f"writing {path.name}")
+            report(f"writing {path.name}")
             try:
-                with defer_interrupts(), _named(temporary, path):
+                with defer_interrupts(), _final_name_in_warnings(temporary, path):
                     write(temporary)
             except OSError as error:
-                raise FileError(f"{path}: cannot be written ({error.strerror or error})") from None
+                raise FileError(
+                    f"{path}: cannot be written ({error.strerror or error})", what=str(path)
+                ) from None
             except PcmcError as error:
                 text = str(error).replace(f"{temporary}: ", "")
-                raise FileError(f"{path}: {text}") from None
+                raise FileError(f"{path}: {text}", what=str(path)) from None
     return paths
 
 
 @contextmanager
-def _named(temporary: Path, path: Path) -> Iterator[None]:
-    """Warnings with the file's own name, but for what its format cannot carry, which nobody asked for."""
-    with warnings.catch_warnings(record=True) as found:
+def _final_name_in_warnings(temporary: Path, path: Path) -> Iterator[None]:
+    """Warnings name the final file. Losses due to the format are not shown: nobody asked for more."""
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FileWarning)
         yield
-    for warning in found:
+    for warning in caught:
         if not issubclass(warning.category, LostWarning):
             text = str(warning.message).replace(str(temporary), str(path))
             warnings.warn(text, warning.category, stacklevel=4)
 
 
 def paint(surface: Surface, path: PathLike, view: Any, colour: str) -> None:
-    """A picture with the patches, the mean curvature (1/length) or its relative error as colours, or
-    with the reactions of the supports as arrows."""
-    # needs the extra plot, which a project without picture does not
+    """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
+    # needs the extra plot, which a project without a picture does not
     from ..plot import draw, reactions
 
     check_picture(view, colour)
@@ -121,46 +128,63 @@ def check_picture(view: Any, colour: str) -> None:
     """Refuse a view or colour that ``paint`` does not know."""
     from ..plot.scene import VIEWS
 
-    if colour not in COLOURS:
-        raise OptionError(unknown("colour", colour, COLOURS))
+    validate.choice("colour", colour, COLOURS)
     if isinstance(view, str):
-        if view not in VIEWS:
-            raise OptionError(unknown("view", view, VIEWS))
-    elif not (isinstance(view, Sequence) and len(view) == 2) or not all(
-        isinstance(angle, int | float) and math.isfinite(angle) for angle in view
+        validate.choice("view", view, tuple(VIEWS))
+    elif not (
+        isinstance(view, Sequence)
+        and len(view) == 2
+        and all(isinstance(angle, int | float) and math.isfinite(angle) for angle in view)
     ):
-        raise OptionError(f"view: expected a name or two angles in degrees, found {view!r}")
+        raise OptionError(
+            f"view: expected a name or two angles in degrees, found {view!r}",
+            what="view",
+            found=view,
+        )
 
 
 def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> None:
-    """Refuse names of files that hold no surface, and of a picture that is none."""
+    """Refuse file names whose suffix is no format of surfaces, or no format of pictures."""
     for file in files:
         suffix = Path(file).suffix.lower()
         if suffix not in io.FORMATS:
-            hint = "; a picture has an option of its own" if suffix == ".png" else ""
-            raise FileError(f"{file}: {unknown('suffix', suffix, io.FORMATS)}{hint}")
+            hint = "; a picture has its own option" if suffix == ".png" else ""
+            raise FileError(
+                f"{file}: {unknown('suffix', suffix, io.FORMATS)}{hint}",
+                what=str(file),
+                found=suffix,
+                expected=tuple(io.FORMATS),
+            )
     if picture is not None and Path(picture).suffix.lower() != ".png":
-        raise FileError(f"{picture}: a picture is written as .png; name it so")
+        raise FileError(
+            f"{picture}: pictures are written as .png only; change the suffix",
+            what=str(picture),
+            found=Path(picture).suffix,
+            expected=".png",
+        )
 
 
 def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
-    """Refuse, before any work, what cannot be written; ``made`` is a folder that is made if missing."""
+    """Refuse, before any work, paths that cannot be written; the folder ``made`` may be missing."""
     seen: list[str] = []
     if made is not None and made.exists() and not made.is_dir():
-        raise FileError(f"{made}: is a file; the output needs a folder")
+        raise FileError(f"{made} is a file; the output needs a folder", what=str(made))
     for path in paths:
-        if path.is_dir():
-            raise FileError(f"{path}: is a folder; give the name of a file")
         place = os.path.normcase(path.absolute())
-        if place in seen:
-            raise FileError(f"{path}: is named twice among the output")
-        seen.append(place)
         folder = path.parent
-        if folder != made and not folder.is_dir():
-            raise FileError(f"{path}: there is no folder {folder}; make it first")
         there = next(f for f in (folder.absolute(), *folder.absolute().parents) if f.exists())
-        if not there.is_dir():
-            raise FileError(f"{path}: {there} is a file; the output needs a folder")
-        if not os.access(there, os.W_OK):
+        problem = None
+        if path.is_dir():
+            problem = "is a folder; give the name of a file"
+        elif place in seen:
+            problem = "is named twice in the output"
+        elif folder != made and not folder.is_dir():
+            problem = f"there is no folder {folder}; create it first"
+        elif not there.is_dir():
+            problem = f"{there} is a file; the output needs a folder"
+        elif not os.access(there, os.W_OK):
             shown = folder if folder.is_dir() else there
-            raise FileError(f"{path}: cannot be written (the folder {shown} is read-only)")
+            problem = f"cannot be written (the folder {shown} is read-only)"
+        if problem:
+            raise FileError(f"{path}: {problem}", what=str(path))
+        seen.append(place)

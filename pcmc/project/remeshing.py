@@ -1,4 +1,4 @@
-"""When a project is remeshed, and to which edge length."""
+"""Remeshing as a step of a project."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ..base.errors import OptionError, unknown
+from ..base import validate
+from ..base.errors import OptionError
 from ..meshing.remeshing import check_lengths
 
 WHEN = ("before", "after")
@@ -14,12 +15,16 @@ WHEN = ("before", "after")
 
 @dataclass(frozen=True)
 class Remeshing:
-    """Other triangles at some time in a project.
+    """New triangles before or after a project is solved.
 
     Attributes
     ----------
-    edge_length, near_curves, growth, chord : as of ``pcmc.remesh.remesh``.
-    when : "before" the surface is solved, or "after" it: then it is solved again.
+    edge_length : of the triangles, length.
+    near_curves : edge length at junctions and boundaries, if shorter, length.
+    growth : largest ratio of the lengths of neighbouring edges, > 1.
+    chord : largest distance between the triangles and the smooth surface, length; without it a
+        tenth of ``edge_length``.
+    when : "before" the surface is solved, or "after"; then it is solved again.
     """
 
     edge_length: float
@@ -29,13 +34,12 @@ class Remeshing:
     when: str = "after"
 
     def __post_init__(self) -> None:
-        if self.when not in WHEN:
-            raise OptionError(unknown("when", self.when, WHEN))
+        validate.choice("when", self.when, WHEN)
         check_lengths(**self.options)
 
     @property
     def options(self) -> dict[str, Any]:
-        """The arguments of ``pcmc.remesh.remesh``."""
+        """The arguments of ``pcmc.meshing.remeshing.remesh``."""
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "when"}
 
 
@@ -45,9 +49,8 @@ def remeshing(table: Mapping[str, Any]) -> Remeshing:
     >>> remeshing({"edge_length": 0.5}).when
     'after'
     """
-    if "edge_length" not in table:
-        raise OptionError("[remesh] needs an edge_length")
     try:
         return Remeshing(**table)
     except OptionError as error:
-        raise OptionError(f"remesh: {error}") from None
+        what = f"remesh.{error.what}" if error.what else "remesh"
+        raise OptionError(f"remesh: {error}", what=what, found=error.found) from None

@@ -1,4 +1,4 @@
-"""From a project to its outcome: built, solved, remeshed, aimed at its targets, certified, written."""
+"""Running a project: mesh, solve, remesh, meet targets, certify, write."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ..base.errors import BalanceWarning, OptionError, PcmcError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
 from ..certificate.certificate import Certificate
-from ..contact.pinching import find_walls
+from ..contact.pinching import standing_part
 from ..meshing.remeshing import remesh
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
-from .file import Project, load, surface_of
-from .output import PathLike, Say, check_names, check_outputs, save, silent
+from .file import Project, in_file, load, surface_of
+from .output import OnStep, PathLike, check_names, check_outputs, ignore, save
 
 if TYPE_CHECKING:
     from ..design import Design
@@ -26,10 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """The end of a project: the result, its certificate, the files written.
-
-    ``design`` is the search for targets, None where the project has none.
-    """
+    """The result of a project, the files written, and the search for its targets if it has any."""
 
     result: Result
     files: Sequence[Path]
@@ -42,20 +39,23 @@ class Outcome:
 
     @property
     def certificate(self) -> Certificate:
-        """Of the surface reached."""
+        """The certificate of the surface reached."""
         return self.result.certificate
 
     @property
     def good(self) -> bool:
-        """Whether the surface is certified and every target met."""
+        """Whether the surface is certified and every target is met."""
         return self.certificate.certified and (self.design is None or self.design.met)
 
 
 def run(
-    path: PathLike, out_dir: PathLike | None = None, progress: Say | None = None, *,
+    path: PathLike,
+    out_dir: PathLike | None = None,
+    progress: OnStep | None = None,
+    *,
     anyway: bool = False,
-) -> Outcome:  # fmt: skip
-    """Build, solve, meet the targets, certify, and write all of a project's output.
+) -> Outcome:
+    """Mesh, solve, meet the targets, certify, and write all output of a project.
 
     Parameters
     ----------
@@ -71,116 +71,133 @@ def run(
 
     Raises
     ------
-    FileError, PlanError, OptionError : in one line, with the file; nothing is written then.
+    FileError, PlanError, OptionError
+        The message is one line and names the file. Nothing is written.
 
     Warns
     -----
-    BalanceWarning : before solving, where the tensions at a junction cannot balance.
+    BalanceWarning
+        Before solving, if the tensions at a junction cannot balance.
     """
     project = load(path)
-    return carry_out(
-        project.in_folder(project.path.parent if out_dir is None else out_dir),
-        progress, anyway=anyway,
-    )  # fmt: skip
+    project = project.in_folder(project.path.parent if out_dir is None else out_dir)
+    return run_project(project, progress, anyway=anyway)
 
 
-def carry_out(
-    project: Project, progress: Say | None = None, *,
-    changed: Callable[[Surface], Surface] | None = None, anyway: bool = False,
-) -> Outcome:  # fmt: skip
-    """A project already loaded, as ``run``; ``changed`` is applied to the surface it starts from."""
-    say, outputs = progress or silent, project.outputs
+def run_project(
+    project: Project,
+    progress: OnStep | None = None,
+    *,
+    changed: Callable[[Surface], Surface] | None = None,
+    anyway: bool = False,
+) -> Outcome:
+    """As ``run``, for a loaded project; ``changed`` is applied to its initial surface."""
+    report, outputs = progress or ignore, project.outputs
     check_names(project.files, project.picture)
     check_outputs(outputs, project.folder)
-    say("reading" if project.plan is None else "meshing the plan")
+    report("reading" if project.plan is None else "meshing the plan")
     start = surface_of(project)
     start = start if changed is None else changed(start)
     _check_balance(start)
-    outcome = settle(project, start, say)
+    outcome = solve_project(project, start, report)
     if not outputs or not (outcome.good or anyway):
         return outcome
     with made(project.folder or Path()):
         written = save(
-            outcome.result, project.files, project.picture,
-            view=project.view, colour=project.colour, progress=say,
-        )  # fmt: skip
+            outcome.result,
+            project.files,
+            project.picture,
+            view=project.view,
+            colour=project.colour,
+            progress=report,
+        )
     return replace(outcome, files=written)
 
 
 def _check_balance(surface: Surface) -> None:
-    """Say before a long search what the tensions alone tell; it is made all the same."""
-    pinchable = find_walls(surface).pinchable
-    found = unbalanced(surface, pinchable)
-    if found:
+    """Warn before a long computation if the tensions alone show that a junction cannot balance."""
+    pinchable = standing_part(surface).walls.pinchable
+    imbalance = unbalanced(surface, pinchable)
+    if imbalance:
         unless = ", unless the junction rests on the plane" if pinchable.any() else ""
-        warnings.warn(f"{found}{unless}; solving all the same", BalanceWarning, stacklevel=3)
+        warnings.warn(f"{imbalance}{unless}; solving anyway", BalanceWarning, stacklevel=3)
 
 
-def settle(project: Project, surface: Surface, progress: Say | None = None) -> Outcome:
-    """Solve a surface as the project says, remesh it, meet its targets; nothing is written.
+def solve_project(project: Project, surface: Surface, progress: OnStep | None = None) -> Outcome:
+    """Solve a surface with the project's options, remesh it, meet its targets; write nothing.
 
-    A surface that is not certified, or misses a target, is not remeshed any further.
+    A surface that is not certified, or misses a target, is not remeshed.
     """
-    say = progress or silent
+    report = progress or ignore
     stages = [m for m in project.remeshing if m.when == "after"]
     try:
         for first in project.remeshing:
             if first.when == "before":
-                say("remeshing")
+                report("remeshing")
                 surface = remesh(surface, **first.options)
-        outcome = _at_rest(project, surface, say)
+        outcome = _solve_or_meet(project, surface, report)
         for stage in stages:
             if not outcome.good:
                 break
-            say("remeshing")
+            report("remeshing")
             surface = remesh(outcome.surface, **stage.options)
-            outcome = _at_rest(replace(project, targets=()), surface, say)
-            if project.targets and outcome.good:  # else its verdict tells more than a search would
-                outcome = _at_rest(project, outcome.surface, say)
+            outcome = _solve_or_meet(replace(project, targets=()), surface, report)
+            if project.targets and outcome.good:  # otherwise its verdict is the better explanation
+                outcome = _solve_or_meet(project, outcome.surface, report)
     except PcmcError as error:
-        raise type(error)(f"{project.path}: {error}") from None
+        raise in_file(project.path, error) from None
     return outcome
 
 
-def _at_rest(project: Project, surface: Surface, say: Say) -> Outcome:
-    """The surface solved, or its targets met, and certified."""
-    design = _aim(project, surface, say) if project.targets else None
+def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
+    """Solve the surface, or meet its targets, and certify it."""
+    design = _meet(project, surface, report) if project.targets else None
     if design is not None:
         result = design.result
     else:
-        result = uninterrupted(solve(surface, project.method, reporter(say), **project.options))
-    say("certifying")
+        result = raise_if_stopped(
+            solve(surface, project.method, reporter(report), **project.options)
+        )
+    report("certifying")
     result.certificate  # noqa: B018 — computed here, while the progress is shown
     return Outcome(result, (), design)
 
 
-def uninterrupted(result: Result) -> Result:
-    """The result; a solver answers Ctrl-C with the best surface so far, a command is to end."""
+def raise_if_stopped(result: Result) -> Result:
+    """The result, unless Ctrl-C stopped the solver: then KeyboardInterrupt, to end the command."""
     if result.status is Status.STOPPED:
         raise KeyboardInterrupt
     return result
 
 
-def reporter(say: Say) -> Callable[[Progress], None]:
-    """A solver's callback that tells how far it is."""
+def reporter(report: OnStep) -> Callable[[Progress], None]:
+    """A solver's callback that reports its step and the forces left."""
 
-    def report(state: Progress) -> None:
+    def callback(state: Progress) -> None:
         force = state.row.get("residual", state.row["gradient_squared"])
-        say(f"solving: step {state.iteration}, forces left {force:.1e}")
+        report(f"solving: step {state.iteration}, forces left {force:.1e}")
 
-    return report
+    return callback
 
 
-def _aim(project: Project, surface: Surface, say: Say) -> Design:
-    from ..design import Reach, meet  # needed by projects with targets only
+def _meet(project: Project, surface: Surface, report: OnStep) -> Design:
+    from ..design import DesignStatus, meet  # needed by projects with targets only
 
     if project.method != "newton":
-        raise OptionError(f"targets are met with method 'newton' only, found {project.method!r}")
+        raise OptionError(
+            f"only method 'newton' can meet targets, found {project.method!r}",
+            what="solve.method",
+            found=project.method,
+            expected="newton",
+        )
     count = iter(range(1, 10**6))
     design = meet(
-        surface, project.targets, project.vary,
-        callback=lambda row: say(f"meeting the targets: solve {next(count)}"), **project.options,
-    )  # fmt: skip
-    if design.reach is Reach.STOPPED:  # as in ``uninterrupted``
+        surface,
+        project.targets,
+        project.vary,
+        callback=lambda row: report(f"meeting the targets: solve {next(count)}"),
+        **project.options,
+    )
+    if design.status is DesignStatus.STOPPED:  # as in ``raise_if_stopped``
         raise KeyboardInterrupt
     return design

@@ -1,10 +1,10 @@
-"""A project with other numbers: tensions and pressures by patch, all else by its key in the file."""
+"""A project with other numbers: tensions and pressures by patch, all others by their key."""
 
 from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -13,49 +13,52 @@ from .. import io
 from ..base.errors import OptionError, PcmcError, unknown
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
-from .file import PathLike, Project, project_of, read_data, surface_of
+from .file import PathLike, Project, in_file, project_of, read_data, surface_of
 
-WHAT = ("tension", "pressure")
-Way = tuple[str | int, ...]
+QUANTITIES = ("tension", "pressure")
+KeyPath = tuple[str | int, ...]
 
 
-def numbers(data: Mapping[str, Any]) -> dict[str, Way]:
-    """The keys of a project that hold a number, by dotted name, and the way to each.
+def numbers(data: Mapping[str, Any]) -> dict[str, KeyPath]:
+    """The numbers of a project: the dotted name of each, and its path in the data.
 
-    Entries of a list go by their name where they have one, else by their number from 1.
+    Entries of a list are named by their key "name" if they have one, otherwise by their number from 1.
 
     >>> list(numbers({"plan": {"rise": 1, "edge": "free", "holes": [{"name": "yard", "r": 2.0}, [3]]}}))
     ['plan.rise', 'plan.holes.yard.r', 'plan.holes.2.1']
     """
-    return {".".join(names): way for names, way in _leaves(data, (), ())}
+    return {".".join(names): path for names, path in _leaves(data, (), ())}
 
 
-def _leaves(value: Any, names: tuple[str, ...], way: Way) -> Iterator[tuple[tuple[str, ...], Way]]:
+def _leaves(
+    value: Any, names: tuple[str, ...], path: KeyPath
+) -> Iterator[tuple[tuple[str, ...], KeyPath]]:
     if isinstance(value, Mapping):
         for key, item in value.items():
-            yield from _leaves(item, (*names, key), (*way, key))
+            yield from _leaves(item, (*names, key), (*path, key))
     elif isinstance(value, list):
         for place, item in enumerate(value):
             named = item.get("name") if isinstance(item, Mapping) else None
             name = named if isinstance(named, str) else str(place + 1)
-            yield from _leaves(item, (*names, name), (*way, place))
+            yield from _leaves(item, (*names, name), (*path, place))
     elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield names, way
+        yield names, path
 
 
 def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surface]:
-    """A project with some of its numbers replaced, and the surface that it starts from.
+    """A project with some of its numbers replaced, and its initial surface.
 
     Parameters
     ----------
     path : of a project (``.toml``), or of a surface, which has no keys.
     values : by ``NAME.tension`` and ``NAME.pressure`` of a patch or wall, or by the dotted name of a
-        number in the file, such as ``plan.edge_length``. These are replaced before the plan is meshed,
-        tensions and pressures afterwards.
+        number in the file, such as ``plan.edge_length``. Numbers of the file are replaced before the
+        plan is meshed, tensions and pressures afterwards.
 
     Raises
     ------
-    FileError, PlanError, OptionError : as of ``load`` and ``build``; for a name that is none of these.
+    FileError, PlanError, OptionError
+        As in ``load`` and ``build``; for an unknown name.
 
     Examples
     --------
@@ -69,45 +72,54 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
 
 
 def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
-    """Refuse every name and value that ``varied`` would, the nearest name said; meshes the plan once."""
+    """Refuse every name and value that ``varied`` refuses; the plan is meshed only once."""
     path = Path(path)
     surface = surface_of(_project(path, {}))
     keys = numbers(_data(path))
-    known = [f"{patch.name}.{what}" for what in WHAT for patch in surface.patches]
+    known = [f"{patch.name}.{what}" for what in QUANTITIES for patch in surface.patches]
     for name, given in values.items():
         if name not in keys and name not in known:
-            shown = known + [k for k, way in keys.items() if _listed(way)]
+            shown = known + [k for k, place in keys.items() if _listed(place)]
             near = get_close_matches(name, keys, n=1, cutoff=0.8)  # a coordinate, perhaps
-            raise OptionError(f"{path}: {unknown('number', name, dict.fromkeys(shown + near))}")
+            raise _unknown_number(path, name, shown + near)
         for value in given:
             if isinstance(value, bool | str | None) or not math.isfinite(value):
-                raise OptionError(f"{path}: {name} must be a finite number, found {value!r}")
+                raise OptionError(
+                    f"{path}: {name} must be a finite number, found {value!r}",
+                    what=name,
+                    found=value,
+                )
             _project(path, {name: value})
             _retensioned(path, surface, {name: value})
 
 
 def digest(path: PathLike) -> str:
-    """SHA-256 of a project file, or of the surface in any other, hexadecimal.
+    """SHA-256, hexadecimal, of a project file, or of the surface that any other file holds.
 
-    A project reads no other file. A surface may (a ``.gltf`` its buffers), so what was read counts.
+    A surface may be spread over several files (a ``.gltf`` has buffers), so its data are hashed.
     """
     if is_project(path):
         return hashlib.sha256(read_data(Path(path))[0].encode()).hexdigest()
     surface = io.read(path)
-    told = hashlib.sha256(repr((surface.patches, surface.plane)).encode())
+    sha = hashlib.sha256(repr((surface.patches, surface.plane)).encode())
     for name in ("vertices", "faces", "patch_of_face", "fixed", "on_plane"):
-        told.update(getattr(surface, name).tobytes())
-    return told.hexdigest()
+        sha.update(getattr(surface, name).tobytes())
+    return sha.hexdigest()
 
 
 def is_project(path: PathLike) -> bool:
-    """Whether a file is a project by its name; all others hold a surface."""
+    """Whether a file is a project, by its suffix; all others hold a surface."""
     return Path(path).suffix.lower() == ".toml"
 
 
-def _listed(way: Way) -> bool:
-    """Whether a key is among those shown: coordinates are too many, patches go by their names."""
-    return isinstance(way[-1], str) and way[1] != "patches"
+def _unknown_number(path: Path, name: str, known: Iterable[str]) -> OptionError:
+    names = tuple(dict.fromkeys(known))
+    return OptionError(f"{path}: {unknown('number', name, names)}", what=name, expected=names)
+
+
+def _listed(place: KeyPath) -> bool:
+    """Whether a message lists the key: no coordinates, and patches have shorter names."""
+    return isinstance(place[-1], str) and place[1] != "patches"
 
 
 def _data(path: Path) -> dict[str, Any]:
@@ -115,29 +127,29 @@ def _data(path: Path) -> dict[str, Any]:
 
 
 def _project(path: Path, values: Mapping[str, float]) -> Project:
-    """The project with other numbers; values that are not of the file are passed over."""
+    """The project with other numbers; names that are not in the file are ignored."""
     if not is_project(path):
         return Project(path)
     data: Any = _data(path)
-    for name, way in numbers(data).items():
+    for name, place in numbers(data).items():
         if name in values:
-            place = data
-            for step in way[:-1]:
-                place = place[step]
-            place[way[-1]] = values[name]
+            table = data
+            for step in place[:-1]:
+                table = table[step]
+            table[place[-1]] = values[name]
     return project_of(path, data)
 
 
 def _retensioned(path: Path, surface: Surface, values: Mapping[str, float]) -> Surface:
-    """The surface with other tensions and pressures; values of the file are passed over."""
+    """The surface with other tensions and pressures; names that are in the file are ignored."""
     keys = numbers(_data(path))
-    given: dict[str, dict[str, float]] = {what: {} for what in WHAT}
+    given: dict[str, dict[str, float]] = {what: {} for what in QUANTITIES}
     for name in values.keys() - keys.keys():
         patch, _, what = name.rpartition(".")
         if what not in given:
-            raise OptionError(f"{path}: {unknown('number', name, keys)}")
+            raise _unknown_number(path, name, keys)
         given[what][patch] = values[name]
     try:
         return with_pressures(surface, given["tension"], given["pressure"])
     except PcmcError as error:
-        raise OptionError(f"{path}: {error}") from None
+        raise in_file(path, error, OptionError) from None

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..base import validate
 from ..base.errors import OptionError, SurfaceError, unknown
-from ..base.validate import build
 from ..surface import Surface
 
 if TYPE_CHECKING:
@@ -107,24 +107,16 @@ def solve(
     """
     if not isinstance(surface, Surface):
         kind = type(surface).__name__
-        raise SurfaceError(
-            f"solve: expected a Surface, found {kind}",
-            what="surface",
-            found=kind,
-            expected="Surface",
-        )
+        message = f"solve: expected a Surface, found {kind}"
+        raise SurfaceError(message, what="surface", found=kind, expected="Surface")
     solver = find_method(method)
     if callback is not None and not callable(callback):
-        raise OptionError(
-            f"callback: expected a function of a Progress, found {callback!r}",
-            what="callback",
-            found=callback,
-            expected="a function",
-        )
+        message = f"callback: expected a function of a Progress, found {callback!r}"
+        raise OptionError(message, what="callback", found=callback, expected="a function")
     if surface.size == 0.0:
-        raise SurfaceError(
-            "solve: all vertices are at one point; start from a surface that has a size",
-            what="vertices",
-        )
-    result: Result = solver.solve(surface, build(solver.options, method, options), callback)
+        message = "solve: all vertices are at one point; start from a surface that has a size"
+        raise SurfaceError(message, what="vertices")
+    result: Result = solver.solve(
+        surface, validate.build(solver.options, method, options), callback
+    )
     return result

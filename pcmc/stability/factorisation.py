@@ -95,12 +95,8 @@ def factoriser(pattern: Pattern, backend: str | None = None) -> Factoriser:
     """
     chosen = backend or available()[0]
     if chosen not in BACKENDS:
-        raise OptionError(
-            unknown("factorisation backend", chosen, BACKENDS),
-            what="backend",
-            found=chosen,
-            expected=BACKENDS,
-        )
+        message = unknown("factorisation backend", chosen, BACKENDS)
+        raise OptionError(message, what="backend", found=chosen, expected=BACKENDS)
     if chosen not in available():
         raise MissingExtra("pypardiso", "fast")
     # MKL refuses a matrix without rows

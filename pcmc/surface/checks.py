@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
+from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import SurfaceError
-from .geometry import Vector, bounding_size, edge_vectors, face_areas
+from .geometry import bounding_size, edge_vectors, face_areas
 from .topology import Topology
 
 ZERO_AREA = 1e-14  # of the squared longest edge: below this a triangle has no direction in floats
@@ -19,28 +20,14 @@ RESTING = 1e-12  # height, relative to the size, at which a vertex counts as lyi
 ROUNDED = 8.0 * float(np.finfo(float).eps)  # the same, relative to the coordinates
 
 
-def finite_vector(value: Any, what: str) -> Vector:
-    """Three finite numbers, or an error that says ``what`` they were to be."""
-    try:
-        vector = tuple(float(c) for c in value)
-    except (TypeError, ValueError):
-        vector = ()
-    if len(vector) != 3 or not all(np.isfinite(vector)):
-        raise SurfaceError(f"{what}: expected three finite numbers, found {value!r}")
-    return vector[0], vector[1], vector[2]
-
-
 def positions(vertices: npt.ArrayLike) -> Floats:
     """(n,3) finite floats, a copy of its own."""
     X = _array(vertices, "vertices", np.float64)
     if X.ndim != 2 or X.shape[1] != 3 or not len(X):
-        raise SurfaceError(f"vertices: expected shape (n, 3) with n > 0, found {X.shape}")
+        _refuse_shape("vertices", X, "(n, 3) with n > 0")
     bad = np.flatnonzero(~np.isfinite(X).all(axis=1))
     if len(bad):
-        raise SurfaceError(
-            f"vertices[{bad[0]}] = {X[bad[0]].tolist()} is not finite ({len(bad)} such vertices);"
-            " replace or remove it"
-        )
+        _refuse_rows("vertices", X, bad, "is not finite", hint="replace or remove it")
     return X
 
 
@@ -48,30 +35,22 @@ def within_reach(X: Floats) -> None:
     """Coordinates up to LARGEST: a solver may run beyond, but not start there."""
     bad = np.flatnonzero((np.abs(X) > LARGEST).any(axis=1))
     if len(bad):
-        raise SurfaceError(
-            f"vertices[{bad[0]}] = {X[bad[0]].tolist()} is farther out than {LARGEST:g}"
-            f" ({len(bad)} such vertices); use a larger unit of length"
-        )
+        fault = f"is farther out than {LARGEST:g}"
+        _refuse_rows("vertices", X, bad, fault, hint="use a larger unit of length")
 
 
 def face_array(faces: npt.ArrayLike, n: int) -> Ints:
     """(m,3) int32 vertex indices within 0..n-1, no vertex twice in a face."""
     F = _integers(faces, "faces")
     if F.ndim != 2 or F.shape[1] != 3 or not len(F):
-        raise SurfaceError(f"faces: expected shape (m, 3) with m > 0, found {F.shape}")
+        _refuse_shape("faces", F, "(m, 3) with m > 0")
     bad = np.flatnonzero(((F < 0) | (n <= F)).any(axis=1))
     if len(bad):
-        raise SurfaceError(
-            f"faces[{bad[0]}] = {F[bad[0]].tolist()} names a vertex outside 0..{n - 1}"
-            f" ({len(bad)} such faces)"
-        )
+        _refuse_rows("faces", F, bad, "names a vertex outside the range", f"0..{n - 1}")
     twice = (F[:, 0] == F[:, 1]) | (F[:, 1] == F[:, 2]) | (F[:, 2] == F[:, 0])
     bad = np.flatnonzero(twice)
     if len(bad):
-        raise SurfaceError(
-            f"faces[{bad[0]}] = {F[bad[0]].tolist()} has a vertex twice ({len(bad)} such faces);"
-            " remove the face"
-        )
+        _refuse_rows("faces", F, bad, "has a vertex twice", hint="remove the face")
     return F.astype(np.int32)
 
 
@@ -79,19 +58,28 @@ def patch_array(patch_of_face: npt.ArrayLike, m: int, patches: Sequence[Any]) ->
     """(m,) int32 indices into ``patches``, every patch used, names unique."""
     names = [getattr(p, "name", None) for p in patches] if isinstance(patches, Iterable) else []
     if not names or None in names:
-        raise SurfaceError(f"patches: expected a sequence of Patch, found {patches!r}")
+        validate.refuse("patches", patches, "a sequence of Patch", error=SurfaceError)
     double = [name for place, name in enumerate(names) if name in names[:place]]
     if double:
-        raise SurfaceError(f"patches: the name {double[0]!r} is used twice; names must be unique")
+        raise SurfaceError(
+            f"patches: the name {double[0]!r} is used twice; names must be unique",
+            what="patches",
+            found=double[0],
+        )
     P = _integers(patch_of_face, "patch_of_face")
     if P.shape != (m,):
-        raise SurfaceError(f"patch_of_face: expected shape ({m},), one per face, found {P.shape}")
+        _refuse_shape("patch_of_face", P, f"({m},), one entry per face")
     bad = np.flatnonzero((P < 0) | (len(names) <= P))
     if len(bad):
-        raise SurfaceError(f"patch_of_face[{bad[0]}] = {P[bad[0]]} is outside 0..{len(names) - 1}")
+        fault = "names a patch outside the range"
+        _refuse_rows("patch_of_face", P, bad, fault, f"0..{len(names) - 1}")
     empty = np.flatnonzero(np.bincount(P, minlength=len(names)) == 0)
     if len(empty):
-        raise SurfaceError(f"patch {names[empty[0]]!r} (index {empty[0]}) has no faces; remove it")
+        raise SurfaceError(
+            f"patch {names[empty[0]]!r} (index {empty[0]}) has no faces; remove it",
+            what="patches",
+            where=names[empty[0]],
+        )
     return P.astype(np.int32)
 
 
@@ -100,14 +88,14 @@ def mask(chosen: Any, n: int, what: str) -> Bools:
     given = np.asarray(list(chosen) if isinstance(chosen, range | set | frozenset) else chosen)
     if given.dtype == bool:
         if given.shape != (n,):
-            raise SurfaceError(f"{what}: a mask must have shape ({n},), found {given.shape}")
+            _refuse_shape(what, given, f"({n},) for a mask")
         return given.copy()
     result = np.zeros(n, dtype=bool)
     if given.size:
         indices = _integers(given, what).ravel()
         bad = np.flatnonzero((indices < 0) | (indices >= n))
         if len(bad):
-            raise SurfaceError(f"{what}[{bad[0]}] = {indices[bad[0]]} is outside 0..{n - 1}")
+            _refuse_rows(what, indices, bad, "names a vertex outside the range", f"0..{n - 1}")
         result[indices] = True
     return result
 
@@ -125,27 +113,25 @@ def mesh(
     names = [p.name for p in patches]
     unused = np.flatnonzero(np.bincount(F.ravel(), minlength=len(X)) == 0)
     if len(unused):
-        raise SurfaceError(
-            f"vertex {unused[0]} belongs to no face ({len(unused)} such vertices); remove it and"
-            " renumber the faces"
-        )
+        fault = "belongs to no face"
+        _refuse_rows("vertices", X, unused, fault, hint="remove it and renumber the faces")
     longest = (edge_vectors(X[F]) ** 2).sum(axis=2).max(axis=1)
     flat = 2.0 * face_areas(X[F]) <= ZERO_AREA * longest
     if flat.any():
-        low = lying(height, X)
-        flat &= ~_vanished(F, patch, patches, held, low)
+        flat &= ~_vanished(F, patch, patches, held, lying(height, X))
     bad = np.flatnonzero(flat)
     if len(bad):
-        raise SurfaceError(
-            f"face {bad[0]} = {F[bad[0]].tolist()} of patch {names[patch[bad[0]]]!r} has zero area"
-            f" ({len(bad)} such faces); merge its vertices or remesh"
-        )
+        fault = f"of patch {names[patch[bad[0]]]!r} has zero area"
+        _refuse_rows("faces", F, bad, fault, hint="merge its vertices or remesh")
     pair = np.sort(topo.edge_of_face, axis=1).astype(np.int64)  # two edges make a triangle
     same = _first_double(pair[:, 0] * len(topo.edges) + pair[:, 1])
     if same is not None:
         first, second = same
         raise SurfaceError(
-            f"faces {first} and {second} are the same triangle {F[first].tolist()}; remove one"
+            f"faces[{second}] is the same triangle as faces[{first}] = {F[first].tolist()}; remove one",
+            what="faces",
+            where=second,
+            found=F[second].tolist(),
         )
     _oriented(F, patch, topo, names)
 
@@ -177,10 +163,9 @@ def on_plane(height: Floats, sliding: Bools, X: Floats, size: float) -> None:
     near = max(1e-9 * size, ROUNDED * float(np.abs(X).max(initial=0.0)))
     bad = np.flatnonzero(sliding & (np.abs(height) > near))
     if len(bad):
-        raise SurfaceError(
-            f"vertex {bad[0]} slides on the plane but lies {height[bad[0]]:.3g} away from it"
-            f" ({len(bad)} such vertices); move it onto the plane or hold it with fixed="
-        )
+        fault = f"slides on the plane, but is {height[bad[0]]:.3g} away from it"
+        hint = "move it onto the plane or hold it with fixed="
+        _refuse_rows("vertices", X, bad, fault, hint=hint)
 
 
 def _oriented(F: Ints, patch: Ints, topo: Topology, names: Sequence[str]) -> None:
@@ -199,11 +184,19 @@ def _oriented(F: Ints, patch: Ints, topo: Topology, names: Sequence[str]) -> Non
         raise SurfaceError(
             f"patch {names[within[one]]!r}: {many} of its faces share edge {ends} (faces"
             f" {one // 3} and {two // 3} among them); split it into patches that each have at"
-            " most two faces at an edge"
+            " most two faces at an edge",
+            what="faces",
+            where=two // 3,
+            found=many,
+            expected="at most 2 faces of a patch at an edge",
         )
     raise SurfaceError(
         f"patch {names[within[one]]!r} is not consistently oriented: faces {one // 3} and"
-        f" {two // 3} run along edge {ends} the same way; reverse one of them"
+        f" {two // 3} run along edge {ends} the same way; reverse one of them",
+        what="faces",
+        where=two // 3,
+        found=ends,
+        expected="opposite directions along a shared edge",
     )
 
 
@@ -222,18 +215,50 @@ def _array(values: npt.ArrayLike, what: str, dtype: Any) -> Any:
     try:
         return np.array(values, dtype=dtype, order="C")
     except (TypeError, ValueError) as error:
-        raise SurfaceError(f"{what}: expected a regular array of numbers ({error})") from None
+        raise SurfaceError(
+            f"{what}: expected a regular array of numbers ({error})",
+            what=what,
+            expected="a regular array of numbers",
+        ) from None
 
 
 def _integers(values: npt.ArrayLike, what: str) -> Ints:
-    found = _array(values, what, None)
-    if not np.issubdtype(found.dtype, np.integer):
-        as_float = _array(found, what, np.float64)
-        flat = as_float.ravel()
-        bad = np.flatnonzero((flat != np.floor(flat)) | (np.abs(flat) > 2**53))
+    given = _array(values, what, None)
+    if not np.issubdtype(given.dtype, np.integer):
+        given = _array(given, what, np.float64)
+        bad = np.argwhere((given != np.floor(given)) | (np.abs(given) > 2**53))
         if len(bad):
+            place = tuple(bad[0].tolist())
             raise SurfaceError(
-                f"{what}: expected whole numbers, found {flat[bad[0]]} at place {bad[0]}"
+                f"{what}{list(place)}: expected a whole number, found {given[place]}",
+                what=what,
+                where=place if len(place) > 1 else place[0],
+                found=float(given[place]),
+                expected="a whole number",
             )
-        found = as_float.astype(np.int64)
-    return found.astype(np.int64)
+    return np.asarray(given.astype(np.int64))
+
+
+def _refuse_shape(what: str, array: Any, expected: str) -> NoReturn:
+    raise SurfaceError(
+        f"{what}: expected shape {expected}, found {array.shape}",
+        what=what,
+        found=array.shape,
+        expected=expected,
+    )
+
+
+def _refuse_rows(
+    what: str, rows: Any, bad: Ints, fault: str, expected: str | None = None, hint: str = ""
+) -> NoReturn:
+    """Refuse the first of the bad rows, with their number."""
+    first = int(bad[0])
+    limits = "" if expected is None else f" {expected}"
+    count = f" ({len(bad)} such entries)" if len(bad) > 1 else ""
+    raise SurfaceError(
+        f"{what}[{first}] = {rows[first].tolist()} {fault}{limits}{count}{hint and f'; {hint}'}",
+        what=what,
+        where=first,
+        found=rows[first].tolist(),
+        expected=expected,
+    )

@@ -12,6 +12,7 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
+from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FreeSurfaceWarning, OptionError, SurfaceError, unknown
 from . import checks
@@ -48,36 +49,29 @@ class Patch:
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", str(self.name))
         object.__setattr__(self, "wall", bool(self.wall))
-        for key in ("tension", "pressure"):
-            value = getattr(self, key)
-            try:
-                if isinstance(value, bool):
-                    raise TypeError
-                object.__setattr__(self, key, float(value))
-            except (TypeError, ValueError):
-                raise SurfaceError(
-                    f"patch {self.name!r}: {key} must be a number, found {value!r}"
-                ) from None
-        if not (math.isfinite(self.tension) and self.tension >= 0.0):
+        tension = self._number("tension", least=0.0, hint="0 makes a wall that does not pull")
+        pressure = self._number("pressure")
+        if tension == 0.0 and pressure != 0.0:
             raise SurfaceError(
-                f"patch {self.name!r}: tension must be a finite number ≥ 0, found {self.tension};"
-                " 0 makes a wall that does not pull"
+                f"tension of {self.name!r}: expected > 0 for a patch under pressure {pressure:g}, found"
+                " 0; only a wall between equal pressures (pressure=0) may have tension 0",
+                what="tension",
+                where=self.name,
+                found=0.0,
+                expected="> 0",
             )
-        if not math.isfinite(self.pressure):
-            raise SurfaceError(
-                f"patch {self.name!r}: pressure must be finite, found {self.pressure}"
-            )
-        for key in ("tension", "pressure"):
-            if abs(getattr(self, key)) > checks.LARGEST:
-                raise SurfaceError(
-                    f"patch {self.name!r}: {key} must be at most {checks.LARGEST:g}, found"
-                    f" {getattr(self, key)}; use a larger unit of force"
-                )
-        if self.tension == 0.0 and self.pressure != 0.0:
-            raise SurfaceError(
-                f"patch {self.name!r}: a patch under pressure {self.pressure} needs a tension > 0;"
-                " only a wall between equal pressures (pressure=0) may have tension 0"
-            )
+
+    def _number(self, key: str, least: float | None = None, hint: str = "") -> float:
+        value, where, most = getattr(self, key), self.name, checks.LARGEST
+        number = validate.number(
+            key, value, least=least, where=where, hint=hint, error=SurfaceError
+        )
+        hint = "use a larger unit of force"
+        validate.number(
+            key, number, least=-most, most=most, where=where, hint=hint, error=SurfaceError
+        )
+        object.__setattr__(self, key, number)
+        return number
 
     @property
     def auxiliary(self) -> bool:
@@ -106,12 +100,34 @@ class Plane:
 
     def __post_init__(self) -> None:
         for key in ("point", "normal"):
-            vector = checks.finite_vector(getattr(self, key), f"Plane.{key}")
+            vector = validate.vector(f"Plane.{key}", getattr(self, key), error=SurfaceError)
             object.__setattr__(self, key, vector)
         length = math.sqrt(sum(c * c for c in self.normal))
         if length == 0.0:
-            raise SurfaceError("Plane.normal must not be the zero vector")
+            raise SurfaceError(
+                "Plane.normal: expected a vector of positive length, found (0, 0, 0)",
+                what="Plane.normal",
+                found=self.normal,
+                expected="a vector of positive length",
+            )
         object.__setattr__(self, "normal", tuple(c / length for c in self.normal))
+
+    @cached_property
+    def axes(self) -> Floats:
+        """(3,3) rows: two unit vectors along the plane and its normal; the identity for z = 0."""
+        normal = np.array(self.normal)
+        axis = np.eye(3)[1 if abs(normal[0]) > 0.9 else 0]
+        first = axis - (axis @ normal) * normal
+        first /= np.linalg.norm(first)
+        return np.stack([first, np.cross(normal, first), normal])
+
+    def to_local(self, points: npt.ArrayLike) -> Floats:
+        """(…,3) two coordinates on the plane and the height above it, of points (…,3).
+
+        >>> Plane(point=(1, 2, 3)).to_local([1, 3, 5]).tolist()
+        [0.0, 1.0, 2.0]
+        """
+        return (np.asarray(points, dtype=float) - np.array(self.point)) @ self.axes.T
 
     def height(self, points: npt.ArrayLike) -> Floats:
         """(…) signed distance of points (…,3) from the plane, positive along the normal."""
@@ -160,17 +176,17 @@ class Surface:
 
     def __post_init__(self) -> None:
         if not isinstance(self.plane, Plane):
-            raise SurfaceError(f"plane: expected a Plane, found {self.plane!r}")
+            raise SurfaceError(
+                f"plane: expected a Plane, found {self.plane!r}", what="plane", found=self.plane
+            )
         X = checks.positions(self.vertices)
         checks.within_reach(X)
         F = checks.face_array(self.faces, len(X))
         patch = checks.patch_array(self.patch_of_face, len(F), self.patches)
         fixed = checks.mask(self.fixed, len(X), "fixed")
         sliding = checks.mask(self.on_plane, len(X), "on_plane") & ~fixed
-        for key, value in (
-            ("vertices", X), ("faces", F), ("patch_of_face", patch), ("fixed", fixed),
-            ("on_plane", sliding),
-        ):  # fmt: skip
+        arrays = {"vertices": X, "faces": F, "patch_of_face": patch, "fixed": fixed}
+        for key, value in (arrays | {"on_plane": sliding}).items():
             value.setflags(write=False)
             object.__setattr__(self, key, value)
         object.__setattr__(self, "patches", tuple(self.patches))
@@ -262,7 +278,7 @@ class Surface:
         """Index of the patch called ``name``."""
         names = [p.name for p in self.patches]
         if name not in names:
-            raise OptionError(unknown("patch", name, names))
+            raise OptionError(unknown("patch", name, names), what="patch", found=name)
         return names.index(name)
 
     def moved(self, vertices: npt.ArrayLike) -> Surface:
@@ -272,7 +288,12 @@ class Surface:
         """
         X = checks.positions(vertices)
         if X.shape != self.vertices.shape:
-            raise SurfaceError(f"vertices: expected shape {self.vertices.shape}, found {X.shape}")
+            raise SurfaceError(
+                f"vertices: expected shape {self.vertices.shape}, found {X.shape}",
+                what="vertices",
+                found=X.shape,
+                expected=self.vertices.shape,
+            )
         checks.on_plane(self.plane.height(X), self.on_plane, X, self.size)
         X.setflags(write=False)
         return self._with(vertices=X)

@@ -6,8 +6,8 @@
 [0.5, 1.0]
 """
 
-from .engine import Progress, run
 from .grid import Sweep, checked
+from .running import Progress, run
 from .solving import solve_case
 from .store import Record, read_store
 from .table import provenance, table, write_table

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import MissingExtra
-from .engine import Progress
+from .running import Progress
 
 if TYPE_CHECKING:
     from rich.console import Console

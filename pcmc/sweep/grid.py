@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import OptionError, unknown
-from .child import WORDS, resolve, scalar
+from .case_script import WORDS, resolve, scalar
 
 
 @dataclass(frozen=True)
@@ -103,14 +103,19 @@ class Sweep:
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """The parameters of each case, in order."""
-        for values in itertools.product(*self.grid.values()):
-            yield dict(zip(self.grid, values, strict=True)) | dict(self.fixed)
+        return cases(self.grid, self.fixed)
 
     @property
     def fingerprint(self) -> str:
         """SHA-256 of the case's name, the grid with its order, and the fixed parameters."""
-        told = [self.case, list(self.grid.items()), sorted(self.fixed.items())]
-        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+        parts = [self.case, list(self.grid.items()), sorted(self.fixed.items())]
+        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def cases(grid: Mapping[str, Sequence[Any]], fixed: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """The parameters of each case, in order."""
+    for values in itertools.product(*grid.values()):
+        yield dict(zip(grid, values, strict=True)) | dict(fixed)
 
 
 def checked(check: Callable[..., object]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

@@ -81,6 +81,6 @@ def solve_project(
     design, start = projects.varied(project, values)
     if method not in (None, design.method):
         design = replace(design, method=method, options={})
-    outcome = projects.settle(design, start)
+    outcome = projects.solve_project(design, start)
     told = row(outcome.result, ("project", "project_digest", "method", *values))
     return told if outcome.design is None else told | {"targets_met": outcome.design.met}

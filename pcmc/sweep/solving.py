@@ -11,7 +11,7 @@ from ..base.errors import OptionError, unknown
 from ..energy.functional import gradient
 from ..solvers import find_method, solve
 from ..solvers.result import Result
-from .child import resolve
+from .case_script import resolve
 from .grid import checked
 
 if TYPE_CHECKING:

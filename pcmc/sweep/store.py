@@ -1,35 +1,36 @@
-"""The file of a sweep: a header and a line per finished case, readable after a crash at any time.
+"""The file of a sweep: an SQLite database with one row per finished case.
 
-A store is a text file of JSON lines. Each line ends with the CRC-32 of what stands before it, and
-is written by one call as soon as its case has finished: whatever ends the sweep after that does not
-lose it. The disk is made to hold what was written at most ten times a second, so when the power
-fails, a tenth of a second is lost. A crash leaves whole lines and at most one broken last line,
-which is cut off when the sweep resumes. (A data base does
-not survive being cut off in the middle; lines do, and every program reads them.) Floats are written
-with the shortest digits that give the same float back.
+A row's key is the parameters of its case, so a grid may grow or shrink: only new cases are run, and rows of
+cases that left the grid stay. The journal is SQLite's rollback journal and not a write-ahead log, which
+fails on network drives and keeps two files beside the store. So a store is one file between transactions,
+and a program that is killed or loses power loses only the transaction it was in.
+
+The sweep that runs holds SQLite's write lock all the time: others can read, and a second sweep is refused.
+The lock ends with its process.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import sys
+import sqlite3
 import time
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 from warnings import warn
 
 from ..base.errors import FileError, FileWarning
-from .child import version
-from .grid import Sweep
+from .case_script import version
+from .grid import Sweep, cases
 
-FORMAT = 1
-FORCE_EVERY = 0.1  # seconds
-FAILED = ("raised", "timed out", "killed")  # statuses the engine gives; all others are the case's
+FORMAT = 2  # 1 was lines of JSON
+SQLITE, LINES = b"SQLite format 3\0", b'{"pcmc sweep"'  # how files of the two formats begin
+READERS = 60.0  # seconds that a commit waits for programs that read the store
+FAILED = ("raised", "timed out", "killed")  # statuses that ``run`` gives; a case gives all others
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,13 @@ class Record:
     Attributes
     ----------
     case : its number in the sweep.
-    parameters : what it was run at.
-    status : ``"finished"`` or the case's own word; ``"raised"``, ``"timed out"`` or ``"killed"``
-        for a case that failed. ``verdict`` is the case's; ``message`` says why a case failed.
-    numbers : what the case returned.
-    wall_time : seconds it took. ``provenance``: when and where it ran, with which versions, and
-        what a failed case printed last.
+    parameters : the values it was run with.
+    status : ``"raised"``, ``"timed out"`` or ``"killed"`` for a case that failed; otherwise the status that
+        the case returned, or ``"finished"``.
+    verdict, message : texts that the case returned. If the case failed, the message is the reason.
+    numbers : all else that the case returned.
+    wall_time : in seconds.
+    provenance : when and where the case ran, with which versions; the last output of a failed case.
     """
 
     case: int
@@ -58,243 +60,244 @@ class Record:
 
     @property
     def failed(self) -> bool:
-        """Whether the case raised, was stopped at its time limit or killed its worker."""
+        """Whether the case raised, reached its time limit or killed its worker."""
         return self.status in FAILED
 
 
 class Store:
-    """An open store: ``records`` by case number, ``append`` for the next, ``force`` now and then."""
+    """An open store: ``records`` by case number, and ``append`` for more."""
 
-    def __init__(self, path: Path, descriptor: int, records: dict[int, Record], end: int) -> None:
+    def __init__(
+        self, path: Path, database: sqlite3.Connection, records: dict[int, Record]
+    ) -> None:
         self.path, self.records = path, records
-        self._descriptor, self._end = descriptor, end
-        self._forced, self._held = time.monotonic(), len(records)  # when last, and how many then
+        self._database = database
 
-    def append(self, record: Record) -> None:
-        """Write one record.
+    def append(self, records: Iterable[Record]) -> None:
+        """Write records in one transaction, and return when the disk holds them.
 
         Raises
         ------
-        FileError : the disk is full or fails. What was stored before stays whole.
+        FileError : the disk is full or fails. The records stored before stay.
         """
-        self._write(_line(vars(record)))
-        self.records[record.case] = record
-        if time.monotonic() - self._forced > FORCE_EVERY:
-            self.force()
-
-    def force(self) -> None:
-        """Return when the disk holds all that was written. FileError as ``append``."""
-        if len(self.records) == self._held:
-            return
-        with self._told(self._held):
-            os.fsync(self._descriptor)
-        self._forced, self._held = time.monotonic(), len(self.records)
-
-    def _write(self, line: bytes) -> None:
-        written = 0
-        with self._told(len(self.records)):
-            while written < len(line):
-                written += os.write(self._descriptor, line[written:])
-        self._end += written
-
-    @contextmanager
-    def _told(self, safe: int) -> Iterator[None]:
-        """Cut off what was written of a line when the disk fails, and say how many are safe."""
+        new = {record.case: record for record in records}
+        rows = [_row(record) for record in new.values()]
         try:
-            yield
-        except OSError as error:
-            with suppress(OSError):
-                os.ftruncate(self._descriptor, self._end)
+            self._database.executemany("INSERT OR REPLACE INTO cases VALUES (?, ?, ?)", rows)
+            self._database.execute("COMMIT")
+            self._database.execute("BEGIN IMMEDIATE")
+        except sqlite3.Error as error:
             raise FileError(
-                f"{self.path}: a record could not be written ({error.strerror or error}); the"
-                f" {safe} cases stored before it are safe; make room and run the same sweep again"
-                " to go on from there"
-            ) from error
-
-
-_open: set[int] = set()  # descriptors of this process's stores
-
-
-def _let_go() -> None:
-    """In a fork of this process, a pool's worker say: it would hold the lock for as long as it lives."""
-    nothing = os.open(os.devnull, os.O_RDWR)
-    for descriptor in _open:
-        os.dup2(nothing, descriptor, False)
-    os.close(nothing)
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_let_go)
+                f"{self.path}: a record could not be written ({error}); the {len(self.records)} cases"
+                " stored before it are safe; make room and run the same sweep again to go on from there",
+                what=str(self.path), found=len(self.records),
+            ) from error  # fmt: skip
+        self.records |= new
 
 
 @contextmanager
 def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
-    """Open the store of ``sweep`` for appending, making it or recovering what a crash left.
+    """Open the store of ``sweep`` for writing; make the file if it is missing.
 
     Raises
     ------
-    FileError : the file is no store, is another sweep's or another version's, is in use, or cannot
-        be opened.
+    FileError : the file is no store, belongs to another sweep or another version of pcmc, is in use, or
+        cannot be opened.
     """
-    path, header = Path(path), _line(_header(sweep))
-    _regular(path)
+    path = Path(path)
+    _check_file(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
     except OSError as error:
-        raise FileError(f"{path}: cannot be opened for writing ({error.strerror})") from error
-    _open.add(descriptor)
-    try:
-        _lock(path, descriptor)
-        data = path.read_bytes()
-        new = header.startswith(data) and data != header  # an empty file, or a crash in the header
-        if not new:
-            _check_header(path, data, sweep)
-        records, end = ({}, 0) if new else _records(path, data)
-        os.ftruncate(descriptor, end)
-        store = Store(path, descriptor, records, end)
-        if new:
-            store._write(header)
-        try:
-            yield store
-        finally:
-            store.force()
-    finally:
-        _open.discard(descriptor)
-        os.close(descriptor)
+        raise FileError(
+            f"{path}: cannot be opened for writing ({error.strerror})", what=str(path)
+        ) from error
+    with _connected(path, "rwc") as database:
+        _lock(path, database)
+        if not database.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]:
+            database.execute("CREATE TABLE sweep (version TEXT, declaration TEXT)")
+            database.execute(
+                "CREATE TABLE cases (parameters TEXT PRIMARY KEY, record TEXT, crc INTEGER)"
+            )
+            database.execute("INSERT INTO sweep VALUES (?, ?)", (version("pcmc"), "{}"))
+            database.execute(f"PRAGMA user_version = {FORMAT}")
+        else:
+            _check_declaration(path, _declaration(path, database), sweep)
+        database.execute("UPDATE sweep SET declaration = ?", (json.dumps(_declared(sweep)),))
+        database.execute("COMMIT")
+        database.execute("BEGIN IMMEDIATE")
+        yield Store(path, database, _records(path, database, sweep))
 
 
 def read_store(path: str | os.PathLike[str]) -> list[Record]:
-    """The records of a store in the order of their case numbers; a sweep may be running on it.
+    """The records of a store; a sweep may be running on it.
+
+    The store may hold more: cases whose values the last sweep on it had no longer in its grid. They
+    are not returned.
+
+    Returns
+    -------
+    list of Record : in the order of the grid.
 
     Raises
     ------
     FileError : the file cannot be read, or is no store.
     """
     path = Path(path)
-    _regular(path)
+    _check_file(path)
     try:
-        data = path.read_bytes()
+        path.open("rb").close()
     except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror})") from error
-    _check_header(path, data, None)
-    records, _ = _records(path, data)
+        raise FileError(f"{path}: cannot be read ({error.strerror})", what=str(path)) from error
+    with _connected(path, "rw") as database:
+        database.execute("BEGIN")
+        declared = _declaration(path, database)
+        records = _records(path, database, cases(declared["grid"], declared["fixed"]))
     return [records[number] for number in sorted(records)]
 
 
-def _regular(path: Path) -> None:
-    """Refuse a folder, a pipe or a device, of which some can be read without end."""
+@contextmanager
+def _connected(path: Path, mode: str) -> Iterator[sqlite3.Connection]:
+    """A connection to the file; errors of SQLite as FileError."""
+    database = None
     try:
-        found = path.exists() and not path.is_file()
-    except OSError as error:
-        raise FileError(f"{path}: cannot be opened ({error.strerror})") from error
-    if found or "\0" in str(path):
-        raise FileError(f"{path}: is no regular file; name a file on a disk")
-
-
-def _header(sweep: Sweep) -> dict[str, Any]:
-    return {
-        "pcmc sweep": FORMAT,
-        "version": version("pcmc"),
-        "fingerprint": sweep.fingerprint,
-        "case": sweep.case,
-        "grid": dict(sweep.grid),
-        "fixed": dict(sweep.fixed),
-    }
-
-
-def _line(fields: dict[str, Any]) -> bytes:
-    r"""One JSON line that ends with the checksum of what stands before it.
-
-    >>> _line({"case": 0})
-    b'{"case": 0, "crc": "7e7fc89a"}\n'
-    """
-    body = json.dumps(fields)[:-1].encode("ascii")
-    return body + b', "crc": "%08x"}\n' % zlib.crc32(body)
-
-
-def _parse(line: bytes) -> dict[str, Any] | None:
-    """The fields of a whole line, or None if a byte of it is wrong."""
-    body, _, _ = line.rpartition(b', "crc": ')
-    if line != body + b', "crc": "%08x"}' % zlib.crc32(body):
-        return None
-    fields: dict[str, Any] = json.loads(body + b"}")
-    return fields
-
-
-def _check_header(path: Path, data: bytes, sweep: Sweep | None) -> None:
-    """Refuse a file that is no store, or not the store of ``sweep``."""
-    found = _parse(data.partition(b"\n")[0])
-    if found is None or "pcmc sweep" not in found:
-        raise FileError(f"{path}: line 1 is not the header of a sweep's store; name another file")
-    if found["pcmc sweep"] != FORMAT:
-        raise FileError(
-            f"{path}: written in store format {found['pcmc sweep']}, this is format {FORMAT}; read"
-            f" it with pcmc {found.get('version')}"
+        database = sqlite3.connect(
+            f"{path.absolute().as_uri()}?mode={mode}", READERS, isolation_level=None, uri=True
         )
-    if sweep is None:
+        yield database
+    except sqlite3.Error as error:
+        raise FileError(
+            f"{path}: cannot be used as a sweep's store ({error})", what=str(path)
+        ) from error
+    finally:
+        if database is not None:
+            database.close()
+
+
+def _check_file(path: Path) -> None:
+    """Refuse a folder, a pipe, a device (some can be read without end), and a file of another kind."""
+    try:
+        irregular = path.exists() and not path.is_file()
+        if irregular or "\0" in str(path):
+            raise FileError(f"{path}: is no regular file; name a file on a disk", what=str(path))
+        with path.open("rb") as file:
+            start = file.read(len(SQLITE))
+    except FileNotFoundError:
         return
-    wanted = _header(sweep)
-    if found["version"] != wanted["version"]:
-        raise FileError(
-            f"{path}: written by pcmc {found['version']}, this is pcmc {wanted['version']}; numbers"
-            " of two versions do not mix: name a new file, or delete this one"
-        )
-    if found["fingerprint"] != wanted["fingerprint"]:
-        raise FileError(
-            f"{path}: written for another sweep ({_difference(found, wanted)}); name a new file, or"
-            " delete this one"
-        )
-
-
-def _difference(found: dict[str, Any], wanted: dict[str, Any]) -> str:
-    """Where two declarations first differ."""
-    for part in ("case", "grid", "fixed"):
-        old, new = found[part], wanted[part]
-        if old == new:
-            continue
-        if part == "case":
-            return f"its case is {old!r}, this one's {new!r}"
-        for name in [*old, *new]:
-            if old.get(name) != new.get(name):
-                was, now = repr(old.get(name)), repr(new.get(name))
-                return f"its {part} has {name}={was:.60}, this one's {now:.60}"
-    return "its parameters stand in another order"
-
-
-def _records(path: Path, data: bytes) -> tuple[dict[int, Record], int]:
-    """The records after the header, and the length of the data up to the last whole line."""
-    *lines, cut_off = data.split(b"\n")
-    found = {}
-    for number, line in enumerate(lines[1:], start=2):
-        told = _parse(line)
-        if told is not None and told.keys() == Record.__annotations__.keys():
-            found[told["case"]] = Record(**told)
-        else:
-            text = (
-                f"{path}: line {number} is damaged; unless a later line has its case, it is not run"
-            )
-            warn(text, FileWarning, stacklevel=4)
-    return found, len(data) - len(cut_off)
-
-
-def _lock(path: Path, descriptor: int) -> None:
-    """Keep a second sweep off the store for as long as this process has it open."""
-    try:
-        if sys.platform == "win32":
-            import msvcrt
-
-            os.lseek(descriptor, 2**30, os.SEEK_SET)  # one byte far behind the data
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl
-
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (BlockingIOError, PermissionError) as error:
-        raise FileError(
-            f"{path}: another sweep is writing to it; wait for it, or name another file"
-        ) from error
     except OSError as error:
+        raise FileError(f"{path}: cannot be opened ({error.strerror})", what=str(path)) from error
+    if start.startswith(LINES):
         raise FileError(
-            f"{path}: cannot be locked ({error.strerror}); name a file on another disk"
+            f"{path}: is a store of an older pcmc, in lines of JSON; name a new file",
+            what=str(path), found=1, expected=FORMAT,
+        )  # fmt: skip
+    if start not in (b"", SQLITE):
+        raise FileError(f"{path}: is not the store of a sweep; name another file", what=str(path))
+
+
+def _lock(path: Path, database: sqlite3.Connection) -> None:
+    """Begin a transaction that keeps a second sweep off the store.
+
+    A sweep releases the lock for some microseconds between two transactions. If the lock is free three
+    times, moments apart, no sweep is running.
+    """
+    try:
+        database.execute("PRAGMA busy_timeout = 0")
+        for pause in (0.01, 0.017):
+            database.execute("BEGIN IMMEDIATE")
+            database.execute("ROLLBACK")
+            time.sleep(pause)
+        database.execute("BEGIN IMMEDIATE")
+        database.execute(f"PRAGMA busy_timeout = {1000 * READERS:.0f}")
+    except sqlite3.OperationalError as error:
+        if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
+            raise
+        raise FileError(
+            f"{path}: another sweep is writing to it (or its disk has no file locks); wait for it, or"
+            " name another file",
+            what=str(path),
         ) from error
+
+
+def _declared(sweep: Sweep) -> dict[str, Any]:
+    return {"case": sweep.case, "grid": dict(sweep.grid), "fixed": dict(sweep.fixed)}
+
+
+def _declaration(path: Path, database: sqlite3.Connection) -> dict[str, Any]:
+    """The case function, grid and fixed values in the store, and the ``version`` that wrote it."""
+    tables = {name for (name,) in database.execute("SELECT name FROM sqlite_schema")}
+    if not {"sweep", "cases"} <= tables:
+        raise FileError(f"{path}: is not the store of a sweep; name another file", what=str(path))
+    (damage,) = database.execute("PRAGMA integrity_check(1)").fetchone()
+    if damage != "ok":
+        raise FileError(f"{path}: is damaged ({damage}); name another file", what=str(path))
+    (found,) = database.execute("PRAGMA user_version").fetchone()
+    written_by, text = database.execute("SELECT version, declaration FROM sweep").fetchone()
+    if found != FORMAT:
+        raise FileError(
+            f"{path}: written in store format {found}, this is format {FORMAT}; read it with pcmc"
+            f" {written_by}",
+            what=str(path), found=found, expected=FORMAT,
+        )  # fmt: skip
+    return {"version": written_by, **json.loads(text)}
+
+
+def _check_declaration(path: Path, stored: dict[str, Any], sweep: Sweep) -> None:
+    """Refuse a store of another sweep. The values in the grid may differ."""
+    if stored["version"] != version("pcmc"):
+        raise FileError(
+            f"{path}: written by pcmc {stored['version']}, this is pcmc {version('pcmc')}; numbers of"
+            " two versions do not mix: name a new file, or delete this one",
+            what=str(path), where="version", found=stored["version"], expected=version("pcmc"),
+        )  # fmt: skip
+    new = _declared(sweep)
+    for part in ("case", "grid", "fixed"):
+        old, wanted = stored[part], new[part]
+        if part == "grid":
+            old, wanted = dict.fromkeys(old, "varied"), dict.fromkeys(wanted, "varied")
+        if old == wanted:
+            continue
+        where, was, now = part, old, wanted
+        if part != "case":
+            where = next(name for name in [*old, *wanted] if old.get(name) != wanted.get(name))
+            was, now = old.get(where, "nothing"), wanted.get(where, "nothing")
+        place = "case is " if part == "case" else f"{part} has {where}="
+        raise FileError(
+            f"{path}: written for another sweep (its {place}{was!r:.60}, this one's {now!r:.60}); name a new"
+            " file, or delete this one",
+            what=str(path), where=where, found=was, expected=now,
+        )  # fmt: skip
+
+
+def _key(parameters: Mapping[str, Any]) -> str:
+    return json.dumps(parameters, sort_keys=True)
+
+
+def _row(record: Record) -> tuple[str, str, int]:
+    """Parameters, the rest of the record, and the checksum of both: SQLite has none."""
+    fields = asdict(record)
+    del fields["case"]
+    key = _key(fields.pop("parameters"))
+    text = json.dumps(fields)
+    return key, text, zlib.crc32((key + text).encode())
+
+
+def _records(
+    path: Path, database: sqlite3.Connection, sweep: Iterable[dict[str, Any]]
+) -> dict[int, Record]:
+    """The stored records of the sweep's cases by case number."""
+    rows = {key: rest for key, *rest in database.execute("SELECT * FROM cases")}
+    records = {}
+    for number, parameters in enumerate(sweep):
+        key = _key(parameters)
+        if key not in rows:
+            continue
+        text, crc = rows[key]
+        if zlib.crc32((key + str(text)).encode()) == crc:
+            records[number] = Record(case=number, parameters=parameters, **json.loads(text))
+        else:
+            warn(
+                f"{path}: the record of case {number} is damaged; the next sweep on this store runs the"
+                " case again", FileWarning, stacklevel=4,
+            )  # fmt: skip
+    return records

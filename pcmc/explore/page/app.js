@@ -1,11 +1,11 @@
-// The page: wishes go to the server one at a time, its answers to the viewer, panel and verdict.
+// The page: it sends one request at a time to the server and shows the answers.
 
 import { arrowsOf, COLOURS, fieldOf, showFindings, showLegend, showVerdict } from "./findings.js";
 import { digits, Panel } from "./panel.js";
 import { Viewer } from "./viewer.js";
-import { ask, fetchFile } from "./wire.js";
+import { ask, fetchFile } from "./server.js";
 
-const OVERTAKE = 400; // milliseconds, at least, after which a newer wish ends the work on an older one
+const REPLACE_AFTER = 400; // milliseconds, at least, before a newer request replaces one under way
 const find = (selector) => document.querySelector(selector);
 const KINDS = {
   ".pcmc": "everything", ".3dm": "Rhino", ".obj": "most programs", ".glb": "viewers, AR",
@@ -14,13 +14,13 @@ const KINDS = {
 
 class Page {
   async open() {
-    const known = new URLSearchParams(location.search).get("draft") || sessionStorage.getItem("draft");
-    // a copy of this tab must not take this tab's draft along
-    sessionStorage.removeItem("draft");
-    addEventListener("pagehide", () => sessionStorage.setItem("draft", this.name));
-    const { header, arrays } = await ask("api/open", known ? { draft: known } : {})
+    const known = new URLSearchParams(location.search).get("session") || sessionStorage.getItem("session");
+    // a copy of this tab starts a session of its own
+    sessionStorage.removeItem("session");
+    addEventListener("pagehide", () => sessionStorage.setItem("session", this.name));
+    const { header, arrays } = await ask("api/open", known ? { session: known } : {})
       .catch((error) => (known && !location.search ? ask("api/open") : Promise.reject(error)));
-    this.name = header.draft;
+    this.name = header.session;
     this.size = header.size;
     this.choice = "patches";
     find("#title").textContent = header.title || "pcmc explore";
@@ -31,13 +31,13 @@ class Page {
     });
     this.startViewer(header, arrays);
     this.panel = new Panel(find("#patches"), header.patches, header.asked, find("#together"),
-      (final) => this.wish(final));
+      (final) => this.request(final));
     find("#together-row").hidden = header.patches.length < 2;
     this.addChoices();
     this.addExports(header.formats);
     this.addActs();
-    this.take({ header, arrays }, true);
-    this.tellWork();
+    this.show({ header, arrays }, true);
+    this.showWork();
   }
 
   startViewer(header, arrays) {
@@ -49,16 +49,16 @@ class Page {
       find("#canvas").hidden = true;
       find("#no-graphics").hidden = false;
       find("#no-graphics").textContent = error.message === "no WebGL 2"
-        ? "This browser shows no 3D pictures (WebGL 2 is missing or switched off); all else works."
+        ? "This browser cannot show the surface: WebGL 2 is missing or switched off. Everything else works."
         : `The 3D picture cannot be drawn: ${error.message}`;
       return;
     }
     this.viewer.setMesh(header, arrays);
   }
 
-  // -- wishes: one under way, and the newest of those that came since ------------------------------
+  // -- requests: one under way, and the newest of those that wait -----------------------------------
 
-  wish(final) {
+  request(final) {
     this.next = { act: final ? "settle" : "follow", values: this.panel.values() };
     find("#verdict").dataset.busy = "true";
     this.pump();
@@ -73,8 +73,8 @@ class Page {
     clearTimeout(this.timer);
     if (!this.next) return;
     const waited = performance.now() - this.since;
-    // what took long the last time is given as long again, or a moving slider would never see an end
-    const patience = Math.max(OVERTAKE, 1.5 * (this.lasted || 0));
+    // a slow surface gets as long as it last took, or a moving slider would never get an answer
+    const patience = Math.max(REPLACE_AFTER, 1.5 * (this.lasted || 0));
     if (this.busy && !now && waited < patience) {
       this.timer = setTimeout(() => this.pump(), patience - waited);
       return;
@@ -88,24 +88,24 @@ class Page {
     const ticket = {};
     this.busy = ticket;
     this.since = performance.now();
-    this.tellWork();
+    this.showWork();
     try {
       const answer = await ask(`api/${this.name}/${act}`, values);
       if (!answer.header.superseded && this.busy === ticket) {
         if (act === "follow") this.lasted = performance.now() - this.since;
-        this.take(answer, !["follow", "settle"].includes(act));
+        this.show(answer, !["follow", "settle"].includes(act));
       }
     } catch (error) {
-      this.tell(error.message);
+      this.notify(error.message);
       if (!this.next) this.panel.show(this.header.asked, this.header.shown, true);
     }
     if (this.busy !== ticket) return;
     this.busy = null;
-    this.tellWork();
+    this.showWork();
     this.pump();
   }
 
-  tellWork() {
+  showWork() {
     clearTimeout(this.slow);
     const card = find("#verdict");
     card.dataset.busy = String(Boolean(this.busy || this.next));
@@ -122,8 +122,8 @@ class Page {
 
   // -- answers -------------------------------------------------------------------------------------
 
-  /** Show an answer; `values` sets the sliders too, which a moving hand would not like. */
-  take({ header, arrays }, values) {
+  /** Show an answer; with `values` set the sliders too, which must not happen while one moves. */
+  show({ header, arrays }, values) {
     this.header = header;
     this.arrays = { ...arrays, underPressure: this.underPressure };
     showVerdict(find("#verdict"), header);
@@ -149,7 +149,7 @@ class Page {
     this.viewer.setArrows(this.choice === "reactions" ? arrowsOf(this.arrays, field, this.size) : null);
   }
 
-  /** Move along the softest mode and back, slowly. */
+  /** Move slowly along the softest mode and back. */
   sway(on) {
     this.swaying = on;
     find("#sway").setAttribute("aria-pressed", String(on));
@@ -166,8 +166,8 @@ class Page {
     this.frame = requestAnimationFrame(step);
   }
 
-  /** One line that goes away by itself. */
-  tell(text) {
+  /** Show one line for a few seconds. */
+  notify(text) {
     const note = find("#note");
     note.textContent = text;
     note.hidden = false;
@@ -216,9 +216,9 @@ class Page {
       const body = suffix === ".png"
         ? await this.viewer.picture() : await fetchFile(`api/${this.name}/export?suffix=${suffix}`);
       download(body, `surface${suffix}`);
-      if (!this.header.at_rest) this.tell("What was saved is the surface drawn, not the values asked for.");
+      if (!this.header.at_rest) this.notify("Saved: the surface shown, with its own values, not those you asked for.");
     } catch (error) {
-      this.tell(error.message);
+      this.notify(error.message);
     }
   }
 
@@ -264,6 +264,6 @@ function download(body, name) {
 
 const page = new Page();
 page.open().catch((error) => {
-  find("#verdict .word").textContent = "Not opened";
+  find("#verdict .word").textContent = "Cannot open";
   find("#verdict .sentence").textContent = error.message;
 });

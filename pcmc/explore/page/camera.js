@@ -1,4 +1,4 @@
-// Where the surface is seen from, and how mouse, fingers and keys change that.
+// The camera, and how mouse, fingers and keys move it.
 
 // azimuth, elevation and angle of view in degrees; a narrow angle keeps parallels parallel
 const NAMED = { diagonal: [-60, 28, 28], elevation: [-90, 0, 1], plan: [-90, 89.9, 1] };

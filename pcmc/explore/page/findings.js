@@ -1,4 +1,4 @@
-// What is found about the surface: the verdict, the numbers, and the fields that colours show.
+// The verdict, the numbers of the surface, and the fields that colours show.
 
 import { colourOf, diverging, sequential } from "./colours.js";
 import { digits } from "./panel.js";
@@ -19,7 +19,7 @@ export const COLOURS = {
 export function showVerdict(root, header) {
   const { verdict, at_rest: atRest } = header;
   const sentence = verdict.name === "not_converged" && !atRest
-    ? "no surface at rest was found for these values" : verdict.sentence;
+    ? "pcmc found no surface at rest for these values" : verdict.sentence;
   root.dataset.verdict = verdict.name;
   root.querySelector(".sign").textContent = SIGNS[verdict.name] || "?";
   root.querySelector(".word").textContent = verdict.word;
@@ -28,15 +28,15 @@ export function showVerdict(root, header) {
     .filter(Boolean).map((part) => `${capital(part)}.`).join(" ");
 }
 
-/** Which surface stays drawn when there is none for the values asked for. */
+/** Which surface the page shows if there is none for the values asked for. */
 function drawn({ asked, shown }) {
   const near = (a, b) => Math.abs(a - b) <= 1e-9 * Math.abs(b);
   const values = shown.flatMap((p, i) => [["tension", "α"], ["pressure", "p"]]
     .filter(([kind]) => !near(p[kind], asked[i][kind]))
     .map(([kind, sign]) => `${p.name} ${sign} = ${digits(p[kind])}`));
-  if (!values.length) return "Drawn as given";
-  const told = values.slice(0, 3).join(", ") + (values.length > 3 ? ", …" : "");
-  return `Drawn is the last one at rest: ${told}`;
+  if (!values.length) return "Shown: the surface as given";
+  const listed = values.slice(0, 3).join(", ") + (values.length > 3 ? ", …" : "");
+  return `Shown: the last surface at rest, ${listed}`;
 }
 
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
@@ -46,18 +46,18 @@ export function showFindings(body, findings) {
   const percent = (x) => (x === null ? "–" : x < 1e-6 ? "below 0.0001 %" : `${digits(100 * x, 3)} %`);
   const rows = [
     ["Rise above the plane", digits(findings.height), "Largest height above the plane Π, length"],
-    ["Area under pressure", digits(findings.area), "Of all patches but the walls, length²"],
+    ["Area under pressure", digits(findings.area), "Of all patches except walls, length²"],
     ["Volume", digits(findings.volume), "Under the patches with pressure, length³"],
     ["Energy", digits(findings.energy, 6), "Σ α A − Σ p V, force · length"],
-    ["Ways down (Morse index)", findings.index ?? "–", "Independent changes of shape that lower the energy; 0 is stable"],
-    ["Load over capacity", percentOf(findings.load_ratio), "Pressure over the most that the boundary's tension could carry; no equilibrium exists above 100 %"],
+    ["Morse index", findings.index ?? "–", "Independent changes of shape that lower the energy; 0 is stable"],
+    ["Load over capacity", percentOf(findings.load_ratio), "The pressure, as a part of the most that the tension of the boundary can carry; above 100 % no equilibrium exists"],
     ["Largest error of H", percent(findings.curvature_error), "Variational mean curvature against p / 2α; exact at rest"],
     ["… by Meyer's measure", percent(findings.curvature_error_cotangent), "As in the paper's figures; smaller on finer meshes"],
     ["Worst triangle", digits(findings.quality, 3), "4√3 area / Σ edge²: 1 is equilateral, 0 degenerate"],
-    ["Residual", digits(findings.residual, 3), "Forces left over the forces of single triangles"],
+    ["Residual", digits(findings.residual, 3), "Unbalanced forces, relative to the forces of single triangles"],
   ];
   if (findings.pinched) {
-    rows.push(["Wall resting on the plane", `${findings.pinched} vertices`, "There the valley touches the plane and the wall has no height"]);
+    rows.push(["Wall resting on the plane", `${findings.pinched} vertices`, "Here the valley touches the plane and the wall has no height"]);
   }
   body.replaceChildren(...rows.map(([name, text, title]) => {
     const row = document.createElement("tr");
@@ -74,7 +74,7 @@ export function showFindings(body, findings) {
 
 const percentOf = (x) => (x === null ? "–" : `${digits(100 * x, 3)} %`);
 
-/** Values, limits and colour map of what colours show; null for the patches' own colours. */
+/** Values, limits and colour map of the chosen field; null for the patches' own colours. */
 export function fieldOf(choice, arrays) {
   if (choice === "patches" || !arrays[choice]) return null;
   if (choice === "error") {

@@ -10,7 +10,7 @@ export function digits(x, count = 4) {
   return String(Number(x.toPrecision(count)));
 }
 
-/** Slider positions 0..STEPS for values: by ratio for what must not be zero, evenly for walls. */
+/** Slider positions 0..STEPS for values: by ratio for values that cannot be zero, evenly for walls. */
 class Range {
   constructor(value, evenly, usual) {
     this.evenly = evenly || value === 0;
@@ -42,11 +42,11 @@ class Range {
 }
 
 export class Panel {
-  /** `wished(final)` is called while a value changes, and with true when the change is done. */
-  constructor(root, patches, asked, together, wished) {
+  /** `changed(final)` is called while a value changes, and with true when the change is done. */
+  constructor(root, patches, asked, together, changed) {
     this.patches = patches;
     this.together = together;
-    this.wished = wished;
+    this.changed = changed;
     this.rows = [];
     const usual = Math.max(...asked.map((p) => p.tension));
     root.replaceChildren(...patches.map((patch, i) => this.card(patch, i, asked[i], usual)));
@@ -88,7 +88,7 @@ export class Panel {
     };
     this.rows.push(entry);
     slider.addEventListener("input", () => this.change(entry, entry.range.value(slider.value), false));
-    slider.addEventListener("change", () => this.wished(true));
+    slider.addEventListener("change", () => this.changed(true));
     number.addEventListener("change", () => {
       if (number.value.trim() === "" || !Number.isFinite(number.valueAsNumber)) {
         this.put(entry, entry.value);
@@ -99,19 +99,19 @@ export class Panel {
     return row;
   }
 
-  /** The user gives a value; patches alike follow by the same ratio, if asked for. */
+  /** The user changes a value; similar patches change by the same ratio if the box is checked. */
   change(entry, value, final) {
     const ratio = entry.value ? value / entry.value : 1;
     if (this.together.checked) {
       for (const other of this.rows) {
-        const alike = other.kind === entry.kind && other.patch.wall === entry.patch.wall;
-        if (alike && other !== entry) {
+        const similar = other.kind === entry.kind && other.patch.wall === entry.patch.wall;
+        if (similar && other !== entry) {
           this.put(other, entry.value ? other.value * ratio : value);
         }
       }
     }
     this.put(entry, value, !final);
-    this.wished(final);
+    this.changed(final);
   }
 
   put(entry, value, moving = false) {
@@ -127,7 +127,7 @@ export class Panel {
     entry.target.textContent = p === undefined ? "wall" : `H̄ = p / 2α = ${digits(p / (2 * alpha), 3)}`;
   }
 
-  /** Show these values, and mark the ones that the surface shown has, where they differ. */
+  /** Show these values; where the surface shown has others, mark them. */
   show(asked, shown, all) {
     for (const entry of this.rows) {
       const wanted = asked[entry.index][entry.kind];
@@ -140,7 +140,7 @@ export class Panel {
     }
   }
 
-  /** What is asked of the server. */
+  /** The values for the server. */
   values() {
     const values = { tensions: {}, pressures: {} };
     for (const { patch, kind, value } of this.rows) values[`${kind}s`][patch.name] = value;

@@ -10,10 +10,10 @@ const MESH = [0.12, 0.16, 0.2, 0.3];
 const GRID = [0.55, 0.6, 0.65, 0.35];
 
 export class Viewer {
-  /** Throws where the browser has no WebGL 2. `told` is called with the grid's spacing. */
-  constructor(canvas, told) {
+  /** Throws if the browser has no WebGL 2. `gridChanged` is called with the grid's spacing. */
+  constructor(canvas, gridChanged) {
     this.canvas = canvas;
-    this.told = told;
+    this.gridChanged = gridChanged;
     this.gl = canvas.getContext("webgl2", { antialias: true, alpha: false });
     if (!this.gl) throw new Error("no WebGL 2");
     this.options = { mesh: true, supports: true, walls: true, smooth: false, grid: true };
@@ -75,7 +75,7 @@ export class Viewer {
     gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW);
   }
 
-  /** What stays the same while the surface moves. */
+  /** Everything that stays the same while the surface moves. */
   setMesh(header, arrays) {
     this.mesh = { header, ...arrays };
     this.camera.stand(header.up);
@@ -219,7 +219,7 @@ export class Viewer {
       }
     }
     this.placeLines("grid", from, to, () => GRID, () => [0.5, 0.5]);
-    this.told(this.options.grid ? spacing : 0);
+    this.gridChanged(this.options.grid ? spacing : 0);
   }
 
   fillArrows() {

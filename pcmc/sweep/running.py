@@ -16,20 +16,21 @@ from typing import TYPE_CHECKING, Any
 
 from ..base import validate
 from ..base.errors import OptionError, SweepError
-from .executors import OWN_VERSION, Submit, open_pool
 from .grid import Sweep
-from .store import FORCE_EVERY, Record, open_store
+from .store import Record, open_store
 from .table import table
+from .workers import OWN_VERSION, Submit, open_workers
 
 if TYPE_CHECKING:
     import pandas as pd
 
 LONGEST = threading.TIMEOUT_MAX  # seconds that a time limit may have
+PACE = 0.05  # seconds between two transactions: each costs some milliseconds
 
 
 @dataclass(frozen=True)
 class Progress:
-    """What ``on_record`` is shown after each case.
+    """The state of a sweep, passed to ``on_record`` after each case.
 
     Attributes
     ----------
@@ -59,35 +60,35 @@ def run(
 ) -> pd.DataFrame:
     """Run every case of the sweep that its store does not hold yet.
 
-    Each case runs on one thread in a child process of the worker it is given to. A case that
-    raises, exceeds the time limit or kills its process becomes a row that says so; the others
-    go on.
+    Each case runs on one thread, in a process of its own. A case that raises, exceeds the time limit or
+    kills its process becomes a row with that status; the others go on.
 
     Parameters
     ----------
     sweep : the cases.
-    store : file that each record is written to as soon as it is there. Run the same sweep with the
-        same file again after a crash, and it goes on from there. None: keep records in memory only.
-    executor : where to run; left open at the end. Processes of it finish the cases they have begun,
-        after Ctrl-C too. Default: ``workers`` local processes.
+    store : file for the records: an SQLite database. Run the same sweep with the same file again after a
+        crash, and only the missing cases run. A grid with more values runs only the new cases; one with
+        fewer leaves the other records in the file. None: keep the records in memory.
+    executor : runs the cases; it is not shut down. Its processes finish the cases that they have begun,
+        also after Ctrl-C. Default: ``workers`` local processes.
     scheduler : address of a Dask scheduler whose workers run the cases: ``"tcp://127.0.0.1:8786"``.
-    workers : local processes; default one for each processor.
-    time_limit : seconds a case may take; None for no limit.
-    retry_failed : run stored cases that failed once more.
-    on_record : called after each stored case. Raise StopIteration to stop as Ctrl-C does; any other
-        exception passes through.
+    workers : number of local processes; default one for each processor.
+    time_limit : per case, in seconds; None for no limit.
+    retry_failed : run the stored cases that failed again.
+    on_record : called with a Progress after each stored case. Raise StopIteration to stop as Ctrl-C does;
+        any other exception passes through.
 
     Returns
     -------
-    DataFrame : one row per case (see ``table``). After Ctrl-C, which ends local workers at once,
+    DataFrame : one row per case (see ``table``). After Ctrl-C, which ends local processes at once, it has
         only the cases stored so far: fewer rows than ``len(sweep)``.
 
     Raises
     ------
-    OptionError, FileError, SweepError, MissingExtra : before any case is run, for bad options, a
-        store of another sweep or version, a scheduler that does not answer, no ``distributed``.
-    FileError : a record cannot be written. SweepError : the executor broke or a worker cannot load
-        the case. All cases stored before stay stored.
+    OptionError, FileError, SweepError, MissingExtra : before any case runs: for a bad option, a store of
+        another sweep or version, a scheduler that does not answer, or if ``distributed`` is missing.
+    FileError : a record cannot be written. SweepError : the executor broke, or a worker cannot load the
+        case function. The cases stored before stay stored.
 
     Examples
     --------
@@ -101,8 +102,8 @@ def run(
     """
     _check_options(executor, scheduler, workers, time_limit, on_record)
     with ExitStack() as stack:
-        kept = None if store is None else stack.enter_context(open_store(store, sweep))
-        records = {} if kept is None else dict(kept.records)
+        stored = None if store is None else stack.enter_context(open_store(store, sweep))
+        records = {} if stored is None else dict(stored.records)
         todo = {
             number: parameters
             for number, parameters in enumerate(sweep)
@@ -111,20 +112,22 @@ def run(
         if todo:
             finished = SimpleQueue[Future[dict[str, Any]] | None]()
             stack.enter_context(_interrupts(lambda: finished.put(None)))
-            pool = open_pool(sweep.case, time_limit, executor, scheduler, workers)
-            submit = stack.enter_context(pool)
-            pending = stack.enter_context(_submitted(submit, todo, finished))
+            opened = open_workers(sweep.case, time_limit, executor, scheduler, workers)
+            pending = stack.enter_context(_submitted(stack.enter_context(opened), todo, finished))
             progress = _progress(records, todo, len(sweep))
-            idle = (lambda: None) if kept is None else kept.force
-            while pending and (future := _next(finished, idle)) is not None:
-                number = pending.pop(future)
-                record = Record(number, todo[number], **_outcome(future))
-                if kept is not None:
-                    kept.append(record)
-                records[number] = record
+            for futures in _batches(finished, pending):
+                new: list[Record] = []
                 try:
-                    if on_record is not None:
-                        on_record(progress(record))
+                    for future, number in futures:
+                        new.append(Record(number, todo[number], **_outcome(future)))
+                finally:
+                    if stored is not None and new:
+                        stored.append(new)
+                records |= {record.case: record for record in new}
+                try:
+                    for record in new:
+                        if on_record is not None:
+                            on_record(progress(record))
                 except StopIteration:
                     break
     return table(records.values())
@@ -140,13 +143,14 @@ def _check_options(
     given = {"executor": executor, "scheduler": scheduler, "workers": workers}
     names = [name for name, value in given.items() if value is not None]
     if len(names) > 1:
-        raise OptionError(f"{' and '.join(names)} exclude each other; give one of them")
+        text = f"{' and '.join(names)} exclude each other; give one of them"
+        raise OptionError(text, what=names[0], found=tuple(names))
     if executor is not None and not isinstance(executor, Executor):
-        raise OptionError(f"executor: expected one of concurrent.futures, found {executor!r:.80}")
+        raise _wrong_option("executor", executor, "one of concurrent.futures")
     if scheduler is not None and not isinstance(scheduler, str):
-        raise OptionError(f"scheduler: expected 'tcp://host:8786', found {scheduler!r:.80}")
+        raise _wrong_option("scheduler", scheduler, "'tcp://host:8786'")
     if on_record is not None and not callable(on_record):
-        raise OptionError(f"on_record: expected a function of a Progress, found {on_record!r:.80}")
+        raise _wrong_option("on_record", on_record, "a function of a Progress")
     if workers is not None:
         validate.integer("workers", workers, least=1)
     if time_limit is not None:
@@ -155,10 +159,15 @@ def _check_options(
         )
 
 
+def _wrong_option(name: str, value: object, expected: str) -> OptionError:
+    text = f"{name}: expected {expected}, found {value!r:.80}"
+    return OptionError(text, what=name, found=value, expected=expected)
+
+
 def _progress(
     records: dict[int, Record], todo: dict[int, Any], total: int
 ) -> Callable[[Record], Progress]:
-    """A function that counts each new record in and tells how far the sweep is."""
+    """A function that counts a new record and returns the state of the sweep."""
     counts = Counter(r.verdict or r.status for n, r in records.items() if n not in todo)
     before, begin = total - len(todo), time.perf_counter()
 
@@ -177,7 +186,7 @@ def _submitted(
     todo: dict[int, dict[str, Any]],
     finished: SimpleQueue[Any],
 ) -> Iterator[dict[Future[dict[str, Any]], int]]:
-    """Give all cases to the pool; futures come out of ``finished``; those left are cancelled."""
+    """Submit all cases. Futures that finish come out of ``finished``; at the end the others are cancelled."""
     pending: dict[Future[dict[str, Any]], int] = {}
     try:
         for number, parameters in todo.items():
@@ -185,7 +194,7 @@ def _submitted(
                 future = submit(parameters)
             except RuntimeError as error:  # shut down, or broken
                 raise SweepError(
-                    f"the executor takes no cases ({error}); give a new one"
+                    f"the executor takes no cases ({error}); give a new one", what="executor"
                 ) from error
             pending[future] = number
             future.add_done_callback(finished.put)
@@ -195,17 +204,32 @@ def _submitted(
             future.cancel()
 
 
-def _next(finished: SimpleQueue[Any], idle: Callable[[], None]) -> Future[dict[str, Any]] | None:
-    """The next finished future, or None to stop; ``idle`` is called while there is none."""
-    while True:
-        with suppress(Empty):  # Windows tells of Ctrl-C only between waits
-            future: Future[dict[str, Any]] | None = finished.get(timeout=FORCE_EVERY)
-            return future
-        idle()
+def _batches(
+    finished: SimpleQueue[Any], pending: dict[Future[dict[str, Any]], int]
+) -> Iterator[list[tuple[Future[dict[str, Any]], int]]]:
+    """The futures that finish, with their case numbers, until none is pending or Ctrl-C puts None.
+
+    A batch is one transaction of the store. It comes at once, but no sooner than PACE after the last.
+    """
+    due, stopped = 0.0, False
+    while pending and not stopped:
+        batch: list[tuple[Future[dict[str, Any]], int]] = []
+        while pending and not stopped:
+            wait = due - time.monotonic()
+            if batch and wait <= 0.0:
+                break
+            with suppress(Empty):  # on Windows, Ctrl-C arrives only between two waits
+                future = finished.get(timeout=wait if batch else PACE)
+                stopped = future is None
+                if not stopped:
+                    batch.append((future, pending.pop(future)))
+        if batch:
+            yield batch
+        due = time.monotonic() + PACE
 
 
 def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any]:
-    """What a case came to; SweepError if the executor, not the case, failed."""
+    """The fields of a case's record; SweepError if the executor failed, not the case."""
     try:
         return _of_this_version(future.result())
     except SweepError:
@@ -223,19 +247,21 @@ def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any]:
             }
         raise SweepError(
             f"the executor failed ({text}); the cases stored so far are safe: run the same sweep"
-            " again to go on from there"
-        ) from error
+            " again to go on from there",
+            what="executor", found=text,
+        ) from error  # fmt: skip
 
 
 def _of_this_version(outcome: dict[str, Any]) -> dict[str, Any]:
-    """The outcome; SweepError if another pcmc gave it, on a worker that came late or is not Dask's."""
+    """The outcome; SweepError if a worker with another version of pcmc returned it."""
     about = outcome["provenance"]
     found = about.get("pcmc", OWN_VERSION)  # a case that ended its process does not say
     if found != OWN_VERSION:
         raise SweepError(
             f"a worker on {about['host']} has pcmc {found}, this is pcmc {OWN_VERSION}; install the"
-            " same version there and run the same sweep again to go on from the cases stored"
-        )
+            " same version there and run the same sweep again to go on from the cases stored",
+            what="pcmc", where=about["host"], found=found, expected=OWN_VERSION,
+        )  # fmt: skip
     return outcome
 
 

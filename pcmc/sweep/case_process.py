@@ -1,14 +1,14 @@
-"""Run a case in a process of its own, so that whatever it does, its caller lives and can say so.
+"""Run a case in a process of its own, so that its caller survives whatever the case does.
 
-Every executor runs the same task, ``run_case``, which hands the case to a child process and waits.
-A case that hangs or dies takes its child along and nothing else, be the caller a thread of this
-process, a worker of a process pool, or a Dask worker on another machine. (Python's process pool
-breaks as a whole when a worker dies and cannot end a task that hangs; a Dask worker is a daemon,
-which may not have children by ``multiprocessing``. A child started as a script knows neither.)
+Every executor runs the same task, ``run_case``, which gives the case to a process and waits. A case that
+hangs or dies ends its own process and nothing else: its caller is a thread of the sweep, a worker of a
+process pool, or a Dask worker on another machine. Python's process pool cannot do this: it breaks as a whole
+when a worker dies, and it cannot stop a task that hangs. ``multiprocessing`` cannot either: it imports the
+user's script again in each process, and refuses to start one from a Dask worker. So the process is a script.
 
-Children are kept between the cases of one sweep, so that a case is imported and compiled once. They
-belong to a *team*, a name that one sweep draws for itself. A child whose parent dies, however
-suddenly, leaves within a second, in the middle of a case too (on Windows, at the case's end).
+Processes are kept between the cases of one sweep, so that a case is imported and compiled once. If the
+parent of a process dies, even by SIGKILL, the process ends within a second, also in the middle of a case
+(on Windows, at the end of its case).
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 import os
 import pickle
+import platform
 import signal
 import subprocess
 import sys
@@ -28,21 +29,21 @@ from datetime import UTC, datetime
 from typing import Any
 
 from ..base.errors import SweepError
-from . import child as child_script
+from . import case_script
 
-GRACE = 2.0  # seconds a child may overrun its time limit before it is killed from outside
+GRACE = 2.0  # seconds that a process may exceed its time limit before it is killed from outside
 ONE_THREAD = {
     f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA", "NUMEXPR")
 } | {"VECLIB_MAXIMUM_THREADS": "1", "PCMC_THREADS": "1"}
 
 
-class Child:
+class CaseProcess:
     """A process that runs one case function, a case at a time, on one thread."""
 
     def __init__(self) -> None:
-        self.log = tempfile.TemporaryFile()  # noqa: SIM115 (it lives as long as the child)
+        self.log = tempfile.TemporaryFile()  # noqa: SIM115 (it lives as long as the process)
         self.process = subprocess.Popen(
-            [sys.executable, "-P", str(child_script.__file__)],
+            [sys.executable, "-P", str(case_script.__file__)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self.log,
@@ -51,35 +52,32 @@ class Child:
             process_group=0 if os.name == "posix" else None,
             creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
-        # the child itself ends at a time limit; this is for one that cannot
+        # the process itself ends at a time limit; this is for one that cannot
         self._deadline, self._closed = math.inf, threading.Event()
         threading.Thread(target=self._watch, daemon=True).start()
 
     def load(self, case: str) -> None:
-        """Have the child import the case function; SweepError if it cannot."""
+        """Import the case function; SweepError if the process cannot."""
         try:
-            self._tell((sys.path, case))
-            kind, text = self._hear()
+            self._send((sys.path, case))
+            kind, text = self._receive()
         except (EOFError, OSError, pickle.UnpicklingError):
             kind, text = "failed", self._end()[1]
         if kind == "failed":
             raise SweepError(
-                f"a worker on {child_script.platform.node()} cannot load the case {case!r};"
-                f" install its package where the workers run:\n{text.strip()}"
-            )
+                f"a worker on {platform.node()} cannot load the case {case!r};"
+                f" install its package where the workers run:\n{text.strip()}",
+                what=case, where=platform.node(),
+            )  # fmt: skip
 
-    def send(self, parameters: Mapping[str, Any], time_limit: float | None) -> None:
-        """Hand the child a case, which it runs after those it was given before."""
-        with suppress(OSError):  # it has ended, and ``receive`` says how
-            self._tell((parameters, time_limit))
-
-    def receive(self, time_limit: float | None) -> dict[str, Any]:
-        """The outcome of the first case without one: the fields of a record from ``status`` on."""
+    def run(self, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
+        """Run one case; the fields of its record from ``status`` on."""
         started, begin = datetime.now(UTC), time.perf_counter()
         if time_limit is not None:
             self._deadline = begin + time_limit + GRACE
         try:
-            outcome: dict[str, Any] = self._hear()
+            self._send((parameters, time_limit))
+            outcome: dict[str, Any] = self._receive()
             return outcome
         except (EOFError, OSError, pickle.UnpicklingError):
             elapsed = time.perf_counter() - begin
@@ -98,7 +96,7 @@ class Child:
                 "provenance": {
                     "started": started.isoformat(timespec="milliseconds"),
                     "output": output,
-                    "host": child_script.platform.node(),
+                    "host": platform.node(),
                     "pid": self.process.pid,
                 },
             }
@@ -110,13 +108,8 @@ class Child:
         """Whether the process can take another case."""
         return self.process.poll() is None
 
-    @property
-    def ended(self) -> bool:
-        """Whether ``receive`` has met its end; ``alive`` looks whether it has come since."""
-        return self.process.returncode is not None
-
     def kill(self) -> None:
-        """End the process and what it started, whatever they do and even if it has ended itself."""
+        """Kill the process and all that it started, even if it has ended itself."""
         if os.name == "posix":
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(self.process.pid, signal.SIGKILL)
@@ -124,7 +117,7 @@ class Child:
             self.process.kill()
 
     def close(self) -> None:
-        """End the process and free its files."""
+        """Kill the process and free its files."""
         self._closed.set()
         self.kill()
         self.process.wait()
@@ -132,32 +125,33 @@ class Child:
             with suppress(OSError):
                 stream.close()
 
-    def _tell(self, message: object) -> None:
+    def _send(self, message: object) -> None:
         assert self.process.stdin is not None
         self.process.stdin.write(pickle.dumps(message))
         self.process.stdin.flush()
 
-    def _hear(self) -> Any:
+    def _receive(self) -> Any:
         assert self.process.stdout is not None
         return pickle.load(self.process.stdout)
 
     def _watch(self) -> None:
-        """Kill a child that overran: one that is stopped, or whose own children hold its pipe."""
+        """Kill a process past its deadline: one that is stopped, or whose children hold its pipe open."""
         while not self._closed.wait(GRACE / 4):
             if time.perf_counter() > self._deadline:
                 self.kill()
 
     def _end(self) -> tuple[int, str]:
+        """Exit code and last output."""
         self.kill()
         code = self.process.wait()
         length = self.log.seek(0, os.SEEK_END)
-        self.log.seek(max(0, length - 4 * child_script.OUTPUT))  # bytes: a character has at most 4
+        self.log.seek(max(0, length - 4 * case_script.OUTPUT))  # bytes: a character has at most 4
         output = self.log.read().decode("utf-8", "replace")
-        return code, output[-child_script.OUTPUT :]
+        return code, output[-case_script.OUTPUT :]
 
 
 def _cause(code: int) -> str:
-    """What an exit code says.
+    """An exit code in words.
 
     >>> _cause(-9), _cause(3)
     ('signal SIGKILL', 'exit code 3')
@@ -168,61 +162,61 @@ def _cause(code: int) -> str:
 
 
 class Team:
-    """The children that one sweep has in this process."""
+    """The processes that one sweep has started from this process."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
-        self.all: list[Child] = []
-        self.idle: list[Child] = []
+        self.all: list[CaseProcess] = []
+        self.idle: list[CaseProcess] = []
         self.closed = False
 
-    def borrow(self, case: str) -> Child:
-        """An idle child, or a new one."""
+    def borrow(self, case: str) -> CaseProcess:
+        """An idle process, or a new one."""
         with self.lock:
             while self.idle:
-                child = self.idle.pop()
-                if child.alive:
-                    return child
-                self._drop(child)
+                process = self.idle.pop()
+                if process.alive:
+                    return process
+                self._drop(process)
             if self.closed:
                 raise SweepError("the sweep has ended")
-            child = Child()
-            self.all.append(child)
+            process = CaseProcess()
+            self.all.append(process)
         try:
-            child.load(case)
+            process.load(case)
         except SweepError:
-            self.give_back(child)
+            self.give_back(process)
             raise
-        return child
+        return process
 
-    def give_back(self, child: Child) -> None:
-        """Keep the child for the next case if it lives."""
+    def give_back(self, process: CaseProcess) -> None:
+        """Keep the process for the next case if it is alive."""
         with self.lock:
-            if child.alive and not self.closed:
-                self.idle.append(child)
+            if process.alive and not self.closed:
+                self.idle.append(process)
             else:
-                self._drop(child)
+                self._drop(process)
 
     def close_idle(self) -> None:
-        """End the children that do nothing."""
+        """End the processes that run no case."""
         with self.lock:
             while self.idle:
                 self._drop(self.idle.pop())
 
     def close(self) -> None:
-        """End all children; those at work are freed by the threads that wait for them."""
+        """End all processes. The threads that wait for a case free its process."""
         self.close_idle()
         with self.lock:
             self.closed = True
-            for child in self.all:
-                child.kill()
+            for process in self.all:
+                process.kill()
 
-    def _drop(self, child: Child) -> None:
-        child.close()
-        self.all.remove(child)
+    def _drop(self, process: CaseProcess) -> None:
+        process.close()
+        self.all.remove(process)
 
 
-# Kept per process, because an executor's task is a bare function and must find its children.
+# Here and not in an object: an executor's task is a function with plain arguments, and must find its team.
 _teams: dict[str, Team] = {}
 _lock = threading.Lock()
 
@@ -230,7 +224,7 @@ _lock = threading.Lock()
 def run_case(
     team: str, case: str, parameters: Mapping[str, Any], time_limit: float | None
 ) -> dict[str, Any]:
-    """Run one case in a child process of ``team`` and return its outcome.
+    """Run one case in a process of ``team``, a name that belongs to one sweep.
 
     Returns
     -------
@@ -246,19 +240,18 @@ def run_case(
                 other.close_idle()
             _teams[team] = Team()
         mine = _teams[team]
-    child = mine.borrow(case)
+    process = mine.borrow(case)
     try:
-        child.send(parameters, time_limit)
-        return child.receive(time_limit)
+        return process.run(parameters, time_limit)
     except BaseException:  # Ctrl-C in a process pool: the next case must not get this one's answer
-        child.close()
+        process.close()
         raise
     finally:
-        mine.give_back(child)
+        mine.give_back(process)
 
 
 def retire(team: str) -> None:
-    """End all children of ``team`` in this process, those at work too."""
+    """End all processes of ``team`` that were started from this process, also those that run a case."""
     with _lock:
         mine = _teams.setdefault(team, Team())
     mine.close()

@@ -1,6 +1,6 @@
-// Asking the server. Answers are one run of bytes: a JSON header and the arrays that it names.
+// Requests to the server. An answer is one run of bytes: a JSON header and the arrays that it names.
 
-/** Header and arrays of a message; see pcmc/explore/packing.py. */
+/** Header and arrays of a message; see pcmc/explore/messages.py. */
 export function unpack(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
@@ -14,29 +14,29 @@ export function unpack(buffer) {
   return { header, arrays };
 }
 
-async function answered(path, options) {
+async function request(path, options) {
   let response;
   try {
     response = await fetch(path, options);
   } catch {
-    throw new Error("The program behind this page has ended. Start it again to go on.");
+    throw new Error("The program behind this page has stopped. Start it again and reload the page.");
   }
   if (!response.ok) {
-    const told = await response.json().catch(() => ({}));
-    throw new Error(told.error || `The server answered ${response.status}.`);
+    const answer = await response.json().catch(() => ({}));
+    throw new Error(answer.error || `The server answered ${response.status}.`);
   }
   return response;
 }
 
-/** Ask with a JSON body; the answer unpacked. */
+/** POST a JSON body; returns the unpacked answer. */
 export async function ask(path, body = {}) {
-  const response = await answered(path, {
+  const response = await request(path, {
     method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body),
   });
   return unpack(await response.arrayBuffer());
 }
 
-/** The body of a file. */
+/** GET a file; returns its body. */
 export async function fetchFile(path) {
-  return (await answered(path)).blob();
+  return (await request(path)).blob();
 }

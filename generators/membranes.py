@@ -1,4 +1,4 @@
-"""Heights over a plan whose edges are given: a loaded membrane, or a soap film."""
+"""Heights over a plan with given heights at its boundary: a loaded membrane, or a soap film."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def membrane(plan: Floats, faces: Ints, held: Bools, heights: Floats, top: float
     Parameters
     ----------
     plan : (n,2); faces : (m,3); held : (n,) bool; heights : (n,), used where held.
-    top : the height of the highest point, above that of every held one.
+    top : height of the highest point, above every held one.
 
     >>> plan = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]])
     >>> faces = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
@@ -29,19 +29,19 @@ def membrane(plan: Floats, faces: Ints, held: Bools, heights: Floats, top: float
     stiffness, areas = _stiffness(np.column_stack([plan, np.zeros(len(plan))]), faces)
     free = ~held
     solver = splu(csc_array(stiffness[free][:, free]))
-    still = np.where(held, heights, 0.0)
-    still[free] = solver.solve(-stiffness[free][:, held] @ heights[held])
+    z = np.where(held, heights, 0.0)
+    z[free] = solver.solve(-stiffness[free][:, held] @ heights[held])
     load = np.bincount(faces.ravel(), np.repeat(areas / 3.0, 3), minlength=len(plan))
     lifted = solver.solve(load[free].astype(float))
-    still[free] += ((top - still[free]) / lifted).min() * lifted
-    return still
+    z[free] += ((top - z[free]) / lifted).min() * lifted
+    return z
 
 
 def soap_film(plan: Floats, faces: Ints, held: Bools, heights: Floats) -> Floats:
     """(n,) heights of the surface of least area over the plan, z given where held.
 
-    Solves Σ (cot a + cot b)(z_i - z_j) = 0 with the cotangents of the last surface, again and
-    again (Pinkall and Polthier 1993), until z changes by less than 1e-12 of its range.
+    Solves Σ (cot a + cot b)(z_i - z_j) = 0 repeatedly, with the cotangents of the last surface
+    (Pinkall and Polthier 1993), until z changes by less than 1e-12 of its range.
 
     >>> plan = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]])
     >>> faces = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])

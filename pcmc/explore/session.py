@@ -1,7 +1,7 @@
-"""One page's draft: the surface it shows, the values it asks for, and the way back.
+"""The session of one page: the surface it shows, the values it asks for, and the steps to undo.
 
-Only surfaces at rest are shown. Where the values asked for have none, the last one stays, and the certificate
-of the attempt says why.
+A session shows only surfaces at rest. If there is none for the values asked for, the last one stays, and the
+certificate of the failed attempt gives the reason.
 """
 
 from __future__ import annotations
@@ -22,164 +22,164 @@ from ..surface.wall_pressures import with_pressures
 AT_REST = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.SADDLE)
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
 SETTLE: dict[str, Any] = {"iterations": 40, "tolerance": 1e-11}  # when it is let go
-GLANCE = 1.0  # seconds that following may take, and as many again for each 50 000 triangles
-PATIENCE = 6.0  # seconds that settling may take
-SMALLEST = 1.0 / 64.0  # part of the way below which settling is not cut up further
-STEPS_KEPT = 200
-BYTES_KEPT = 64_000_000
+FOLLOW_SECONDS = 1.0  # time limit of following, and as much again for each 50 000 triangles
+SETTLE_SECONDS = 6.0  # time limit of settling
+SMALLEST_STEP = 1.0 / 64.0  # part of the way; settling takes no smaller step
+MOST_STEPS = 200  # to undo
+MOST_BYTES = 64_000_000  # of vertices in these steps
 
 Values = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """What the page is told.
+    """What the server sends to the page.
 
     Attributes
     ----------
-    surface, found : the surface to show and its certificate.
+    surface, certificate : the surface to show and its certificate.
     asked : the patches with the values asked for.
-    trouble : certificate of the attempt at the values asked for, where it did not come to rest.
+    failure : certificate of the attempt at the values asked for, if it did not come to rest.
     undo, redo : how many steps there are either way.
-    superseded : whether newer values came meanwhile, so that this is of no interest.
+    superseded : whether newer values have arrived meanwhile, so that the page ignores this state.
     """
 
     surface: Surface
-    found: Certificate
+    certificate: Certificate
     asked: tuple[Patch, ...]
-    trouble: Certificate | None
+    failure: Certificate | None
     undo: int
     redo: int
     superseded: bool = False
 
 
 @dataclass(frozen=True, eq=False)
-class Beginning:
-    """The surface that every draft begins with, its certificate, and what went wrong with it, if so."""
+class Start:
+    """The surface that every session begins with, its certificate, and that of a failed solve."""
 
     surface: Surface
-    found: Certificate
-    trouble: Certificate | None
+    certificate: Certificate
+    failure: Certificate | None
 
 
-def begin(surface: Surface) -> Beginning:
-    """Solve a surface, unless it is at rest already; where no solver comes to rest, leave it as it is."""
-    found = certify(surface)
-    trouble = None if found.verdict in AT_REST else found
+def solved_start(surface: Surface) -> Start:
+    """Solve a surface, unless it is at rest already; if no solver converges, return it unchanged."""
+    certificate = certify(surface)
+    failure = None if certificate.verdict in AT_REST else certificate
     for target in ("stationary", "minimum"):
-        if trouble is None:
+        if failure is None:
             break
         result = solve(surface, target=target)
         ended = result.certify()
         if ended.verdict in AT_REST:
-            return Beginning(result.surface, ended, None)
-        trouble = ended
-    return Beginning(surface, found, trouble)
+            return Start(result.surface, ended, None)
+        failure = ended
+    return Start(surface, certificate, failure)
 
 
-class Draft:
+class Session:
     """A surface that follows its values; every method is safe to call from any thread.
 
-    A newer call ends the work on an older one. ``turn`` is held while there is work to do.
+    A newer call ends the work on an older one. Each call holds ``turn`` while it works.
     """
 
-    def __init__(
-        self, beginning: Beginning, turn: AbstractContextManager[Any] | None = None
-    ) -> None:
+    def __init__(self, start: Start, turn: AbstractContextManager[Any] | None = None) -> None:
         self._lock = threading.Lock()
         self._turn = turn or nullcontext()
-        self._asked_for = 0
-        self.surface = beginning.surface
-        self._found = beginning.found
-        self._trouble = beginning.trouble
+        self._requests = 0
+        self.surface = start.surface
+        self._certificate = start.certificate
+        self._failure = start.failure
         self._asked = self.surface.patches
         self._steps = [self.surface]
         self._place = 0
 
     def state(self) -> State:
-        """What there is to show now."""
+        """The present state."""
         with self._lock:
             return self._state()
 
     def follow(self, values: Values) -> State:
-        """Towards these tensions and pressures while a slider moves: as far as two quick attempts lead."""
+        """Move towards these values while a slider moves: as far as two quick attempts lead."""
 
         def act(stop: Callable[[], bool]) -> None:
-            asked = self._wanted(values)
-            end = time.monotonic() + GLANCE * (1.0 + asked.m / 50_000)
+            asked = self._with_values(values)
+            end = time.monotonic() + FOLLOW_SECONDS * (1.0 + asked.m / 50_000)
             way = reach(self.surface, asked, until(stop, end), attempts=2, **FOLLOW)
             if stop():
                 return
-            if way.found is not None:
-                self.surface, self._found, self._trouble = way.surface, way.found, None
+            if way.certificate is not None:
+                self.surface, self._certificate, self._failure = way.surface, way.certificate, None
             else:
-                self._trouble = way.failed
+                self._failure = way.failed
 
         return self._run(act)
 
     def settle(self, values: Values) -> State:
-        """To these values, in as many steps as it takes; where there is no way, as far as there is.
+        """Move to these values, or as close as possible, in as many steps as needed.
 
-        What is reached is a step that ``undo`` returns to.
+        The surface reached is a step that ``undo`` returns to.
         """
 
         def act(stop: Callable[[], bool]) -> None:
-            asked, end = self._wanted(values), time.monotonic() + PATIENCE
+            asked, end = self._with_values(values), time.monotonic() + SETTLE_SECONDS
             way = reach(self.surface, asked, until(stop, end), **SETTLE)
             if stop():
                 return
-            if way.found is not None:
+            if way.certificate is not None:
                 self._show(way.surface)
-            self._trouble = way.failed
-            self._keep()
+            self._failure = way.failed
+            self._add_step()
 
         return self._run(act)
 
     def stabilise(self) -> State:
-        """From a saddle down to a stable shape, if there is one nearby."""
+        """Move from a saddle to a stable shape, if there is one nearby."""
 
         def act(stop: Callable[[], bool]) -> None:
-            end = time.monotonic() + PATIENCE
+            end = time.monotonic() + SETTLE_SECONDS
             result = attempt(self.surface, until(stop, end), target="minimum")
-            found = result.certify()
+            certificate = result.certify()
             if stop():
                 return
-            if found.verdict in AT_REST:
-                self.surface, self._found, self._trouble = result.surface, found, None
-                self._keep()
+            if certificate.verdict in AT_REST:
+                self.surface, self._certificate, self._failure = result.surface, certificate, None
+                self._add_step()
             else:
-                self._trouble = found
+                self._failure = certificate
 
         return self._run(act)
 
     def undo(self) -> State:
-        """A step back; from values that were not reached, back to those that are shown."""
+        """One step back; if the values asked for were not reached, back to those of the surface shown."""
         return self._run(
-            lambda stop: self._go(self._place if self._astray else max(self._place - 1, 0))
+            lambda stop: self._go(
+                self._place if self._has_unsaved_changes else max(self._place - 1, 0)
+            )
         )
 
     def redo(self) -> State:
-        """The step that was undone, again."""
+        """Repeat the step that was undone."""
         return self._run(lambda stop: self._go(min(self._place + 1, len(self._steps) - 1)))
 
     def reset(self) -> State:
-        """To the beginning, as a step of its own."""
+        """Return to the start, as a new step."""
 
         def act(stop: Callable[[], bool]) -> None:
             self._show(self._steps[0])
-            self._asked, self._trouble = self.surface.patches, None
-            self._keep()
+            self._asked, self._failure = self.surface.patches, None
+            self._add_step()
 
         return self._run(act)
 
     # -- below here the lock is held ---------------------------------------------------------------
 
     def _run(self, act: Callable[[Callable[[], bool]], None]) -> State:
-        self._asked_for += 1
-        mine = self._asked_for
+        self._requests += 1
+        mine = self._requests
 
         def late() -> bool:
-            return mine < self._asked_for
+            return mine < self._requests
 
         with self._lock, self._turn:
             before = self._asked
@@ -189,7 +189,7 @@ class Draft:
                 self._asked = before
             return self._state(superseded=late())
 
-    def _wanted(self, values: Values) -> Surface:
+    def _with_values(self, values: Values) -> Surface:
         """The surface shown, with the values asked for."""
         given = {key: dict(values.get(key) or {}) for key in ("tensions", "pressures")}
         wanted = with_pressures(self.surface, given["tensions"], given["pressures"])
@@ -197,44 +197,44 @@ class Draft:
         return wanted
 
     def _show(self, surface: Surface) -> None:
-        self.surface, self._found = surface, certify(surface)
+        self.surface, self._certificate = surface, certify(surface)
 
-    def _keep(self) -> None:
-        """What is shown becomes the newest step."""
+    def _add_step(self) -> None:
+        """The surface shown becomes the newest step."""
         if self.surface is self._steps[self._place]:
             return
-        most = max(4, min(STEPS_KEPT, BYTES_KEPT // self.surface.vertices.nbytes))
-        kept = [*self._steps[: self._place + 1], self.surface]
+        most = max(4, min(MOST_STEPS, MOST_BYTES // self.surface.vertices.nbytes))
+        steps = [*self._steps[: self._place + 1], self.surface]
         # the first stays: it is what ``reset`` returns to
-        self._steps = kept if len(kept) <= most else [kept[0], *kept[2:]]
+        self._steps = steps if len(steps) <= most else [steps[0], *steps[2:]]
         self._place = len(self._steps) - 1
 
     def _go(self, place: int) -> None:
         self._place = place
         self._show(self._steps[place])
-        self._asked, self._trouble = self.surface.patches, None
+        self._asked, self._failure = self.surface.patches, None
 
     @property
-    def _astray(self) -> bool:
-        """Whether values or surface have left the newest step without becoming one."""
+    def _has_unsaved_changes(self) -> bool:
+        """Whether values or surface differ from the newest step."""
         here = self._steps[self._place]
         return self.surface is not here or self._asked != here.patches
 
     def _state(self, superseded: bool = False) -> State:
         after = len(self._steps) - 1 - self._place
+        before = self._place + self._has_unsaved_changes
         return State(
-            self.surface, self._found, self._asked, self._trouble, self._place + self._astray, after,
-            superseded,
-        )  # fmt: skip
+            self.surface, self._certificate, self._asked, self._failure, before, after, superseded
+        )
 
 
 def until(stop: Callable[[], bool], end: float) -> Callable[[], bool]:
-    """When to stop: as told, or when the monotonic clock shows ``end``."""
+    """True when ``stop`` is, or when the monotonic clock has passed ``end``."""
     return lambda: stop() or time.monotonic() > end
 
 
 def attempt(surface: Surface, stop: Callable[[], bool], **options: Any) -> Result:
-    """Solve, and stop when told to."""
+    """Solve, and end early when ``stop`` becomes true."""
 
     def check(_: Progress) -> None:
         if stop():
@@ -245,21 +245,21 @@ def attempt(surface: Surface, stop: Callable[[], bool], **options: Any) -> Resul
 
 @dataclass(frozen=True, eq=False)
 class Reached:
-    """How far a way of changing values led: the last surface at rest, and what ended it, if anything did.
+    """The last surface at rest on the way to other values, and the failed attempt after it, if any.
 
-    ``found`` is the surface's certificate without modes; None where there was no step at all.
+    ``certificate`` is the surface's, without modes; None if there was no step at all.
     """
 
     surface: Surface
-    found: Certificate | None
+    certificate: Certificate | None
     failed: Certificate | None
 
 
 def reach(
     start: Surface, asked: Surface, stop: Callable[[], bool], attempts: int = 100, **options: Any
 ) -> Reached:
-    """Follow the equilibrium from ``start`` to the values of ``asked``, in steps halved where one fails."""
-    here, found, done, step = start, None, 0.0, 1.0
+    """Follow the equilibrium from ``start`` to the values of ``asked``; a step that fails is halved."""
+    here, certificate, done, step = start, None, 0.0, 1.0
     failed = None
     for _ in range(attempts):
         ahead = min(1.0, done + step)
@@ -267,15 +267,15 @@ def reach(
         result = attempt(aim, stop, target="stationary", **options)
         ended = result.certify(modes=0)
         if ended.verdict in AT_REST:
-            here, found, done, step = result.surface, ended, ahead, 2.0 * step
+            here, certificate, done, step = result.surface, ended, ahead, 2.0 * step
             if done == 1.0:
-                return Reached(here, found, None)
+                return Reached(here, certificate, None)
         else:
             failed = ended if ahead == 1.0 or failed is None else failed
             step = 0.5 * (ahead - done)
-        if step < SMALLEST or stop():
+        if step < SMALLEST_STEP or stop():
             break
-    return Reached(here, found, failed)
+    return Reached(here, certificate, failed)
 
 
 def between(start: Surface, end: Surface, part: float) -> Surface:

@@ -1,4 +1,4 @@
-"""What travels to the page: a JSON header and the arrays it names, in one run of bytes.
+"""Messages to the page: a JSON header and the arrays it names, in one run of bytes.
 
 4 bytes     length of the header, little-endian
 header      JSON, padded with spaces to a multiple of 4 bytes; "arrays" lists [name, type, count]
@@ -19,7 +19,7 @@ KINDS = {"f": "<f4", "u": "<u4"}
 
 
 def pack(header: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
-    """One message; float arrays travel as float32, whole numbers as uint32.
+    """One message; float arrays become float32, integers uint32.
 
     >>> packed = pack({"a": float("nan")}, {"x": np.array([1.5])})
     >>> unpack(packed)
@@ -47,7 +47,7 @@ def unpack(message: bytes) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]
 
 
 def plain(value: Any) -> Any:
-    """What JSON can hold: numbers that are not finite become None."""
+    """The value in terms of JSON; numbers that are not finite become None."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

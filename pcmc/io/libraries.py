@@ -1,4 +1,4 @@
-"""Libraries that read and write formats: brought in on demand, their failures made ours."""
+"""Libraries that read and write formats: imported on demand, their errors translated."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from ..base.errors import FileError, MissingExtra, PcmcError
 
 
-def library(name: str, extra: str = "files") -> Any:
+def load_library(name: str, extra: str = "files") -> Any:
     """The module of that name, or MissingExtra."""
     try:
         return import_module(name)
@@ -19,13 +19,13 @@ def library(name: str, extra: str = "files") -> Any:
 
 
 @contextmanager
-def reading(kind: str) -> Iterator[None]:
-    """Turns whatever a library raises on a bad file into one line."""
+def translated_errors(kind: str) -> Iterator[None]:
+    """Turn whatever a library raises on a bad file into a FileError of one line."""
     try:
         yield
     except (PcmcError, OSError, MissingExtra, MemoryError):
         raise
     except Exception as error:  # libraries raise anything, from KeyError to struct.error
-        said = " ".join(str(error).split())[:120]
-        reason = f"{type(error).__name__}: {said}" if said else type(error).__name__
+        text = " ".join(str(error).split())[:120]
+        reason = f"{type(error).__name__}: {text}" if text else type(error).__name__
         raise FileError(f"not a readable {kind} file, or cut off ({reason})") from None

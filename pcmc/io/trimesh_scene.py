@@ -1,4 +1,4 @@
-"""From a trimesh scene, named meshes each with vertices of its own, to Contents."""
+"""Read the meshes of a trimesh scene, each with its own vertices."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import FileError
-from .contents import Contents, Description
+from .mesh_data import MeshData
+from .metadata import Metadata
 
 
-def from_meshes(scene: Any, default: str, about: Description | None = None) -> Contents:
-    """Every mesh of the scene where its node places it; meshes of one name are one patch."""
-    about = about or Description()
+def from_meshes(scene: Any, default: str, metadata: Metadata | None = None) -> MeshData:
+    """Every mesh of the scene, placed by its node; meshes of one name are one patch."""
+    metadata = metadata or Metadata()
     X, F, patch, names = [], [], [], []
     data: dict[str, list[Any]] = {}
     start, order = 0, list(scene.geometry)
@@ -34,9 +35,13 @@ def from_meshes(scene: Any, default: str, about: Description | None = None) -> C
             data.setdefault(attribute, []).append(np.asarray(values, dtype=np.float64).ravel())
         start += len(points)
     if not X:
-        raise FileError("it holds no triangles")
+        raise FileError("the file has no triangles", where="faces", found=0)
     scalars = {k: np.concatenate(v) for k, v in data.items() if sum(map(len, v)) == start}
-    return Contents(
-        np.concatenate(X), np.concatenate(F), np.concatenate(patch), about.named(names),
-        plane=about.plane, scalars=scalars,
-    )  # fmt: skip
+    return MeshData(
+        np.concatenate(X),
+        np.concatenate(F),
+        np.concatenate(patch),
+        metadata.named(names),
+        plane=metadata.plane,
+        scalars=scalars,
+    )

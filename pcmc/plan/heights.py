@@ -1,4 +1,4 @@
-"""Initial heights over a plan: what its boundary spans, and a membrane blown up above it."""
+"""Initial heights over a plan: a harmonic surface through the boundary, and a dome above it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from .planar import signed_areas
 
-RISE = 0.3  # of the clear radius: a shallow dome
-FULLNESS = (
-    0.75  # power of the membrane's height: below 1 the dome is fuller and meets walls steeper
-)
-SLOPE = 0.8  # of the dome at its edge: steeper would draw the triangles out
-LEAST = 0.15  # of that slope, everywhere, so that there is room for walls
+RISE = 0.3  # of the radius of the largest circle without supports: a shallow dome
+FULLNESS = 0.75  # power of the membrane's height; below 1 the dome is steeper at its edge
+SLOPE = 0.8  # largest slope of the dome; steeper ones stretch the triangles
+LEAST = 0.15  # of that slope: smallest slope, so that walls have room
 
 
 def stiffness(points: Floats, triangles: Ints) -> csr_array:
@@ -34,12 +32,12 @@ def stiffness(points: Floats, triangles: Ints) -> csr_array:
     return csr_array(coo_array((local.ravel(), (row.ravel(), column.ravel())), shape=(n, n)))
 
 
-def spanned(points: Floats, triangles: Ints, heights: Floats) -> Floats:
-    """(n,) the harmonic function with the given heights, where they are not NaN.
+def harmonic_heights(points: Floats, triangles: Ints, heights: Floats) -> Floats:
+    """(n,) the harmonic function with the given heights; NaN is unknown.
 
     >>> square = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [1, 1.0]])
     >>> fan = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
-    >>> spanned(square, fan, np.array([0, 0, 3, 3, np.nan])).tolist()
+    >>> harmonic_heights(square, fan, np.array([0, 0, 3, 3, np.nan])).tolist()
     [0.0, 0.0, 3.0, 3.0, 1.5]
     """
     known = ~np.isnan(heights)
@@ -47,20 +45,20 @@ def spanned(points: Floats, triangles: Ints, heights: Floats) -> Floats:
     if np.ptp(given[known]) == 0.0:
         return np.full(len(points), given[known][0])
     L = stiffness(points, triangles)
-    return _solved(L, -(L @ given), known) + given
+    return _solve(L, -(L @ given), known) + given
 
 
 def dome(points: Floats, triangles: Ints, held: Bools, rise: float | None = None) -> Floats:
     """(n,) heights of an initial dome: 0 where held, at most ``rise``, never steep at the edge.
 
-    A membrane under pressure, Δu = -1 with u = 0 at held vertices and a free edge elsewhere, gives
-    the shape (u / max u)^0.75. ``rise`` is by default 0.3 of the radius of the largest circle clear
-    of held vertices. The height is between 0.12 and 0.8 times the distance from those (more only
-    where a larger rise demands it).
+    The shape is (u / max u)^0.75 for a membrane under pressure: Δu = -1, u = 0 at held vertices, free
+    edges elsewhere. ``rise`` is by default 0.3 of the radius of the largest circle without held
+    vertices. The height is between 0.12 and 0.8 times the distance from the held vertices; both
+    slopes grow with a larger rise.
     """
     area = np.abs(signed_areas(points, triangles))
     load = np.bincount(triangles.ravel(), np.repeat(area / 3.0, 3), len(points)).astype(float)
-    u = np.maximum(_solved(stiffness(points, triangles), load, held), 0.0)
+    u = np.maximum(_solve(stiffness(points, triangles), load, held), 0.0)
     distance = np.asarray(cKDTree(points[held]).query(points)[0])
     radius = float(distance.max())
     rise = RISE * radius if rise is None else rise
@@ -69,7 +67,7 @@ def dome(points: Floats, triangles: Ints, held: Bools, rise: float | None = None
     return np.clip(full, LEAST * slope * distance, slope * distance)
 
 
-def _solved(L: csr_array, load: Floats, known: Bools) -> Floats:
+def _solve(L: csr_array, load: Floats, known: Bools) -> Floats:
     """(n,) u with L u = load at the unknown vertices and u = 0 at the known ones."""
     free = np.flatnonzero(~known)
     u: Floats = np.zeros(len(load))

@@ -1,4 +1,4 @@
-"""What the page draws of a surface: its sheets, lines and supports once, its fields at every change."""
+"""The data that the page draws: sheets, lines and supports once, fields at every change."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ Arrays = dict[str, npt.NDArray[Any]]
 
 
 def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
-    """What stays the same however the surface moves.
+    """Everything that stays the same while the surface moves.
 
-    A vertex where sheets meet is drawn once for each, so that colours and shading break there:
-    ``sheet_faces`` (m,3) index such corners, ``sheet_vertex`` and ``sheet_patch`` say whose they are.
+    A vertex where sheets meet is drawn once for each sheet, so that colours and shading break there:
+    ``sheet_faces`` (m,3) index these corners; ``sheet_vertex`` and ``sheet_patch`` are their vertex
+    and patch.
     """
     corner = surface.patch_of_face[:, None].astype(np.int64) * surface.n + surface.faces
     corners, faces = np.unique(corner, return_inverse=True)
@@ -62,34 +63,34 @@ def _walls_alone(surface: Surface) -> Bools:
 
 
 def centre(surface: Surface) -> Floats:
-    """(3,) middle of the bounding box; the page's origin, where single precision is at its best."""
+    """(3,) middle of the bounding box: the page's origin, near which single precision is best."""
     X = surface.vertices
     return 0.5 * (X.min(axis=0) + X.max(axis=0))
 
 
-def fields(surface: Surface, found: Certificate, origin: Floats) -> Arrays:
-    """Vertices relative to the origin, and the numbers that colours may show."""
+def fields(surface: Surface, certificate: Certificate, origin: Floats) -> Arrays:
+    """Vertices relative to the origin, and the values that colours may show."""
     arrays: Arrays = {
         "vertices": surface.vertices - origin,
         "curvature": mean_curvature(surface, "variational"),
         "error": curvature_error(surface, "cotangent"),
-        "reactions": reactions_per_length(surface, found.reactions),
+        "reactions": reactions_per_length(surface, certificate.reactions),
     }
-    if len(found.modes):
-        arrays["mode"] = found.modes[0] / (np.abs(found.modes[0]).max() or 1.0)
+    if len(certificate.modes):
+        arrays["mode"] = certificate.modes[0] / (np.abs(certificate.modes[0]).max() or 1.0)
     return arrays
 
 
-def findings(surface: Surface, found: Certificate) -> dict[str, Any]:
-    """The certificate in numbers, for the page's table."""
+def findings(surface: Surface, certificate: Certificate) -> dict[str, Any]:
+    """Numbers of the surface and its certificate, for the page's table."""
     height = surface.plane.height(surface.vertices)
     roof = ~surface.walls
     return {
-        **found.numbers(),
+        **certificate.numbers(),
         "height": float(height.max()),
         "area": float(patch_areas(surface)[roof].sum()),
         "patches": [
             {"name": row["patch"], "mean_H": row["mean_H"], "area": row["area"]}
-            for row in found.patches.to_dict(orient="records")
+            for row in certificate.patches.to_dict(orient="records")
         ],
     }

@@ -1,4 +1,4 @@
-"""What is probably not meant in a mesh from another program is said, and what is meant is not."""
+"""Probable mistakes in a mesh from another program give a warning, other meshes none."""
 
 import warnings
 
@@ -38,20 +38,20 @@ def write_obj(path, gap=0.0, turned=False, axes=(0, 1, 2)):
     return path
 
 
-def test_patches_that_meet_and_agree_are_read_without_a_word(tmp_path):
+def test_patches_that_meet_and_agree_give_no_warning(tmp_path):
     surface = pcmc.read(write_obj(tmp_path / "good.obj"))
     assert len(surface.topology.junctions) == 1
 
 
-def test_a_seam_that_is_open_by_little_is_said(tmp_path):
+def test_a_narrow_open_seam_gives_a_warning(tmp_path):
     with pytest.warns(
-        FileWarning, match=r"10 vertices on its .* at most 0\.001 from .*: a seam is open"
+        FileWarning, match=r"a seam is open: 10 boundary vertices are within 0\.001 of another"
     ):
         surface = pcmc.read(write_obj(tmp_path / "gap.obj", gap=1e-3))
     assert not len(surface.topology.junctions)
 
 
-def test_two_roofs_apart_are_meant(tmp_path):
+def test_a_wide_gap_gives_no_warning(tmp_path):
     pcmc.read(write_obj(tmp_path / "apart.obj", gap=0.5 / SIDE))
 
 
@@ -61,12 +61,14 @@ def test_patches_turned_against_each_other_are_named(tmp_path):
 
 
 @pytest.mark.parametrize(("axes", "named"), [((0, 2, 1), "y"), ((2, 0, 1), "x")])
-def test_a_roof_on_its_side_is_said(tmp_path, axes, named):
-    with pytest.warns(FileWarning, match=f"looks along {named} and not up, which is z here"):
+def test_a_roof_on_its_side_gives_a_warning(tmp_path, axes, named):
+    with pytest.warns(
+        FileWarning, match=f"faces {named}, but z is up here; rotate it if {named} was up"
+    ):
         pcmc.read(write_obj(tmp_path / "lying.obj", axes=axes))
 
 
-def test_what_was_written_here_is_meant(tmp_path):
+def test_files_that_pcmc_wrote_give_no_warning(tmp_path):
     upright = pcmc.read(write_obj(tmp_path / "good.obj"))
     lying = upright.moved(upright.vertices[:, [2, 0, 1]])
     for suffix in (".obj", ".ply", ".vtp"):
@@ -74,11 +76,14 @@ def test_what_was_written_here_is_meant(tmp_path):
         pcmc.read(tmp_path / f"a{suffix}")
 
 
-def test_the_command_says_what_a_plain_mesh_does_not_tell(tmp_path, capsys):
+def test_the_command_warns_that_a_plain_mesh_has_no_supports(tmp_path, capsys):
     path = write_obj(tmp_path / "good.obj")
     for command in (["solve", str(path), "--tension", "4"], ["certify", str(path)]):
         cli.main(command)
-        assert "its boundary is held, and tensions and pressures are 1" in capsys.readouterr().err
+        assert (
+            "its boundary is taken as fixed; tensions and pressures are 1"
+            in capsys.readouterr().err
+        )
     pcmc.write(tmp_path / "told.obj", pcmc.read(path, tensions=4.0))
     assert cli.main(["solve", str(tmp_path / "told.obj")]) == 0
     assert capsys.readouterr().err == ""
@@ -88,8 +93,14 @@ def surveyed():
     near = tent(tilted=False)
     plane = pcmc.Plane(tuple(FAR))
     return near, pcmc.Surface(
-        near.vertices + FAR, near.faces, near.patch_of_face, near.patches, near.fixed, near.on_plane, plane
-    )  # fmt: skip
+        near.vertices + FAR,
+        near.faces,
+        near.patch_of_face,
+        near.patches,
+        near.fixed,
+        near.on_plane,
+        plane,
+    )
 
 
 def test_stl_far_from_the_origin_is_written_about_its_middle_and_says_so(tmp_path):

@@ -1,11 +1,10 @@
-"""Drafting: the mesh, heights, walls and supports of a Plan."""
+"""The Surface of a plan: its mesh, heights, patches, supports and walls."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,22 +13,21 @@ from ..base.errors import PlanError, PlanWarning, SurfaceError
 from ..meshing.angles import improve_angles
 from ..surface import Patch, Surface
 from .arrangement import Arrangement, arrange, hole_points
-from .curves import Curve, to_local, to_space
-from .lift import dome, spanned
+from .coordinates import to_local, to_space
+from .curves import Curve
+from .data import PlanData
+from .heights import dome, harmonic_heights
 from .lines import SNAP, Drawn, Kind, Line
 from .parts import EDGES, Area
 from .planar import PlanarMesh, locate, signed_areas, triangulate
-from .walls import Added, WallTop, stand
+from .walls import UpperEdge, WallMesh, build_walls
 
-if TYPE_CHECKING:
-    from .roof import Plan  # which asks for this module when a surface is wanted
-
-MOST = 5_000_000  # triangles
-STEEPEST = 10.0  # initial rise over the plan's size
-GOOD_ANGLE = 28.0  # degrees; below it the slope has spoilt a triangle that was good in plan
+MAX_TRIANGLES = 5_000_000
+MAX_RISE = 10.0  # of the initial surface, over the size of the plan
+GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan
 
 
-def surface(plan: Plan) -> Surface:
+def build_surface(plan: PlanData) -> Surface:
     """The mesh of the plan at its initial height, with its walls and supports."""
     _check_size(plan)
     lines, on_edge = _lines(plan)
@@ -41,9 +39,11 @@ def surface(plan: Plan) -> Surface:
     mesh = _meshed(plan, drawn, hole_points(drawn, lines))
     fixed, sliding = _supports(plan, drawn, lines, on_edge, len(mesh.points))
     if not (fixed | sliding).any():
-        raise PlanError("nothing holds the roof; fix an edge or give supports")
+        raise PlanError("nothing holds the roof; fix an edge or give supports", what="supports")
     if (fixed | sliding).all():
-        raise PlanError("every vertex of the mesh is held; use a smaller edge_length")
+        raise PlanError(
+            "every vertex of the mesh is held; use a smaller edge_length", what="edge_length"
+        )
     _warn_of_free_edges(drawn, lines, fixed | sliding)
     base, height = _heights(plan, drawn, mesh, fixed | sliding)
     patches, patch_of_face = _patches(plan, mesh)
@@ -63,49 +63,51 @@ def surface(plan: Plan) -> Surface:
     )
 
 
-def _meshed(plan: Plan, drawn: Arrangement, holes: Sequence[Sequence[float]]) -> PlanarMesh:
+def _meshed(plan: PlanData, drawn: Arrangement, holes: Sequence[Sequence[float]]) -> PlanarMesh:
     try:
         return triangulate(drawn.points, drawn.segments, plan.edge_length, holes)
     except SurfaceError as error:
         raise PlanError(
-            f"the plan's lines come too close to each other for edges of length"
-            f" {plan.edge_length:g}: {error}"
+            f"lines of the plan are too close to each other for edges of length"
+            f" {plan.edge_length:g}: {error}",
+            what="edge_length",
+            found=plan.edge_length,
         ) from None
 
 
-def _check_size(plan: Plan) -> None:
-    """A length that is a slip must not fill the memory, or lead to errors that do not name it."""
+def _check_size(plan: PlanData) -> None:
+    """Refuse lengths that are probably mistakes, before they fill the memory."""
+
+    def error(key: str, problem: str) -> PlanError:
+        value = getattr(plan, key)
+        return PlanError(f"{key}={value:g} {problem}", what=key, found=value)
+
     x, y = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2].T
     area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
     count = area / (np.sqrt(0.1875) * plan.edge_length**2)
-    if count > MOST:
-        raise PlanError(
-            f"edge_length={plan.edge_length:g} would make about {count:.2g} triangles; at most"
-            f" {MOST} are allowed"
-        )
     size = float(np.hypot(np.ptp(x), np.ptp(y)))
+    if count > MAX_TRIANGLES:
+        limit = f"at most {MAX_TRIANGLES} are allowed"
+        raise error("edge_length", f"would make about {count:.2g} triangles; {limit}")
     if plan.edge_length > size:
-        raise PlanError(
-            f"edge_length={plan.edge_length:g} is longer than the plan, {size:.4g} from corner to"
-            " corner; use a smaller one"
-        )
-    if plan.rise is not None and plan.rise > STEEPEST * size:
-        raise PlanError(
-            f"rise={plan.rise:g} is more than {STEEPEST:g} times the plan's size, {size:.4g}; use a"
-            " smaller one"
-        )
+        problem = f"is longer than the plan, {size:.4g} from corner to corner; use a smaller one"
+        raise error("edge_length", problem)
+    if plan.rise is not None and plan.rise > MAX_RISE * size:
+        limit = f"{MAX_RISE:g} times the plan's size, {size:.4g}"
+        raise error("rise", f"is more than {limit}; use a smaller one")
     for hole in plan.holes:
-        extent = float(
-            np.ptp(hole.curve.local(plan.plane).at(hole.curve.dense)[:, :2], axis=0).max()
-        )
+        xy = hole.curve.local(plan.plane).at(hole.curve.dense)[:, :2]
+        extent = float(np.ptp(xy, axis=0).max())
         if extent <= SNAP * plan.edge_length:
             raise PlanError(
                 f"{hole.name} is only {extent:g} wide, too little for edges of length"
-                f" {plan.edge_length:g}; leave it out, or use a smaller edge_length"
+                f" {plan.edge_length:g}; leave it out, or use a smaller edge_length",
+                what=hole.name,
+                found=extent,
             )
 
 
-def _lines(plan: Plan) -> tuple[list[Line], list[Curve]]:
+def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:
     """The lines to draw, in the coordinates of Π, and the supports that lie on the boundary."""
     lines = [Line("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
     lines += [Line(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
@@ -128,7 +130,7 @@ def _lines(plan: Plan) -> tuple[list[Line], list[Curve]]:
 
 
 def _supports(
-    plan: Plan, drawn: Arrangement, lines: Sequence[Line], on_edge: Sequence[Curve], n: int
+    plan: PlanData, drawn: Arrangement, lines: Sequence[Line], on_edge: Sequence[Curve], n: int
 ) -> tuple[Bools, Bools]:
     """(n,) fixed and sliding vertices."""
     edge = {line.name: hole.edge for line, hole in zip(lines[1:], plan.holes, strict=False)}
@@ -152,7 +154,7 @@ def _supports(
 
 
 def _warn_of_free_edges(drawn: Arrangement, lines: Sequence[Line], held: Bools) -> None:
-    """No shape is at rest where a patch ends with nothing to pull against; the mesh alone may hold it."""
+    """Warn of free edges: the tension of the patch has nothing to pull against there."""
     for line in (line for line in lines if line.bounds):
         chains = [c.vertices for c in drawn.chains if lines[c.line] is line]
         free = list(dict.fromkeys(v for chain in chains for v in chain if not held[v]))
@@ -160,23 +162,23 @@ def _warn_of_free_edges(drawn: Arrangement, lines: Sequence[Line], held: Bools) 
             place = drawn.points[free[0]].round(4).tolist()
             text = (
                 f"nothing holds {line.name} at {place} ({len(free)} such vertices): the tension has"
-                " nothing to pull against there, and the roof will hardly come to rest; hold the edge,"
-                " along a curve in space if it is to be above the plane"
+                " nothing to pull against there, and there is probably no equilibrium; fix the edge,"
+                " along a curve in space if it should be above the plane"
             )
             warnings.warn(text, PlanWarning, stacklevel=4)
 
 
 def _heights(
-    plan: Plan, drawn: Arrangement, mesh: PlanarMesh, held: Bools
+    plan: PlanData, drawn: Arrangement, mesh: PlanarMesh, held: Bools
 ) -> tuple[Floats, Floats]:
-    """(n,) the heights that the boundary spans, and those of the initial surface."""
+    """(n,) the heights of the surface that the boundary spans, and of the initial surface."""
     given = np.full(len(mesh.points), np.nan)
     given[: len(drawn.heights)] = drawn.heights
-    base = spanned(mesh.points, mesh.triangles, given)
+    base = harmonic_heights(mesh.points, mesh.triangles, given)
     return base, base + dome(mesh.points, mesh.triangles, held, plan.rise)
 
 
-def _patches(plan: Plan, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
+def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
     """The plan's patches and the patch of each triangle."""
     count = int(mesh.region.max()) + 1
     area = signed_areas(mesh.points, mesh.triangles)
@@ -193,13 +195,20 @@ def _patches(plan: Plan, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
     if not located:
         if len(areas) != count:
             raise PlanError(
-                f"the dividers cut the plan into {count} parts, but {len(areas)} patches are named"
-                f" ({', '.join(a.name for a in areas)}); name as many, or say which is where (at=)"
+                f"the dividers cut the plan into {count} parts, but there are {len(areas)} patches"
+                f" ({', '.join(a.name for a in areas)}); give one for each part, or place them with at=",
+                what="patches",
+                found=len(areas),
+                expected=count,
             )
         owner: Ints = np.argsort(np.lexsort(centroid.round(6).T[::-1]))
     elif len(located) < len(areas):
         missing = next(a.name for a in areas if a.at is None)
-        raise PlanError(f"patch {missing!r} has no at=; give it to all patches or to none")
+        raise PlanError(
+            f"patch {missing!r} has no at=; give it to all patches or to none",
+            what="at",
+            where=missing,
+        )
     else:
         owner = _located(areas, mesh, count, centroid)
     patches = [Patch(a.name, a.tension, a.pressure) for a in areas]
@@ -214,31 +223,45 @@ def _located(areas: Sequence[Area], mesh: PlanarMesh, count: int, centroid: Floa
         for point, triangle in zip(points, locate(mesh, points), strict=True):
             if triangle < 0:
                 raise PlanError(
-                    f"patch {one.name!r}: its point {point.tolist()} is not inside the plan"
+                    f"patch {one.name!r}: its point {point.tolist()} is not inside the plan",
+                    what="at",
+                    where=one.name,
+                    found=point.tolist(),
                 )
             part = mesh.region[triangle]
             if owner[part] not in (-1, number):
                 raise PlanError(
-                    f"patches {areas[owner[part]].name!r} and {one.name!r} are at the same part of"
-                    f" the plan (around {centroid[part].round(3).tolist()}): no divider is between"
+                    f"patches {areas[owner[part]].name!r} and {one.name!r} are in the same part of the"
+                    f" plan (around {centroid[part].round(3).tolist()}); draw a divider between them",
+                    what="at",
+                    where=one.name,
+                    found=areas[owner[part]].name,
                 )
             owner[part] = number
     bare = np.flatnonzero(owner < 0)
     if len(bare):
         raise PlanError(
             f"the part of the plan around {centroid[bare[0]].round(3).tolist()} has no patch"
-            f" ({len(bare)} such parts); add one with at= inside it"
+            f" ({len(bare)} such parts); add one with at= inside it",
+            what="patches",
+            where=centroid[bare[0]].round(3).tolist(),
         )
     return owner
 
 
 def _walls(
-    plan: Plan, drawn: Arrangement, lines: Sequence[Line], triangles: Ints, pressure: Floats,
-    X: Floats, base: Floats, fixed: Bools,
-) -> tuple[Added, list[Patch]]:  # fmt: skip
-    """The walls and their patches: one for each divider, and for each difference of pressure at it.
+    plan: PlanData,
+    drawn: Arrangement,
+    lines: Sequence[Line],
+    triangles: Ints,
+    pressure: Floats,
+    X: Floats,
+    base: Floats,
+    fixed: Bools,
+) -> tuple[WallMesh, list[Patch]]:
+    """The walls and their patches: one for each divider and each difference of pressure along it.
 
-    A wall between rooms takes the pressure of the one on its divider's left less that on its right.
+    A wall takes the pressure on the left of its divider less that on the right.
     """
     first = 1 + len(plan.holes)
     kinds: list[tuple[int, float]] = []
@@ -258,14 +281,16 @@ def _walls(
         kind = (chain.line - first, _beside(triangles, pressure, one, two))
         if kind not in kinds:
             kinds.append(kind)
-        tops.append(WallTop(chain.vertices, kinds.index(kind), divider.bottom != "sliding"))
+        tops.append(UpperEdge(chain.vertices, kinds.index(kind), divider.bottom != "sliding"))
     mixed = np.flatnonzero(level & (floor != 0.0))
     if len(mixed):
         raise PlanError(
             f"at {drawn.points[mixed[0]].round(6).tolist()} a wall with a sloped bottom meets one"
-            " whose bottom is on the plane; give both the same bottom"
+            " whose bottom is on the plane; give both the same bottom",
+            what="bottom",
+            where=drawn.points[mixed[0]].round(6).tolist(),
         )
-    walls = stand(X, tops, plan.edge_length, plan.plane, fixed, floor)
+    walls = build_walls(X, tops, plan.edge_length, plan.plane, fixed, floor)
     order = sorted(range(len(kinds)), key=lambda k: kinds[k][0])
     walls = replace(walls, label=np.argsort(order)[walls.label] if kinds else walls.label)
     return walls, [_wall_patch(plan, kinds, k) for k in order]
@@ -279,7 +304,7 @@ def _beside(triangles: Ints, pressure: Floats, one: int, two: int) -> float:
     return float(pressure[left].sum() - pressure[right].sum())
 
 
-def _wall_patch(plan: Plan, kinds: Sequence[tuple[int, float]], number: int) -> Patch:
+def _wall_patch(plan: PlanData, kinds: Sequence[tuple[int, float]], number: int) -> Patch:
     divider = plan.dividers[kinds[number][0]]
     alike = [k for k, (line, _) in enumerate(kinds) if line == kinds[number][0]]
     suffix = f"-{alike.index(number) + 1}" if len(alike) > 1 else ""

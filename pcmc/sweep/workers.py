@@ -1,4 +1,4 @@
-"""Where the cases of a sweep run: local processes, a given executor, or a Dask cluster."""
+"""Who runs the cases: processes of this machine, a given executor, or a Dask cluster."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ import os
 import re
 import uuid
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from typing import Any
 
 from ..base.errors import MissingExtra, OptionError, SweepError
-from .child import version
-from .isolate import retire, run_case
-from .local import LocalPool
+from .case_process import retire, run_case
+from .case_script import version
 
 Submit = Callable[[Mapping[str, Any]], "Future[dict[str, Any]]"]
 
@@ -22,36 +21,36 @@ CONNECT = 10.0  # seconds a scheduler has to answer, and then to show a worker
 
 
 @contextmanager
-def open_pool(
+def open_workers(
     case: str,
     time_limit: float | None,
     executor: Executor | None,
     scheduler: str | None,
     workers: int | None,
 ) -> Iterator[Submit]:
-    """What runs a case, given its parameters; at the end the sweep's child processes are ended."""
+    """A function that has a case run, given its parameters. At the end, the case processes are ended."""
     team = uuid.uuid4().hex
     if scheduler is not None:
-        with _cluster(team, scheduler) as pool:
-            yield lambda parameters: pool.submit(run_case, team, case, parameters, time_limit)
-    elif executor is not None:
-        try:
-            yield lambda parameters: executor.submit(run_case, team, case, parameters, time_limit)
-        finally:
-            retire(team)
-    else:
-        local = LocalPool(case, workers or _processors(), time_limit)
-        try:
-            yield local.submit
-        finally:
-            local.close()
+        with _cluster(team, scheduler) as cluster:
+            yield lambda parameters: cluster.submit(run_case, team, case, parameters, time_limit)
+        return
+    pool = executor or ThreadPoolExecutor(workers or _processors())
+    try:
+        yield lambda parameters: pool.submit(run_case, team, case, parameters, time_limit)
+    finally:
+        retire(team)
+        if executor is None:
+            pool.shutdown()
 
 
 @contextmanager
 def _cluster(team: str, address: str) -> Iterator[Executor]:
     """An executor on the workers of a Dask scheduler, each with the same version of pcmc."""
     if not re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^/]+:\d+/?", address):
-        raise OptionError(f"scheduler: expected 'tcp://host:8786', found {address!r}")
+        raise OptionError(
+            f"scheduler: expected 'tcp://host:8786', found {address!r}",
+            what="scheduler", found=address, expected="tcp://host:8786",
+        )  # fmt: skip
     try:
         from distributed import Client
     except ImportError:
@@ -60,7 +59,9 @@ def _cluster(team: str, address: str) -> Iterator[Executor]:
         client = Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise SweepError(
-            f"no Dask scheduler answers at {address!r} ({error}); start one with: dask scheduler"
+            f"no Dask scheduler answers at {address!r} ({error}); start one with: dask scheduler",
+            what="scheduler",
+            found=address,
         ) from error
     with client:
         try:
@@ -68,14 +69,16 @@ def _cluster(team: str, address: str) -> Iterator[Executor]:
         except TimeoutError as error:
             raise SweepError(
                 f"the Dask scheduler at {address!r} has no workers; start one with:"
-                f" dask worker {address}"
+                f" dask worker {address}",
+                what="scheduler",
+                found=address,
             ) from error
         _same_version(client)
         try:
             yield client.get_executor(pure=False)
         finally:
             if client.status == "running":
-                with suppress(Exception):  # workers that have gone took their children along
+                with suppress(Exception):  # a worker that has gone has taken its processes along
                     client.run(retire, team, on_error="ignore")
 
 
@@ -85,7 +88,11 @@ def _same_version(client: Any) -> None:
         if found != OWN_VERSION:
             raise SweepError(
                 f"the Dask worker {worker} has pcmc {found}, this is pcmc {OWN_VERSION}; install"
-                " the same version there"
+                " the same version there",
+                what="pcmc",
+                where=worker,
+                found=found,
+                expected=OWN_VERSION,
             )
 
 

@@ -1,0 +1,111 @@
+"""A point of a branch with its tangent, its index and its lowest eigenvalues."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.spatial import cKDTree
+
+from ..base.arrays import Floats
+from ..stability.modes import Stiffness, lowest
+from .correction import BorderedMatrix
+from .mesh import BranchMesh
+from .state import State
+
+TANGENT_ACCURACY = 1e-6  # relative, to which the tangent's linear system is solved
+DENSE = 12  # unknowns below which all eigenvalues are computed at once
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """dX/ds and dλ/ds along a branch, in the metric  ds² = Σ weights |dX|² + (dλ/scale)².
+
+    Attributes
+    ----------
+    direction, slope : dX/ds (n,3), and dλ/ds.
+    weights : (n,) 1/length²; with them the first part of ds² is the mean square displacement over the
+        surface in units of its size.
+    scale : size of λ.
+    """
+
+    direction: Floats
+    slope: float
+    weights: Floats
+    scale: float
+
+    @property
+    def row(self) -> Floats:
+        """(n,3) the tangent as a linear form on displacements."""
+        return self.weights[:, None] * self.direction
+
+    @property
+    def rate(self) -> float:
+        """Its entry for changes of λ."""
+        return self.slope / self.scale**2
+
+    def length(self, d: Floats, change: float) -> float:
+        """Length of a displacement d (n,3) and a change of λ together, in the metric."""
+        square = self.weights @ np.einsum("ij,ij->i", d, d)
+        return float(np.sqrt(square + (change / self.scale) ** 2))
+
+    def on(self, old: State, mesh: BranchMesh) -> Tangent:
+        """The tangent on another mesh: each vertex takes it from the nearest one of the old mesh."""
+        new = State(mesh, mesh.surface.vertices, old.parameter)
+        nearest = cKDTree(old.X).query(new.X)[1]
+        return Tangent(self.direction[nearest], self.slope, new.area_weights, self.scale)
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """A point of the branch.
+
+    Attributes
+    ----------
+    state : X and λ, with energy, volume, height and quality.
+    tangent : of the branch there.
+    eigenvalues : all negative ones and at least one more, ascending, force/length³.
+    index : number of negative eigenvalues.
+    """
+
+    state: State
+    tangent: Tangent
+    eigenvalues: Floats
+    index: int
+
+
+def branch_point(at: State, before: Tangent | float) -> BranchPoint:
+    """The point of the branch at a state on it.
+
+    ``before`` gives the sense of the tangent: a tangent nearby, or the sign of dλ/ds.
+    """
+    scale = at.mesh.line.scale
+    if isinstance(before, Tangent):
+        matrix, sense = BorderedMatrix(at, before.row, before.rate), 1.0
+    else:
+        matrix, sense = BorderedMatrix(at, np.zeros_like(at.X), 1.0 / scale**2), before
+    s, slope = matrix.solve(np.zeros(at.space.size), sense, TANGENT_ACCURACY)
+    direction, weights = at.motion(s), at.area_weights
+    length = Tangent(direction, slope, weights, scale).length(direction, slope)
+    stiffness = matrix.stiffness
+    return BranchPoint(
+        at,
+        Tangent(direction / length, slope / length, weights, scale),
+        _eigenvalues(stiffness),
+        stiffness.negative,
+    )
+
+
+def _eigenvalues(stiffness: Stiffness) -> Floats:
+    """All negative eigenvalues and at least one more, ascending."""
+    size = len(stiffness.mass)
+    if size < DENSE:
+        mass = np.diag(stiffness.mass)
+        return np.asarray(eigh(stiffness.matrix.toarray(), mass, eigvals_only=True))
+    count = stiffness.negative + 2
+    while True:
+        values = lowest(stiffness, min(count, size - 1))[0]
+        if np.count_nonzero(values < 0.0) >= stiffness.negative or count >= size - 1:
+            return values
+        count *= 2

@@ -1,0 +1,201 @@
+"""Newton's method for a point of a branch: equilibrium and one more equation, solved together.
+
+The unknowns are the positions X and the parameter λ:
+
+    r(X, λ) = B(X)ᵀ ∇E(X; λ) = 0,    g(X, λ) = 0
+
+with g a condition on arclength, volume, height or λ itself. A Newton step solves
+
+    [ J   f ] [ s ]     [ -r ]        J s = dr along s,  f = Bᵀ ∂∇E/∂λ
+    [ cᵀ  d ] [ δλ]  =  [ -g ]        c = Bᵀ ∂g/∂X,  d = ∂g/∂λ
+
+by GMRES. J is applied, not assembled: s moves the vertices by Bs, the insides of the sheets follow
+their junctions, and the bases B turn (``linearise``). The preconditioner has H = Bᵀ(∂²E)B in the place
+of J, by block elimination on a factorisation of H. At a fold J is singular; the bordered matrix is not.
+(Keller 1977 for the arclength; Govaerts 2000, ch. 3, for the elimination.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from ..base.arrays import Floats
+from ..stability.factorisation import Factor, SingularMatrix
+from ..stability.modes import Stiffness
+from .mesh import BranchMesh
+from .state import State
+
+ITERATIONS = 12  # most Newton steps of a correction
+SLOW = 0.8  # ratio of successive residuals; three in a row above it end the correction
+COLLAPSED = 0.02  # triangle quality below which no point is accepted
+CONSTRAINT_TOLERANCE = 1e-9  # |g| that counts as zero
+
+
+class NotOnBranch(ArithmeticError):
+    """No point of the branch was found there; the message says why."""
+
+
+class MeshCollapsed(NotOnBranch):
+    """Triangles collapse or turn over on the way."""
+
+
+class ContactChanged(NotOnBranch):
+    """The contact of a wall with Π may change near this state."""
+
+    def __init__(self, near: State) -> None:
+        super().__init__("the contact of a wall with the plane changes")
+        self.near = near
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """The equation g(X, λ) = 0 beside equilibrium; g is of order 1.
+
+    Attributes
+    ----------
+    value : g.
+    gradient : ∂g/∂X (n,3).
+    rate : ∂g/∂λ.
+    """
+
+    value: Callable[[State], float]
+    gradient: Callable[[State], Floats]
+    rate: float
+
+
+def fixed_parameter(parameter: float, scale: float) -> Constraint:
+    """λ is given."""
+    return Constraint(
+        lambda at: (at.parameter - parameter) / scale, lambda at: np.zeros_like(at.X), 1.0 / scale
+    )
+
+
+def fixed_arclength(near: State, row: Floats, rate: float) -> Constraint:
+    """⟨row, X - X₀⟩ + rate (λ - λ₀) = 0, pseudo-arclength: across the tangent form at a state."""
+    return Constraint(
+        lambda at: float((row * (at.X - near.X)).sum()) + rate * (at.parameter - near.parameter),
+        lambda _: row,
+        rate,
+    )
+
+
+def fixed_volume(mesh: BranchMesh, volume: float) -> Constraint:
+    """The volume is given."""
+    unit = mesh.full.size**3
+    return Constraint(
+        lambda at: (at.volume - volume) / unit, lambda at: at.volume_gradient / unit, 0.0
+    )
+
+
+def fixed_height(mesh: BranchMesh, vertex: int, height: float) -> Constraint:
+    """The height of one vertex over Π is given."""
+    plane, unit = mesh.surface.plane, mesh.full.size
+    row = np.zeros((mesh.full.n, 3))
+    row[vertex] = np.array(plane.normal) / unit
+    return Constraint(
+        lambda at: float(plane.height(at.X[vertex]) - height) / unit, lambda _: row, 0.0
+    )
+
+
+class BorderedMatrix:
+    """The matrix [[J, f], [cᵀ, d]] at a state, with H factorised.
+
+    The last row is ⟨row, motion⟩ + rate δλ; ``unit`` brings it to the size of the others.
+    """
+
+    def __init__(self, at: State, row: Floats, rate: float) -> None:
+        self.at, self.row, self.rate = at, row, rate
+        self.values, self.factor = _hessian(at)
+        f = at.parameter_derivative
+        size = float(np.linalg.norm(f)) or 1.0
+        self.unit = size / float(np.linalg.norm(row) + abs(rate))
+
+    @property
+    def stiffness(self) -> Stiffness:
+        """H with its mass and inertia."""
+        return self.at.mesh.stiffness(self.at.space, self.at.X, self.values, self.factor)
+
+    def solve(self, right: Floats, last: float, accuracy: float) -> tuple[Floats, float]:
+        """(s, δλ) with  J s + f δλ = right,  ⟨row, motion⟩ + rate δλ = last."""
+        size = len(right) + 1
+        behind = self.factor.solve(self.at.parameter_derivative)
+        c = self.at.space.to_coordinates(self.row)
+        pivot = self.rate - float(c @ behind)
+        if not np.isfinite(pivot) or pivot == 0.0:
+            raise NotOnBranch("the bordered matrix is singular: branches meet here")
+
+        def eliminate(z: Floats) -> Floats:
+            s = self.factor.solve(z[:-1])
+            change = (z[-1] / self.unit - float(c @ s)) / pivot
+            return np.append(s - behind * change, change)
+
+        z, _ = gmres(
+            LinearOperator((size, size), self.times, dtype=float),
+            np.append(right, last * self.unit),
+            M=LinearOperator((size, size), eliminate, dtype=float),
+            rtol=accuracy,
+            restart=20,
+            maxiter=2,
+        )
+        return z[:-1], float(z[-1])
+
+    def times(self, z: Floats) -> Floats:
+        """The matrix times a vector (N+1,)."""
+        at = self.at
+        d = at.moved(at.motion(z[:-1])) - at.aligned
+        along = float((self.row * d).sum())
+        return np.append(
+            at.jacobian.times(d) + at.parameter_derivative * z[-1],
+            self.unit * (along + self.rate * z[-1]),
+        )
+
+
+def correct(start: State, constraint: Constraint, tolerance: float) -> State:
+    """The point of the branch near a state that also meets the constraint.
+
+    Raises
+    ------
+    NotOnBranch : Newton's method does not converge, or a tension would reach 0.
+    MeshCollapsed : triangles collapse.
+    ContactChanged : a junction comes down to Π on the way.
+    """
+    mesh, at = start.mesh, start
+    last, slow = np.inf, 0
+    _check_tensions(at)
+    for iteration in range(ITERATIONS + 1):
+        g = constraint.value(at)
+        if at.residual <= tolerance and abs(g) <= CONSTRAINT_TOLERANCE:
+            return at
+        size = at.residual + abs(g)
+        slow = slow + 1 if not size < SLOW * last else 0
+        if slow >= 3 or not np.isfinite(at.residual + g):
+            break
+        last = size
+        matrix = BorderedMatrix(at, constraint.gradient(at), constraint.rate)
+        s, change = matrix.solve(-at.forces, -g, 1e-3)
+        step = at.motion(s)
+        if not np.abs(step).max() < mesh.full.size:
+            break
+        at = State(mesh, at.moved(step), at.parameter + change, iteration + 1)
+        _check_tensions(at)
+        if at.quality < COLLAPSED:
+            raise MeshCollapsed("triangles collapse")
+        if mesh.reaches_plane(at.X).any():
+            raise ContactChanged(start)  # beyond Π the walls' forces mislead Newton's method
+    raise NotOnBranch(f"Newton's method does not converge (residual {at.residual:.1e})")
+
+
+def _check_tensions(at: State) -> None:
+    if not at.mesh.line.allows(at.parameter):
+        raise NotOnBranch(f"a tension would reach 0 at the parameter {at.parameter:g}")
+
+
+def _hessian(at: State) -> tuple[Floats, Factor]:
+    try:
+        return at.mesh.hessian(at.surface, at.space, at.X)
+    except SingularMatrix as error:
+        raise NotOnBranch(f"the Hessian has no factorisation ({error})") from None

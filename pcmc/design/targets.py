@@ -1,0 +1,247 @@
+"""What a search aims at and what it may change: targets and parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from ..base import validate
+from ..base.errors import OptionError, unknown
+from ..surface import Surface
+from .quantities import QUANTITIES, Measurement
+
+KINDS = ("tension", "pressure")
+FACTOR = 20.0  # a parameter without bounds may change by this factor, up or down
+
+
+@dataclass(frozen=True)
+class Target:
+    """A quantity of a surface, and the value or limits wanted for it.
+
+    Parameters
+    ----------
+    quantity : ``"apex"``, greatest height over Π of a patch; ``"height"`` over a point of Π;
+        ``"volume"`` (V_i of a patch, seen from the point of Π) and ``"area"``; ``"curvature"``,
+        p / (2α), a patch's mean curvature at rest; ``"reaction"``, the greatest force per length
+        on the held boundary of a patch.
+    of : name of the patch; for ``"height"`` the point (x, y) in the coordinates of Π. None: all patches
+        under pressure together (for ``"reaction"`` the whole held boundary); not for ``"curvature"``.
+    value, at_most, at_least : a value, or a limit on one side or both. Give none of them to measure the
+        quantity only.
+
+    Examples
+    --------
+    >>> Target("apex", "north", 2.5).label
+    'apex of north'
+    >>> Target("apx", "north")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    pcmc.base.errors.OptionError: unknown quantity 'apx'; did you mean 'apex'? Known: apex, height, ...
+    """
+
+    quantity: str
+    of: Any = None
+    value: float | None = None
+    at_most: float | None = None
+    at_least: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.quantity not in QUANTITIES:
+            raise OptionError(
+                unknown("quantity", self.quantity, QUANTITIES),
+                what="quantity",
+                found=self.quantity,
+                expected=tuple(QUANTITIES),
+            )
+        if self.quantity == "height":
+            object.__setattr__(self, "of", _point(self.of))
+        elif not (isinstance(self.of, str) or (self.of is None and self.quantity != "curvature")):
+            raise OptionError(
+                f"{self.quantity}: expected the name of a patch, found {self.of!r}",
+                what="of",
+                found=self.of,
+            )
+        for key in ("value", "at_most", "at_least"):
+            if getattr(self, key) is not None:
+                validate.number(f"{self.label}: {key}", getattr(self, key))
+        if self.value is not None and (self.at_most, self.at_least) != (None, None):
+            raise OptionError(f"{self.label}: give a value or limits, not both", what="value")
+        least, most = self.at_least, self.at_most
+        if least is not None and most is not None and most < least:
+            raise OptionError(
+                f"{self.label}: at_most {most:g} is less than at_least {least:g}",
+                what="at_most",
+                found=most,
+                expected=least,
+            )
+
+    @property
+    def label(self) -> str:
+        """The quantity in words."""
+        if self.quantity == "height":
+            return f"height at ({self.of[0]:g}, {self.of[1]:g})"
+        return self.quantity if self.of is None else f"{self.quantity} of {self.of}"
+
+    @property
+    def limits(self) -> tuple[float, ...]:
+        """The value or limits given; empty if the quantity is only measured."""
+        return tuple(v for v in (self.value, self.at_most, self.at_least) if v is not None)
+
+    def nearest(self, measured: float) -> float:
+        """The wanted value nearest to a measured one."""
+        if self.value is not None:
+            return self.value
+        low = -math.inf if self.at_least is None else self.at_least
+        high = math.inf if self.at_most is None else self.at_most
+        return min(max(measured, low), high)
+
+    def scale(self, surface: Surface) -> float:
+        """What a misfit is divided by: the value wanted or, if that is 0, the quantity's usual size."""
+        return max(map(abs, self.limits)) or QUANTITIES[self.quantity].size(surface)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A tension or pressure that may vary.
+
+    Parameters
+    ----------
+    patch : name of the patch.
+    kind : ``"tension"`` or ``"pressure"``. Where the pressure of a room varies, those of its walls, the
+        differences between rooms, are updated, unless they are parameters themselves.
+    low, high : bounds; by default a twentieth of the present value and twenty times it.
+
+    >>> Parameter("wall", low=0.0, high=3.0).label
+    'tension of wall'
+    """
+
+    patch: str
+    kind: str = "tension"
+    low: float | None = None
+    high: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.patch, str):
+            raise OptionError(
+                f"Parameter: expected the name of a patch, found {self.patch!r}",
+                what="patch",
+                found=self.patch,
+            )
+        validate.choice("kind of parameter", self.kind, KINDS)
+        for key in ("low", "high"):
+            if getattr(self, key) is not None:
+                validate.number(f"{self.label}: {key}", getattr(self, key))
+
+    @property
+    def label(self) -> str:
+        """The parameter in words."""
+        return f"{self.kind} of {self.patch}"
+
+    def value(self, surface: Surface) -> float:
+        """Its value on a surface."""
+        patch = surface.patches[surface.patch_index(self.patch)]
+        return patch.tension if self.kind == "tension" else patch.pressure
+
+    def tension_under_pressure(self, surface: Surface) -> bool:
+        """Whether it is the tension of a patch with a pressure; such a tension is never 0."""
+        loaded = surface.patches[surface.patch_index(self.patch)].pressure != 0.0
+        return loaded and self.kind == "tension"
+
+    def bounds(self, surface: Surface) -> tuple[float, float]:
+        """(low, high), with the defaults that follow from its present value."""
+        present = self.value(surface)
+        if present == 0.0 and None in (self.low, self.high):
+            raise OptionError(
+                f"{self.label} is 0 now; give low and high", what=self.label, found=0.0
+            )
+        ends = sorted((present / FACTOR, present * FACTOR))
+        low = ends[0] if self.low is None else self.low
+        high = ends[1] if self.high is None else self.high
+        if not low < high:
+            raise OptionError(
+                f"{self.label}: low {low:g} must be less than high {high:g}",
+                what=self.label,
+                where="low",
+                found=low,
+                expected=high,
+            )
+        loaded = self.tension_under_pressure(surface)
+        if self.kind == "tension" and (low < 0.0 or (loaded and low == 0.0)):
+            least = "> 0" if loaded else "≥ 0"
+            raise OptionError(
+                f"{self.label}: low must be {least}, found {low:g}",
+                what=self.label,
+                where="low",
+                found=low,
+                expected=least,
+            )
+        return low, high
+
+
+def measure(surface: Surface, target: Target) -> Measurement:
+    """Value and derivatives of the target's quantity on a surface.
+
+    >>> from pcmc import Patch, Surface
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
+    >>> pyramid = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                   [Patch("roof", 1.0)], fixed=range(4))
+    >>> volume = measure(pyramid, Target("volume", "roof"))
+    >>> round(volume.value, 12), volume.by_position[4].round(12).tolist()
+    (1.333333333333, [0.0, 0.0, 1.333333333333])
+    """
+    return QUANTITIES[target.quantity].measure(surface, target.of)
+
+
+def as_parameters(given: Parameter | str | Iterable[Parameter | str]) -> list[Parameter]:
+    """One parameter or several as a list; a name stands for that patch's tension."""
+    parameters = [
+        Parameter(p) if isinstance(p, str) else p
+        for p in _as_list(given, (Parameter, str), "a Parameter or the name of a patch")
+    ]
+    labels = [p.label for p in parameters]
+    for k, label in enumerate(labels):
+        if label in labels[:k]:
+            raise OptionError(f"the {label} is given twice; remove one", what=label, where=k)
+    return parameters
+
+
+def as_targets(given: Target | Iterable[Target]) -> list[Target]:
+    """One target or several as a list."""
+    return _as_list(given, (Target,), "a Target")
+
+
+def _as_list(given: Any, kinds: tuple[type, ...], expected: str) -> list[Any]:
+    """One value or several, by any iterable, as a list of values of these kinds."""
+
+    def wrong(found: object, where: int | None = None) -> OptionError:
+        several = ", or several of them" if where is None else ""
+        return OptionError(
+            f"expected {expected}{several}, found {'none' if found == [] else repr(found)}",
+            where=where,
+            found=found,
+            expected=expected,
+        )
+
+    if isinstance(given, kinds):
+        return [given]
+    if isinstance(given, str | bytes) or not isinstance(given, Iterable):
+        raise wrong(given)
+    values = list(given)
+    if not values:
+        raise wrong(values)
+    for k, value in enumerate(values):
+        if not isinstance(value, kinds):
+            raise wrong(value, k)
+    return values
+
+
+def _point(of: Any) -> tuple[float, float]:
+    try:
+        x, y = (float(c) for c in of)
+    except (TypeError, ValueError):
+        raise OptionError(
+            f"height: expected a point (x, y) of Π, found {of!r}", what="of", found=of
+        ) from None
+    return validate.number("height: x", x), validate.number("height: y", y)

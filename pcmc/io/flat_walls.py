@@ -1,0 +1,119 @@
+"""Walls without height, for formats with a mesh per patch: written as text beside the meshes.
+
+Below a junction on Π the triangles of a wall have no area, and its vertices lie on the junction. Meshes for
+other programs cannot hold such triangles, and a reader that joins patches by position would merge them. So
+the file has the meshes without them and a text with all walls; the reader puts these walls back.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import astuple, dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import FileError
+from ..surface import Patch, Surface
+from ..surface.geometry import bounding_size
+from .mesh_data import ROUNDING, MeshData, support_of, without_unused
+
+KEY = "pcmc walls"
+CHANGED = "walls without height were left out: the surface has changed since they were written"
+
+
+def encode_walls(surface: Surface, shown: Surface) -> str:
+    """The walls of a surface as text; ``shown`` is the surface without the triangles that have no area."""
+    wall = surface.walls[surface.patch_of_face]
+    used, local = np.unique(surface.faces[wall], return_inverse=True)
+    values = {
+        "vertices": surface.vertices[used].tolist(),
+        "support": support_of(surface)[used].tolist(),
+        "above": np.isin(used, surface.faces[~wall]).tolist(),
+        "faces": local.reshape(-1, 3).tolist(),
+        "patch": surface.patch_of_face[wall].tolist(),
+        "patches": [astuple(p) for p in surface.patches],
+        "shown": int(np.count_nonzero(shown.walls[shown.patch_of_face])),
+    }
+    return json.dumps(values)
+
+
+def restore_walls(data: MeshData) -> MeshData:
+    """The same, its patches joined, with the walls of ``data.walls`` in place of those in the meshes.
+
+    If the surface has changed since, the walls are left out, with a note.
+    """
+    if data.walls is None:
+        return data
+    walls = _Walls.parsed(data.walls)
+    names = {walls.patches[k].name for k in walls.patch}
+    is_wall = np.array([p.name in names for p in data.patches])[data.patch_of_face]
+    sheets = np.unique(data.faces[~is_wall])
+    reach = ROUNDING * bounding_size(data.vertices)
+    far, near = cKDTree(data.vertices[sheets]).query(walls.vertices[walls.above])
+    if np.count_nonzero(is_wall) != walls.shown or np.any(far > reach):
+        return replace(data, walls=None, notes=(*data.notes, CHANGED))
+    n, below = len(data.vertices), ~walls.above
+    place = np.empty(len(below), dtype=np.int64)
+    place[walls.above], place[below] = sheets[near], n + np.arange(np.count_nonzero(below))
+    X = np.concatenate([data.vertices, walls.vertices[below]])
+    X[place] = walls.vertices  # those above too: to rest on Π they must lie on it to the last digit
+    support = np.zeros(len(X), dtype=np.int8)
+    support[:n] = 0 if data.support is None else data.support
+    support[place] = walls.support
+    patches = list(data.patches)
+    patches += [p for p in walls.patches if p.name in names - {q.name for q in patches}]
+    number = {p.name: k for k, p in enumerate(patches)}
+    patch = np.array([number.get(p.name, -1) for p in walls.patches])[walls.patch]
+    beside = cKDTree(data.vertices).query(walls.vertices[below])[1]
+    whole = replace(
+        data,
+        vertices=X,
+        faces=np.concatenate([data.faces[~is_wall], place[walls.faces]]),
+        patch_of_face=np.concatenate([data.patch_of_face[~is_wall], patch]),
+        patches=tuple(patches),
+        support=support,
+        scalars={k: np.concatenate([v, v[beside]]) for k, v in data.scalars.items()},
+        walls=None,
+    )
+    return replace(without_unused(whole), notes=data.notes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Walls:
+    """The walls that ``encode_walls`` wrote."""
+
+    vertices: Floats
+    support: Ints
+    above: Bools
+    faces: Ints
+    patch: Ints
+    patches: list[Patch]
+    shown: int
+
+    @classmethod
+    def parsed(cls, text: str) -> _Walls:
+        try:
+            values = json.loads(text)
+            walls = cls(
+                vertices=np.array(values["vertices"], dtype=np.float64).reshape(-1, 3),
+                support=np.array(values["support"], dtype=np.int8),
+                above=np.array(values["above"], dtype=bool),
+                faces=np.array(values["faces"], dtype=np.int64).reshape(-1, 3),
+                patch=np.array(values["patch"], dtype=np.int64),
+                patches=[Patch(*p) for p in values["patches"]],
+                shown=int(values["shown"]),
+            )
+            n = len(walls.vertices)
+            if not n == len(walls.support) == len(walls.above) > walls.faces.max():
+                raise ValueError
+            if not len(walls.faces) == len(walls.patch) or walls.patch.max() >= len(walls.patches):
+                raise ValueError
+        except (ValueError, KeyError, TypeError):
+            raise FileError(
+                f"the description of walls in it is damaged: {text!r:.60}",
+                where=KEY,
+                found=text[:60],
+            ) from None
+        return walls

@@ -1,0 +1,92 @@
+"""Warnings about meshes of other programs: open seams, patches turned against each other, a wrong axis up.
+
+Such a mesh can be solved, but probably gives another roof than the one drawn.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.arrays import Floats, Ints
+from ..surface.geometry import area_vectors, segment_lengths
+from .mesh_data import MeshData
+
+GAP = 0.05  # of the boundary edges next to it: closer vertices are one, drawn twice
+FACES_ONE_WAY = 0.5  # part of the area: then it is a roof, and not a column or a ball
+FACES_UP = 1e-2  # part of the projected area: less, and another axis is up
+
+
+def import_warnings(data: MeshData) -> tuple[str, ...]:
+    """A sentence for each probable mistake; none where the format has supports, as pcmc's files do.
+
+    >>> from pcmc import Patch
+    >>> X = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+    >>> pair = MeshData(X, np.array([[0, 1, 2], [0, 3, 2]]), np.array([0, 1]), (Patch("a", 1), Patch("b", 1)))
+    >>> import_warnings(pair)[0].split(":")[0]
+    "patches 'a' and 'b' are turned against each other"
+    """
+    if data.support is not None or not len(data.faces):
+        return ()
+    return tuple(filter(None, (_open_seam(data), _opposed_patches(data), _wrong_up(data))))
+
+
+def _directed(data: MeshData) -> tuple[Ints, Ints]:
+    """(3m,2) the edges of all faces as they run, and (3m,) the number of the edge that each is."""
+    F = data.faces
+    run = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
+    number = np.unique(np.sort(run, axis=1), axis=0, return_inverse=True)[1]
+    return run, number.ravel()
+
+
+def _open_seam(data: MeshData) -> str:
+    run, number = _directed(data)
+    outer = run[(np.bincount(number) == 1)[number]]
+    if not len(outer):
+        return ""
+    X: Floats = data.vertices
+    length = segment_lengths(X, outer)
+    beside = np.full(len(X), np.inf)
+    np.minimum.at(beside, outer.ravel(), np.repeat(length, 2))
+    rim = np.unique(outer)
+    distances, neighbours = map(np.asarray, cKDTree(X[rim]).query(X[rim], k=2))
+    apart, near = distances[:, 1], neighbours[:, 1]
+    close = apart < GAP * np.minimum(beside[rim], beside[rim[near]])
+    if not close.any():
+        return ""
+    place = X[rim[close][0]].round(4).tolist()
+    return (
+        f"a seam is open: {np.count_nonzero(close)} boundary vertices are within"
+        f" {apart[close].max():.2g} of another one, the first at {place}; join them in the program that"
+        " drew the mesh"
+    )
+
+
+def _opposed_patches(data: MeshData) -> str:
+    run, number = _directed(data)
+    patch = np.tile(data.patch_of_face, 3)
+    order = np.argsort(number, kind="stable")
+    pairs = order[(np.bincount(number) == 2)[number[order]]].reshape(-1, 2)
+    one, two = pairs.T
+    wrong = (patch[one] != patch[two]) & (run[one] == run[two]).all(axis=1)
+    if not wrong.any():
+        return ""
+    first = np.flatnonzero(wrong)[0]
+    a, b = (data.patches[patch[k]].name for k in sorted((one[first], two[first])))
+    return (
+        f"patches {a!r} and {b!r} are turned against each other: their pressures act to opposite"
+        " sides; unless you want that, reverse the faces of one"
+    )
+
+
+def _wrong_up(data: MeshData) -> str:
+    vector = area_vectors(data.vertices[data.faces])
+    total = np.abs(vector.sum(axis=0))
+    size = float(np.linalg.norm(total))
+    if (
+        size < FACES_ONE_WAY * float(np.linalg.norm(vector, axis=1).sum())
+        or total[2] > FACES_UP * size
+    ):
+        return ""
+    axis = "xy"[int(total[:2].argmax())]
+    return f"the surface faces {axis}, but z is up here; rotate it if {axis} was up"

@@ -1,0 +1,157 @@
+"""The mesh of a file and its data, as every reader returns them, before they become a Surface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import OptionError, unknown
+from ..surface import Patch, Plane, Surface, checks
+from ..surface.geometry import bounding_size
+from ..surface.topology import topology
+
+FREE, SLIDING, FIXED = 0, 1, 2
+ROUNDING = 1e-6  # of the size: the most that a format rounds by
+
+
+@dataclass(frozen=True, eq=False)
+class MeshData:
+    """A file's mesh and data, as far as its format has them.
+
+    Attributes
+    ----------
+    vertices, faces, patch_of_face : as in Surface.
+    patches : one per patch; tension and pressure are 1 where the format has none.
+    support : (n,) int, FREE, SLIDING or FIXED; None where the format has no supports.
+    plane : Π; None where the format has none.
+    scalars : (n,) or (m,) arrays by name.
+    certificate : the certificate's values by name, empty when the file has none.
+    notes : sentences on what the reader changed ("3 quads were cut into triangles").
+    joined : whether patches share their vertices for certain, as in files that pcmc wrote. Then two
+        vertices at one place stay two: those of a wall without height below a junction on Π.
+    walls : the text of ``flat_walls.encode_walls``, where patches are separate meshes and a wall has
+        no height.
+    """
+
+    vertices: Floats
+    faces: Ints
+    patch_of_face: Ints
+    patches: tuple[Patch, ...]
+    support: Ints | None = None
+    plane: Plane | None = None
+    scalars: Mapping[str, Floats] = field(default_factory=dict)
+    certificate: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    joined: bool = False
+    walls: str | None = None
+
+
+def support_of(surface: Surface) -> Ints:
+    """(n,) int8 FREE, SLIDING or FIXED."""
+    return np.where(surface.fixed, FIXED, np.where(surface.on_plane, SLIDING, FREE)).astype(np.int8)
+
+
+def without_unused(data: MeshData) -> MeshData:
+    """The same without vertices that no face uses, which Surface refuses."""
+    used = np.zeros(len(data.vertices), dtype=bool)
+    used[data.faces] = True
+    if used.all():
+        return data
+    number = np.cumsum(used) - 1
+    note = f"{np.count_nonzero(~used)} vertices that no face uses were left out"
+    return replace(
+        data,
+        vertices=data.vertices[used],
+        faces=number[data.faces],
+        support=None if data.support is None else data.support[used],
+        scalars={k: v[used] if len(v) == len(used) else v for k, v in data.scalars.items()},
+        notes=(*data.notes, note),
+    )
+
+
+def merged(data: MeshData) -> MeshData:
+    """The same with vertices at one place merged: patches written as separate meshes need it."""
+    if data.joined:
+        return data
+    from .merge import coincident  # scipy.spatial is slow to import, and rarely needed
+
+    keep, place = coincident(checks.positions(data.vertices))
+    if len(keep) == len(data.vertices):
+        return data
+    support = None
+    if data.support is not None:
+        support = np.zeros(len(keep), dtype=np.int8)
+        np.maximum.at(support, place, data.support)
+    n = len(data.vertices)
+    scalars = {k: v[keep] if len(v) == n else v for k, v in data.scalars.items()}
+    return replace(
+        data,
+        vertices=data.vertices[keep],
+        faces=place[data.faces],
+        support=support,
+        scalars=scalars,
+    )
+
+
+def to_surface(
+    data: MeshData,
+    tensions: Mapping[str, float] | float | None = None,
+    pressures: Mapping[str, float] | float | None = None,
+    fixed: npt.ArrayLike | str | None = None,
+    on_plane: npt.ArrayLike | None = None,
+    plane: Plane | None = None,
+) -> Surface:
+    """The Surface of the data; arguments that are given replace the file's values."""
+    n = len(data.vertices)
+    support = data.support
+    if isinstance(fixed, str) and fixed != "boundary":
+        raise OptionError(unknown("fixed", fixed, ["boundary"]), what="fixed", found=fixed)
+    if isinstance(fixed, str) or (fixed is None and support is None):
+        held = topology(data.faces, data.patch_of_face, n).on_boundary
+    elif fixed is None:
+        held = np.asarray(support == FIXED)
+    else:
+        held = checks.mask(fixed, n, "fixed")
+    if on_plane is not None:
+        sliding = checks.mask(on_plane, n, "on_plane")
+    else:
+        sliding = np.zeros(n, dtype=bool) if support is None else support == SLIDING
+    if fixed is None and support is None:
+        held = held & ~sliding
+    patches = _changed(data.patches, "tension", tensions)
+    plane = plane or data.plane or Plane()
+    return Surface(
+        _on(plane, data.vertices, sliding & ~held),
+        data.faces,
+        data.patch_of_face,
+        _changed(patches, "pressure", pressures),
+        held,
+        sliding,
+        plane,
+    )
+
+
+def _on(plane: Plane, X: Floats, sliding: Bools) -> Floats:
+    """Sliding vertices that rounding moved off the plane, back onto it."""
+    height, size = plane.height(X), bounding_size(X)
+    near = sliding & (np.abs(height) < ROUNDING * size) & (np.abs(height) > 1e-12 * size)
+    return X - np.where(near, height, 0.0)[:, None] * np.array(plane.normal) if near.any() else X
+
+
+def _changed(
+    patches: tuple[Patch, ...], key: str, values: Mapping[str, float] | float | None
+) -> tuple[Patch, ...]:
+    if values is None:
+        return patches
+    names = [p.name for p in patches]
+    if not isinstance(values, Mapping):
+        values = dict.fromkeys(names, values)
+    for name in values:
+        if name not in names:
+            raise OptionError(unknown("patch", name, names), what=f"{key}s", where=name)
+    return tuple(replace(p, **{key: values.get(p.name, getattr(p, key))}) for p in patches)

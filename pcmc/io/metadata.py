@@ -1,0 +1,60 @@
+"""One line of JSON with what formats of plain meshes have no place for: patches, plane, counts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass, field
+
+from ..base.errors import FileError
+from ..surface import Patch, Plane, Surface
+
+
+def metadata_text(surface: Surface) -> str:
+    """Patches, plane and counts as JSON, for the comment or metadata of a format."""
+    point, normal = surface.plane.point, surface.plane.normal
+    values = {
+        "patches": [astuple(p) for p in surface.patches],
+        "plane": [point, normal],
+        "counts": [surface.n, surface.m],
+    }
+    return json.dumps(values)
+
+
+@dataclass(frozen=True)
+class Metadata:
+    """The same read back: patches by name, the plane, numbers of vertices and faces."""
+
+    patches: Mapping[str, Patch] = field(default_factory=dict)
+    plane: Plane | None = None
+    counts: tuple[int, int] | None = None
+
+    def named(self, names: Sequence[str]) -> tuple[Patch, ...]:
+        """The patches of these names; tension and pressure are 1 where the metadata lack them."""
+        return tuple(self.patches.get(name, Patch(name, 1.0)) for name in names)
+
+    def check_counts(self, vertices: int, faces: int) -> None:
+        """Raise FileError when the file lacks some of the mesh that was written."""
+        if self.counts is not None and self.counts != (vertices, faces):
+            raise FileError(
+                f"cut off or changed: {self.counts[0]} vertices and {self.counts[1]} faces were"
+                f" written, but the file has {vertices} and {faces}",
+                found=(vertices, faces),
+                expected=self.counts,
+            )
+
+
+def parse_metadata(text: str | None) -> Metadata:
+    """The metadata in a text; without a text, empty ones."""
+    if text is None:
+        return Metadata()
+    try:
+        values = json.loads(text)
+        patches = [Patch(*p) for p in values["patches"]]
+        plane = Plane(*(tuple(v) for v in values["plane"]))
+        counts = (int(values["counts"][0]), int(values["counts"][1]))
+    except (ValueError, KeyError, TypeError, IndexError):
+        raise FileError(
+            f"the pcmc metadata in it are damaged: {text[:60]!r}", where="metadata", found=text[:60]
+        ) from None
+    return Metadata({p.name: p for p in patches}, plane, counts)

@@ -1,0 +1,86 @@
+"""``Plan``: a roof given by the lines of its plan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..base.errors import MissingExtra, OptionError
+from ..surface import Plane, Surface
+from .data import PlanData
+from .parts import check_keys
+
+
+@dataclass(frozen=True, eq=False)
+class Plan(PlanData):
+    """A roof given by the lines of its plan.
+
+    Curves are Curves or their plain data (see ``curve``).
+
+    Attributes
+    ----------
+    outline : a closed curve; it may leave Π, but its course in plan must not cross itself.
+    dividers : lines between patches: Dividers, or curves (with walls of tension 1).
+    holes : openings: Holes, or curves (with fixed edges).
+    patches : an Area for each part into which the dividers cut the plan, or a mapping from names to
+        their attributes; without patches ``tension`` holds for every part.
+    edge_length : of the triangles, length.
+    edge : the support of the outline: "fixed"; "sliding" on Π, where the roof is at rest if it meets Π
+        at a right angle; or "free" except at ``supports``. A free edge has nothing to pull against:
+        for a roof on a few points, draw the edges between them as curves in space (arches) and hold
+        those.
+    supports : points [x, y] or [x, y, z], and curves along which vertices are fixed. A curve on the
+        outline or a hole fixes that part of it; one inside a patch is fixed where it is drawn.
+    plane : Π.
+    rise : height of the initial surface above the one that the boundary spans, length; by default
+        0.3 of the radius of the largest circle without supports.
+    tension : α of all patches, instead of ``patches``, force/length.
+
+    Raises
+    ------
+    OptionError
+        For a value that an attribute may not have.
+    MissingExtra
+        From ``surface``, without the library shapely.
+    PlanError
+        From ``surface``, if the lines do not divide the plan properly; names the line.
+
+    Warns
+    -----
+    PlanWarning
+        From ``surface``, if an edge is free.
+
+    Examples
+    --------
+    >>> plan = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], [[[4, 0], [4, 4]]], edge_length=0.5,
+    ...             patches={"west": {"tension": 2.0}, "east": {"tension": 2.5}})
+    >>> [p.name for p in plan.surface().patches]
+    ['west', 'east', 'wall 1']
+    """
+
+    def surface(self) -> Surface:
+        """The mesh of the plan at its initial height, with its walls and supports."""
+        try:
+            from .build import build_surface  # needs shapely; a plan without its mesh does not
+        except ModuleNotFoundError as error:
+            if error.name != "shapely":
+                raise
+            raise MissingExtra("shapely", "plan") from None
+        return build_surface(self)
+
+
+def plan_from(data: Mapping[str, Any]) -> Plan:
+    """A Plan from plain data, such as a table of a project file; keys are Plan's attributes.
+
+    >>> plan_from({"outline": [[0, 0], [4, 0], [0, 3]], "edge_length": 0.5, "tension": 2.0}).edge
+    'fixed'
+    """
+    values = dict(data)
+    check_keys(values, Plan, "plan")
+    if "outline" not in values:
+        raise OptionError("a plan needs an outline", what="outline")
+    if isinstance(values.get("plane"), Mapping):
+        check_keys(values["plane"], Plane, "plane")
+        values["plane"] = Plane(**values["plane"])
+    return Plan(**values)

@@ -1,0 +1,142 @@
+"""Vectors at the vertices as arrows on a surface: modes, forces, reactions of the supports."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.arrays import Floats
+from ..base.errors import OptionError
+from ..certificate.balance import reactions_per_length
+from ..surface import Surface
+from .figure import INK, SMALL, TEXT, Image, finish
+from .pictures import (
+    DOTS_FROM,
+    EDGES_FROM,
+    Path,
+    ViewName,
+    fit_frames,
+    frame_axes,
+    frames_of,
+)
+from .raster import paint
+from .scene import mean_edge, scene, view_of
+
+ARROW = "#B2182B"
+
+
+def vectors(
+    surface: Surface,
+    field: npt.ArrayLike,
+    path: Path | None = None,
+    *,
+    length: float = 0.12,
+    most: int = 400,
+    view: ViewName = "diagonal",
+    label: str = "",
+    title: str = "",
+    supports: bool = True,
+    edges: bool | None = None,
+    width: int = 900,
+    renderer: str = "auto",
+) -> Image:
+    """Vectors at the vertices (a mode, the reactions, the forces) as arrows on the surface.
+
+    Parameters
+    ----------
+    field : (n,3).
+    length : of the longest arrow, as a part of the surface's size.
+    most : number of arrows; if there were more, the longest of each neighbourhood is drawn.
+    label : the unit, beside an arrow of round length that shows the scale.
+    view, title, supports, edges, width, renderer : as in ``draw``.
+    """
+    arrows = np.asarray(field, dtype=float)
+    if arrows.shape != (surface.n, 3) or not np.isfinite(arrows).all():
+        raise OptionError(
+            f"field: expected finite numbers of shape ({surface.n}, 3), found {arrows.shape}",
+            what="field",
+            found=arrows.shape,
+            expected=(surface.n, 3),
+        )
+    seen = view_of(surface, view)
+    longest = float(np.linalg.norm(arrows, axis=1).max())
+    stretch = length * surface.size / longest if longest > 0.0 else 0.0
+    at = seen.project(surface.vertices)
+    tips = at + stretch * seen.project(arrows)
+    (frame,) = frames_of([np.concatenate([at, tips])], 1, width)
+    spacing = mean_edge(surface) * frame.scale
+    painted = scene(
+        surface,
+        seen,
+        None,
+        supports=supports and spacing >= DOTS_FROM,
+        edges=spacing >= EDGES_FROM if edges is None else edges,
+    )
+    figure, (axes,) = frame_axes([frame], 1, width)
+    axes.set_title(title, fontsize=TEXT, color=INK, pad=5.0)
+    if label:
+        figure.supxlabel(" ", fontsize=2.0 * SMALL)  # the place of the arrow that tells the scale
+    fit_frames(figure, [axes], [frame], 1)
+    frame.show(axes, paint(painted, frame.low, frame.scale, frame.size, renderer))
+    if longest > 0.0:
+        chosen = _thinned(at, np.linalg.norm(arrows, axis=1), most)
+        quiver = axes.quiver(
+            *at[chosen].T,
+            *(tips - at)[chosen].T,
+            angles="xy",
+            scale_units="xy",
+            scale=1.0,
+            color=ARROW,
+            width=2.2 / width,
+            headwidth=4.0,
+            headlength=5.0,
+            headaxislength=4.5,
+        )
+        if label:
+            unit = float(f"{longest:.1g}")
+            middle = 0.5 * axes.get_position().y0
+            axes.quiverkey(
+                quiver,
+                0.5,
+                middle,
+                unit * stretch,
+                f"{unit:g} {label}",
+                coordinates="figure",
+                labelpos="E",
+                fontproperties={"size": SMALL},
+                labelcolor=INK,
+            )
+    return finish(figure, path)
+
+
+def reactions(surface: Surface, path: Path | None = None, **options: Any) -> Image:
+    """Arrows of the reactions along the held boundary, force per length; see ``reactions_per_length``.
+
+    ``options`` are those of ``vectors``: view, length, most, label, title, supports, edges, width, renderer.
+
+    Raises
+    ------
+    OptionError : when no boundary is held, so that there are no reactions.
+    """
+    per_length = reactions_per_length(surface)
+    if np.isnan(per_length).all():
+        raise OptionError(
+            "no boundary of the surface is held: there are no reactions to draw", what="surface"
+        )
+    return vectors(surface, np.nan_to_num(per_length), path, **{"label": "force/length", **options})
+
+
+def _thinned(at: Floats, size: Floats, most: int) -> npt.NDArray[np.intp]:
+    """Indices of the longest arrow in each square of a grid of about ``most`` squares."""
+    keep = np.flatnonzero(size > 1e-6 * size.max())
+    if len(keep) <= most:
+        return keep
+    span = np.ptp(at[keep], axis=0)
+    cell = np.sqrt(max(span[0] * span[1], 1e-12 * span.max() ** 2) / most)
+    square = np.floor((at[keep] - at[keep].min(axis=0)) / cell).astype(np.int64)
+    order = np.lexsort((-size[keep], square[:, 1], square[:, 0]))
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = (np.diff(square[order], axis=0) != 0).any(axis=1)
+    return keep[order[first]]
