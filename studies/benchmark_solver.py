@@ -151,5 +151,8 @@ def redesign(quick: bool) -> list[Row]:
 
 
 SOLVER: list[Callable[[bool], list[Row]]] = [
-    redesign, newton_steps, from_start_to_rest, peak_memory,
-]  # fmt: skip
+    redesign,
+    newton_steps,
+    from_start_to_rest,
+    peak_memory,
+]
