@@ -20,12 +20,21 @@ from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxTranslator
 
-import generators
 import pcmc
 from pcmc.project import reference
 
 DOCS = Path(__file__).resolve().parent
 HOME = DOCS.parent
+MODULES = (  # modules with names that users need beside those of their package
+    "pcmc.base.errors",
+    "pcmc.meshing.refinement",
+    "pcmc.meshing.remeshing",
+    "pcmc.solvers.lbfgs",
+    "pcmc.solvers.nesterov",
+    "pcmc.solvers.newton",
+    "pcmc.solvers.result",
+)
+ENTRIES = ("Parameters", "Attributes", "Returns", "Raises", "Warns")  # sections of docstrings
 
 project = "pcmc"
 author = "The pcmc developers"
@@ -55,10 +64,18 @@ numpydoc_class_members_toctree = False
 
 
 def public_modules() -> list[ModuleType]:
-    """pcmc, its packages that have an ``__all__``, and the generators."""
-    names = [f"pcmc.{m.name}" for m in pkgutil.iter_modules(pcmc.__path__) if m.ispkg]
-    modules = [pcmc, *map(importlib.import_module, names), generators]
-    return [module for module in modules if getattr(module, "__all__", None)]
+    """pcmc, its packages with public names, some modules in them, and the generators."""
+    packages = [f"pcmc.{m.name}" for m in pkgutil.iter_modules(pcmc.__path__) if m.name != "cli"]
+    names = ["pcmc", *sorted([*packages, *MODULES]), "generators"]
+    return [module for module in map(importlib.import_module, names) if public_names(module)]
+
+
+def public_names(module: ModuleType) -> list[str]:
+    """The module's ``__all__``; without one, the classes and functions that it defines."""
+    if hasattr(module, "__all__"):
+        return list(module.__all__)
+    own = [n for n, v in vars(module).items() if getattr(v, "__module__", "") == module.__name__]
+    return [n for n in own if not n.startswith("_")]
 
 
 def write_reference(folder: Path) -> None:
@@ -71,7 +88,7 @@ def write_reference(folder: Path) -> None:
     documented: dict[int, str] = {}
     for module in public_modules():
         name = module.__name__
-        public = {n: getattr(module, n) for n in module.__all__}
+        public = {n: getattr(module, n) for n in public_names(module)}
         public = {n: value for n, value in public.items() if not isinstance(value, ModuleType)}
         elsewhere = [documented[id(v)] for v in public.values() if id(v) in documented]
         here = {n: value for n, value in public.items() if id(value) not in documented}
@@ -113,6 +130,21 @@ def generate() -> None:
     write_reference(DOCS / "reference" / "generated")
 
 
+def split_entries(*arguments: Any) -> None:
+    """Put the meaning of ``name : meaning`` on a line of its own: to numpydoc it would be the type."""
+    lines = arguments[-1]
+    section, out = "", []
+    for line, following in zip(lines, [*lines[1:], ""], strict=False):
+        if following and not following.strip("-"):
+            section = line
+        name, colon, meaning = line.partition(" : ")
+        if section in ENTRIES and colon and not line.startswith(" "):
+            out += [name, f"    {meaning}"]
+        else:
+            out.append(line)
+    lines[:] = out
+
+
 def escape_bars(*arguments: Any) -> None:
     """Escape the bars of formulas such as ``|H - H̄|`` in docstrings: to reStructuredText they are links."""
     lines = arguments[-1]
@@ -132,6 +164,7 @@ def visit_math(self: SphinxTranslator, node: nodes.math) -> None:
 def setup(app: Sphinx) -> None:
     """Generate the pages and choose MathML for formulas."""
     generate()
+    app.connect("autodoc-process-docstring", split_entries, priority=100)  # before numpydoc
     app.connect("autodoc-process-docstring", escape_bars, priority=900)  # after numpydoc
     app.add_html_math_renderer("mathml", (visit_math, None), (visit_math, None))
     app.config.html_math_renderer = "mathml"

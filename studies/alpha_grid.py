@@ -64,9 +64,9 @@ def table(folder: Folder) -> dict[str, float]:
         "wall_large": wall >= 8.0,
     }
     classes |= {f"{name}_at_4": classes[name] & (wall == 4.0) for name in ("equal", "slightly_smaller")}
-    found = {name: float(records.converged[mask].mean()) for name, mask in classes.items()}
+    measured = {name: float(records.converged[mask].mean()) for name, mask in classes.items()}
     low = (records.alpha_large <= 2.0) | (records.alpha_small <= 2.0)
-    return found | {
+    return measured | {
         "cases": len(records),
         "iterations": records.iterations_taken.max(),
         "converged": float(records.converged.sum()),
@@ -100,10 +100,17 @@ def figure(folder: Folder) -> None:
         values[name] = np.where(failed, np.nan, table.gradient_squared.to_numpy())
         marks[name] = failed
     heatmap(
-        TENSIONS, TENSIONS, values, folder.figure("fig16"), marks=marks, log=True,
-        xlabel="α of the larger patch", ylabel="α of the smaller patch", columns=5,
+        TENSIONS,
+        TENSIONS,
+        values,
+        folder.figure("fig16"),
+        marks=marks,
+        log=True,
+        xlabel="α of the larger patch",
+        ylabel="α of the smaller patch",
+        columns=5,
         label=f"‖∇E‖² after {ITERATIONS} iterations; × diverged",
-    )  # fmt: skip
+    )
 
 
 STUDY = Study(

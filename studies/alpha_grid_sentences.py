@@ -104,6 +104,11 @@ def _sentence(
     else:
         verdict = "confirmed" if holds(ours, other) else "corrected"
     return {
-        "paper": says, "measured": what, "value": ours, "against": against, "other": other,
-        "verdict": verdict, "instead": correction if verdict == "corrected" else "",
-    }  # fmt: skip
+        "paper": says,
+        "measured": what,
+        "value": ours,
+        "against": against,
+        "other": other,
+        "verdict": verdict,
+        "instead": correction if verdict == "corrected" else "",
+    }

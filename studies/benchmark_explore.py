@@ -32,10 +32,9 @@ def slider(quick: bool) -> list[Row]:
     remark = f"{surface.m:,} triangles, server and network"
     return [
         Row("slider followed", float(np.median(times)), "ms", remark, most=ASKED),
-        Row("slider followed, 95 of 100 within", float(np.percentile(times, 95)), "ms", remark,
-            most=ASKED),
+        Row("slider followed, 95 of 100 within", float(np.percentile(times, 95)), "ms", remark, most=ASKED),
         Row("slider followed, slowest", float(times.max()), "ms", remark),
-    ]  # fmt: skip
+    ]
 
 
 def answers(surface: Surface, asked: list[dict[str, float]]) -> list[float]:

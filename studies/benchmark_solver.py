@@ -150,6 +150,4 @@ def redesign(quick: bool) -> list[Row]:
     return [Row("solving a changed design again", 1e3 * seconds, "ms", remark, most=50.0)]
 
 
-SOLVER: list[Callable[[bool], list[Row]]] = [
-    redesign, newton_steps, from_start_to_rest, peak_memory,
-]  # fmt: skip
+SOLVER: list[Callable[[bool], list[Row]]] = [redesign, newton_steps, from_start_to_rest, peak_memory]

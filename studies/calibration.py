@@ -14,8 +14,8 @@ from .study import Study
 
 def data(folder: Folder, short: bool) -> None:
     """Build every mesh of the declared lists and measure it."""
-    found = candidates(["example3"] if short else ("example2", "example3", "example4"))
-    rows = [asdict(candidate) | {"ratio": candidate.ratio} for candidate in found]
+    meshes = candidates(["example3"] if short else ("example2", "example3", "example4"))
+    rows = [asdict(candidate) | {"ratio": candidate.ratio} for candidate in meshes]
     folder.write_table("records", pd.DataFrame(rows))
 
 
@@ -43,10 +43,16 @@ def figure(folder: Folder) -> None:
             for family, rows in mine.groupby("family")
         }
         lines(
-            curves, folder.figure(str(example)), x="triangles", y="initial ‖∇E‖² / printed",
+            curves,
+            folder.figure(str(example)),
+            x="triangles",
+            y="initial ‖∇E‖² / printed",
             title=f"Example {str(example).removeprefix('example')}: the initial shape's ‖∇E‖²",
-            levels={"printed": 1.0}, xscale="log", yscale="log", markers=True,
-        )  # fmt: skip
+            levels={"printed": 1.0},
+            xscale="log",
+            yscale="log",
+            markers=True,
+        )
 
 
 STUDY = Study(

@@ -79,9 +79,14 @@ def cone(tensions: tuple[float, float, float], opening: float) -> Cone | None:
     sheets = [math.acos(math.cos(height) * math.cos(azimuth)) for azimuth in azimuths]
     arcs = (sheets[0], sheets[1], height)
     return Cone(
-        height, azimuths, arcs, angles, float(np.dot(tensions, arcs)),
-        (two * min(rest, opening), one * min(rest, opening)), _exponent(tensions, arcs, angles),
-    )  # fmt: skip
+        height,
+        azimuths,
+        arcs,
+        angles,
+        float(np.dot(tensions, arcs)),
+        (two * min(rest, opening), one * min(rest, opening)),
+        _exponent(tensions, arcs, angles),
+    )
 
 
 def _angle(one: float, wall: float, other: float) -> float:

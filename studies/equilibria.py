@@ -34,14 +34,14 @@ def data(folder: Folder, short: bool) -> None:
         start = build()
         options: dict[str, Any] = {"iterations": 5} if short else {}
         result = solve(start, "newton", target="stationary", **options)
-        found = result.certify(modes=0)
+        certificate = result.certify(modes=0)
         rows.append(
             {
                 "example": name,
                 "triangles": start.m,
                 "status": result.status.name.lower(),
-                "verdict": found.verdict.name.lower(),
-                "index": -1 if found.index is None else found.index,
+                "verdict": certificate.verdict.name.lower(),
+                "index": -1 if certificate.index is None else certificate.index,
                 "energy": result.energy,
                 "gradient_squared": float((gradient(result.surface) ** 2).sum()),
                 **errors(result.surface),

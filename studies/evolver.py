@@ -46,16 +46,21 @@ def run(surface: pcmc.Surface, commands: str, timeout: float = 600.0, upright: b
             file.write(f"\nautodisplay off\n{commands}\nquit\nquit\n")
         try:
             done = subprocess.run(
-                [PROGRAM, "-x", str(datafile)], stdin=subprocess.DEVNULL, capture_output=True,
-                text=True, timeout=timeout, cwd=folder, check=False,
-            )  # fmt: skip
+                [PROGRAM, "-x", str(datafile)],
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                timeout=timeout,
+                cwd=folder,
+                check=False,
+            )
         except FileNotFoundError:
             raise EvolverError(f"{PROGRAM} is not installed (Debian: evolver-nox)") from None
         except subprocess.TimeoutExpired:
             raise EvolverError(f"{PROGRAM} did not finish within {timeout:g} s") from None
     if "ERROR" in done.stderr or "syntax error" in done.stderr:
-        said = re.findall(r"^.*(?:ERROR|syntax error).*$", done.stderr, re.M)
-        raise EvolverError(f"{PROGRAM}: {'; '.join(said)}")
+        errors = re.findall(r"^.*(?:ERROR|syntax error).*$", done.stderr, re.M)
+        raise EvolverError(f"{PROGRAM}: {'; '.join(errors)}")
     return done.stdout
 
 
@@ -105,10 +110,10 @@ def inertia(surface: pcmc.Surface, probe: float = 0.0, normal: bool = True) -> I
     space of ``pcmc.motion`` has. Without, all free coordinates are unknowns.
     """
     out = run(surface, f"hessian_normal {'on' if normal else 'off'}\neigenprobe {probe!r}")
-    found = re.search(r"Eigencounts:\s*(\d+)\s*<,\s*(\d+)\s*==,\s*(\d+)\s*>", out)
-    if found is None:
+    counts = re.search(r"Eigencounts:\s*(\d+)\s*<,\s*(\d+)\s*==,\s*(\d+)\s*>", out)
+    if counts is None:
         raise EvolverError(f"{PROGRAM} gave no eigenvalue counts: {' '.join(out.split())[-200:]}")
-    return Inertia(*map(int, found.groups()))
+    return Inertia(*map(int, counts.groups()))
 
 
 def seconds(
@@ -119,8 +124,8 @@ def seconds(
     ``before`` runs first, untimed. Reading the file is not counted.
     """
     timed = f'clock_was := clock\n{commands}\nprintf "T %.17g\\n", clock - clock_was\n'
-    told = "clock_was := 0.0\n" + before + "\n" + timed * repeat
-    out = run(surface, told, timeout=3600.0, upright=upright)
+    script = "clock_was := 0.0\n" + before + "\n" + timed * repeat
+    out = run(surface, script, timeout=3600.0, upright=upright)
     return _answers(out, "T", 1)[:, 0]
 
 

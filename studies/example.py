@@ -32,7 +32,7 @@ def numbers(folder: Folder, case: str, stages: Mapping[str, Surface]) -> dict[st
     record = folder.read_table("records").set_index("case").loc[case]
     history = folder.read_table("histories")
     E = history.energy[history.case == case].to_numpy()
-    found = {
+    measured = {
         "initial_gradient_squared": record.initial_gradient_squared,
         "gradient_squared": record.gradient_squared,
         "least_gradient_squared": record.least_gradient_squared,
@@ -46,13 +46,13 @@ def numbers(folder: Folder, case: str, stages: Mapping[str, Surface]) -> dict[st
         "triangles": record.triangles,
     }
     for stage, surface in stages.items():
-        found |= {f"{stage}_{key}": value for key, value in errors(surface).items()}
-        found[f"{stage}_area"] = external_area(surface)
+        measured |= {f"{stage}_{key}": value for key, value in errors(surface).items()}
+        measured[f"{stage}_area"] = external_area(surface)
     for method in METHODS:
-        found[f"error_ratio_{method}"] = (
-            found[f"final_largest_error_{method}"] / found[f"initial_largest_error_{method}"]
+        measured[f"error_ratio_{method}"] = (
+            measured[f"final_largest_error_{method}"] / measured[f"initial_largest_error_{method}"]
         )
-    return found
+    return measured
 
 
 def shapes(
@@ -73,15 +73,26 @@ def shapes(
         surface = stages[stage]
         roofs, walls = ([p.name for p in surface.patches if p.auxiliary is x] for x in (False, True))
         panel(
-            [surface] * 3, folder.figure(shape), views=["diagonal", "elevation", walls_view],
+            [surface] * 3,
+            folder.figure(shape),
+            views=["diagonal", "elevation", walls_view],
             titles=["(a) diagonal view", "(b) elevation view", "the walls alone, larger"],
-            patches=[None, None, walls], one_scale=False, legend=True, width=1500,
-        )  # fmt: skip
+            patches=[None, None, walls],
+            one_scale=False,
+            legend=True,
+            width=1500,
+        )
         if error is not None:
             draw(
-                surface, folder.figure(error), view="plan", scalars=error_percent(surface),
-                patches=roofs, width=800, legend=True, **error_scale(surface),
-            )  # fmt: skip
+                surface,
+                folder.figure(error),
+                view="plan",
+                scalars=error_percent(surface),
+                patches=roofs,
+                width=800,
+                legend=True,
+                **error_scale(surface),
+            )
     energy_history(folder, {"proposed method": case}, history)
 
 
@@ -91,8 +102,9 @@ def energy_history(folder: Folder, cases: Mapping[str, str], name: str, title: s
 
     table = folder.read_table("histories")
     frames = {label: table[table.case == case] for label, case in cases.items()}
-    histories(frames, folder.figure(name), x="iteration", label="energy E", dashes=len(cases) > 1,
-              title=title)  # fmt: skip
+    histories(
+        frames, folder.figure(name), x="iteration", label="energy E", dashes=len(cases) > 1, title=title
+    )
 
 
 def gradient_history(folder: Folder, cases: Mapping[str, str], name: str) -> None:

@@ -139,9 +139,11 @@ def _given(start: Surface, records: pd.DataFrame) -> dict[str, float]:
         "square": float(np.diff(across).max()),
         "height": float(start.vertices[junction_top(start), 2]),
         **{key: records[key][_main(2.0)] for key in (*PAPER, "t0", "iterations")},
-        **{f"{key}_histories": records[key]["fig10-proposed-printed"]
-           for key in ("t0", "alpha_aux", "iterations")},
-    }  # fmt: skip
+        **{
+            f"{key}_histories": records[key]["fig10-proposed-printed"]
+            for key in ("t0", "alpha_aux", "iterations")
+        },
+    }
 
 
 def _junction(surface: Surface) -> dict[str, float]:
@@ -157,20 +159,20 @@ def _junction(surface: Surface) -> dict[str, float]:
 
 
 def _shape_numbers(junction: pd.DataFrame, records: pd.DataFrame) -> dict[str, float]:
-    found = {}
+    measured = {}
     for wall in WALLS:
-        found[f"turn_{wall:g}"] = junction.turn[_main(wall)]
-        found[f"height_{wall:g}"] = junction.height[_main(wall)]
-        found[f"gradient_squared_{wall:g}"] = records.gradient_squared[_main(wall)]
+        measured[f"turn_{wall:g}"] = junction.turn[_main(wall)]
+        measured[f"height_{wall:g}"] = junction.height[_main(wall)]
+        measured[f"gradient_squared_{wall:g}"] = records.gradient_squared[_main(wall)]
     for method in ("cotangent", "variational"):
         for name, n in (("coarse", COARSE), ("fine", FINE)):
-            found[f"largest_{method}_{name}"] = records[f"largest_error_{method}"][_main(2.0, n)]
-            found[f"mean_{method}_{name}"] = records[f"mean_error_{method}"][_main(2.0, n)]
+            measured[f"largest_{method}_{name}"] = records[f"largest_error_{method}"][_main(2.0, n)]
+            measured[f"mean_{method}_{name}"] = records[f"mean_error_{method}"][_main(2.0, n)]
     parallel = [f"wall{wall:g}-n{COARSE}-parallel-printed" for wall in WALLS]
     other = [junction.turn[name] for name in parallel]
-    found["height_3_parallel"] = junction.height[parallel[-1]]
-    found["least_turn_step_parallel"] = min(b - a for a, b in pairwise(other))
-    return found
+    measured["height_3_parallel"] = junction.height[parallel[-1]]
+    measured["least_turn_step_parallel"] = min(b - a for a, b in pairwise(other))
+    return measured
 
 
 def _fig10(histories: pd.DataFrame) -> pd.DataFrame:
@@ -199,8 +201,7 @@ def _fig10(histories: pd.DataFrame) -> pd.DataFrame:
 
 def _numbers10(fig10: pd.DataFrame) -> dict[str, float]:
     lines = fig10.set_index("case")
-    kept = ["energy_30", "energy_end", "fall_in_second_half", "total_rise", "early_rise",
-            "forced_steps"]  # fmt: skip
+    kept = ["energy_30", "energy_end", "fall_in_second_half", "total_rise", "early_rise", "forced_steps"]
     sufficient = lines.loc["fig10-proposed-sufficient"]
     return {f"fig10_sufficient_{key}": sufficient[key] for key in ("total_rise", "early_rise")} | {
         f"fig10_{variant.replace('-', '_')}_{key}": lines[key][f"fig10-{variant}-printed"]
@@ -229,14 +230,24 @@ def figure(folder: Folder) -> None:
     draw_elevations(shapes, folder.figure("fig07"), top=1.2)
     standing = folder.read_table("standing")
     heights = {str(run): (mine.iteration, mine.height) for run, mine in standing.groupby("run", sort=False)}
-    lines(heights, folder.figure("fig07-wall"), x="iteration", y="height of the wall",
-          title="Example 1, wall of α 3: its middle sinks to the ground and bounces")  # fmt: skip
+    lines(
+        heights,
+        folder.figure("fig07-wall"),
+        x="iteration",
+        y="height of the wall",
+        title="Example 1, wall of α 3: its middle sinks to the ground and bounces",
+    )
     pair = [end, folder.read_mesh(_main(2.0, FINE))["final"]]
     panel(
-        pair, folder.figure("fig09"), views="plan", titles=["(a) coarse mesh", "(b) fine mesh"],
-        scalars=[error_percent(s) for s in pair], patches=["left", "right"], legend=True,
+        pair,
+        folder.figure("fig09"),
+        views="plan",
+        titles=["(a) coarse mesh", "(b) fine mesh"],
+        scalars=[error_percent(s) for s in pair],
+        patches=["left", "right"],
+        legend=True,
         **error_scale(*pair),
-    )  # fmt: skip
+    )
     for test, name, what in (
         ("printed", "fig10", "Eq. (25) as printed: the line search changes nothing"),
         ("sufficient", "fig10-sufficient", "sufficient decrease instead: a late jump does not come"),

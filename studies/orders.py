@@ -30,8 +30,12 @@ class Order:
 
     def row(self) -> dict[str, float]:
         """For a table."""
-        return {"order": self.order, "standard_error": self.standard_error, "points": self.points,
-                "limit": self.limit}  # fmt: skip
+        return {
+            "order": self.order,
+            "standard_error": self.standard_error,
+            "points": self.points,
+            "limit": self.limit,
+        }
 
 
 UNKNOWN = Order(float("nan"), float("nan"), 0)

@@ -21,9 +21,7 @@ from pcmc.base.errors import FileError
 
 PAPER = Path(__file__).with_name("paper.toml")
 HOLDS, NEAR, DIFFERS, MISSING = "reproduced", "near", "differs", "not measured"
-REPRODUCED, CONDITIONAL, NOT = (
-    "reproduced", "conditionally reproduced", "not reproduced",
-)  # fmt: skip
+REPRODUCED, CONDITIONAL, NOT = "reproduced", "conditionally reproduced", "not reproduced"
 OWN = "; our addition"
 FIGURE_COLUMNS = ["figure", "shows", "study", "label", "claims", "reason"]
 RELATIONS = {
@@ -78,7 +76,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of the paper: its number, what it shows, and what of it the text does not tell."""
+    """A figure of the paper: its number, what it shows, and what the text does not say about it."""
 
     number: str
     shows: str
@@ -103,16 +101,16 @@ class Finding:
     def reason(self, instead: float = math.nan) -> str:
         """The claim without its example, and what we find, in words that stand alone."""
         digits = 4 if self.claim.kind == "sentence" else 5
-        ours, told = f"{self.ours:.4g}", f"{self.paper:.{digits}g}"
+        ours, target = f"{self.ours:.4g}", f"{self.paper:.{digits}g}"
         if self.claim.fails:
-            return self.claim.fails.format(ours=ours, paper=told, instead=f"{instead:.4g}")
+            return self.claim.fails.format(ours=ours, paper=target, instead=f"{instead:.4g}")
         says = self.claim.says.partition(": ")[2] or self.claim.says
         if self.claim.kind == "sentence":
-            return f"{says}: ours {ours}, to hold it must be {self.claim.relation} {told}"
+            return f"{says}: ours {ours}, to hold it must be {self.claim.relation} {target}"
         if self.claim.relation != "=":
-            return f"{says}: ours {ours}, printed {self.claim.relation} {told}"
+            return f"{says}: ours {ours}, printed {self.claim.relation} {target}"
         share = f" ({self.difference / self.paper:+.1%})" if self.paper else ""
-        return f"{says}: ours {ours}, printed {told}{share}"
+        return f"{says}: ours {ours}, printed {target}{share}"
 
 
 @cache
@@ -122,20 +120,20 @@ def paper(path: Path = PAPER) -> tuple[list[Claim], list[Figure]]:
         data = tomllib.load(file)
     claims = [_build(Claim, entry, path) for entry in data["claim"]]
     figures = [_build(Figure, entry, path) for entry in data["figure"]]
+    numbers = {figure.number for figure in figures}
+    measured = {claim.ours for claim in claims}
     for claim in claims:
         if claim.relation not in RELATIONS:
-            raise FileError(f"{path}: {claim.says!r}: relation must be =, < or >")
-        missing = set(claim.figures) - {figure.number for figure in figures}
-        if missing:
-            raise FileError(f"{path}: {claim.says!r} names figure {missing.pop()}, which is not there")
-        if claim.instead and claim.instead not in {other.ours for other in claims}:
-            raise FileError(f"{path}: {claim.says!r} names claim {claim.instead}, which is not there")
+            raise _wrong(path, claim, "relation", claim.relation, tuple(RELATIONS))
+        if missing := set(claim.figures) - numbers:
+            raise _wrong(path, claim, "figures", missing.pop(), tuple(sorted(numbers)))
+        if claim.instead and claim.instead not in measured:
+            raise _wrong(path, claim, "instead", claim.instead, "the key of another claim")
         try:
             claim.fails.format(ours=0, paper=0, instead=0)
         except (KeyError, IndexError, ValueError):
-            raise FileError(
-                f"{path}: {claim.says!r}: fails may hold {{ours}}, {{paper}} and {{instead}} only"
-            ) from None
+            fields = "no fields but {ours}, {paper} and {instead}"
+            raise _wrong(path, claim, "fails", claim.fails, fields) from None
     return claims, figures
 
 
@@ -148,7 +146,7 @@ def printed(ours: str) -> float:
     for claim in paper()[0]:
         if claim.ours == ours and not isinstance(claim.paper, str):
             return float(claim.paper)
-    raise FileError(f"{PAPER} prints no number for {ours}")
+    raise FileError(f"{PAPER}: no claim has a printed number for {ours!r}", what=str(PAPER), found=ours)
 
 
 def judge(claim: Claim, measured: Mapping[str, float]) -> Finding:
@@ -158,8 +156,8 @@ def judge(claim: Claim, measured: Mapping[str, float]) -> Finding:
     >>> [judge(claim, {"study.x": x}).verdict for x in (2.4, 2.9, 4.0)]
     ['reproduced', 'near', 'differs']
     """
-    told = claim.paper
-    value = measured.get(told, math.nan) if isinstance(told, str) else float(told)
+    target = claim.paper
+    value = measured.get(target, math.nan) if isinstance(target, str) else float(target)
     ours = measured.get(claim.ours, math.nan)
     if math.isnan(ours) or math.isnan(value):
         verdict = MISSING
@@ -178,7 +176,7 @@ def label(figure: Figure, findings: Sequence[Finding]) -> tuple[str, str, str]:
     What the paper says or prints about the figure decides: neither its inputs nor our own additions
     count. Not reproduced: a claim fails, and so does its other reading if it has one; or nothing was
     measured. Conditionally: a claim holds on its other reading only, or is only near, or what the
-    figure holds is not in the text. Reproduced: every claim holds as it stands.
+    figure holds is not in the text. Reproduced: every claim holds.
     """
     mine = [f for f in findings if figure.number in f.claim.figures]
     claims = [f for f in mine if not (f.claim.own or f.claim.given)]
@@ -243,4 +241,16 @@ def _build(kind: type[Any], entry: Mapping[str, Any], path: Path) -> Any:
     try:
         return kind(**values)
     except TypeError as error:
-        raise FileError(f"{path}: {entry.get('says') or entry.get('number')!r}: {error}") from None
+        name = entry.get("says") or entry.get("number")
+        raise FileError(f"{path}: {name!r}: {error}", what=str(path), where=name) from None
+
+
+def _wrong(path: Path, claim: Claim, key: str, found: object, expected: object) -> FileError:
+    """The error for a wrong value of a claim's key."""
+    return FileError(
+        f"{path}: claim {claim.says!r}: {key} must be {expected}, found {found!r}",
+        what=str(path),
+        where=key,
+        found=found,
+        expected=expected,
+    )

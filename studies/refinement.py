@@ -41,7 +41,7 @@ from pcmc.meshing.refinement import refine
 from pcmc.solvers.result import Result
 from pcmc.surface.geometry import area_vectors, face_areas
 
-from .flow import errors
+from .flow import NOISE_RESIDUAL, errors
 from .folder import Folder
 from .orders import Order, limit_order, slope
 from .study import Study
@@ -132,15 +132,19 @@ def _hall() -> Surface:
 
 FAMILIES = (
     Family("cap", "cap", _cap, 6, _outlines(spherical_cap_exact()), spherical_cap_exact),
-    Family("joined_caps", "joined caps", _joined, 6, _outlines(joined_caps_exact()),
-           joined_caps_exact),
+    Family("joined_caps", "joined caps", _joined, 6, _outlines(joined_caps_exact()), joined_caps_exact),
     Family("example1", "Example 1", _squares, 7),
     Family("example2", "Example 2", two_caps, 7, lengths=(1.2, 0.8, 0.6, 0.4, 0.3, 0.2, 0.19)),
-    Family("example2_near", "Example 2, α small 3.2", _near, 6,
-           [(ball.centre[0], 0.0, ball.floor_radius) for ball in (LARGE, SMALL)]),
+    Family(
+        "example2_near",
+        "Example 2, α small 3.2",
+        _near,
+        6,
+        [(ball.centre[0], 0.0, ball.floor_radius) for ball in (LARGE, SMALL)],
+    ),
     Family("example3", "Example 3", _fans, 6, [(0.0, 0.0, 20.0)]),
     Family("example4", "Example 4", _hall, 6),
-)  # fmt: skip
+)
 TIMES = ["family", "level", "triangles", "seconds", "peak_megabytes"]
 
 
@@ -180,7 +184,7 @@ def run_family(name: str, levels: int) -> list[dict[str, Any]]:
             "index": -1 if certificate.index is None else certificate.index,
             "steps": result.iterations,
             "factorisations": int(result.history.factorisation.iloc[-1]),
-            "residual": certificate.residual,
+            "residual": float(np.maximum(certificate.residual, NOISE_RESIDUAL)),
             "quality": certificate.quality,
             "energy": result.energy,
             "height": float(here.plane.height(here.vertices).max()),
@@ -315,27 +319,43 @@ def figure(folder: Folder) -> None:
             curves[f"{family.title}, energy"] = (mine.edge_length / size, apart)
             curves[f"{family.title}, position"] = (mine.edge_length / size, mine.position / size)
     convergence(
-        curves, folder.figure("closed-forms"), x="edge length / height",
-        y="relative error", title="closed forms: energy, and mean distance from the exact surface",
-    )  # fmt: skip
+        curves,
+        folder.figure("closed-forms"),
+        x="edge length / height",
+        y="relative error",
+        title="closed forms: energy, and mean distance from the exact surface",
+    )
     ok = records[records.status == "converged"]
     times = times.merge(ok[["family", "level"]])
     for key in ("largest", "mean"):
         convergence(
-            {f.title: (mine.edge_length, mine[f"{key}_error_cotangent"]) for f in FAMILIES
-             for mine in [ok[ok.family == f.name]]},
-            folder.figure(f"{key}-error"), y=f"{key} |H - H̄| / H̄, the paper's measure",
-            title="what the paper's measure shows at the equilibria", fit=key == "mean",
-        )  # fmt: skip
+            {
+                f.title: (mine.edge_length, mine[f"{key}_error_cotangent"])
+                for f in FAMILIES
+                for mine in [ok[ok.family == f.name]]
+            },
+            folder.figure(f"{key}-error"),
+            y=f"{key} |H - H̄| / H̄, the paper's measure",
+            title="what the paper's measure shows at the equilibria",
+            fit=key == "mean",
+        )
     for key, label, scale in (
-        ("seconds", "processor time, s", "log"), ("peak_megabytes", "peak memory, MB", "linear"),
-    ):  # fmt: skip
+        ("seconds", "processor time, s", "log"),
+        ("peak_megabytes", "peak memory, MB", "linear"),
+    ):
         lines(
-            {f.title: (mine.triangles, mine[key]) for f in FAMILIES
-             for mine in [times[times.family == f.name]]},
-            folder.figure(key.replace("_", "-")), x="triangles", y=label, xscale="log",
-            yscale=scale, markers=True,
-        )  # fmt: skip
+            {
+                f.title: (mine.triangles, mine[key])
+                for f in FAMILIES
+                for mine in [times[times.family == f.name]]
+            },
+            folder.figure(key.replace("_", "-")),
+            x="triangles",
+            y=label,
+            xscale="log",
+            yscale=scale,
+            markers=True,
+        )
 
 
 STUDY = Study(
@@ -344,9 +364,7 @@ STUDY = Study(
     data,
     table,
     figure,
-    parameters={
-        f.name: {"levels": f.levels, "edge_lengths": list(f.lengths)} for f in FAMILIES
-    },
+    parameters={f.name: {"levels": f.levels, "edge_lengths": list(f.lengths)} for f in FAMILIES},
     seconds=65,
     paper=False,
-)  # fmt: skip
+)

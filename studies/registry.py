@@ -24,9 +24,20 @@ from . import (
 from .study import Study
 
 MODULES = (
-    example1, example2, example3, example4, alpha_grid, calibration, mesh_search, equilibria,
-    alpha_grid_geometric, stability, refinement, solvers, existence,
-)  # fmt: skip
+    example1,
+    example2,
+    example3,
+    example4,
+    alpha_grid,
+    calibration,
+    mesh_search,
+    equilibria,
+    alpha_grid_geometric,
+    stability,
+    refinement,
+    solvers,
+    existence,
+)
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out
 
@@ -37,15 +48,16 @@ def chosen(names: Iterable[str]) -> list[Study]:
     >>> [study.name for study in chosen(["stability", "example1", "stability"])]
     ['stability', 'example1']
     """
-    found: dict[str, Study] = {}
+    studies: dict[str, Study] = {}
     for name in names:
         if name == EXTRAS:
-            found |= {study.name: study for study in STUDIES.values() if not study.paper}
+            studies |= {study.name: study for study in STUDIES.values() if not study.paper}
         elif name in STUDIES:
-            found[name] = STUDIES[name]
+            studies[name] = STUDIES[name]
         else:
-            raise OptionError(unknown("study", name, [*STUDIES, EXTRAS]))
-    return list(found.values())
+            known = [*STUDIES, EXTRAS]
+            raise OptionError(unknown("study", name, known), what="study", found=name, expected=tuple(known))
+    return list(studies.values())
 
 
 def of_the_paper() -> list[Study]:

@@ -115,8 +115,15 @@ def figure_cells(figures: pd.DataFrame) -> list[list[str]]:
 def solver_table(results: Path) -> list[str]:
     """How each method ends in the study ``solvers``, over all examples and resolutions."""
     rows = Folder(results / "solvers").read_table("summary").to_dict("records")
-    head = ["Method", "At rest", "Verdicts", "Largest residual", "Largest curvature error, median",
-            "Worst triangle", "Evaluations, median"]  # fmt: skip
+    head = [
+        "Method",
+        "At rest",
+        "Verdicts",
+        "Largest residual",
+        "Largest curvature error, median",
+        "Worst triangle",
+        "Evaluations, median",
+    ]
     cells = [
         [
             row["method"],

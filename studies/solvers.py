@@ -27,7 +27,7 @@ from generators import bezier_hall, four_fans, two_caps, two_squares
 from pcmc import Surface, certify, solve
 from pcmc.solvers.result import Progress
 
-from .flow import PAPER, SHORT_ITERATIONS, errors, forced_steps
+from .flow import NOISE_RESIDUAL, PAPER, SHORT_ITERATIONS, errors, forced_steps
 from .folder import Folder
 from .panels import curve_panels
 from .study import Study
@@ -100,8 +100,7 @@ def data(folder: Folder, short: bool) -> None:
         for size in example.sizes[: 1 if short else None]:
             start = example.build(size)
             for label in METHODS:
-                case = {"example": example.name, "size": size, "triangles": start.m,
-                        "method": label}  # fmt: skip
+                case = {"example": example.name, "size": size, "triangles": start.m, "method": label}
                 record, history, seconds = _run(start, label, example.t0, short)
                 records.append(case | record)
                 times.append(case | {"seconds": seconds})
@@ -140,7 +139,7 @@ def _run(start: Surface, label: str, t0: float, short: bool) -> tuple[dict[str, 
         "evaluations": result.evaluations,
         "factorisations": int(result.history.get("factorisation", pd.Series([0])).iloc[-1]),
         "forced_steps": forced_steps(result.history),
-        "residual": found.residual,
+        "residual": float(np.maximum(found.residual, NOISE_RESIDUAL)),
         "gradient_squared": float(result.history.gradient_squared.iloc[-1]),
         "energy": result.energy,
         **errors(final),
@@ -178,9 +177,11 @@ def table(folder: Folder) -> dict[str, float]:
     folder.write_table("summary", summary)
     found = {}
     for key, label in (
-        ("flow", "the paper's flow"), ("lbfgs", "L-BFGS"), ("newton", GEOMETRIC),
+        ("flow", "the paper's flow"),
+        ("lbfgs", "L-BFGS"),
+        ("newton", GEOMETRIC),
         ("newton_minimum", DEFAULT),
-    ):  # fmt: skip
+    ):
         (row,) = summary[summary.method == label].to_dict("records")
         for column in ("runs", "at_rest", "stable", "largest_residual", "worst_quality"):
             found[f"{column}_{key}"] = float(row[column])
@@ -202,9 +203,12 @@ def figure(folder: Folder) -> None:
         }
         columns = max(1, frame.groupby("example").triangles.nunique().max())
         curve_panels(
-            panels, folder.figure(f"residual-{name}"), columns=int(columns), xlabel=label,
+            panels,
+            folder.figure(f"residual-{name}"),
+            columns=int(columns),
+            xlabel=label,
             ylabel="relative residual",
-        )  # fmt: skip
+        )
 
 
 def _curves(mine: pd.DataFrame, column: str) -> Mapping[str, tuple[Any, Any]]:

@@ -25,6 +25,7 @@ from pcmc import Certificate, Surface, certify, solve
 from pcmc.base.arrays import Floats
 
 from .cone import cone
+from .flow import NOISE
 from .folder import MESH, Folder
 from .study import Study
 
@@ -119,7 +120,7 @@ def _findings(status: str, found: Certificate) -> dict[str, Any]:
         "verdict": found.verdict.name.lower(),
         "index": -1 if found.index is None else found.index,
         **{f"eigenvalue_{k + 1}": value for k, value in enumerate(values)},
-        "curvature_error": found.curvature_error,
+        "curvature_error": float(np.maximum(found.curvature_error, NOISE)),
         "quality": found.quality,
         "pinched": len(found.pinched),
     }

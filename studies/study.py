@@ -56,9 +56,8 @@ def perform(
 ) -> None:
     """Run the steps of a study in ``results / study.name`` and write its provenance.
 
-    ``announce`` is told each step before it starts. The measured numbers of an earlier run are taken
-    away first, and before new data its meshes too, so that a study that fails, or no longer makes one,
-    leaves none behind.
+    ``announce`` is called with each step before it starts. The measured numbers of an earlier run are
+    deleted first, and before new data its meshes too. So a study that fails leaves no old ones behind.
     """
     folder = Folder(results / study.name)
     seconds = {}

@@ -46,8 +46,14 @@ def test_commands_of_the_table_run_in_order(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     lines = re.findall(r"^\| `pcmc ([^`]+)` \|", README, re.MULTILINE)
     assert [line.split()[0] for line in lines] == [
-        "solve", "certify", "remesh", "convert", "plot", "sweep", "explore",
-    ]  # fmt: skip
+        "solve",
+        "certify",
+        "remesh",
+        "convert",
+        "plot",
+        "sweep",
+        "explore",
+    ]
     for line in lines[:-1]:
         assert cli.main(shlex.split(line)) == 0, capsys.readouterr().err
     for name in ("roof.pcmc", "fine.pcmc", "roof.3dm", "error.png", "walls.csv"):
