@@ -1,0 +1,32 @@
+"""The recipes of the documentation work as they are printed."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from pcmc.project import reference, run, sections
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+
+
+def block(page, language):
+    return re.search(rf"```{language}\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), re.S)[
+        1
+    ]
+
+
+def test_the_project_file_of_the_how_to_is_certified_and_meets_its_target(tmp_path):
+    path = tmp_path / "hall.toml"
+    path.write_text(block("how-to/project-file.md", "toml"), encoding="utf-8")
+    outcome = run(path)
+    assert outcome.good
+    west = outcome.surface.faces[outcome.surface.patch_of_face == 0]
+    assert abs(outcome.surface.vertices[west, 2].max() - 1.2) < 1e-6
+
+
+def test_the_page_of_keys_has_every_key_of_every_section():
+    parts = reference().split("\n## ")
+    for section, part in zip(sections()[1:], parts, strict=True):
+        assert section.name in part.splitlines()[0]
+        assert [key.name for key in section.keys if f"| `{key.name}` |" not in part] == []
