@@ -9,11 +9,6 @@ from ..certificate.certificate import Certificate
 OK, NOT_CERTIFIED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
-def code(certificate: Certificate) -> int:
-    """The exit code for a certificate."""
-    return OK if certificate.certified else NOT_CERTIFIED
-
-
 def report(certificate: Certificate, written: list[Path]) -> None:
     """Print the verdict, and the files written."""
     print(*filter(None, (certificate.verdict.value, certificate.detail)), sep="\n")

@@ -5,10 +5,11 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import BalanceWarning, OptionError, PcmcError
+from ..base.errors import BalanceWarning, OptionError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
 from ..certificate.certificate import Certificate
@@ -99,14 +100,8 @@ def run_project(
     if not outputs or not (outcome.good or anyway):
         return outcome
     with made(project.folder or Path()):
-        written = save(
-            outcome.result,
-            project.files,
-            project.picture,
-            view=project.view,
-            colour=project.colour,
-            progress=report,
-        )
+        look = {"view": project.view, "colour": project.colour}
+        written = save(outcome.result, project.files, project.picture, progress=report, **look)
     return replace(outcome, files=written)
 
 
@@ -125,23 +120,19 @@ def solve_project(project: Project, surface: Surface, progress: OnStep | None = 
     A surface that is not certified, or misses a target, is not remeshed.
     """
     report = progress or ignore
-    stages = [m for m in project.remeshing if m.when == "after"]
-    try:
-        for first in project.remeshing:
-            if first.when == "before":
+    with in_file(project.path):
+        for stage in project.remeshing:
+            if stage.when == "before":
                 report("remeshing")
-                surface = remesh(surface, **first.options)
+                surface = remesh(surface, **stage.options)
         outcome = _solve_or_meet(project, surface, report)
-        for stage in stages:
-            if not outcome.good:
-                break
-            report("remeshing")
-            surface = remesh(outcome.surface, **stage.options)
-            outcome = _solve_or_meet(replace(project, targets=()), surface, report)
-            if project.targets and outcome.good:  # otherwise its verdict is the better explanation
-                outcome = _solve_or_meet(project, outcome.surface, report)
-    except PcmcError as error:
-        raise in_file(project.path, error) from None
+        for stage in project.remeshing:
+            if stage.when == "after" and outcome.good:
+                report("remeshing")
+                surface = remesh(outcome.surface, **stage.options)
+                outcome = _solve_or_meet(replace(project, targets=()), surface, report)
+                if project.targets and outcome.good:  # otherwise its verdict is the better explanation
+                    outcome = _solve_or_meet(project, outcome.surface, report)
     return outcome
 
 
@@ -178,20 +169,14 @@ def _meet(project: Project, surface: Surface, report: OnStep) -> Design:
     from ..design import DesignStatus, meet  # needed by projects with targets only
 
     if project.method != "newton":
-        raise OptionError(
-            f"only method 'newton' can meet targets, found {project.method!r}",
-            what="solve.method",
-            found=project.method,
-            expected="newton",
-        )
-    count = iter(range(1, 10**6))
-    design = meet(
-        surface,
-        project.targets,
-        project.vary,
-        callback=lambda row: report(f"meeting the targets: solve {next(count)}"),
-        **project.options,
-    )
+        message = f"only method 'newton' can meet targets, found {project.method!r}"
+        raise OptionError(message, what="solve.method", found=project.method, expected="newton")
+    solves = count(1)
+
+    def callback(row: object) -> None:
+        report(f"meeting the targets: solve {next(solves)}")
+
+    design = meet(surface, project.targets, project.vary, callback=callback, **project.options)
     if design.status is DesignStatus.STOPPED:  # as in ``raise_if_stopped``
         raise KeyboardInterrupt
     return design

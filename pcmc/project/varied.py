@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import io
-from ..base.errors import OptionError, PcmcError, unknown
+from ..base.errors import OptionError, unknown
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 from .file import PathLike, Project, in_file, project_of, read_data, surface_of
@@ -82,9 +82,8 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
             raise _unknown_number(path, name, shown + near)
         for value in given:
             if isinstance(value, bool | str | None) or not math.isfinite(value):
-                raise OptionError(
-                    f"{path}: {name} must be a finite number, found {value!r}", what=name, found=value
-                )
+                text = f"{path}: {name} must be a finite number, found {value!r}"
+                raise OptionError(text, what=name, found=value)
             _project(path, {name: value})
             _retensioned(path, surface, {name: value})
 
@@ -145,7 +144,5 @@ def _retensioned(path: Path, surface: Surface, values: Mapping[str, float]) -> S
         if what not in given:
             raise _unknown_number(path, name, keys)
         given[what][patch] = values[name]
-    try:
+    with in_file(path, OptionError):
         return with_pressures(surface, given["tension"], given["pressure"])
-    except PcmcError as error:
-        raise in_file(path, error, OptionError) from None
