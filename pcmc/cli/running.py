@@ -12,7 +12,7 @@ from typing import Any
 from ..base import errors
 from ..base.errors import MissingExtra, PcmcError
 from ..base.interrupts import termination_as_interrupt
-from .codes import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
+from . import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
 SHOWN = (errors.BalanceWarning, errors.FileWarning, errors.FreeSurfaceWarning, errors.PlanWarning)
 FAILING = ("strict", "surrogateescape")  # error handlers; the second is the locale C's
@@ -88,6 +88,5 @@ def _interrupted() -> int:
 
 def _say(text: str) -> None:
     """Print one line to stderr, which is None if the shell closed it."""
-    if sys.stderr is None:
-        return
-    print("pcmc: " + " ".join(text.split()), file=sys.stderr)
+    if sys.stderr is not None:
+        print("pcmc: " + " ".join(text.split()), file=sys.stderr)

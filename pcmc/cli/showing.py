@@ -13,9 +13,8 @@ from ..base.errors import OptionError, unknown
 from ..base.interrupts import defer_interrupts
 from ..io import load, write
 from ..surface import Surface
-from . import arguments
+from . import OK, arguments
 from .arguments import TOML, Colour, Input, Pressures, Settings, ViewName, option
-from .codes import OK
 from .progress import working
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,14 +13,9 @@ from .. import project as projects
 from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
-from . import arguments
+from . import NOT_CERTIFIED, OK, arguments
 from .arguments import MANY_FILES, TOML, Input, Pressures, Settings, number, option
-from .codes import NOT_CERTIFIED, OK, names, report
 from .progress import working
-
-if TYPE_CHECKING:
-    from ..design import Design
-
 
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
@@ -36,9 +31,7 @@ def solve_(
     tension: Settings = None,
     pressure: Pressures = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
-    anyway: Annotated[
-        bool, typer.Option("--anyway", help="Write the output even if it is not certified.")
-    ] = False,
+    anyway: Annotated[bool, typer.Option("--anyway", help="Write the output even if not certified.")] = False,
 ) -> int:
     """Solve a surface or a project, certify it, and write all files, or none.
 
@@ -53,27 +46,27 @@ def solve_(
         options["target"] = target
     project = replace(project, method=method or project.method, options=options)
     with working() as say:
-        outcome = projects.run_project(
-            project,
-            say,
-            anyway=anyway,
-            changed=partial(arguments.retensioned, tension=tension, pressure=pressure),
-        )
-    print(f"{outcome.surface.m} triangles; {outcome.result.message}")
-    if outcome.design is not None:
-        print(f"targets {outcome.design.message}")
-        if outcome.design.met:
-            print(_with(outcome.design))
-    report(outcome.certificate, list(outcome.files))
+        changed = partial(arguments.retensioned, tension=tension, pressure=pressure)
+        outcome = projects.run_project(project, say, anyway=anyway, changed=changed)
+    _report(outcome)
     if project.outputs and not outcome.files:
         print("nothing written (use --anyway to write it)")
     return OK if outcome.good else NOT_CERTIFIED
 
 
-def _with(design: Design) -> str:
-    """The targets' quantities, and the parameters that give them; of a missed target the message has them."""
-    tables = (design.targets, design.parameters)
-    return ", with ".join(", ".join(f"{k} {v:.6g}" for k, v in t["value"].items()) for t in tables)
+def _report(outcome: projects.Outcome) -> None:
+    """Print how the solver ended, the targets and parameters, the verdict, and the files written."""
+    print(f"{outcome.surface.m} triangles; {outcome.result.message}")
+    if outcome.design is not None:
+        print(f"targets {outcome.design.message}")
+        if outcome.design.met:  # otherwise the message has the values
+            tables = (outcome.design.targets, outcome.design.parameters)
+            print(", with ".join(", ".join(f"{k} {v:.6g}" for k, v in t["value"].items()) for t in tables))
+    print(outcome.certificate.verdict.value)
+    if outcome.certificate.detail:
+        print(outcome.certificate.detail)
+    if outcome.files:
+        print(f"written: {', '.join(map(str, outcome.files))}")
 
 
 def _project(
@@ -127,13 +120,12 @@ def remesh_(
             say("remeshing")
             surface = remesh(arguments.surface_in(file), **stage.options)
             projects.write_all([(path, partial(write, surface=surface)) for path in output], say)
-        print(f"{surface.m} triangles, not solved; written: {names(output)}")
+        print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
     project = replace(_project(file, None, output, None), remeshing=(stage,), picture=None)
     with working() as say:
         outcome = projects.run_project(project, say)
-    print(f"{outcome.surface.m} triangles; {outcome.result.message}")
-    report(outcome.certificate, list(outcome.files))
+    _report(outcome)
     if outcome.files:
         return OK
     print("nothing written (use --no-solve to write the new mesh)")

@@ -11,8 +11,8 @@ import typer
 from ..base.errors import FileError, MissingExtra, OptionError
 from ..io import FORMATS
 from ..project import check_outputs
+from . import INTERRUPTED, NOT_CERTIFIED, OK
 from .arguments import TOML, integer, number, option, values_of
-from .codes import INTERRUPTED, NOT_CERTIFIED, OK
 from .progress import sweeping
 
 TABLES = (".csv", ".parquet")

@@ -51,7 +51,8 @@ def add_legend(figure: Any, pictures: Iterable[Shown]) -> None:
     from matplotlib.patches import Patch as Swatch
 
     colors, dots = entries(pictures)
-    area, dot = {"edgecolor": INK, "linewidth": 0.4}, {"linestyle": "", "marker": "o", "markersize": 2.6}
+    area: dict[str, Any] = {"edgecolor": INK, "linewidth": 0.4}
+    dot: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 2.6}
     handles: list[Any] = [Swatch(facecolor=color, label=name, **area) for name, color in colors.items()]
     handles += [Line2D([], [], color=color, label=name, **dot) for name, color in dots.items()]
     if handles:

@@ -120,10 +120,9 @@ def panel(
 ) -> Image:
     """Several surfaces in one picture, with one scale of colour.
 
-    ``views``, ``scalars``, ``numbers`` and ``patches`` are one per surface (``views`` and ``patches``
-    may be one for all).
-    ``one_scale`` draws a length equally long everywhere; without it each surface fills its place.
-    The rest is as in ``draw``.
+    ``views``, ``scalars``, ``numbers`` and ``patches`` are one per surface; ``views`` and ``patches``
+    may be one for all. ``one_scale`` draws a length equally long everywhere; without it each surface
+    fills its place. The rest is as in ``draw``.
     """
     drawings = _drawings(surfaces, views, titles, scalars, numbers, patches)
     columns = min(columns or (3 if len(drawings) not in (1, 2, 4) else 2), len(drawings))

@@ -115,7 +115,8 @@ def _with_matplotlib(scene: Scene, low: Floats, scale: float, size: tuple[int, i
     axes.set_axis_off()
     axes.set_xlim(low[0], low[0] + size[0] / scale)
     axes.set_ylim(low[1], low[1] + size[1] / scale)
-    look = {"facecolors": fills[order], "edgecolors": fills[order], "linewidths": widths[order]}
-    axes.add_collection(PolyCollection([shapes[k] for k in order], joinstyle="round", **look))
+    painted, fills = [shapes[k] for k in order], fills[order]
+    look: dict[str, Any] = {"linewidths": widths[order], "joinstyle": "round"}
+    axes.add_collection(PolyCollection(painted, facecolors=fills, edgecolors=fills, **look))
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[: size[1] * SAMPLES, : size[0] * SAMPLES, :3]

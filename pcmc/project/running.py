@@ -142,17 +142,12 @@ def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcom
     if design is not None:
         result = design.result
     else:
-        result = raise_if_stopped(solve(surface, project.method, reporter(report), **project.options))
+        result = solve(surface, project.method, reporter(report), **project.options)
+        if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
+            raise KeyboardInterrupt
     report("certifying")
     result.certificate  # noqa: B018 — computed here, while the progress is shown
     return Outcome(result, (), design)
-
-
-def raise_if_stopped(result: Result) -> Result:
-    """The result, unless Ctrl-C stopped the solver: then KeyboardInterrupt, to end the command."""
-    if result.status is Status.STOPPED:
-        raise KeyboardInterrupt
-    return result
 
 
 def reporter(report: OnStep) -> Callable[[Progress], None]:
@@ -177,6 +172,6 @@ def _meet(project: Project, surface: Surface, report: OnStep) -> Design:
         report(f"meeting the targets: solve {next(solves)}")
 
     design = meet(surface, project.targets, project.vary, callback=callback, **project.options)
-    if design.status is DesignStatus.STOPPED:  # as in ``raise_if_stopped``
+    if design.status is DesignStatus.STOPPED:  # by Ctrl-C
         raise KeyboardInterrupt
     return design

@@ -77,7 +77,8 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
     known = [f"{patch.name}.{what}" for what in QUANTITIES for patch in surface.patches]
     for name, given in values.items():
         if name not in keys and name not in known:
-            shown = known + [k for k, place in keys.items() if _listed(place)]
+            # no coordinates, and patches have shorter names
+            shown = known + [k for k, at in keys.items() if isinstance(at[-1], str) and at[1] != "patches"]
             near = get_close_matches(name, keys, n=1, cutoff=0.8)  # a coordinate, perhaps
             raise _unknown_number(path, name, shown + near)
         for value in given:
@@ -110,11 +111,6 @@ def is_project(path: PathLike) -> bool:
 def _unknown_number(path: Path, name: str, known: Iterable[str]) -> OptionError:
     names = tuple(dict.fromkeys(known))
     return OptionError(f"{path}: {unknown('number', name, names)}", what=name, expected=names)
-
-
-def _listed(place: KeyPath) -> bool:
-    """Whether a message lists the key: no coordinates, and patches have shorter names."""
-    return isinstance(place[-1], str) and place[1] != "patches"
 
 
 def _data(path: Path) -> dict[str, Any]:
