@@ -25,7 +25,7 @@
 
 from .file import Project, build, load, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
-from .output import COLOURS, check_names, check_outputs, check_picture, paint, save, write_all
+from .output import COLOURS, check_names, check_outputs, check_picture, paint, write_all
 from .remeshing import Remeshing
 from .running import Outcome, run, run_project, solve_project
 from .varied import check_varied, digest, is_project, varied
@@ -50,7 +50,6 @@ __all__ = [
     "reference",
     "run",
     "run_project",
-    "save",
     "sections",
     "solve_project",
     "surface_of",

@@ -7,7 +7,6 @@ import os
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,6 @@ from ..base.files import atomic_writes
 from ..base.interrupts import defer_interrupts
 from ..certificate.certificate import Certificate
 from ..energy.curvature import curvature_error, mean_curvature
-from ..solvers.result import Result
 from ..surface import Surface
 
 PathLike = str | os.PathLike[str]
@@ -31,27 +29,6 @@ COLOURS = ("patches", "curvature", "error", "reactions")
 
 def ignore(step: str) -> None:
     """An ``OnStep`` that shows nothing."""
-
-
-def save(
-    result: Result,
-    files: Iterable[PathLike],
-    picture: PathLike | None = None,
-    *,
-    view: Any = "diagonal",
-    colour: str = "patches",
-    progress: OnStep | None = None,
-) -> list[Path]:
-    """Write a result to files, and a picture of it: all of them, or none.
-
-    ``fields`` and the certificate are written if the format can hold them.
-    """
-    surface, certificate = result.surface, result.certificate
-    data: dict[str, Any] = {"scalars": fields(surface, certificate), "certificate": certificate}
-    works = [(Path(file), partial(io.write, surface=surface, **data)) for file in files]
-    if picture is not None:
-        works.append((Path(picture), partial(paint, surface, view=view, colour=colour)))
-    return write_all(works, progress)
 
 
 def fields(surface: Surface, certificate: Certificate) -> dict[str, Floats]:

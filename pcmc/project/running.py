@@ -5,10 +5,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from .. import io
 from ..base.errors import BalanceWarning, OptionError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
@@ -19,7 +21,7 @@ from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from .file import Project, in_file, load, surface_of
-from .output import OnStep, PathLike, check_names, check_outputs, ignore, save
+from .output import OnStep, PathLike, check_names, check_outputs, fields, ignore, paint, write_all
 
 if TYPE_CHECKING:
     from ..design import Design
@@ -99,10 +101,14 @@ def run_project(
     outcome = solve_project(project, start, report)
     if not outputs or not (outcome.good or anyway):
         return outcome
-    with made(project.folder or Path()):
+    surface, certificate = outcome.surface, outcome.certificate
+    data: dict[str, Any] = {"scalars": fields(surface, certificate), "certificate": certificate}
+    works = [(Path(file), partial(io.write, surface=surface, **data)) for file in project.files]
+    if project.picture is not None:
         look = {"view": project.view, "colour": project.colour}
-        written = save(outcome.result, project.files, project.picture, progress=report, **look)
-    return replace(outcome, files=written)
+        works.append((Path(project.picture), partial(paint, surface, **look)))
+    with made(project.folder or Path()):
+        return replace(outcome, files=write_all(works, report))
 
 
 def _check_balance(surface: Surface) -> None:
