@@ -10,6 +10,8 @@ import signal
 import sys
 from collections.abc import Sequence
 
+OK, NOT_CERTIFIED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130  # exit codes
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command. The shell's ``pcmc`` calls this.
@@ -45,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _stopped() -> int:
     print("pcmc: stopped", file=sys.stderr, flush=True)
-    return 130
+    return INTERRUPTED
 
 
 def _exit(*_: object) -> None:

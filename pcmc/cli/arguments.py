@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from .. import project as projects
+from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..io import FORMATS, read_bare
 from ..surface import Surface
@@ -17,30 +18,22 @@ from ..surface.wall_pressures import with_pressures
 
 TOML = ".toml"
 
+
+def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
+    """An option of a command: what stands for its value, and its help."""
+    return typer.Option(*names, metavar=metavar, help=meaning, **more)
+
+
 Input = Annotated[Path, typer.Argument(metavar="FILE", help="A surface, or a project (.toml).")]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--tension",
-        metavar="NAME=VALUE",
-        help="Tension of a patch. A bare VALUE applies to every patch under pressure.",
-    ),
-]
+_EVERY = "A bare VALUE applies to every patch under pressure"
+Settings = Annotated[list[str] | None, option("NAME=VALUE", f"Tension of a patch. {_EVERY}.", "--tension")]
 Pressures = Annotated[
     list[str] | None,
-    typer.Option(
-        "--pressure",
-        metavar="NAME=VALUE",
-        help="Pressure on a patch. A bare VALUE applies to every patch under pressure; wall pressures are"
-        " updated.",
-    ),
+    option("NAME=VALUE", f"Pressure on a patch. {_EVERY}; wall pressures are updated.", "--pressure"),
 ]
-ViewName = Annotated[
-    str, typer.Option(metavar="NAME", help="diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")
-]
-Colour = Annotated[
-    str, typer.Option("--colour", "--color", metavar="NAME", help="patches, curvature, error or reactions.")
-]
+ViewName = Annotated[str, option("NAME", "diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")]
+Colour = Annotated[str, option("NAME", "patches, curvature, error or reactions.", "--colour", "--color")]
+MANY_FILES = option("FILE", "File to write; may be repeated.", "-o", "--output")
 
 
 def number(text: str | float) -> float:
@@ -69,22 +62,17 @@ def check_input(file: Path) -> None:
     """Refuse a file whose suffix is neither a project's nor a surface's."""
     suffix = file.suffix.lower()
     if suffix not in (TOML, *FORMATS):
-        raise FileError(
-            f"{file}: {unknown('suffix', suffix, [TOML, *FORMATS])}",
-            what=str(file),
-            found=suffix,
-            expected=(TOML, *FORMATS),
-        )
+        raise FileError(f"{file}: {unknown('suffix', suffix, [TOML, *FORMATS])}", what=str(file))
 
 
 def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str] | None) -> Surface:
     """The surface with the tensions and pressures of the command line."""
     loaded = [patch.name for patch in surface.patches if not patch.auxiliary]
-    tensions, pressures = (_by_name(loaded, tension, "--tension"), _by_name(loaded, pressure, "--pressure"))
+    tensions, pressures = _by_name(loaded, tension, "--tension"), _by_name(loaded, pressure, "--pressure")
     return with_pressures(surface, tensions, pressures)
 
 
-def _by_name(names: list[str], given: list[str] | None, option: str) -> dict[str, float]:
+def _by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:
     """Value by patch, from NAME=VALUE, or VALUE for all ``names``. A later one replaces an earlier one."""
     values: dict[str, float] = {}
     for text in given or ():
@@ -94,9 +82,7 @@ def _by_name(names: list[str], given: list[str] | None, option: str) -> dict[str
         except ValueError:
             amount = math.nan
         if (sign and not name) or math.isnan(amount):
-            raise OptionError(
-                f"{option}: expected NAME=NUMBER or NUMBER, found {text!r}", what=option, found=text
-            )
+            validate.refuse(flag, text, "NAME=NUMBER or NUMBER")
         values |= {name: amount} if name else dict.fromkeys(names, amount)
     return values
 
@@ -109,10 +95,7 @@ def values_of(text: str) -> tuple[str, list[Any]]:
     """
     name, sign, values = text.partition("=")
     if not (name and sign and all(values.split(","))):
-        expected = "NAME=VALUE or NAME=V1,V2"
-        raise OptionError(
-            f"expected {expected}, found {text!r}", what="values", found=text, expected=expected
-        )
+        raise OptionError(f"expected NAME=VALUE or NAME=V1,V2, found {text!r}", what="values", found=text)
     return name, [_value(one) for one in values.split(",")]
 
 

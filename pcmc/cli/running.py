@@ -9,17 +9,12 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from ..base.errors import (
-    BalanceWarning,
-    FileWarning,
-    FreeSurfaceWarning,
-    MissingExtra,
-    PcmcError,
-    PlanWarning,
-)
+from ..base import errors
+from ..base.errors import MissingExtra, PcmcError
 from ..base.interrupts import termination_as_interrupt
-from .codes import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
+from . import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
+SHOWN = (errors.BalanceWarning, errors.FileWarning, errors.FreeSurfaceWarning, errors.PlanWarning)
 FAILING = ("strict", "surrogateescape")  # error handlers; the second is the locale C's
 
 
@@ -27,7 +22,7 @@ def run(arguments: list[str]) -> int:
     """Run the command; errors become one line on stderr, and the exit code says how it ended."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for kind in (BalanceWarning, FileWarning, FreeSurfaceWarning, PlanWarning):
+        for kind in SHOWN:
             warnings.simplefilter("always", kind)
         warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")
         _escape_missing_letters(sys.stdout)
@@ -93,6 +88,5 @@ def _interrupted() -> int:
 
 def _say(text: str) -> None:
     """Print one line to stderr, which is None if the shell closed it."""
-    if sys.stderr is None:
-        return
-    print("pcmc: " + " ".join(text.split()), file=sys.stderr)
+    if sys.stderr is not None:
+        print("pcmc: " + " ".join(text.split()), file=sys.stderr)

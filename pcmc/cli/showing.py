@@ -4,29 +4,17 @@ from __future__ import annotations
 
 import inspect
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
 from .. import project as projects
-from ..base.errors import FileError, OptionError, unknown
+from ..base.errors import OptionError, unknown
 from ..base.interrupts import defer_interrupts
 from ..io import load, write
 from ..surface import Surface
-from .arguments import (
-    TOML,
-    Colour,
-    Input,
-    Pressures,
-    Settings,
-    ViewName,
-    integer,
-    retensioned,
-    surface_in,
-    values_of,
-    view_of,
-)
-from .codes import OK
+from . import OK, arguments
+from .arguments import TOML, Colour, Input, Pressures, Settings, ViewName, option
 from .progress import working
 
 
@@ -46,20 +34,15 @@ def convert(
     """
     projects.check_names([output])
     projects.check_outputs([output])
-    surface = retensioned(surface_in(file), tension, pressure)
-    data = _data(file) if not (tension or pressure) else {}
+    surface = arguments.retensioned(arguments.surface_in(file), tension, pressure)
+    data: dict[str, Any] = {}
+    if file.suffix.lower() != TOML and not (tension or pressure):
+        content = load(file)
+        data = {"scalars": content.scalars, "certificate": content.certificate or None}
     with defer_interrupts():
         write(output, surface, **data)
     print(f"written: {output}")
     return OK
-
-
-def _data(file: Path) -> dict[str, Any]:
-    """The scalars and the certificate in a file."""
-    if file.suffix.lower() == TOML:
-        return {}
-    content = load(file)
-    return {"scalars": content.scalars, "certificate": content.certificate or None}
 
 
 def plot(
@@ -74,17 +57,11 @@ def plot(
     Example:
       pcmc plot roof.pcmc roof.png --colour error
     """
-    if picture.suffix.lower() != ".png":
-        raise FileError(
-            f"{picture}: a picture is written as .png; change the suffix",
-            what=str(picture),
-            found=picture.suffix,
-            expected=".png",
-        )
-    seen = view_of(view)
+    projects.check_names([], picture)
+    seen = arguments.view_of(view)
     projects.check_picture(seen, colour)
     projects.check_outputs([picture])
-    surface = surface_in(file)
+    surface = arguments.surface_in(file)
     projects.write_all([(picture, lambda path: projects.paint(surface, path, seen, colour))])
     print(f"written: {picture}")
     return OK
@@ -93,16 +70,13 @@ def plot(
 def explore(
     file: Annotated[Path | None, typer.Argument(metavar="[FILE]")] = None,
     example: Annotated[
-        str | None, typer.Option(metavar="NAME", help="A generator, such as two_caps, instead of a file.")
+        str | None, option("NAME", "A generator, such as two_caps, instead of a file.")
     ] = None,
     parameter: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the example; may be repeated."),
+        list[str] | None, option("NAME=VALUE", "Parameter of the example; may be repeated.", "--set")
     ] = None,
-    host: Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[
-        int, typer.Option(parser=integer, metavar="NUMBER", help="Port; 0 for any free one.")
-    ] = 0,
+    host: Annotated[str, option("ADDRESS", "Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, option("NUMBER", "Port; 0 for any free one.", parser=arguments.integer)] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
 ) -> int:
     """Explore a surface in the browser until Ctrl-C.
@@ -119,10 +93,9 @@ def explore(
     with working() as say:
         say("building")
         if file is not None:
-            surface, title = surface_in(file), file.name
+            surface, title = arguments.surface_in(file), file.name
         else:
-            given = dict(values_of(text) for text in parameter or ())
-            values = {name: listed[0] for name, listed in given.items()}
+            values = {name: listed[0] for name, listed in map(arguments.values_of, parameter or ())}
             surface, title = _example(str(example), values), str(example)
         say("solving")
         explorer = start(surface, host, port, title)
@@ -145,5 +118,4 @@ def _example(name: str, parameters: dict[str, Any]) -> Surface:
         raise
     except (ImportError, AttributeError, ValueError, TypeError) as error:
         raise OptionError(f"--example {name}: {error}", what="--example", found=name) from None
-    surface: Surface = build(**parameters)
-    return surface
+    return cast("Surface", build(**parameters))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,34 +13,25 @@ from .. import project as projects
 from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
-from .arguments import TOML, Input, Pressures, Settings, check_input, number, retensioned, surface_in
-from .codes import NOT_CERTIFIED, OK, code, names, report
+from . import NOT_CERTIFIED, OK, arguments
+from .arguments import MANY_FILES, TOML, Input, Pressures, Settings, number, option
 from .progress import working
 
-if TYPE_CHECKING:
-    from ..design import Design
+CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
 
 def solve_(
     file: Input,
-    output: Annotated[
-        list[Path] | None,
-        typer.Option("-o", "--output", metavar="FILE", help="File to write; may be repeated."),
-    ] = None,
-    picture: Annotated[Path | None, typer.Option(metavar="PNG", help="Picture to draw.")] = None,
-    method: Annotated[str | None, typer.Option(metavar="NAME", help="newton, nesterov or lbfgs.")] = None,
+    output: Annotated[list[Path] | None, MANY_FILES] = None,
+    picture: Annotated[Path | None, option("PNG", "Picture to draw.")] = None,
+    method: Annotated[str | None, option("NAME", "newton, nesterov or lbfgs.")] = None,
     target: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="minimum, or stationary to accept saddles too (newton only)."),
+        str | None, option("NAME", "minimum, or stationary to accept saddles too (newton only).")
     ] = None,
     tension: Settings = None,
     pressure: Pressures = None,
-    folder: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Folder for a project's output.")
-    ] = None,
-    anyway: Annotated[
-        bool, typer.Option("--anyway", help="Write the output even if it is not certified.")
-    ] = False,
+    folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
+    anyway: Annotated[bool, typer.Option("--anyway", help="Write the output even if not certified.")] = False,
 ) -> int:
     """Solve a surface or a project, certify it, and write all files, or none.
 
@@ -55,35 +46,34 @@ def solve_(
         options["target"] = target
     project = replace(project, method=method or project.method, options=options)
     with working() as say:
-        outcome = projects.run_project(
-            project, say, anyway=anyway, changed=partial(retensioned, tension=tension, pressure=pressure)
-        )
-    print(f"{outcome.surface.m} triangles; {outcome.result.message}")
-    if outcome.design is not None:
-        print(f"targets {outcome.design.message}")
-        if outcome.design.met:
-            print(_with(outcome.design))
-    report(outcome.certificate, list(outcome.files))
+        changed = partial(arguments.retensioned, tension=tension, pressure=pressure)
+        outcome = projects.run_project(project, say, anyway=anyway, changed=changed)
+    _report(outcome)
     if project.outputs and not outcome.files:
         print("nothing written (use --anyway to write it)")
     return OK if outcome.good else NOT_CERTIFIED
 
 
-def _with(design: Design) -> str:
-    """The targets' quantities, and the parameters that give them.
-
-    If a target is missed, ``design.message`` has them.
-    """
-    reached = (f"{label} {value:.6g}" for label, value in design.targets["value"].items())
-    values = (f"{label} {value:.6g}" for label, value in design.parameters["value"].items())
-    return f"{', '.join(reached)}, with {', '.join(values)}"
+def _report(outcome: projects.Outcome) -> None:
+    """Print how the solver ended, the targets and parameters, the verdict, and the files written."""
+    print(f"{outcome.surface.m} triangles; {outcome.result.message}")
+    if outcome.design is not None:
+        print(f"targets {outcome.design.message}")
+        if outcome.design.met:  # otherwise the message has the values
+            tables = (outcome.design.targets, outcome.design.parameters)
+            print(", with ".join(", ".join(f"{k} {v:.6g}" for k, v in t["value"].items()) for t in tables))
+    print(outcome.certificate.verdict.value)
+    if outcome.certificate.detail:
+        print(outcome.certificate.detail)
+    if outcome.files:
+        print(f"written: {', '.join(map(str, outcome.files))}")
 
 
 def _project(
     file: Path, folder: Path | None, output: list[Path] | None, picture: Path | None
 ) -> projects.Project:
     """The project, with the output files of the command line if there are any."""
-    check_input(file)
+    arguments.check_input(file)
     if file.suffix.lower() != TOML:
         return projects.Project(file, files=output or (), picture=picture, folder=folder)
     project = projects.load(file).in_folder(file.parent if folder is None else folder)
@@ -99,31 +89,19 @@ def certify_(file: Input, tension: Settings = None, pressure: Pressures = None) 
     """
     with working() as say:
         say("certifying")
-        certificate = certify(retensioned(surface_in(file), tension, pressure))
+        certificate = certify(arguments.retensioned(arguments.surface_in(file), tension, pressure))
     print(certificate)
-    return code(certificate)
+    return OK if certificate.certified else NOT_CERTIFIED
 
 
 def remesh_(
     file: Input,
-    edge_length: Annotated[
-        float, typer.Option(parser=number, metavar="LENGTH", help="Edge length of the triangles.")
-    ],
-    output: Annotated[
-        list[Path], typer.Option("-o", "--output", metavar="FILE", help="File to write; may be repeated.")
-    ],
+    edge_length: Annotated[float, option("LENGTH", "Edge length of the triangles.", parser=number)],
+    output: Annotated[list[Path], MANY_FILES],
     near_curves: Annotated[
-        float | None,
-        typer.Option(parser=number, metavar="LENGTH", help="Edge length at junctions and boundaries."),
+        float | None, option("LENGTH", "Edge length at junctions and boundaries.", parser=number)
     ] = None,
-    chord: Annotated[
-        float | None,
-        typer.Option(
-            parser=number,
-            metavar="LENGTH",
-            help="Largest distance to the smooth surface; triangles are smaller where it curves more.",
-        ),
-    ] = None,
+    chord: Annotated[float | None, option("LENGTH", CHORD, parser=number)] = None,
     solved: Annotated[
         bool, typer.Option("--solve/--no-solve", help="Solve and certify the new mesh.")
     ] = True,
@@ -140,15 +118,14 @@ def remesh_(
     if not solved:
         with working() as say:
             say("remeshing")
-            surface = remesh(surface_in(file), **stage.options)
+            surface = remesh(arguments.surface_in(file), **stage.options)
             projects.write_all([(path, partial(write, surface=surface)) for path in output], say)
-        print(f"{surface.m} triangles, not solved; written: {names(output)}")
+        print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
     project = replace(_project(file, None, output, None), remeshing=(stage,), picture=None)
     with working() as say:
         outcome = projects.run_project(project, say)
-    print(f"{outcome.surface.m} triangles; {outcome.result.message}")
-    report(outcome.certificate, list(outcome.files))
+    _report(outcome)
     if outcome.files:
         return OK
     print("nothing written (use --no-solve to write the new mesh)")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,41 +10,30 @@ import typer
 
 from ..base.errors import FileError, MissingExtra, OptionError
 from ..io import FORMATS
-from .arguments import TOML, integer, number, values_of
-from .codes import INTERRUPTED, NOT_CERTIFIED, OK
+from ..project import check_outputs
+from . import INTERRUPTED, NOT_CERTIFIED, OK
+from .arguments import TOML, integer, number, option, values_of
 from .progress import sweeping
+
+TABLES = (".csv", ".parquet")
+WHAT = "A project (.toml), a surface, or package.module:function that returns a Surface."
+STORE = "File for finished cases. The same command again runs only the missing ones."
 
 
 def sweep(
-    what: Annotated[
-        str,
-        typer.Argument(
-            metavar="WHAT",
-            help="A project (.toml), a surface, or package.module:function that returns a Surface.",
-        ),
-    ],
+    what: Annotated[str, typer.Argument(metavar="WHAT", help=WHAT)],
     values: Annotated[list[str], typer.Argument(metavar="NAME=V1,V2,...")],
     method: Annotated[
-        str | None, typer.Option(metavar="NAME", help="newton, nesterov or lbfgs; default: the project's.")
+        str | None, option("NAME", "newton, nesterov or lbfgs; default: the project's.")
     ] = None,
-    store: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="File for finished cases. The same command again runs only the missing ones."
-        ),
-    ] = None,
-    csv: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Table to write (.csv or .parquet).")
-    ] = None,
+    store: Annotated[Path | None, option("FILE", STORE)] = None,
+    csv: Annotated[Path | None, option("FILE", "Table to write (.csv or .parquet).")] = None,
     workers: Annotated[
-        int | None,
-        typer.Option(parser=integer, metavar="NUMBER", help="Local processes; default: one per processor."),
+        int | None, option("NUMBER", "Local processes; default: one per processor.", parser=integer)
     ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler to use: tcp://HOST:8786.")
-    ] = None,
+    scheduler: Annotated[str | None, option("ADDRESS", "Dask scheduler to use: tcp://HOST:8786.")] = None,
     time_limit: Annotated[
-        float, typer.Option(parser=number, metavar="SECONDS", help="Time limit per case, in seconds.")
+        float, option("SECONDS", "Time limit per case, in seconds.", parser=number)
     ] = 600.0,
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Run the stored cases that failed again.")
@@ -66,10 +54,10 @@ def sweep(
     from ..sweep import run, write_table
     from ..sweep.store import FAILED
 
-    for path, suffixes in ((csv, (".csv", ".parquet")), (store, ())):
-        _check_place(path, suffixes)
-    if csv is not None and store is not None and csv.resolve() == store.resolve():
-        raise OptionError(f"{csv} cannot be both the store and the table; name two files", what="--store")
+    check_outputs([path for path in (csv, store) if path is not None])
+    if csv is not None and csv.suffix not in TABLES:
+        text = f"{csv}: a table is written as {' or '.join(TABLES)}; change the suffix"
+        raise FileError(text, what=str(csv), found=csv.suffix, expected=TABLES)
     if csv is not None and csv.suffix == ".parquet" and find_spec("pyarrow") is None:
         raise MissingExtra("pyarrow", "files")
     given: dict[str, list[Any]] = {}
@@ -110,12 +98,8 @@ def _cases(what: str, grid: dict[str, Any], fixed: dict[str, Any], method: str |
     if Path(what).suffix.lower() in (TOML, *FORMATS):
         return project_sweep(what, grid, fixed, method=method)
     if ":" not in what:
-        raise OptionError(
-            f"{what}: expected a project (.toml), a surface ({' '.join(FORMATS)}), or a generator such"
-            " as generators:two_caps",
-            what="WHAT",
-            found=what,
-        )
+        kinds = f"a project (.toml), a surface ({' '.join(FORMATS)}), or a generator"
+        raise OptionError(f"{what}: expected {kinds} such as generators:two_caps", what="WHAT", found=what)
     return Sweep(solve_case, grid, {"generator": what, "method": method or "newton", **fixed})
 
 
@@ -124,22 +108,3 @@ def _print_failures(failed: Any) -> None:
     for message, cases in failed.groupby("message", sort=False):
         others = f" and {len(cases) - 1} more" if len(cases) > 1 else ""
         print(f"case {cases.index[0]}{others}: {cases['status'].iloc[0]}: {message}")
-
-
-def _check_place(path: Path | None, suffixes: tuple[str, ...]) -> None:
-    """Refuse a file that cannot be written, before any case runs."""
-    if path is None:
-        return
-    if suffixes and path.suffix not in suffixes:
-        raise FileError(
-            f"{path}: a table is written as {' or '.join(suffixes)}; change the suffix",
-            what=str(path),
-            found=path.suffix,
-            expected=suffixes,
-        )
-    if path.is_dir():
-        raise FileError(f"{path}: is a folder; give the name of a file", what=str(path))
-    if not path.parent.is_dir():
-        raise FileError(f"{path}: there is no folder {path.parent}; make it first", what=str(path))
-    if not os.access(path.parent, os.W_OK):
-        raise FileError(f"{path}: cannot be written (the folder {path.parent} is read-only)", what=str(path))

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..certificate.balance import reactions_per_length
 from ..surface import Surface
 from .figure import INK, SMALL, TEXT, Image, finish
 from .pictures import DOTS_FROM, EDGES_FROM, Path, ViewName, fit_frames, frame_axes, frames_of
-from .raster import paint
 from .scene import mean_edge, scene, view_of
 
 ARROW = "#B2182B"
@@ -46,60 +46,34 @@ def vectors(
     """
     arrows = np.asarray(field, dtype=float)
     if arrows.shape != (surface.n, 3) or not np.isfinite(arrows).all():
-        raise OptionError(
-            f"field: expected finite numbers of shape ({surface.n}, 3), found {arrows.shape}",
-            what="field",
-            found=arrows.shape,
-            expected=(surface.n, 3),
-        )
+        validate.refuse("field", arrows.shape, f"finite numbers of shape ({surface.n}, 3)")
     seen = view_of(surface, view)
-    longest = float(np.linalg.norm(arrows, axis=1).max())
+    size = np.linalg.norm(arrows, axis=1)
+    longest = float(size.max())
     stretch = length * surface.size / longest if longest > 0.0 else 0.0
     at = seen.project(surface.vertices)
     tips = at + stretch * seen.project(arrows)
     (frame,) = frames_of([np.concatenate([at, tips])], 1, width)
     spacing = mean_edge(surface) * frame.scale
-    painted = scene(
-        surface,
-        seen,
-        None,
-        supports=supports and spacing >= DOTS_FROM,
-        edges=spacing >= EDGES_FROM if edges is None else edges,
-    )
+    dotted, meshed = supports and spacing >= DOTS_FROM, spacing >= EDGES_FROM if edges is None else edges
+    painted = scene(surface, seen, None, supports=dotted, edges=meshed)
     figure, (axes,) = frame_axes([frame], 1, width)
     axes.set_title(title, fontsize=TEXT, color=INK, pad=5.0)
     if label:
         figure.supxlabel(" ", fontsize=2.0 * SMALL)  # the place of the arrow that tells the scale
     fit_frames(figure, [axes], [frame], 1)
-    frame.show(axes, paint(painted, frame.low, frame.scale, frame.size, renderer))
+    frame.show(axes, painted, renderer)
     if longest > 0.0:
-        chosen = _thinned(at, np.linalg.norm(arrows, axis=1), most)
-        quiver = axes.quiver(
-            *at[chosen].T,
-            *(tips - at)[chosen].T,
-            angles="xy",
-            scale_units="xy",
-            scale=1.0,
-            color=ARROW,
-            width=2.2 / width,
-            headwidth=4.0,
-            headlength=5.0,
-            headaxislength=4.5,
-        )
+        chosen = _thinned(at, size, most)
+        in_plane = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
+        heads = {"headwidth": 4.0, "headlength": 5.0, "headaxislength": 4.5}
+        arrow = [*at[chosen].T, *(tips - at)[chosen].T]
+        quiver = axes.quiver(*arrow, color=ARROW, width=2.2 / width, **in_plane, **heads)
         if label:
-            unit = float(f"{longest:.1g}")
-            middle = 0.5 * axes.get_position().y0
-            axes.quiverkey(
-                quiver,
-                0.5,
-                middle,
-                unit * stretch,
-                f"{unit:g} {label}",
-                coordinates="figure",
-                labelpos="E",
-                fontproperties={"size": SMALL},
-                labelcolor=INK,
-            )
+            unit, middle = float(f"{longest:.1g}"), 0.5 * axes.get_position().y0
+            look = {"labelpos": "E", "fontproperties": {"size": SMALL}, "labelcolor": INK}
+            text = f"{unit:g} {label}"
+            axes.quiverkey(quiver, 0.5, middle, unit * stretch, text, coordinates="figure", **look)
     return finish(figure, path)
 
 
@@ -114,9 +88,7 @@ def reactions(surface: Surface, path: Path | None = None, **options: Any) -> Ima
     """
     per_length = reactions_per_length(surface)
     if np.isnan(per_length).all():
-        raise OptionError(
-            "no boundary of the surface is held: there are no reactions to draw", what="surface"
-        )
+        raise OptionError("no boundary of the surface is held: no reactions to draw", what="surface")
     return vectors(surface, np.nan_to_num(per_length), path, **{"label": "force/length", **options})
 
 

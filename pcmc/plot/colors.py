@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import MissingExtra, OptionError, unknown
+from ..base.errors import MissingExtra
 from .figure import INK, SMALL
 
 
@@ -54,32 +55,23 @@ def color_map(name: str) -> Any:
         from matplotlib import colormaps
     except ImportError:
         raise MissingExtra("matplotlib", "plot") from None
-    if name not in colormaps:
-        raise OptionError(unknown("cmap", name, sorted(colormaps)), what="cmap", found=name)
-    return colormaps[name]
+    return colormaps[validate.choice("cmap", name, sorted(colormaps))]
 
 
 def color_scale(
     values: Sequence[Floats | None], limits: tuple[float, float] | None, cmap: str | None
 ) -> ColorScale | None:
     """The scale for all the values together, or None when there are none."""
-    if all(v is None for v in values):
+    given = [v[np.isfinite(v)] for v in values if v is not None]
+    if not given:
         return None
-    every = np.concatenate([v for v in values if v is not None])
-    known = every[np.isfinite(every)]
-    least, most = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
-    signed = least < 0.0 < most
+    known = np.concatenate(given)
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    signed = low < 0.0 < high
     if limits is not None:
         low, high = (float(v) for v in limits)
         if not (np.isfinite([low, high]).all() and low < high):
-            raise OptionError(
-                f"limits: expected two finite numbers, low < high, found {limits!r}",
-                what="limits",
-                found=limits,
-                expected="low < high",
-            )
+            validate.refuse("limits", limits, "two finite numbers, low < high")
     elif signed:
-        low, high = -max(-least, most), max(-least, most)
-    else:
-        low, high = least, most
+        low, high = -max(-low, high), max(-low, high)
     return ColorScale(low, high, color_map(cmap or ("RdBu_r" if signed else "viridis")))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError, unknown
 from .colors import color_bar, color_map
@@ -45,19 +46,15 @@ def lines(
     bounds, drawn as horizontal lines.
     """
     for scale in (xscale, yscale):
-        if scale not in SCALES:
-            raise OptionError(unknown("scale", scale, SCALES), what="scale", found=scale)
+        validate.choice("scale", scale, SCALES)
     figure, axes = new_axes(width, height, title, x, y)
     axes.set_xscale(xscale)
     axes.set_yscale(yscale)
     for k, (label, (xs, ys)) in enumerate(curves.items()):
         px, py = _curve(label, xs, ys, xscale, yscale)
         turn = k // len(CURVES)  # how many times all colours are used already
-        look = (
-            overlap_style(k, len(curves))
-            if dashes
-            else {"linewidth": 1.1, "linestyle": ("-", "--")[turn % 2]}
-        )
+        plain = {"linewidth": 1.1, "linestyle": ("-", "--")[turn % 2]}
+        look = overlap_style(k, len(curves)) if dashes else plain
         marker = MARKERS[(k + turn) % len(MARKERS)] if markers else None
         axes.plot(px, py, color=CURVES[k % len(CURVES)], marker=marker, markersize=2.8, label=label, **look)
     for label, level in (levels or {}).items():
@@ -75,8 +72,7 @@ def _plain_ticks(axis: Any) -> None:
         return
     decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.log10(high))
     steps = (1, 1.5, 2, 3, 4, 5, 6, 8) if high < 5.0 * low else (1, 2, 3, 5)
-    ticks = [step * decade for decade in decades for step in steps]
-    ticks = [tick for tick in ticks if low <= tick <= high]
+    ticks = [step * decade for decade in decades for step in steps if low <= step * decade <= high]
     axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
     axis.set_ticks([], minor=True)
 
@@ -88,42 +84,27 @@ def histories(
     y: str = "energy",
     x: str | None = None,
     label: str = "",
-    title: str = "",
     yscale: str | None = None,
-    dashes: bool = False,
-    width: int = 900,
-    height: int = 560,
+    **options: Any,
 ) -> Image:
     """Histories of solves by label, one column against another.
 
     ``y`` is a column of each frame ("energy", "gradient_squared", ...); ``x`` another one, or the
     row number (iteration) when None. The scale is logarithmic unless y has values ≤ 0 or is the
-    energy. ``dashes`` as in ``lines``.
+    energy. ``options`` are those of ``lines``: title, dashes, width, height.
     """
     curves = {}
     for name, frame in frames.items():
         for column in (y, x):
             if column is not None and column not in frame.columns:
-                raise OptionError(
-                    f"history {name!r}: {unknown('column', column, frame.columns)}",
-                    what="history",
-                    where=name,
-                    found=column,
-                )
+                message = f"history {name!r}: {unknown('column', column, frame.columns)}"
+                raise OptionError(message, what="history", where=name, found=column)
         xs = np.arange(len(frame)) if x is None else frame[x].to_numpy()
         curves[name] = (xs, frame[y].to_numpy())
     positive = all((np.asarray(v)[np.isfinite(v)] > 0.0).all() for _, v in curves.values())
-    return lines(
-        curves,
-        path,
-        x=(x or "iteration").replace("_", " "),
-        y=label or y.replace("_", " "),
-        title=title,
-        yscale=yscale or ("log" if positive and y != "energy" else "linear"),
-        dashes=dashes,
-        width=width,
-        height=height,
-    )
+    scale = yscale or ("log" if positive and y != "energy" else "linear")
+    along, up = (x or "iteration").replace("_", " "), label or y.replace("_", " ")
+    return lines(curves, path, x=along, y=up, yscale=scale, **options)
 
 
 def convergence(
@@ -150,15 +131,7 @@ def convergence(
             ends = np.array([px[known].min(), px[known].max()])
             axes.plot(ends, np.exp(height_at_1) * ends**slope, color=color, linewidth=0.8)
             label = f"{name}: slope {slope:.2f}"
-        axes.plot(
-            px,
-            py,
-            color=color,
-            linestyle="none",
-            marker=MARKERS[k % len(MARKERS)],
-            markersize=3.2,
-            label=label,
-        )
+        axes.plot(px, py, MARKERS[k % len(MARKERS)], color=color, markersize=3.2, label=label)
     every = np.unique(np.concatenate([np.asarray(xs, dtype=float) for xs, _ in curves.values()]))
     every = every[np.isfinite(every) & (every > 0.0)]
     if len(every) <= 8:
@@ -193,13 +166,12 @@ def heatmap(
     shape = (len(ys), len(xs))
     data = {k: _table("tables", k, v, shape).astype(float) for k, v in tables.items()}
     if not data:
-        raise OptionError("heatmap: expected at least one table, found none", what="tables", found=0)
+        validate.refuse("tables", 0, "at least one table")
     for name, v in data.items():
         data[name] = np.where(np.isfinite(v) & ((v > 0.0) | (not log)), v, np.nan)
     crosses = {k: _table("marks", k, v, shape) for k, v in (marks or {}).items()}
-    for name in crosses:
-        if name not in data:
-            raise OptionError(unknown("table", name, data), what="marks", where=name)
+    for name in crosses.keys() - data.keys():
+        raise OptionError(unknown("table", name, data), what="marks", where=name)
     columns = min(columns, len(data))
     ratio = shape[0] / shape[1]
     figure = new(width, width * ratio * -(-len(data) // columns) / columns + 200.0, pad=6.0)
@@ -234,20 +206,12 @@ def new_axes(width: int, height: int, title: str, x: str, y: str) -> tuple[Any, 
 
 def add_legend(axes: Any, count: int) -> None:
     """A legend of the curves, where there are several; beside the axes if it is long."""
+    text = {"fontsize": SMALL, "labelcolor": INK}
     if count > LEGEND_INSIDE:
-        axes.figure.legend(
-            fontsize=SMALL, labelcolor=INK, handlelength=2.4, frameon=False, loc="outside right upper"
-        )
+        axes.figure.legend(handlelength=2.4, frameon=False, loc="outside right upper", **text)
     elif count > 1 or axes.get_legend_handles_labels()[1] not in ([], [""]):
-        axes.legend(
-            fontsize=SMALL,
-            labelcolor=INK,
-            handlelength=3.2,
-            facecolor="white",
-            framealpha=0.8,
-            edgecolor="none",
-            borderpad=0.2,
-        )
+        box = {"facecolor": "white", "framealpha": 0.8, "edgecolor": "none", "borderpad": 0.2}
+        axes.legend(handlelength=3.2, **box, **text)
 
 
 def table_ticks(
@@ -268,12 +232,7 @@ def _curve(
     """Float arrays, NaN where an axis cannot show the value."""
     px, py = np.array(xs, dtype=float), np.array(ys, dtype=float)
     if px.ndim != 1 or px.shape != py.shape:
-        raise OptionError(
-            f"curve {label!r}: expected x and y of one length, found shapes {px.shape}, {py.shape}",
-            what="curves",
-            where=label,
-            found=(px.shape, py.shape),
-        )
+        validate.refuse("curves", (px.shape, py.shape), "x and y of one length", where=label)
     for values, scale in ((px, xscale), (py, yscale)):
         values[~np.isfinite(values) | ((scale == "log") & (values <= 0.0))] = np.nan
     return px, py
@@ -282,13 +241,7 @@ def _curve(
 def _table(what: str, title: str, values: npt.ArrayLike, shape: tuple[int, int]) -> npt.NDArray[Any]:
     table = np.asarray(values)
     if table.shape != shape:
-        raise OptionError(
-            f"{what}[{title!r}]: expected shape {shape}, (len(y), len(x)), found {table.shape}",
-            what=what,
-            where=title,
-            found=table.shape,
-            expected=shape,
-        )
+        validate.refuse(what, table.shape, f"shape {shape}, (len(y), len(x))", where=title)
     return table
 
 

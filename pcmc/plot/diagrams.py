@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -41,12 +41,9 @@ def diagram(
     for k, (label, branch) in enumerate(branches.items()):
         for column in (x, y):
             if column not in branch.events.columns:
-                raise OptionError(
-                    f"branch {label!r}: {unknown('column', column, _columns(branch))}",
-                    what="branches",
-                    where=label,
-                    found=column,
-                )
+                known = branch.events.columns.intersection(branch.points.columns, sort=False)
+                message = f"branch {label!r}: {unknown('column', column, known)}"
+                raise OptionError(message, what="branches", where=label, found=column)
         color = CURVES[k % len(CURVES)]
         named = label
         for stable, (px, py) in _pieces(branch, x, y):
@@ -55,16 +52,8 @@ def diagram(
         for kind, rows in branch.events.groupby("kind", sort=False):
             text = "" if kind in marked else MEANINGS[str(kind)]
             marked.add(str(kind))
-            axes.plot(
-                rows[x],
-                rows[y],
-                MARKERS[str(kind)],
-                color=color,
-                markersize=3.6,
-                markerfacecolor="white",
-                markeredgewidth=0.8,
-                label=text,
-            )
+            look = {"markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 0.8}
+            axes.plot(rows[x], rows[y], MARKERS[str(kind)], color=color, label=text, **look)
     add_legend(axes, len(branches) + len(marked))
     return finish(figure, path)
 
@@ -77,12 +66,5 @@ def _pieces(branch: Branch, x: str, y: str) -> list[tuple[bool, tuple[Floats, Fl
     every = every[np.argsort(every[:, 0], kind="stable")]
     stable = every[:, 3] == 0.0
     cuts = np.flatnonzero(stable[1:] != stable[:-1]) + 1
-    pieces: list[tuple[bool, tuple[Floats, Floats]]] = []
-    for first, last in zip([0, *cuts], [*cuts, len(every)], strict=True):
-        piece = every[first : last + 1]
-        pieces.append((bool(stable[first]), (piece[:, 1], piece[:, 2])))
-    return pieces
-
-
-def _columns(branch: Branch) -> list[Any]:
-    return [name for name in branch.events.columns if name in branch.points.columns]
+    ends = zip([0, *cuts], [*cuts, len(every)], strict=True)
+    return [(bool(stable[i]), (every[i : k + 1, 1], every[i : k + 1, 2])) for i, k in ends]

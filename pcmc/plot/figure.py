@@ -36,8 +36,7 @@ def new(width: float, height: float, pad: float = 4.0) -> Any:
         raise MissingExtra("matplotlib", "plot") from None
     gap = pad / DPI
     layout = ConstrainedLayoutEngine(w_pad=gap, h_pad=gap, wspace=0.0, hspace=0.0)
-    size = (width / DPI, height / DPI)
-    figure = Figure(figsize=size, dpi=DPI, facecolor="white", layout=layout)
+    figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white", layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
@@ -105,12 +104,8 @@ def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
     if path is None:
         return image
     if os.path.splitext(path)[1].lower() != ".png":
-        raise FileError(
-            f"{os.fspath(path)}: pictures are PNG files; end the name with .png",
-            what=os.fspath(path),
-            found=os.path.splitext(path)[1],
-            expected=".png",
-        )
+        text = f"{os.fspath(path)}: pictures are PNG files; end the name with .png"
+        raise FileError(text, what=os.fspath(path), expected=".png")
     picture = Pillow.fromarray(image)
     stream = io.BytesIO()
     picture.save(stream, format="PNG", optimize=True)

@@ -51,23 +51,11 @@ def add_legend(figure: Any, pictures: Iterable[Shown]) -> None:
     from matplotlib.patches import Patch as Swatch
 
     colors, dots = entries(pictures)
-    handles: list[Any] = [
-        Swatch(facecolor=color, edgecolor=INK, linewidth=0.4, label=name) for name, color in colors.items()
-    ]
-    handles += [
-        Line2D([], [], linestyle="", marker="o", markersize=2.6, color=color, label=name)
-        for name, color in dots.items()
-    ]
+    area: dict[str, Any] = {"edgecolor": INK, "linewidth": 0.4}
+    dot: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 2.6}
+    handles: list[Any] = [Swatch(facecolor=color, label=name, **area) for name, color in colors.items()]
+    handles += [Line2D([], [], color=color, label=name, **dot) for name, color in dots.items()]
     if handles:
-        figure.legend(
-            handles=handles,
-            loc="outside lower center",
-            ncols=min(len(handles), IN_A_LINE),
-            fontsize=SMALL,
-            frameon=False,
-            labelcolor=INK,
-            handlelength=1.2,
-            handleheight=1.0,
-            borderaxespad=0.3,
-            borderpad=0.9,
-        )
+        space = {"handlelength": 1.2, "handleheight": 1.0, "borderaxespad": 0.3, "borderpad": 0.9}
+        text = {"fontsize": SMALL, "labelcolor": INK, "ncols": min(len(handles), IN_A_LINE)}
+        figure.legend(handles=handles, loc="outside lower center", frameon=False, **text, **space)

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..base import validate
 from ..base.arrays import Bools, Floats
-from ..base.errors import OptionError
 from ..surface import Surface
 from ..surface.geometry import area_vectors
 from .colors import color_scale
 from .figure import INK, SMALL, TEXT, Image, finish, fit_height, grid, new
 from .legend import add_legend, shown_vertices
 from .raster import paint
-from .scene import View, mean_edge, scene, view_of
+from .scene import Scene, View, mean_edge, scene, view_of
 
 Path = str | os.PathLike[str]
 ViewName = str | tuple[float, float]
@@ -120,10 +120,9 @@ def panel(
 ) -> Image:
     """Several surfaces in one picture, with one scale of colour.
 
-    ``views``, ``scalars``, ``numbers`` and ``patches`` are one per surface (``views`` and ``patches``
-    may be one for all).
-    ``one_scale`` draws a length equally long everywhere; without it each surface fills its place.
-    The rest is as in ``draw``.
+    ``views``, ``scalars``, ``numbers`` and ``patches`` are one per surface; ``views`` and ``patches``
+    may be one for all. ``one_scale`` draws a length equally long everywhere; without it each surface
+    fills its place. The rest is as in ``draw``.
     """
     drawings = _drawings(surfaces, views, titles, scalars, numbers, patches)
     columns = min(columns or (3 if len(drawings) not in (1, 2, 4) else 2), len(drawings))
@@ -141,17 +140,13 @@ def panel(
         add_legend(figure, shown)
     fit_frames(figure, axes, frames, columns)
     for k, drawing in enumerate(drawings):
-        painted = scene(
-            drawing.surface,
-            drawing.view,
-            None if colors is None or drawing.values is None else colors.rgb(drawing.values),
-            supports=dotted[k],
-            edges=edge[k] >= EDGES_FROM if edges is None else edges,
-            patches=drawing.patches,
-        )
-        frames[k].show(axes[k], paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer))
+        surface, view = drawing.surface, drawing.view
+        fill = None if colors is None or drawing.values is None else colors.rgb(drawing.values)
+        meshed = edge[k] >= EDGES_FROM if edges is None else edges
+        painted = scene(surface, view, fill, supports=dotted[k], edges=meshed, patches=drawing.patches)
+        frames[k].show(axes[k], painted, renderer)
         if drawing.numbers is not None:
-            _print_numbers(axes[k], drawing.surface, drawing.view, drawing.numbers, form)
+            _print_numbers(axes[k], surface, view, drawing.numbers, form)
     return finish(figure, path)
 
 
@@ -178,7 +173,7 @@ def _drawings(
     """One for each surface, from the arguments of ``panel``."""
     count = len(surfaces)
     if not count:
-        raise OptionError("panel: expected at least one surface, found none", what="surfaces", found=0)
+        validate.refuse("surfaces", 0, "at least one surface")
     if _is_view(views):
         views = [views] * count
     if patches is None or all(isinstance(entry, str) for entry in patches):
@@ -209,15 +204,14 @@ class Frame:
     low: Floats
     scale: float
 
-    def show(self, axes: Any, image: Floats) -> None:
-        """Show an image of this size on the axes, pixel on pixel."""
+    def show(self, axes: Any, painted: Scene, renderer: str) -> None:
+        """Paint a scene on the axes, pixel on pixel."""
+        image = paint(painted, self.low, self.scale, self.size, renderer)
         right, top = self.low + np.array(self.size) / self.scale
         figure, box = axes.figure.bbox, axes.get_window_extent()
-        corner = (
-            round(box.x0) / figure.width,
-            (figure.height - round(figure.height - box.y1) - self.size[1]) / figure.height,
-        )
-        axes.set_position((*corner, self.size[0] / figure.width, self.size[1] / figure.height))
+        left = round(box.x0) / figure.width
+        bottom = (figure.height - round(figure.height - box.y1) - self.size[1]) / figure.height
+        axes.set_position((left, bottom, self.size[0] / figure.width, self.size[1] / figure.height))
         axes.imshow(image, extent=(self.low[0], right, self.low[1], top), aspect="auto")
 
 
@@ -262,16 +256,8 @@ def _print_numbers(axes: Any, surface: Surface, view: View, numbers: Floats, for
 
     shown = np.flatnonzero(np.isfinite(numbers) & _facing(surface, view))
     for (x, y), number in zip(view.project(surface.vertices[shown]), numbers[shown], strict=True):
-        axes.text(
-            x,
-            y,
-            format(number, form),
-            fontsize=SMALL,
-            color=INK,
-            ha="center",
-            va="center",
-            path_effects=[withStroke(linewidth=1.4, foreground="white")],
-        )
+        text = axes.text(x, y, format(number, form), fontsize=SMALL, color=INK, ha="center", va="center")
+        text.set_path_effects([withStroke(linewidth=1.4, foreground="white")])
 
 
 def _facing(surface: Surface, view: View) -> Bools:
@@ -291,12 +277,7 @@ def _is_view(view: object) -> bool:
 
 def _per_surface(name: str, entries: Any, count: int) -> list[Any]:
     if len(entries) != count:
-        raise OptionError(
-            f"{name}: expected {count}, one per surface, found {len(entries)}",
-            what=name,
-            found=len(entries),
-            expected=count,
-        )
+        validate.refuse(name, len(entries), f"{count}, one per surface")
     return list(entries)
 
 
@@ -311,12 +292,6 @@ def _arrays(
         array = None if values is None else np.asarray(values, dtype=float)
         shapes = [(surface.n,), (surface.m,)] if faces else [(surface.n,)]
         if array is not None and array.shape not in shapes:
-            wanted = " or ".join(map(str, shapes))
-            raise OptionError(
-                f"{name}: expected shape {wanted}, found {array.shape}",
-                what=name,
-                found=array.shape,
-                expected=shapes,
-            )
+            validate.refuse(name, array.shape, f"shape {' or '.join(map(str, shapes))}")
         result.append(array)
     return result

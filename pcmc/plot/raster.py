@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import MissingExtra, OptionError, unknown
+from ..base.errors import MissingExtra
 from .scene import Scene
 
 RENDERERS = ("auto", "pyvista", "matplotlib")
@@ -23,11 +24,12 @@ def paint(scene: Scene, low: Floats, scale: float, size: tuple[int, int], render
 
     ``scale`` is pixels per unit of length, ``size`` (w, h) in pixels.
     """
-    if renderer not in RENDERERS:
-        raise OptionError(unknown("renderer", renderer, RENDERERS), what="renderer", found=renderer)
-    if renderer == "pyvista" or (renderer == "auto" and opengl()):
-        return _with_pyvista(scene, low, scale, size)
-    return _with_matplotlib(scene, low, scale, size)
+    validate.choice("renderer", renderer, RENDERERS)
+    painter = (
+        _with_pyvista if renderer == "pyvista" or (renderer == "auto" and opengl()) else _with_matplotlib
+    )
+    blocks = painter(scene, low, scale, size).reshape(size[1], SAMPLES, size[0], SAMPLES, 3).astype(float)
+    return np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
 
 
 @cache
@@ -58,34 +60,25 @@ def _with_pyvista(scene: Scene, low: Floats, scale: float, size: tuple[int, int]
     with pyvista.vtk_verbosity("off"):
         plotter = pyvista.Plotter(off_screen=True, window_size=(width, height), lighting="none")
         plotter.set_background("white")
-        t = len(scene.corners)
-        cells = np.arange(3 * t).reshape(-1, 3)
+        plain: dict[str, Any] = {"scalars": "rgb", "rgb": True, "lighting": False}
+        cells = np.arange(3 * len(scene.corners)).reshape(-1, 3)
         mesh = pyvista.PolyData.from_regular_faces(scene.corners.reshape(-1, 3), cells)
         mesh["rgb"] = np.round(scene.colors.reshape(-1, 3) * 255.0).astype(np.uint8)
-        plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=False)
+        plotter.add_mesh(mesh, **plain)
         for line_width in np.unique(scene.widths):
             chosen = scene.widths == line_width
-            ends = scene.segments[chosen].reshape(-1, 3)
-            lines = pyvista.line_segments_from_points(ends)
+            lines = pyvista.line_segments_from_points(scene.segments[chosen].reshape(-1, 3))
             lines.cell_data["rgb"] = np.round(scene.shades[chosen] * 255.0).astype(np.uint8)
-            plotter.add_mesh(lines, scalars="rgb", rgb=True, lighting=False, line_width=SAMPLES * line_width)
+            plotter.add_mesh(lines, line_width=SAMPLES * line_width, **plain)
         if len(scene.dots):
             dots = pyvista.PolyData(scene.dots)
             dots["rgb"] = np.round(scene.dot_colors * 255.0).astype(np.uint8)
-            plotter.add_mesh(
-                dots,
-                scalars="rgb",
-                rgb=True,
-                lighting=False,
-                style="points",
-                render_points_as_spheres=True,
-                point_size=SAMPLES * DOT,
-            )
+            round_dots = {"style": "points", "render_points_as_spheres": True, "point_size": SAMPLES * DOT}
+            plotter.add_mesh(dots, **plain, **round_dots)
         _aim(plotter, scene, low, scale, size)
         image = plotter.screenshot(return_img=True)
         plotter.close()
-    blocks = image[..., :3].reshape(size[1], SAMPLES, size[0], SAMPLES, 3).astype(float)
-    return np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
+    return image[..., :3]
 
 
 def _aim(plotter: Any, scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> None:
@@ -122,18 +115,8 @@ def _with_matplotlib(scene: Scene, low: Floats, scale: float, size: tuple[int, i
     axes.set_axis_off()
     axes.set_xlim(low[0], low[0] + size[0] / scale)
     axes.set_ylim(low[1], low[1] + size[1] / scale)
-    axes.add_collection(
-        PolyCollection(
-            [shapes[k] for k in order],
-            facecolors=fills[order],
-            edgecolors=fills[order],
-            linewidths=widths[order],
-            closed=True,
-            joinstyle="round",
-        )
-    )
+    painted, fills = [shapes[k] for k in order], fills[order]
+    look: dict[str, Any] = {"linewidths": widths[order], "joinstyle": "round"}
+    axes.add_collection(PolyCollection(painted, facecolors=fills, edgecolors=fills, **look))
     canvas.draw()
-    image = np.asarray(canvas.buffer_rgba())[..., :3]
-    image = image[: size[1] * SAMPLES, : size[0] * SAMPLES]
-    blocks = image.reshape(size[1], SAMPLES, size[0], SAMPLES, 3).astype(float)
-    return np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
+    return np.asarray(canvas.buffer_rgba())[: size[1] * SAMPLES, : size[0] * SAMPLES, :3]

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
-from ..base.errors import OptionError, unknown
 from ..surface import Surface
 from ..surface.colours import patch_colors, rgb
 from ..surface.geometry import area_vectors
@@ -49,9 +49,7 @@ def view_of(surface: Surface, view: str | tuple[float, float]) -> View:
     +y when Π is horizontal.
     """
     if isinstance(view, str):
-        if view not in VIEWS:
-            raise OptionError(unknown("view", view, VIEWS), what="view", found=view)
-        view = VIEWS[view]
+        view = VIEWS[validate.choice("view", view, tuple(VIEWS))]
     azimuth, elevation = (math.radians(a) for a in view)
     up = np.array(surface.plane.normal)
     first = next(e for e in np.eye(3) if abs(e @ up) < 0.9)
@@ -121,31 +119,17 @@ def scene(
         triangles_near = np.tile(near, 6)
     chosen, ends, widths, shades = _segments(surface, view, edges, shown)
     held, points, kinds = _dots(surface, view, supports, F)
-    depth = [triangles_near, _nearest(surface, shown, near)[chosen], _nearest_vertex(surface, F, near)[held]]
-    return Scene(
-        view,
-        P,
-        np.clip(colors, 0.0, 1.0),
-        ends,
-        widths,
-        shades,
-        points,
-        kinds,
-        np.argsort(np.concatenate(depth), kind="stable"),
-    )
+    topo = surface.topology
+    edges_near = _nearest(len(topo.edges), topo.edge_of_face[shown], near)[chosen]
+    depth = np.concatenate([triangles_near, edges_near, _nearest(surface.n, F, near)[held]])
+    order = np.argsort(depth, kind="stable")
+    return Scene(view, P, np.clip(colors, 0.0, 1.0), ends, widths, shades, points, kinds, order)
 
 
-def _nearest(surface: Surface, shown: Bools, near: Floats) -> Floats:
-    """(e,) depth of the nearest shown face at each edge."""
-    result = np.full(len(surface.topology.edges), -np.inf)
-    np.maximum.at(result, surface.topology.edge_of_face[shown].ravel(), np.repeat(near, 3))
-    return result
-
-
-def _nearest_vertex(surface: Surface, faces: Ints, near: Floats) -> Floats:
-    """(n,) depth of the nearest of the faces at each vertex."""
-    result = np.full(surface.n, -np.inf)
-    np.maximum.at(result, faces.ravel(), np.repeat(near, 3))
+def _nearest(count: int, parts: Ints, near: Floats) -> Floats:
+    """(count,) depth of the nearest face at each edge or vertex; ``parts`` (m,3) are those of the faces."""
+    result = np.full(count, -np.inf)
+    np.maximum.at(result, parts.ravel(), np.repeat(near, 3))
     return result
 
 
@@ -164,11 +148,8 @@ def _normals(surface: Surface, smooth: bool) -> Floats:
     area = area_vectors(X[F])
     if smooth:
         key = surface.patch_of_face[:, None].astype(np.int64) * surface.n + F
-        corner, inverse = np.unique(key, return_inverse=True)
-        inverse = inverse.ravel()
-        total = np.stack(
-            [np.bincount(inverse, np.repeat(area[:, d], 3), len(corner)) for d in range(3)], axis=1
-        )
+        inverse = np.unique(key, return_inverse=True)[1].ravel()
+        total = np.stack([np.bincount(inverse, np.repeat(a, 3)) for a in area.T], axis=1)
         normal = total[inverse].reshape(-1, 3, 3)
     else:
         normal = np.repeat(area[:, None], 3, axis=1)

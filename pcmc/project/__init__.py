@@ -25,9 +25,9 @@
 
 from .file import Project, build, load, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
-from .output import COLOURS, check_names, check_outputs, check_picture, paint, save, write_all
+from .output import COLOURS, check_names, check_outputs, check_picture, paint, write_all
 from .remeshing import Remeshing
-from .running import Outcome, raise_if_stopped, reporter, run, run_project, solve_project
+from .running import Outcome, run, run_project, solve_project
 from .varied import check_varied, digest, is_project, varied
 
 __all__ = [
@@ -47,12 +47,9 @@ __all__ = [
     "is_project",
     "load",
     "paint",
-    "raise_if_stopped",
     "reference",
-    "reporter",
     "run",
     "run_project",
-    "save",
     "sections",
     "solve_project",
     "surface_of",

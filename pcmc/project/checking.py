@@ -9,18 +9,14 @@ from typing import Any
 from ..base.errors import FileError, unknown
 from .keys import KINDS, REQUIRED, Section, main_sections, solve_section, target_sections
 
+Place = tuple[str, ...]  # the keys that lead to a table or a value
+
 
 def check_keys(text: str, data: Mapping[str, Any]) -> None:
-    """Check every key of a project file, with its line: known, of the right kind, none missing.
+    """Check every key of a project file: known, of the right kind, none missing.
 
-    Parameters
-    ----------
-    text, data : of the file, as it is written and as TOML reads it.
-
-    Raises
-    ------
-    FileError
-        ``what`` is the dotted key, ``where`` its line.
+    ``text`` is the file as it is written, ``data`` as TOML reads it. In a FileError ``what`` is the
+    dotted key, ``where`` its line.
     """
     root, *below = main_sections()
     _check_table(text, root, (), data)
@@ -31,26 +27,23 @@ def check_keys(text: str, data: Mapping[str, Any]) -> None:
             _check_table(text, section, place, table)
 
 
-def _tables(data: Any, section: Section) -> Iterator[tuple[tuple[str, ...], Any]]:
+def _tables(data: Any, section: Section) -> Iterator[tuple[Place, Any]]:
     """The tables of the file that a section describes, each with its place."""
-    found: list[tuple[tuple[str, ...], Any]] = [((), data)]
+    found: list[tuple[Place, Any]] = [((), data)]
     for step in section.name.split("."):
         if step == "NAME":
             found = [((*p, str(name)), t) for p, table in found for name, t in table.items()]
         else:
-            found = [((*p, step), table[step]) for p, table in found if step in table]
-            listed = [(p, t if isinstance(t, list) else [t]) for p, t in found]
-            found = [(p, t) for p, entries in listed for t in entries]
+            below = [((*p, step), table[step]) for p, table in found if step in table]
+            found = [(p, t) for p, value in below for t in (value if isinstance(value, list) else [value])]
+    curved = any(key.name == "curve" for key in section.keys)
     for place, table in found:
-        if isinstance(table, Mapping):
-            # a divider or hole without the key "curve" is a curve itself
-            if "curve" in table or all(key.name != "curve" for key in section.keys):
-                yield place, table
-        elif section.name.endswith("NAME"):
+        # a divider or hole without the key "curve" is a curve itself
+        if "curve" in table or not curved if isinstance(table, Mapping) else section.name.endswith("NAME"):
             yield place, table
 
 
-def _check_table(text: str, section: Section, place: tuple[str, ...], table: Any) -> None:
+def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
     if not isinstance(table, Mapping):
         raise _wrong_kind(text, place, table, "a table")
     known = {key.name: key for key in section.keys}
@@ -72,31 +65,21 @@ def _check_table(text: str, section: Section, place: tuple[str, ...], table: Any
             raise _error(text, (*place, name), message, at=place, expected=key.kind)
 
 
-def _wrong_kind(text: str, place: tuple[str, ...], value: Any, kind: str) -> FileError:
+def _wrong_kind(text: str, place: Place, value: Any, kind: str) -> FileError:
     name = ".".join(place)
     hint = f"; write [[{name}]]" if kind.startswith("a list") and isinstance(value, Mapping) else ""
     message = f"{name} must be {kind}, found {value!r:.60}{hint}"
     return _error(text, place, message, found=value, expected=kind)
 
 
-def _error(
-    text: str,
-    place: tuple[str, ...],
-    message: str,
-    *,
-    at: tuple[str, ...] | None = None,
-    found: Any = None,
-    expected: Any = None,
-) -> FileError:
+def _error(text: str, place: Place, message: str, *, at: Place | None = None, **fields: Any) -> FileError:
     """The error about the key at ``place``, with its line or that of another key ``at``."""
     at = place if at is None else at
-    line = line_of(text, at[:-1], at[-1], found) if at else 1
-    return FileError(
-        f"line {line}: {message}", what=".".join(place), where=line, found=found, expected=expected
-    )
+    line = line_of(text, at[:-1], at[-1], fields.get("found")) if at else 1
+    return FileError(f"line {line}: {message}", what=".".join(place), where=line, **fields)
 
 
-def line_of(text: str, place: tuple[str, ...], key: str, value: Any = None) -> int:
+def line_of(text: str, place: Place, key: str, value: Any = None) -> int:
     """The line of a key in the table at ``place``; the one with its value if several entries have it.
 
     >>> line_of("[plan]\\nrise = 2\\n[solve]\\nrise = 1", ("solve",), "rise")
@@ -104,7 +87,7 @@ def line_of(text: str, place: tuple[str, ...], key: str, value: Any = None) -> i
     """
     named = re.compile(rf"(^|[\s{{,.\[]){_quoted(key)}\s*([=.\]])")
     last = re.compile(rf"(^|[\s{{,.\[]){_quoted(place[-1])}\s*[=.\]]") if place else None
-    header: tuple[str, ...] = ()
+    header: Place = ()
     lines = []  # how badly each fits, and its number
     for number, line in enumerate(text.splitlines(), 1):
         if head := re.match(r"\s*\[\[?([^\[\]]+)\]\]?\s*(#|$)", line):

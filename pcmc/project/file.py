@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -63,8 +64,7 @@ class Project:
         """The same project with its output in a folder."""
         base = Path(folder)
         picture = None if self.picture is None else base / self.picture
-        files = [base / name for name in self.files]
-        return replace(self, files=files, picture=picture, folder=base)
+        return replace(self, files=[base / name for name in self.files], picture=picture, folder=base)
 
 
 def load(path: PathLike) -> Project:
@@ -88,18 +88,13 @@ def read_data(path: Path) -> tuple[str, dict[str, Any]]:
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
     except UnicodeDecodeError as error:
-        raise FileError(
-            f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8",
-            what=str(path),
-            where=error.start,
-        ) from None
+        message = f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8"
+        raise FileError(message, what=str(path), where=error.start) from None
     except tomllib.TOMLDecodeError as error:
         line, hint = _toml_error(text, str(error))
         raise FileError(f"{path}: not TOML: {error}{hint}", what=str(path), where=line) from None
-    try:
+    with in_file(path, FileError):
         check_keys(text, data)
-    except PcmcError as error:
-        raise in_file(path, error, FileError) from None
     return text, data
 
 
@@ -109,24 +104,18 @@ def _toml_error(text: str, message: str) -> tuple[int | None, str]:
     if place is None:
         return None, ""
     line, column = int(place[1]), int(place[2])
-    if text.split("\n")[line - 1][column - 1 :][:1].isascii():
-        return line, ""
-    return line, "; put names with letters beyond a-z in quotes"
+    plain = text.split("\n")[line - 1][column - 1 :][:1].isascii()
+    return line, "" if plain else "; put names with letters beyond a-z in quotes"
 
 
-def in_file(path: Path, error: PcmcError, kind: type[PcmcError] | None = None) -> PcmcError:
-    """The same error, or one of another kind, with the file at the start of its message."""
-    return (kind or type(error))(
-        f"{path}: {error}", what=error.what, where=error.where, found=error.found, expected=error.expected
-    )
-
-
-def project_of(path: Path, data: Mapping[str, Any]) -> Project:
-    """The project with the given data. Errors as in ``load``."""
+@contextmanager
+def in_file(path: Path, kind: type[PcmcError] | None = None) -> Iterator[None]:
+    """Put the file at the start of the message of an error, and raise it as ``kind`` if that is given."""
     try:
-        return _project(path, data)
+        yield
     except PcmcError as error:
-        raise in_file(path, error, FileError) from None
+        fields = {name: getattr(error, name) for name in ("what", "where", "found", "expected")}
+        raise (kind or type(error))(f"{path}: {error}", **fields) from None
 
 
 def build(path: PathLike) -> Surface:
@@ -138,34 +127,32 @@ def surface_of(project: Project) -> Surface:
     """The mesh of the project's plan."""
     if project.plan is None:
         return io.read_bare(project.path)
-    try:
+    with in_file(project.path):
         return project.plan.surface()
-    except PcmcError as error:
-        raise in_file(project.path, error) from None
 
 
-def _project(path: Path, data: Mapping[str, Any]) -> Project:
-    output = data.get("output", {})
-    options = dict(data.get("solve", {}))
+def project_of(path: Path, data: Mapping[str, Any]) -> Project:
+    """The project with the given data. Errors as in ``load``."""
+    output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
     method = options.pop("method", "newton")
-    find_method(method).options(**options)  # refuses bad values before the plan is meshed
     files, picture = output.get("files", []), output.get("picture")
-    check_names(files, picture)
     view, colour = output.get("view", "diagonal"), output.get("colour", "patches")
-    check_picture(view, colour)
-    stages = data.get("remesh", [])
-    return Project(
-        path=path,
-        plan=plan_from(data["plan"]),
-        method=method,
-        options=options,
-        remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
-        **(_search(data["targets"]) if "targets" in data else {}),
-        files=files,
-        picture=picture,
-        view=tuple(view) if isinstance(view, list) else view,
-        colour=colour,
-    )
+    with in_file(path, FileError):
+        find_method(method).options(**options)  # refuses bad values before the plan is meshed
+        check_names(files, picture)
+        check_picture(view, colour)
+        return Project(
+            path=path,
+            plan=plan_from(data["plan"]),
+            method=method,
+            options=options,
+            remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
+            **(_search(data["targets"]) if "targets" in data else {}),
+            files=files,
+            picture=picture,
+            view=tuple(view) if isinstance(view, list) else view,
+            colour=colour,
+        )
 
 
 def _search(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -112,15 +112,10 @@ def _of_class(
 def main_sections() -> tuple[Section, ...]:
     """The file itself, and all sections but [solve] and [targets]."""
     curve, curves = {"curve": "a curve"}, "a list of curves or tables"
-    plan = {
-        "outline": "a curve",
-        "dividers": curves,
-        "holes": curves,
-        "patches": "a table",
-        "supports": "a list of points and curves",
-        "plane": "a table",
-    }
+    plan = {"outline": "a curve", "dividers": curves, "holes": curves, "patches": "a table"}
+    plan |= {"supports": "a list of points and curves", "plane": "a table"}
     area = _of_class(Area, {"at": "a point [x, y] or a list of points"})
+    directions = "of the picture: diagonal, elevation, plan, or [azimuth, elevation] in degrees"
     return (
         Section(
             "",
@@ -135,9 +130,7 @@ def main_sections() -> tuple[Section, ...]:
         ),
         Section("plan", "The roof, by the lines of its plan.", _of_class(Plan, plan, {"edge": EDGES})),
         Section(
-            "plan.patches.NAME",
-            "A patch; NAME is its name.",
-            tuple(key for key in area if key.name != "name"),
+            "plan.patches.NAME", "A patch; NAME is its name.", tuple(k for k in area if k.name != "name")
         ),
         Section(
             "plan.dividers",
@@ -164,19 +157,9 @@ def main_sections() -> tuple[Section, ...]:
             "output",
             "What to write. Without it nothing is written.",
             (
-                Key(
-                    "files",
-                    "a list of names",
-                    [],
-                    "of the files with the surface; the suffix names the format",
-                ),
+                Key("files", "a list of names", [], "files of the surface; the suffix names the format"),
                 Key("picture", "a text", None, "name of a picture, .png"),
-                Key(
-                    "view",
-                    "a name or two angles",
-                    "diagonal",
-                    "of the picture: diagonal, elevation, plan, or [azimuth, elevation] in degrees",
-                ),
+                Key("view", "a name or two angles", "diagonal", directions),
                 Key("colour", "a text", "patches", "of the picture", COLOURS),
             ),
         ),
@@ -189,11 +172,8 @@ def solve_section(method: str) -> Section:
     known = Key("method", "a text", "newton", "the solver", tuple(METHODS))
     if method not in METHODS:
         return Section("solve", "The solver and its options.", (known,))
-    limits = {
-        "newton": {"target": ("minimum", "stationary")},
-        "nesterov": {"armijo": ("printed", "sufficient")},
-    }
-    options = _of_class(find_method(method).options, choices=limits.get(method))
+    choices = {"target": ("minimum", "stationary"), "armijo": ("printed", "sufficient")}
+    options = _of_class(find_method(method).options, choices=choices)
     return Section("solve", "The solver and its options.", (known, *options), f'method = "{method}"')
 
 
@@ -203,6 +183,8 @@ def target_sections() -> tuple[Section, ...]:
     from ..design import Parameter, Target  # needed by projects with targets only
     from ..design.quantities import QUANTITIES
 
+    changing = _of_class(Parameter, choices={"kind": ("tension", "pressure")})
+    varied = "what may change; a name alone is a patch whose tension may"
     wanted = _of_class(Target, {"of": "a name or a point [x, y]"}, {"quantity": tuple(QUANTITIES)})
     return (
         Section(
@@ -210,20 +192,11 @@ def target_sections() -> tuple[Section, ...]:
             "Quantities to be met by changing tensions or pressures.",
             (
                 Key("meet", "a list of tables", REQUIRED, "the quantities and their values"),
-                Key(
-                    "vary",
-                    "a list of names or tables",
-                    REQUIRED,
-                    "what may change; a name alone is a patch whose tension may",
-                ),
+                Key("vary", "a list of names or tables", REQUIRED, varied),
             ),
         ),
         Section("targets.meet", "A quantity and what it is to be.", wanted),
-        Section(
-            "targets.vary",
-            "What may change.",
-            _of_class(Parameter, choices={"kind": ("tension", "pressure")}),
-        ),
+        Section("targets.vary", "What may change.", changing),
     )
 
 
@@ -256,12 +229,8 @@ def reference() -> str:
     lines = []
     for section in sections()[1:]:
         condition = f" with `{section.condition}`" if section.condition else ""
-        lines += [
-            f"## `{section.name if section is _CURVE else f'[{section.name}]'}`{condition}",
-            "",
-            section.help,
-            "",
-        ]
+        title = section.name if section is _CURVE else f"[{section.name}]"
+        lines += [f"## `{title}`{condition}", "", section.help, ""]
         lines += ["| key | value | default | meaning |", "|---|---|---|---|"]
         for key in section.keys:
             value = ", ".join(f'`"{c}"`' for c in key.choices) or key.kind

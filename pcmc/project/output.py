@@ -15,12 +15,11 @@ import numpy as np
 from .. import io
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import FileError, FileWarning, LostWarning, OptionError, PcmcError, unknown
+from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknown
 from ..base.files import atomic_writes
 from ..base.interrupts import defer_interrupts
 from ..certificate.certificate import Certificate
 from ..energy.curvature import curvature_error, mean_curvature
-from ..solvers.result import Result
 from ..surface import Surface
 
 PathLike = str | os.PathLike[str]
@@ -30,34 +29,6 @@ COLOURS = ("patches", "curvature", "error", "reactions")
 
 def ignore(step: str) -> None:
     """An ``OnStep`` that shows nothing."""
-
-
-def save(
-    result: Result,
-    files: Iterable[PathLike],
-    picture: PathLike | None = None,
-    *,
-    view: Any = "diagonal",
-    colour: str = "patches",
-    progress: OnStep | None = None,
-) -> list[Path]:
-    """Write a result to files, and a picture of it: all of them, or none.
-
-    ``fields`` and the certificate are written if the format can hold them.
-    """
-    surface, certificate = result.surface, result.certificate
-    scalars = fields(surface, certificate)
-
-    def write(path: Path) -> None:
-        io.write(path, surface, scalars=scalars, certificate=certificate)
-
-    def draw(path: Path) -> None:
-        paint(surface, path, view, colour)
-
-    works = [(Path(file), write) for file in files]
-    if picture is not None:
-        works.append((Path(picture), draw))
-    return write_all(works, progress)
 
 
 def fields(surface: Surface, certificate: Certificate) -> dict[str, Floats]:
@@ -87,9 +58,8 @@ def write_all(
                 with defer_interrupts(), _final_name_in_warnings(temporary, path):
                     write(temporary)
             except OSError as error:
-                raise FileError(
-                    f"{path}: cannot be written ({error.strerror or error})", what=str(path)
-                ) from None
+                text = f"{path}: cannot be written ({error.strerror or error})"
+                raise FileError(text, what=str(path)) from None
             except PcmcError as error:
                 text = str(error).replace(f"{temporary}: ", "")
                 raise FileError(f"{path}: {text}", what=str(path)) from None
@@ -131,14 +101,10 @@ def check_picture(view: Any, colour: str) -> None:
     validate.choice("colour", colour, COLOURS)
     if isinstance(view, str):
         validate.choice("view", view, tuple(VIEWS))
-    elif not (
-        isinstance(view, Sequence)
-        and len(view) == 2
-        and all(isinstance(angle, int | float) and math.isfinite(angle) for angle in view)
-    ):
-        raise OptionError(
-            f"view: expected a name or two angles in degrees, found {view!r}", what="view", found=view
-        )
+    else:
+        angles = view if isinstance(view, Sequence) and len(view) == 2 else [math.nan]
+        if not all(isinstance(angle, int | float) and math.isfinite(angle) for angle in angles):
+            validate.refuse("view", view, "a name or two angles in degrees")
 
 
 def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> None:
@@ -147,42 +113,33 @@ def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> N
         suffix = Path(file).suffix.lower()
         if suffix not in io.FORMATS:
             hint = "; a picture has its own option" if suffix == ".png" else ""
-            raise FileError(
-                f"{file}: {unknown('suffix', suffix, io.FORMATS)}{hint}",
-                what=str(file),
-                found=suffix,
-                expected=tuple(io.FORMATS),
-            )
+            text = f"{file}: {unknown('suffix', suffix, io.FORMATS)}{hint}"
+            raise FileError(text, what=str(file), found=suffix)
     if picture is not None and Path(picture).suffix.lower() != ".png":
-        raise FileError(
-            f"{picture}: pictures are written as .png only; change the suffix",
-            what=str(picture),
-            found=Path(picture).suffix,
-            expected=".png",
-        )
+        text = f"{picture}: pictures are written as .png only; change the suffix"
+        raise FileError(text, what=str(picture), found=Path(picture).suffix, expected=".png")
 
 
 def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
     """Refuse, before any work, paths that cannot be written; the folder ``made`` may be missing."""
-    seen: list[str] = []
+    seen = set()
     if made is not None and made.exists() and not made.is_dir():
         raise FileError(f"{made} is a file; the output needs a folder", what=str(made))
     for path in paths:
-        place = os.path.normcase(path.absolute())
+        place = os.path.normcase(path.resolve())
         folder = path.parent
         there = next(f for f in (folder.absolute(), *folder.absolute().parents) if f.exists())
         problem = None
         if path.is_dir():
             problem = "is a folder; give the name of a file"
         elif place in seen:
-            problem = "is named twice in the output"
+            problem = "is named twice; name two files for the output"
         elif folder != made and not folder.is_dir():
             problem = f"there is no folder {folder}; create it first"
         elif not there.is_dir():
             problem = f"{there} is a file; the output needs a folder"
         elif not os.access(there, os.W_OK):
-            shown = folder if folder.is_dir() else there
-            problem = f"cannot be written (the folder {shown} is read-only)"
+            problem = f"cannot be written (the folder {folder if folder.is_dir() else there} is read-only)"
         if problem:
             raise FileError(f"{path}: {problem}", what=str(path))
-        seen.append(place)
+        seen.add(place)

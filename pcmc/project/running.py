@@ -5,10 +5,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ..base.errors import BalanceWarning, OptionError, PcmcError
+from .. import io
+from ..base.errors import BalanceWarning, OptionError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
 from ..certificate.certificate import Certificate
@@ -18,7 +21,7 @@ from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from .file import Project, in_file, load, surface_of
-from .output import OnStep, PathLike, check_names, check_outputs, ignore, save
+from .output import OnStep, PathLike, check_names, check_outputs, fields, ignore, paint, write_all
 
 if TYPE_CHECKING:
     from ..design import Design
@@ -98,16 +101,14 @@ def run_project(
     outcome = solve_project(project, start, report)
     if not outputs or not (outcome.good or anyway):
         return outcome
+    surface, certificate = outcome.surface, outcome.certificate
+    data: dict[str, Any] = {"scalars": fields(surface, certificate), "certificate": certificate}
+    works = [(Path(file), partial(io.write, surface=surface, **data)) for file in project.files]
+    if project.picture is not None:
+        look = {"view": project.view, "colour": project.colour}
+        works.append((Path(project.picture), partial(paint, surface, **look)))
     with made(project.folder or Path()):
-        written = save(
-            outcome.result,
-            project.files,
-            project.picture,
-            view=project.view,
-            colour=project.colour,
-            progress=report,
-        )
-    return replace(outcome, files=written)
+        return replace(outcome, files=write_all(works, report))
 
 
 def _check_balance(surface: Surface) -> None:
@@ -125,23 +126,19 @@ def solve_project(project: Project, surface: Surface, progress: OnStep | None = 
     A surface that is not certified, or misses a target, is not remeshed.
     """
     report = progress or ignore
-    stages = [m for m in project.remeshing if m.when == "after"]
-    try:
-        for first in project.remeshing:
-            if first.when == "before":
+    with in_file(project.path):
+        for stage in project.remeshing:
+            if stage.when == "before":
                 report("remeshing")
-                surface = remesh(surface, **first.options)
+                surface = remesh(surface, **stage.options)
         outcome = _solve_or_meet(project, surface, report)
-        for stage in stages:
-            if not outcome.good:
-                break
-            report("remeshing")
-            surface = remesh(outcome.surface, **stage.options)
-            outcome = _solve_or_meet(replace(project, targets=()), surface, report)
-            if project.targets and outcome.good:  # otherwise its verdict is the better explanation
-                outcome = _solve_or_meet(project, outcome.surface, report)
-    except PcmcError as error:
-        raise in_file(project.path, error) from None
+        for stage in project.remeshing:
+            if stage.when == "after" and outcome.good:
+                report("remeshing")
+                surface = remesh(outcome.surface, **stage.options)
+                outcome = _solve_or_meet(replace(project, targets=()), surface, report)
+                if project.targets and outcome.good:  # otherwise its verdict is the better explanation
+                    outcome = _solve_or_meet(project, outcome.surface, report)
     return outcome
 
 
@@ -151,17 +148,12 @@ def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcom
     if design is not None:
         result = design.result
     else:
-        result = raise_if_stopped(solve(surface, project.method, reporter(report), **project.options))
+        result = solve(surface, project.method, reporter(report), **project.options)
+        if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
+            raise KeyboardInterrupt
     report("certifying")
     result.certificate  # noqa: B018 — computed here, while the progress is shown
     return Outcome(result, (), design)
-
-
-def raise_if_stopped(result: Result) -> Result:
-    """The result, unless Ctrl-C stopped the solver: then KeyboardInterrupt, to end the command."""
-    if result.status is Status.STOPPED:
-        raise KeyboardInterrupt
-    return result
 
 
 def reporter(report: OnStep) -> Callable[[Progress], None]:
@@ -178,20 +170,14 @@ def _meet(project: Project, surface: Surface, report: OnStep) -> Design:
     from ..design import DesignStatus, meet  # needed by projects with targets only
 
     if project.method != "newton":
-        raise OptionError(
-            f"only method 'newton' can meet targets, found {project.method!r}",
-            what="solve.method",
-            found=project.method,
-            expected="newton",
-        )
-    count = iter(range(1, 10**6))
-    design = meet(
-        surface,
-        project.targets,
-        project.vary,
-        callback=lambda row: report(f"meeting the targets: solve {next(count)}"),
-        **project.options,
-    )
-    if design.status is DesignStatus.STOPPED:  # as in ``raise_if_stopped``
+        message = f"only method 'newton' can meet targets, found {project.method!r}"
+        raise OptionError(message, what="solve.method", found=project.method, expected="newton")
+    solves = count(1)
+
+    def callback(row: object) -> None:
+        report(f"meeting the targets: solve {next(solves)}")
+
+    design = meet(surface, project.targets, project.vary, callback=callback, **project.options)
+    if design.status is DesignStatus.STOPPED:  # by Ctrl-C
         raise KeyboardInterrupt
     return design

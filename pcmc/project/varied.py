@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import io
-from ..base.errors import OptionError, PcmcError, unknown
+from ..base.errors import OptionError, unknown
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 from .file import PathLike, Project, in_file, project_of, read_data, surface_of
@@ -77,14 +77,14 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
     known = [f"{patch.name}.{what}" for what in QUANTITIES for patch in surface.patches]
     for name, given in values.items():
         if name not in keys and name not in known:
-            shown = known + [k for k, place in keys.items() if _listed(place)]
+            # no coordinates, and patches have shorter names
+            shown = known + [k for k, at in keys.items() if isinstance(at[-1], str) and at[1] != "patches"]
             near = get_close_matches(name, keys, n=1, cutoff=0.8)  # a coordinate, perhaps
             raise _unknown_number(path, name, shown + near)
         for value in given:
             if isinstance(value, bool | str | None) or not math.isfinite(value):
-                raise OptionError(
-                    f"{path}: {name} must be a finite number, found {value!r}", what=name, found=value
-                )
+                text = f"{path}: {name} must be a finite number, found {value!r}"
+                raise OptionError(text, what=name, found=value)
             _project(path, {name: value})
             _retensioned(path, surface, {name: value})
 
@@ -111,11 +111,6 @@ def is_project(path: PathLike) -> bool:
 def _unknown_number(path: Path, name: str, known: Iterable[str]) -> OptionError:
     names = tuple(dict.fromkeys(known))
     return OptionError(f"{path}: {unknown('number', name, names)}", what=name, expected=names)
-
-
-def _listed(place: KeyPath) -> bool:
-    """Whether a message lists the key: no coordinates, and patches have shorter names."""
-    return isinstance(place[-1], str) and place[1] != "patches"
 
 
 def _data(path: Path) -> dict[str, Any]:
@@ -145,7 +140,5 @@ def _retensioned(path: Path, surface: Surface, values: Mapping[str, float]) -> S
         if what not in given:
             raise _unknown_number(path, name, keys)
         given[what][patch] = values[name]
-    try:
+    with in_file(path, OptionError):
         return with_pressures(surface, given["tension"], given["pressure"])
-    except PcmcError as error:
-        raise in_file(path, error, OptionError) from None
