@@ -113,13 +113,12 @@ def read(path: Path, **_: Any) -> MeshData:
     file = _open(path)
     if "written by pcmc" in file.header:
         file.section("read")  # its last line: without it the file is cut off
-    top = file.section("top")
-    known = _parameters(top)
+    known = _parameters(file.section("top"))
     ids, X, support, constraint = _vertices(file, known)
-    faces = _faces(file, ids)
-    F, source, notes = triangulate(X, faces.corners, faces.counts)
-    pressure, more = _pressures(file, faces.ids, known)
-    patch_of_face, patches = _patches(file, faces.rest, pressure, known)
+    face_ids, corners, counts, rest = _faces(file, ids)
+    F, source, notes = triangulate(X, corners, counts)
+    pressure, more = _pressures(file, face_ids, known)
+    patch_of_face, patches = _patches(file, rest, pressure, known)
     given = re.search(r"^// origin (\S+) (\S+) (\S+)$", file.header, re.M)
     origin = np.array([float(c) for c in given.groups()]) if given else np.zeros(3)
     plane = _plane(file, constraint, origin, known)
@@ -162,12 +161,8 @@ class _File:
     def section(self, name: str) -> _Section:
         if name not in self.sections:
             known = ", ".join(k for k in self.sections if k != "top") or "none"
-            raise FileError(
-                f"no {name} section (found: {known}); the file is cut off or is not a Surface Evolver"
-                " datafile",
-                where=name,
-                found=known,
-            )
+            text = f"no {name} section (found: {known}); the file is cut off or no Surface Evolver datafile"
+            raise FileError(text, where=name)
         return self.sections[name]
 
 
@@ -191,27 +186,16 @@ def _open(path: Path) -> _File:
 
 
 UNREADABLE = (
-    "string",
-    "quadratic",
-    "lagrange",
-    "simplex_representation",
-    "torus",
-    "torus_filled",
-    "symmetry_group",
-    "#include",
-    "#define",
+    "string|quadratic|lagrange|simplex_representation|torus|torus_filled|symmetry_group|#include|#define"
 )
 
 
 def _parameters(top: _Section) -> dict[str, float]:
     """Named constants of the top section, which coordinates and tensions may use."""
-    for word in UNREADABLE:
-        hit = re.search(rf"^[^\S\n]*{word}\b", top.text, re.I | re.M)
-        if hit:
-            raise top.error(
-                f"{word} is not supported; load the file in Surface Evolver, `dump` it, and read the dump",
-                offset=hit.start(),
-            )
+    foreign = re.search(rf"^[^\S\n]*({UNREADABLE})\b", top.text, re.I | re.M)
+    if foreign:
+        text = f"{foreign[1].lower()} is not supported; load the file in Surface Evolver and `dump` it"
+        raise top.error(f"{text}; read the dump", offset=foreign.start())
     known = {"pi": math.pi}
     for hit in re.finditer(r"^[^\S\n]*parameter\s+(\w+)\s*=\s*([^\n]+)", top.text, re.I | re.M):
         known[hit[1].lower()] = constant(hit[2], known, partial(top.error, offset=hit.start()))
@@ -244,15 +228,8 @@ def _vertices(file: _File, known: Mapping[str, float]) -> tuple[Ints, Floats, In
     return np.array(columns[0], dtype=np.int64), X, support[code], constraint[code]
 
 
-@dataclass(frozen=True, eq=False)
-class _Faces:
-    ids: Ints
-    corners: Ints  # vertices of face after face
-    counts: Ints  # corners of each face
-    rest: list[str]  # what follows the edges on each face's line
-
-
-def _faces(file: _File, vertex_ids: Ints) -> _Faces:
+def _faces(file: _File, vertex_ids: Ints) -> tuple[Ints, Ints, Ints, list[str]]:
+    """Ids, vertices of face after face, corners of each face, and what follows the edges on its line."""
     edges, faces = file.section("edges"), file.section("faces")
     what = "an edge number and two vertices"
     edge_rows = edges.elements(r"(\d+)[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)[^\n]*", what)
@@ -270,10 +247,9 @@ def _faces(file: _File, vertex_ids: Ints) -> _Faces:
     following[last] = last - counts + 1
     open_at = np.flatnonzero(head != tail[following])
     if len(open_at):
-        text = "the edges of the face do not follow each other head to tail"
-        raise faces.error(text, row[open_at[0]])
+        raise faces.error("the edges of the face do not follow each other head to tail", row[open_at[0]])
     ids = np.array([f[0] for f in listed], dtype=np.int64)
-    return _Faces(ids, tail, counts, [f[2] for f in listed])
+    return ids, tail, counts, [f[2] for f in listed]
 
 
 def _places(ids: Ints, wanted: Ints, section: _Section, what: str, row: Ints | None = None) -> Ints:
@@ -336,10 +312,8 @@ def _plane(file: _File, constraint: Ints, origin: Floats, known: Mapping[str, fl
     top = file.section("top")
     used = np.unique(constraint[constraint > 0])
     if len(used) > 1:
-        raise top.error(
-            f"sliding vertices lie on constraints {', '.join(map(str, used))}; pcmc supports one plane"
-            " for all of them"
-        )
+        text = f"sliding vertices lie on constraints {', '.join(map(str, used))}"
+        raise top.error(f"{text}; pcmc supports one plane for all of them")
     wanted = int(used[0]) if len(used) else 1
     pattern = rf"^[^\S\n]*constraint\s+{wanted}\b[^\n]*\s+(?:formula|function)\s*:?\s*([^\n]+)"
     hit = re.search(pattern, top.text, re.I | re.M)
@@ -367,10 +341,8 @@ def _numbers(
     try:
         return np.array(words, dtype=np.float64)
     except ValueError:
-        code, kinds = pd.factorize(np.array(words, dtype=object))
-
-    def value(k: int) -> float:
-        at = int(np.argmax(code == k)) if row is None else row
-        return constant(kinds[k], known, lambda text: section.error(text, at))
-
-    return np.array([value(k) for k in range(len(kinds))])[code]
+        rows = range(len(words)) if row is None else [row]
+        values = [
+            constant(word, known, partial(section.error, row=k)) for k, word in zip(rows, words, strict=True)
+        ]
+        return np.array(values)

@@ -111,7 +111,5 @@ class _Walls:
             if not len(walls.faces) == len(walls.patch) or walls.patch.max() >= len(walls.patches):
                 raise ValueError
         except (ValueError, KeyError, TypeError):
-            raise FileError(
-                f"the description of walls in it is damaged: {text!r:.60}", where=KEY, found=text[:60]
-            ) from None
+            raise FileError(f"the description of walls in it is damaged: {text!r:.60}", where=KEY) from None
         return walls

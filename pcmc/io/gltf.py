@@ -80,9 +80,8 @@ def read(path: Path) -> MeshData:
         try:
             scene = trimesh.load_scene(path, process=False)
         except FileNotFoundError as error:
-            raise FileError(
-                f"its part {error} is missing; keep the files of a .gltf in one folder", where=str(error)
-            ) from None
+            text = f"its part {error} is missing; keep the files of a .gltf in one folder"
+            raise FileError(text, where=str(error)) from None
     mesh = from_meshes(scene, path.stem, parse_metadata(scene.metadata.get("pcmc")))
     X = mesh.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
     scalars = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_") and k != SUPPORT}

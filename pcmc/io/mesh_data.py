@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, unknown
@@ -16,6 +19,8 @@ from ..surface.geometry import bounding_size
 from ..surface.topology import topology
 
 FREE, SLIDING, FIXED = 0, 1, 2
+HELD = {"fixed": FIXED, "sliding": SLIDING}  # names of groups and layers of supports
+TOLERANCE = 1e-7  # of the size, to merge vertices; single precision keeps this much
 ROUNDING = 1e-6  # of the size: the most that a format rounds by
 
 
@@ -62,35 +67,47 @@ def without_unused(data: MeshData) -> MeshData:
     used[data.faces] = True
     if used.all():
         return data
-    number = np.cumsum(used) - 1
     note = f"{np.count_nonzero(~used)} vertices that no face uses were left out"
-    return replace(
-        data,
-        vertices=data.vertices[used],
-        faces=number[data.faces],
-        support=None if data.support is None else data.support[used],
-        scalars={k: v[used] if len(v) == len(used) else v for k, v in data.scalars.items()},
-        notes=(*data.notes, note),
-    )
+    return replace(_selected(data, np.flatnonzero(used), np.cumsum(used) - 1), notes=(*data.notes, note))
 
 
 def merged(data: MeshData) -> MeshData:
     """The same with vertices at one place merged: patches written as separate meshes need it."""
     if data.joined:
         return data
-    from .merge import coincident  # scipy.spatial is slow to import, and rarely needed
-
     keep, place = coincident(checks.positions(data.vertices))
     if len(keep) == len(data.vertices):
         return data
-    support = None
+    selected = _selected(data, keep, place)
     if data.support is not None:
-        support = np.zeros(len(keep), dtype=np.int8)
-        np.maximum.at(support, place, data.support)
+        np.maximum.at(selected.support, place, data.support)
+    return selected
+
+
+def coincident(X: Floats) -> tuple[Ints, Ints]:
+    """Which vertices to keep, and the index among them of every vertex.
+
+    Vertices closer than TOLERANCE times the diagonal of the bounding box become one, the first of them.
+
+    >>> keep, place = coincident(np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1e-9], [0, 1, 0.0]]))
+    >>> keep.tolist(), place.tolist()
+    ([0, 1, 3], [0, 1, 0, 2])
+    """
+    one, two = cKDTree(X).query_pairs(TOLERANCE * bounding_size(X), output_type="ndarray").T
+    graph = coo_array((np.ones(len(one), dtype=bool), (one, two)), shape=(len(X), len(X)))
+    group = connected_components(graph, directed=False)[1]  # groups are numbered by their first vertex
+    return np.unique(group, return_index=True)[1], group
+
+
+def _selected(data: MeshData, keep: Ints, place: Ints) -> MeshData:
+    """The same with the vertices ``keep``; ``place`` is the new index of every vertex."""
     n = len(data.vertices)
-    scalars = {k: v[keep] if len(v) == n else v for k, v in data.scalars.items()}
     return replace(
-        data, vertices=data.vertices[keep], faces=place[data.faces], support=support, scalars=scalars
+        data,
+        vertices=data.vertices[keep],
+        faces=place[data.faces],
+        support=None if data.support is None else data.support[keep],
+        scalars={k: v[keep] if len(v) == n else v for k, v in data.scalars.items()},
     )
 
 

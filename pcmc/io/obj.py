@@ -13,13 +13,12 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..surface import Surface
-from .mesh_data import FIXED, FREE, SLIDING, MeshData, support_of
+from .mesh_data import FREE, HELD, MeshData, support_of
 from .metadata import metadata_text, parse_metadata
 from .polygons import triangulate
 from .text import format_rows
 
 MARK = "# pcmc "
-HELD = {"fixed": FIXED, "sliding": SLIDING}
 VERTEX = re.compile(r"^[^\S\n]*v[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\n]*$", re.M)
 FACE = re.compile(r"^[^\S\n]*f[^\S\n]+([^\n]+)$", re.M)
 POINT = re.compile(r"^[^\S\n]*p[^\S\n]+([\d \t]+)$", re.M)

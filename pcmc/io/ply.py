@@ -41,11 +41,8 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any)
     for name, values in scalars.items():
         key = re.sub(r"\s+", "_", name)
         if key in RESERVED:
-            raise FileError(
-                f"scalars: .ply files use the name {name!r} themselves; rename the scalar",
-                where=name,
-                found=name,
-            )
+            text = f"scalars: .ply files use the name {name!r} themselves; rename the scalar"
+            raise FileError(text, where=name, found=name)
         (vertex if len(values) == surface.n else face)[key] = np.asarray(values, dtype="<f8")
     header = [
         "ply",
@@ -136,9 +133,7 @@ def _header(data: bytes) -> tuple[str, str, int]:
     header = data[: end.start()].decode("utf-8", "replace").replace("\r", "")
     form = re.search(r"^format (ascii|binary_little_endian|binary_big_endian) ", header, re.M)
     if form is None:
-        raise FileError(
-            "its header names no known format", where="header", expected="ascii or binary_…_endian"
-        )
+        raise FileError("its header names no known format", where="header")
     return header, form[1], end.end()
 
 
@@ -153,9 +148,8 @@ def _elements(header: str, order: str) -> list[_Element]:
                 case ["property", "list", of_count, of_items, name]:
                     last = elements.pop()
                     if last.items is not None:
-                        raise FileError(
-                            f"line {number}: pcmc reads one list per element, this is a second", where=number
-                        )
+                        text = f"line {number}: pcmc reads one list per element, this is a second"
+                        raise FileError(text, where=number)
                     items = (name, order + TYPES[of_count], order + TYPES[of_items])
                     elements.append(_Element(last.name, last.size, last.before, items, []))
                 case ["property", kind, name]:
@@ -165,16 +159,12 @@ def _elements(header: str, order: str) -> list[_Element]:
         except FileError:
             raise
         except (KeyError, IndexError, ValueError):
-            raise FileError(
-                f"line {number}: not a line of a PLY header: {line[:60]!r}", where=number, found=line
-            ) from None
+            text = f"line {number}: not a line of a PLY header: {line[:60]!r}"
+            raise FileError(text, where=number) from None
     names = [e.name for e in elements]
     if "vertex" not in names or "face" not in names[names.index("vertex") :]:
-        raise FileError(
-            f"its header must list vertices, then faces; found {', '.join(names) or 'none'}",
-            where="header",
-            found=names,
-        )
+        text = f"its header must list vertices, then faces; found {', '.join(names) or 'none'}"
+        raise FileError(text, where="header")
     missing = set("xyz") - {name for name, _ in elements[names.index("vertex")].before}
     if missing:
         raise FileError(f"its vertices have no property {min(missing)}", where="vertex")
@@ -254,8 +244,5 @@ def _mixed(element: _Element, data: Any, counts: Ints, offsets: Ints) -> dict[st
 
 def _enough(element: _Element, data: bytes, end: int) -> None:
     if end > len(data):
-        raise FileError(
-            f"cut off: the file ends before its {element.size} {element.name} elements do",
-            where=element.name,
-            expected=element.size,
-        )
+        text = f"cut off: the file ends before its {element.size} {element.name} elements do"
+        raise FileError(text, where=element.name)

@@ -31,12 +31,8 @@ def triangulate(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tup
     """
     few = np.flatnonzero(counts < 3)
     if len(few):
-        raise FileError(
-            f"face {few[0]} has {counts[few[0]]} corners; a face needs three or more",
-            where=int(few[0]),
-            found=int(counts[few[0]]),
-            expected="three or more corners",
-        )
+        text = f"face {few[0]} has {counts[few[0]]} corners; a face needs three or more"
+        raise FileError(text, where=int(few[0]))
     if (counts == 3).all():
         return corners.reshape(-1, 3), np.arange(len(counts)), ()
     start = np.cumsum(counts) - counts
@@ -65,12 +61,8 @@ def _best_fans(X: Floats, polygon: Ints, number: Ints) -> Ints:
     best = worst.argmax(axis=0)
     bad = np.flatnonzero(worst.max(axis=0) <= 0.0)
     if len(bad):
-        raise FileError(
-            f"face {number[bad[0]]} is a polygon of {k} corners that no fan of triangles fills;"
-            " cut it into triangles in the program that wrote it",
-            where=int(number[bad[0]]),
-            found=int(k),
-        )
+        text = f"face {number[bad[0]]} is a polygon of {k} corners that no fan of triangles fills; cut it"
+        raise FileError(f"{text} in the program that wrote it", where=int(number[bad[0]]), found=int(k))
     return fans[best, np.arange(len(polygon))]
 
 
@@ -110,12 +102,8 @@ def from_polygons(
     if corners.min() < 0 or corners.max() >= len(X):
         bad = int(np.flatnonzero((corners < 0) | (corners >= len(X)))[0])
         face = int(np.searchsorted(np.cumsum(counts), bad, side="right"))
-        raise FileError(
-            f"face {face} names vertex {corners[bad]}, which is outside 0..{len(X) - 1}",
-            where=face,
-            found=int(corners[bad]),
-            expected=f"0..{len(X) - 1}",
-        )
+        text = f"face {face} names vertex {corners[bad]}, which is outside 0..{len(X) - 1}"
+        raise FileError(text, where=face)
     X = np.array(X, dtype=np.float64)
     F, source, notes = triangulate(X, corners.astype(np.int64), counts.astype(np.int64))
     metadata.check_counts(len(X), len(F))

@@ -19,13 +19,11 @@ from ..surface.colours import patch_colors
 from ..surface.geometry import bounding_size
 from . import flat_walls
 from .libraries import load_library, translated_errors
-from .merge import TOLERANCE
-from .mesh_data import FIXED, FREE, SLIDING, MeshData, support_of
+from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of
 from .metadata import Metadata, metadata_text, parse_metadata
 from .polygons import triangulate
 
 KEY = "pcmc"
-HELD = {"fixed": FIXED, "sliding": SLIDING}
 VERSION = 7  # of Rhino's format
 COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255)}
 
@@ -110,11 +108,8 @@ def read(path: Path) -> MeshData:
         else:
             others += 1
     if not X:
-        raise FileError(
-            f"the file has no meshes ({others} other objects); mesh the surfaces in Rhino",
-            where="meshes",
-            found=0,
-        )
+        text = f"the file has no meshes ({others} other objects); mesh the surfaces in Rhino"
+        raise FileError(text, where="meshes", found=0)
     points = np.concatenate(X)
     F, source, notes = triangulate(points, np.concatenate(corners), np.concatenate(counts))
     if others:

@@ -34,11 +34,8 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any)
     mesh.cell_data["patch"] = surface.patch_of_face
     for name, values in scalars.items():
         if name in RESERVED:
-            raise FileError(
-                f"scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar",
-                where=name,
-                found=name,
-            )
+            text = f"scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"
+            raise FileError(text, where=name, found=name)
         (mesh.point_data if len(values) == surface.n else mesh.cell_data)[name] = values
     mesh.field_data["pcmc"] = [metadata_text(surface)]
     if path.suffix.lower() == ".vtu":
@@ -76,13 +73,9 @@ def _polygons(mesh: Any) -> tuple[Ints, Ints, Ints]:
 def _cells(mesh: Any) -> tuple[Ints, Ints, Ints]:
     solid = np.flatnonzero(mesh.celltypes >= FIRST_SOLID)
     if len(solid):
-        raise FileError(
-            f"cell {solid[0]} is of VTK's type {mesh.celltypes[solid[0]]}; pcmc reads triangles, quads"
-            " and polygons",
-            where=int(solid[0]),
-            found=int(mesh.celltypes[solid[0]]),
-            expected=FLAT,
-        )
+        kind = int(mesh.celltypes[solid[0]])
+        text = f"cell {solid[0]} is of VTK's type {kind}; pcmc reads triangles, quads and polygons"
+        raise FileError(text, where=int(solid[0]), found=kind)
     chosen = np.flatnonzero(np.isin(mesh.celltypes, FLAT))
     offsets = np.asarray(mesh.cell_offsets)
     counts = np.diff(offsets)[chosen]
