@@ -46,10 +46,6 @@ class Format:
     walls: bool = False
     loses: tuple[str, ...] = ()
 
-    def holds(self, scalar: Floats, n: int) -> bool:
-        """Whether the format holds this scalar, of n vertices or of the faces."""
-        return self.scalars == "both" or (self.scalars == "vertices" and len(scalar) == n)
-
 
 FORMATS = {
     ".pcmc": Format("native", scalars="both", certificate=True, shared=True),
@@ -104,23 +100,23 @@ def read(
     SurfaceError : for a mesh that is not a surface.
     MissingExtra : when the format needs a library that is not installed.
     """
-    return _read(path, load(path), (tensions, pressures, fixed, on_plane, plane), ())
+    return _read(path, (tensions, pressures, fixed, on_plane, plane))
 
 
 def read_bare(path: str | os.PathLike[str]) -> Surface:
     """``read`` without arguments, with a warning also if the file has no supports."""
+    return _read(path, ())
+
+
+def _read(path: str | os.PathLike[str], given: tuple[Any, ...]) -> Surface:
     data = load(path)
-    return _read(path, data, (), (NO_SUPPORTS,) if data.support is None else ())
-
-
-def _read(
-    path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...], notes: tuple[str, ...]
-) -> Surface:
     try:
         surface = to_surface(data, *given)
     except PcmcError as error:
         raise _in_file(path, error, type(error)) from None
-    notes = (*data.notes, *import_warnings(data), *notes)
+    notes = (*data.notes, *import_warnings(data))
+    if not given and data.support is None:
+        notes = (*notes, NO_SUPPORTS)
     if notes:
         warnings.warn(f"{os.fspath(path)}: {'; '.join(notes)}", FileWarning, stacklevel=3)
     return surface
@@ -176,7 +172,8 @@ def write(
             text = f"{path}: the patch name {patch.name!r} contains a line break; rename the patch"
             raise FileError(text, what=str(path), where="patches", found=patch.name)
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
-    lost = [name for name, scalar in scalars.items() if not form.holds(scalar, surface.n)]
+    sizes = {"": (), "vertices": (surface.n,), "both": (surface.n, surface.m)}[form.scalars]
+    lost = [name for name, scalar in scalars.items() if len(scalar) not in sizes]
     if certificate is not None and not form.certificate:
         lost.append("certificate")
     shown, walls = surface, None

@@ -12,8 +12,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, unknown
+from ..base.validate import choice
 from ..surface import Patch, Plane, Surface, checks
 from ..surface.geometry import bounding_size
 from ..surface.topology import topology
@@ -79,7 +80,7 @@ def merged(data: MeshData) -> MeshData:
     if len(keep) == len(data.vertices):
         return data
     selected = _selected(data, keep, place)
-    if data.support is not None:
+    if data.support is not None and selected.support is not None:
         np.maximum.at(selected.support, place, data.support)
     return selected
 
@@ -120,40 +121,25 @@ def to_surface(
     plane: Plane | None = None,
 ) -> Surface:
     """The Surface of the data; arguments that are given replace the file's values."""
-    n = len(data.vertices)
-    support = data.support
-    if isinstance(fixed, str) and fixed != "boundary":
-        raise OptionError(unknown("fixed", fixed, ["boundary"]), what="fixed", found=fixed)
-    if isinstance(fixed, str) or (fixed is None and support is None):
+    n, X = len(data.vertices), data.vertices
+    support = np.full(n, FREE) if data.support is None else data.support
+    sliding = support == SLIDING if on_plane is None else checks.mask(on_plane, n, "on_plane")
+    if isinstance(fixed, str):
+        choice("fixed", fixed, ["boundary"])
         held = topology(data.faces, data.patch_of_face, n).on_boundary
-    elif fixed is None:
-        held = np.asarray(support == FIXED)
-    else:
+    elif fixed is not None:
         held = checks.mask(fixed, n, "fixed")
-    if on_plane is not None:
-        sliding = checks.mask(on_plane, n, "on_plane")
+    elif data.support is not None:
+        held = support == FIXED
     else:
-        sliding = np.zeros(n, dtype=bool) if support is None else support == SLIDING
-    if fixed is None and support is None:
-        held = held & ~sliding
-    patches = _changed(data.patches, "tension", tensions)
+        held = topology(data.faces, data.patch_of_face, n).on_boundary & ~sliding
+    patches = _changed(_changed(data.patches, "tension", tensions), "pressure", pressures)
     plane = plane or data.plane or Plane()
-    return Surface(
-        _on(plane, data.vertices, sliding & ~held),
-        data.faces,
-        data.patch_of_face,
-        _changed(patches, "pressure", pressures),
-        held,
-        sliding,
-        plane,
-    )
-
-
-def _on(plane: Plane, X: Floats, sliding: Bools) -> Floats:
-    """Sliding vertices that rounding moved off the plane, back onto it."""
     height, size = plane.height(X), bounding_size(X)
-    near = sliding & (np.abs(height) < ROUNDING * size) & (np.abs(height) > 1e-12 * size)
-    return X - np.where(near, height, 0.0)[:, None] * np.array(plane.normal) if near.any() else X
+    rounded = sliding & ~held & (np.abs(height) < ROUNDING * size) & (np.abs(height) > 1e-12 * size)
+    if rounded.any():  # back onto the plane
+        X = X - np.where(rounded, height, 0.0)[:, None] * np.array(plane.normal)
+    return Surface(X, data.faces, data.patch_of_face, patches, held, sliding, plane)
 
 
 def _changed(

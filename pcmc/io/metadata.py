@@ -12,13 +12,8 @@ from ..surface import Patch, Plane, Surface
 
 def metadata_text(surface: Surface) -> str:
     """Patches, plane and counts as JSON, for the comment or metadata of a format."""
-    point, normal = surface.plane.point, surface.plane.normal
-    values = {
-        "patches": [astuple(p) for p in surface.patches],
-        "plane": [point, normal],
-        "counts": [surface.n, surface.m],
-    }
-    return json.dumps(values)
+    patches, plane = [astuple(p) for p in surface.patches], astuple(surface.plane)
+    return json.dumps({"patches": patches, "plane": plane, "counts": [surface.n, surface.m]})
 
 
 @dataclass(frozen=True)

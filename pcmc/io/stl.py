@@ -18,6 +18,7 @@ from ..surface.geometry import area_vectors
 from ..surface.surface import FAR
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData
+from .metadata import Metadata
 from .text import format_rows
 from .trimesh_scene import from_meshes
 
@@ -55,7 +56,7 @@ def read(path: Path) -> MeshData:
     _complete(path)
     with translated_errors("STL"):
         scene = trimesh.load_scene(path, file_type="stl", process=False)
-    return from_meshes(scene, path.stem)
+    return from_meshes(scene, path.stem, Metadata())
 
 
 def _complete(path: Path) -> None:

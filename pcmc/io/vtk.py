@@ -51,7 +51,9 @@ def read(path: Path) -> MeshData:
     with translated_errors(path.suffix[1:]), pyvista.vtk_verbosity("off"), warnings.catch_warnings():
         warnings.simplefilter("error")  # VTK's errors come as warnings
         mesh = pyvista.read(path)
-        corners, counts, chosen = (_polygons if isinstance(mesh, pyvista.PolyData) else _cells)(mesh)
+        if isinstance(mesh, pyvista.PolyData):
+            mesh = (mesh.triangulate() if mesh.n_strips else mesh).cast_to_unstructured_grid()
+        corners, counts, chosen = _cells(mesh)
         points, text = np.asarray(mesh.points), mesh.field_data.get("pcmc")
         point_data = {k: np.asarray(v) for k, v in mesh.point_data.items()}
         cell_data = {k: np.asarray(v)[chosen] for k, v in mesh.cell_data.items()}
@@ -59,18 +61,8 @@ def read(path: Path) -> MeshData:
     return from_polygons(points, corners, counts, point_data, cell_data, metadata, path.stem)
 
 
-def _polygons(mesh: Any) -> tuple[Ints, Ints, Ints]:
-    """Corners, corners per face, and the faces' places among all cells."""
-    if mesh.n_strips:
-        mesh = mesh.triangulate()
-    polys = mesh.GetPolys()
-    convert = load_library("pyvista").convert_array
-    counts = np.diff(convert(polys.GetOffsetsArray()))
-    first = mesh.n_verts + mesh.n_lines
-    return convert(polys.GetConnectivityArray()), counts, first + np.arange(len(counts))
-
-
 def _cells(mesh: Any) -> tuple[Ints, Ints, Ints]:
+    """Corners, corners per face, and the faces' places among all cells."""
     solid = np.flatnonzero(mesh.celltypes >= FIRST_SOLID)
     if len(solid):
         kind = int(mesh.celltypes[solid[0]])
