@@ -96,7 +96,7 @@ def _bodies(surface: Surface) -> str:
 # Reading
 
 
-def read(path: Path, **_: Any) -> MeshData:
+def read(path: Path) -> MeshData:
     """The mesh, tensions, pressures and supports of a datafile; errors name the line."""
     header, file = _open(path)
     if "written by pcmc" in header:
@@ -117,7 +117,6 @@ def read(path: Path, **_: Any) -> MeshData:
 class _Section:
     """A part of the file. A form feed stands for a line end that does not end an element."""
 
-    name: str
     text: str
     first_line: int
 
@@ -163,7 +162,7 @@ def _open(path: Path) -> tuple[str, _Sections]:
     sections = _Sections()
     for name, start, end in zip(names, starts, ends, strict=True):
         line = 1 + bare[:start].count("\n") + bare[:start].count("\f")
-        sections.setdefault(name, _Section(name, bare[start:end], line))
+        sections.setdefault(name, _Section(bare[start:end], line))
         if name == "read":
             break  # what follows are commands
     header = re.split(r"^[^\S\n]*vertices\b", text, maxsplit=1, flags=re.I | re.M)[0]
