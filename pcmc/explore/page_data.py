@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Floats
 from ..certificate.balance import reactions_per_length
 from ..certificate.certificate import Certificate
 from ..energy.curvature import curvature_error, mean_curvature
@@ -40,7 +40,8 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
         "ground": float(surface.plane.height(centre(surface))),
     }
     inner, curves = ~topo.curve_edge, topo.curve_edge
-    of_wall = _walls_alone(surface)
+    of_wall = np.ones(len(topo.edges), dtype=bool)  # edges all of whose triangles belong to walls
+    of_wall[topo.edge_of_face[~surface.walls[surface.patch_of_face]]] = False
     return header, {
         "sheet_faces": faces.reshape(-1, 3),
         "sheet_vertex": corners % surface.n,
@@ -52,14 +53,6 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
         "fixed": np.flatnonzero(surface.fixed),
         "sliding": np.flatnonzero(surface.on_plane),
     }
-
-
-def _walls_alone(surface: Surface) -> Bools:
-    """(e,) edges all of whose triangles belong to walls."""
-    alone = np.ones(len(surface.topology.edges), dtype=bool)
-    roof = ~surface.walls[surface.patch_of_face]
-    alone[surface.topology.edge_of_face[roof]] = False
-    return alone
 
 
 def centre(surface: Surface) -> Floats:

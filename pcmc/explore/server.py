@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from ..base.errors import MissingExtra, OptionError, PcmcError, SurfaceError
+from ..base.errors import MissingExtra, OptionError, PcmcError, SurfaceError, unknown
 from ..certificate.certificate import Certificate
 from ..io import FORMATS, write
 from ..project.output import fields as written_fields
@@ -34,13 +34,18 @@ SOLVES_AT_ONCE = 2
 LONGEST_REQUEST = 1_000_000  # bytes
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+HEADERS = {
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:",
+}
 ACTS = ("follow", "settle", "stabilise", "undo", "redo", "reset", "state")
 
 
 class RequestError(Exception):
     """A request that the server answers with one line of error."""
 
-    def __init__(self, status: HTTPStatus, line: str) -> None:
+    def __init__(self, line: str, status: HTTPStatus = HTTPStatus.BAD_REQUEST) -> None:
         super().__init__(line)
         self.status = status
 
@@ -53,12 +58,8 @@ class Explorer:
 
     def __init__(self, surface: Surface, host: str, port: int, title: str) -> None:
         if not isinstance(surface, Surface):
-            raise SurfaceError(
-                f"explore: expected a Surface, found {type(surface).__name__}",
-                what="surface",
-                found=type(surface).__name__,
-                expected="Surface",
-            )
+            found = type(surface).__name__
+            raise SurfaceError(f"explore: expected a Surface, found {found}", what="surface", found=found)
         self._server = _listen(host, port)
         self._server.explorer = self
         self.title = title
@@ -87,7 +88,7 @@ class Explorer:
         """The session of that name."""
         with self._lock:
             if name not in self.sessions:
-                raise RequestError(HTTPStatus.GONE, "this session has expired; reload the page")
+                raise RequestError("this session has expired; reload the page", HTTPStatus.GONE)
             self.sessions.move_to_end(name)
             return self.sessions[name]
 
@@ -165,11 +166,9 @@ def _listen(host: str, port: int) -> _Server:
         return _Server((host, port))
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise OptionError(
-            f"cannot listen on {host!r}, port {port}: {reason}; with port 0 pcmc takes a free one",
-            what="port" if host in LOOPBACK else "host",
-            found=(host, port),
-        ) from None
+        text = f"cannot listen on {host!r}, port {port}: {reason}; with port 0 pcmc takes a free one"
+        what = "port" if host in LOOPBACK else "host"
+        raise OptionError(text, what=what, found=(host, port)) from None
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -193,10 +192,9 @@ class _Handler(BaseHTTPRequestHandler):
         try:
             self._check_origin()
             act()
-        except RequestError as error:
-            self._send_error_line(error.status, str(error))
-        except (PcmcError, MissingExtra) as error:
-            self._send_error_line(HTTPStatus.BAD_REQUEST, str(error))
+        except (RequestError, PcmcError, MissingExtra) as error:
+            status = getattr(error, "status", HTTPStatus.BAD_REQUEST)
+            self._send(json.dumps({"error": str(error)}).encode(), "application/json", status=status)
 
     def _check_origin(self) -> None:
         """Refuse requests from pages of other sites, and under other names of this machine."""
@@ -205,9 +203,9 @@ class _Handler(BaseHTTPRequestHandler):
         explorer = self.server.explorer
         name = host.rsplit(":", 1)[0].strip("[]")
         if explorer.local and name not in LOOPBACK:
-            raise RequestError(HTTPStatus.FORBIDDEN, f"open this page at {explorer.url}")
+            raise RequestError(f"open this page at {explorer.url}", HTTPStatus.FORBIDDEN)
         if origin is not None and urlsplit(origin).netloc != host:
-            raise RequestError(HTTPStatus.FORBIDDEN, "requests from pages of other sites are refused")
+            raise RequestError("requests from pages of other sites are refused", HTTPStatus.FORBIDDEN)
 
     def _get(self) -> None:
         parts = urlsplit(self.path)
@@ -220,7 +218,7 @@ class _Handler(BaseHTTPRequestHandler):
             suffix = parse_qs(parts.query).get("suffix", [""])[0]
             self._export(self.server.explorer.session(steps[1]), suffix)
         else:
-            raise RequestError(HTTPStatus.NOT_FOUND, f"there is nothing at {parts.path}")
+            raise RequestError(f"there is nothing at {parts.path}", HTTPStatus.NOT_FOUND)
 
     def _post(self) -> None:
         asked = self._json()
@@ -237,21 +235,19 @@ class _Handler(BaseHTTPRequestHandler):
             given = (_values(asked),) if steps[2] in ("follow", "settle") else ()
             self._send_state(getattr(session, steps[2])(*given))
         else:
-            raise RequestError(HTTPStatus.NOT_FOUND, f"there is nothing at {self.path}")
+            raise RequestError(f"there is nothing at {self.path}", HTTPStatus.NOT_FOUND)
 
     def _json(self) -> dict[str, Any]:
         length = self.headers.get("Content-Length", "")
         if not length.isdigit() or int(length) > LONGEST_REQUEST:
             self.close_connection = True
-            raise RequestError(
-                HTTPStatus.BAD_REQUEST, f"a request needs a length of at most {LONGEST_REQUEST} bytes"
-            )
+            raise RequestError(f"a request needs a length of at most {LONGEST_REQUEST} bytes")
         try:
             asked = json.loads(self.rfile.read(int(length)) or b"{}")
         except ValueError as error:
-            raise RequestError(HTTPStatus.BAD_REQUEST, f"not JSON: {error}") from None
+            raise RequestError(f"not JSON: {error}") from None
         if not isinstance(asked, dict):
-            raise RequestError(HTTPStatus.BAD_REQUEST, "expected a JSON object")
+            raise RequestError("expected a JSON object")
         return asked
 
     # -- answers -----------------------------------------------------------------------------------
@@ -277,18 +273,12 @@ class _Handler(BaseHTTPRequestHandler):
     def _export(self, session: Session, suffix: str) -> None:
         state = session.state()
         if suffix not in FORMATS:
-            raise RequestError(
-                HTTPStatus.BAD_REQUEST, f"unknown format {suffix!r}; known: {', '.join(FORMATS)}"
-            )
+            raise RequestError(unknown("format", suffix, FORMATS))
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the page says which formats carry the numbers
             path = Path(folder) / f"surface{suffix}"
-            write(
-                path,
-                state.surface,
-                scalars=written_fields(state.surface, state.certificate),
-                certificate=plain(state.certificate.numbers()),
-            )
+            scalars = written_fields(state.surface, state.certificate)
+            write(path, state.surface, scalars=scalars, certificate=plain(state.certificate.numbers()))
             body = path.read_bytes()
         self._send(body, "application/octet-stream", f'attachment; filename="surface{suffix}"')
 
@@ -296,23 +286,18 @@ class _Handler(BaseHTTPRequestHandler):
         kind = TYPES.get(Path(name).suffix)
         file = files(__package__).joinpath("page", name)
         if kind is None or "\\" in name or not file.is_file():
-            raise RequestError(HTTPStatus.NOT_FOUND, f"there is no file {name!r}")
+            raise RequestError(f"there is no file {name!r}", HTTPStatus.NOT_FOUND)
         self._send(file.read_bytes(), f"{kind}; charset=utf-8")
-
-    def _send_error_line(self, status: HTTPStatus, line: str) -> None:
-        self._send(json.dumps({"error": line}).encode(), "application/json", status=status)
 
     def _send(
         self, body: bytes, kind: str, disposition: str = "", status: HTTPStatus = HTTPStatus.OK
     ) -> None:
-        self.send_response(status)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(body)))
-        self.send_header("Cache-Control", "no-store")
-        self.send_header("X-Content-Type-Options", "nosniff")
-        self.send_header("Content-Security-Policy", "default-src 'self'; img-src 'self' blob: data:")
+        headers = {**HEADERS, "Content-Type": kind, "Content-Length": str(len(body))}
         if disposition:
-            self.send_header("Content-Disposition", disposition)
+            headers["Content-Disposition"] = disposition
+        self.send_response(status)
+        for name, value in headers.items():
+            self.send_header(name, value)
         self.end_headers()
         self.wfile.write(body)
 
@@ -323,12 +308,10 @@ def _values(asked: dict[str, Any]) -> dict[str, dict[str, float]]:
     for key in ("tensions", "pressures"):
         given = asked.get(key, {})
         if not isinstance(given, dict):
-            raise RequestError(HTTPStatus.BAD_REQUEST, f"{key}: expected numbers by patch")
+            raise RequestError(f"{key}: expected numbers by patch")
         for name, value in given.items():
             if not isinstance(value, int | float) or isinstance(value, bool):
-                raise RequestError(
-                    HTTPStatus.BAD_REQUEST, f"{key}: {name!r}: expected a number, found {value!r}"
-                )
+                raise RequestError(f"{key}: {name!r}: expected a number, found {value!r}")
         values[key] = given
     return values
 
@@ -341,11 +324,6 @@ def _patches(patches: tuple[Patch, ...]) -> list[dict[str, Any]]:
 
 
 def _verdict(certificate: Certificate) -> dict[str, str]:
-    sentence = certificate.verdict.value
-    word, _, rest = sentence.partition(": ")
-    return {
-        "name": certificate.verdict.name.lower(),
-        "word": word,
-        "sentence": rest,
-        "detail": certificate.detail,
-    }
+    word, _, rest = certificate.verdict.value.partition(": ")
+    name = certificate.verdict.name.lower()
+    return {"name": name, "word": word, "sentence": rest, "detail": certificate.detail}

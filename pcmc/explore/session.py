@@ -33,7 +33,7 @@ Values = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """What the server sends to the page.
+    """The surface of a session and all that the page says about it.
 
     Attributes
     ----------
@@ -47,22 +47,13 @@ class State:
     surface: Surface
     certificate: Certificate
     asked: tuple[Patch, ...]
-    failure: Certificate | None
-    undo: int
-    redo: int
+    failure: Certificate | None = None
+    undo: int = 0
+    redo: int = 0
     superseded: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class Start:
-    """The surface that every session begins with, its certificate, and that of a failed solve."""
-
-    surface: Surface
-    certificate: Certificate
-    failure: Certificate | None
-
-
-def solved_start(surface: Surface) -> Start:
+def solved_start(surface: Surface) -> State:
     """Solve a surface, unless it is at rest already; if no solver converges, return it unchanged."""
     certificate = certify(surface)
     failure = None if certificate.verdict in AT_REST else certificate
@@ -72,9 +63,9 @@ def solved_start(surface: Surface) -> Start:
         result = solve(surface, target=target)
         ended = result.certify()
         if ended.verdict in AT_REST:
-            return Start(result.surface, ended, None)
+            return State(result.surface, ended, result.surface.patches)
         failure = ended
-    return Start(surface, certificate, failure)
+    return State(surface, certificate, surface.patches, failure)
 
 
 class Session:
@@ -83,16 +74,12 @@ class Session:
     A newer call ends the work on an older one. Each call holds ``turn`` while it works.
     """
 
-    def __init__(self, start: Start, turn: AbstractContextManager[Any] | None = None) -> None:
-        self._lock = threading.Lock()
-        self._turn = turn or nullcontext()
+    def __init__(self, start: State, turn: AbstractContextManager[Any] | None = None) -> None:
+        self._lock, self._turn = threading.Lock(), turn or nullcontext()
         self._requests = 0
-        self.surface = start.surface
-        self._certificate = start.certificate
-        self._failure = start.failure
-        self._asked = self.surface.patches
-        self._steps = [self.surface]
-        self._place = 0
+        self.surface, self._certificate = start.surface, start.certificate
+        self._asked, self._failure = start.asked, start.failure
+        self._steps, self._place = [self.surface], 0
 
     def state(self) -> State:
         """The present state."""

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknow
 from ..base.files import atomic_write
 from ..contact.pinching import standing_part
 from ..surface import Plane, Surface
+from .flat_walls import encode_walls, restore_walls
 from .import_warnings import import_warnings
 from .mesh_data import MeshData, merged, to_surface, without_unused
 
@@ -46,33 +46,24 @@ class Format:
     walls: bool = False
     loses: tuple[str, ...] = ()
 
-    def holds(self, scalar: Floats, n: int) -> bool:
-        """Whether the format holds this scalar, of n vertices or of the faces."""
-        return self.scalars == "both" or (self.scalars == "vertices" and len(scalar) == n)
-
-
-_EVOLVER = Format("evolver", shared=True)
-_VTK = Format("vtk", scalars="both")
-_GLTF = Format("gltf", scalars="vertices", separate=True, walls=True)
 
 FORMATS = {
     ".pcmc": Format("native", scalars="both", certificate=True, shared=True),
-    ".fe": _EVOLVER,
-    ".dmp": _EVOLVER,
+    ".fe": Format("evolver", shared=True),
+    ".dmp": Format("evolver", shared=True),
     ".obj": Format("obj"),
     ".ply": Format("ply", scalars="both"),
     ".stl": Format("stl", separate=True, loses=("supports", "tensions", "pressures")),
-    ".vtp": _VTK,
-    ".vtu": _VTK,
-    ".glb": _GLTF,
-    ".gltf": _GLTF,
+    ".vtp": Format("vtk", scalars="both"),
+    ".vtu": Format("vtk", scalars="both"),
+    ".glb": Format("gltf", scalars="vertices", separate=True, walls=True),
+    ".gltf": Format("gltf", scalars="vertices", separate=True, walls=True),
     ".3dm": Format("rhino", separate=True, walls=True),
 }
 """The formats by suffix."""
 
 NO_SUPPORTS = (
-    "the file has no supports: its boundary is taken as fixed; tensions and pressures are 1 unless"
-    " you give them"
+    "no supports in the file: its boundary is taken as fixed; tensions and pressures are 1 unless given"
 )
 
 
@@ -109,23 +100,23 @@ def read(
     SurfaceError : for a mesh that is not a surface.
     MissingExtra : when the format needs a library that is not installed.
     """
-    return _read(path, load(path), (tensions, pressures, fixed, on_plane, plane), ())
+    return _read(path, (tensions, pressures, fixed, on_plane, plane))
 
 
 def read_bare(path: str | os.PathLike[str]) -> Surface:
     """``read`` without arguments, with a warning also if the file has no supports."""
+    return _read(path, ())
+
+
+def _read(path: str | os.PathLike[str], given: tuple[Any, ...]) -> Surface:
     data = load(path)
-    return _read(path, data, (), (NO_SUPPORTS,) if data.support is None else ())
-
-
-def _read(
-    path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...], notes: tuple[str, ...]
-) -> Surface:
     try:
         surface = to_surface(data, *given)
     except PcmcError as error:
         raise _in_file(path, error, type(error)) from None
-    notes = (*data.notes, *import_warnings(data), *notes)
+    notes = (*data.notes, *import_warnings(data))
+    if not given and data.support is None:
+        notes = (*notes, NO_SUPPORTS)
     if notes:
         warnings.warn(f"{os.fspath(path)}: {'; '.join(notes)}", FileWarning, stacklevel=3)
     return surface
@@ -136,26 +127,16 @@ def load(path: str | os.PathLike[str]) -> MeshData:
     path = Path(path)
     form = _format(path)
     try:
-        with path.open("rb"):
-            pass
-        data = without_unused(_module(form).read(path))
+        path.open("rb").close()  # the libraries' errors for a missing file differ
+        data = without_unused(import_module(f".{form.module}", __name__).read(path))
         if form.shared:
             return data
-        data = merged(data)
-        if data.walls is not None:
-            from .flat_walls import restore_walls  # needs scipy.spatial, as merging does
-
-            data = restore_walls(data)
-        return data
+        return restore_walls(merged(data))
     except OSError as error:
-        reason = error.strerror or error
-        raise FileError(f"{path}: cannot be read ({reason})", what=str(path)) from None
+        raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
     except UnicodeDecodeError as error:
-        raise FileError(
-            f"{path}: byte {error.start} is not text; is it a {path.suffix} file?",
-            what=str(path),
-            where=error.start,
-        ) from None
+        text = f"{path}: byte {error.start} is not text; is it a {path.suffix} file?"
+        raise FileError(text, what=str(path), where=error.start) from None
     except PcmcError as error:
         raise _in_file(path, error, FileError) from None
 
@@ -188,32 +169,27 @@ def write(
     form = _format(path)
     for patch in surface.patches:
         if "\n" in patch.name or "\r" in patch.name:
-            raise FileError(
-                f"{path}: the patch name {patch.name!r} contains a line break; rename the patch",
-                what=str(path),
-                where="patches",
-                found=patch.name,
-            )
+            text = f"{path}: the patch name {patch.name!r} contains a line break; rename the patch"
+            raise FileError(text, what=str(path), where="patches", found=patch.name)
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
-    lost = [name for name, scalar in scalars.items() if not form.holds(scalar, surface.n)]
+    sizes = {"": (), "vertices": (surface.n,), "both": (surface.n, surface.m)}[form.scalars]
+    lost = [name for name, scalar in scalars.items() if len(scalar) not in sizes]
     if certificate is not None and not form.certificate:
         lost.append("certificate")
     shown, walls = surface, None
     if form.separate:
         shown = standing_part(surface).surface
         if shown.m < surface.m and form.walls:
-            from .flat_walls import encode_walls
-
             walls = encode_walls(surface, shown)
         elif shown.m < surface.m:
             lost.append(f"{surface.m - shown.m} triangles of walls without height")
     values = _values(certificate)
     try:
+        module = import_module(f".{form.module}", __name__)
         with atomic_write(path) as temporary:
-            note = _module(form).write(temporary, shown, scalars=scalars, certificate=values, walls=walls)
+            note = module.write(temporary, shown, scalars=scalars, certificate=values, walls=walls)
     except OSError as error:
-        reason = error.strerror or error
-        raise FileError(f"{path}: cannot be written ({reason})", what=str(path)) from None
+        raise FileError(f"{path}: cannot be written ({error.strerror or error})", what=str(path)) from None
     except PcmcError as error:
         raise _in_file(path, error, FileError) from None
     if lost:
@@ -226,29 +202,16 @@ def write(
 def _in_file(path: str | os.PathLike[str], error: PcmcError, kind: type[PcmcError]) -> PcmcError:
     """The error with the file's name in front, as one of this kind."""
     what = os.fspath(path) if kind is FileError else error.what
-    return kind(
-        f"{os.fspath(path)}: {error}",
-        what=what,
-        where=error.where,
-        found=error.found,
-        expected=error.expected,
-    )
+    text = f"{os.fspath(path)}: {error}"
+    return kind(text, what=what, where=error.where, found=error.found, expected=error.expected)
 
 
 def _format(path: Path) -> Format:
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
-        raise FileError(
-            f"{path}: {unknown('suffix', suffix, FORMATS)}",
-            what=str(path),
-            found=suffix,
-            expected=list(FORMATS),
-        )
+        text = f"{path}: {unknown('suffix', suffix, FORMATS)}"
+        raise FileError(text, what=str(path), found=suffix, expected=list(FORMATS))
     return FORMATS[suffix]
-
-
-def _module(form: Format) -> ModuleType:
-    return import_module(f".{form.module}", __name__)
 
 
 def _values(certificate: Any) -> Mapping[str, Any]:
@@ -256,11 +219,9 @@ def _values(certificate: Any) -> Mapping[str, Any]:
     if certificate is None or isinstance(certificate, Mapping):
         return certificate or {}
     if not is_dataclass(certificate):
+        found = type(certificate).__name__
         raise FileError(
-            f"certificate: expected a Certificate, found {type(certificate).__name__}",
-            what="certificate",
-            found=type(certificate).__name__,
-            expected="Certificate",
+            f"certificate: expected a Certificate, found {found}", what="certificate", found=found
         )
     shown = [f.name for f in fields(certificate) if f.repr and not f.name.startswith("_")]
     return {name: getattr(certificate, name) for name in shown}
@@ -269,11 +230,7 @@ def _values(certificate: Any) -> Mapping[str, Any]:
 def _scalar(surface: Surface, name: str, value: npt.ArrayLike) -> Floats:
     array = np.asarray(value, dtype=float)
     if array.shape not in ((surface.n,), (surface.m,)):
-        raise FileError(
-            f"scalars[{name!r}]: expected shape ({surface.n},) for vertices or ({surface.m},) for"
-            f" faces, found {array.shape}",
-            what="scalars",
-            where=name,
-            found=array.shape,
-        )
+        shapes = f"({surface.n},) for vertices or ({surface.m},) for faces"
+        text = f"scalars[{name!r}]: expected shape {shapes}, found {array.shape}"
+        raise FileError(text, what="scalars", where=name, found=array.shape)
     return array

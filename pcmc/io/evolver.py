@@ -53,19 +53,19 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
     patches = list(enumerate(surface.patches, 1))
     face_tag = np.array([f" tension {p.tension!r} patch {k}" for k, p in patches])
     X = surface.vertices - np.array(surface.plane.point)
+    normal = zip(surface.plane.normal, "xyz", strict=True)
+    sides = ((surface.topology.edge_of_face + 1) * surface.topology.sense)[:, [2, 0, 1]]
     header = HEADER.format(
         origin=" ".join(map(repr, surface.plane.point)),
         patches="\n".join(f"// patch {k} {p.name}" for k, p in patches),
-        formula=_formula(surface.plane.normal),
+        formula=" + ".join(c if a == 1.0 else f"({a!r})*{c}" for a, c in normal if a != 0.0),
     )
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(header)
-        file.write("\nVERTICES\n")
+        file.write(header + "\nVERTICES\n")
         file.write(format_rows("%d %r %r %r%s\n", _count(X), *X.T, tag[support]))
         file.write("\nEDGES\n")
         file.write(format_rows("%d %d %d%s\n", _count(edges), *edges.T, tag[_edge_support(surface)]))
         file.write("\nFACES\n")
-        sides = _signed_edges(surface)
         file.write(format_rows("%d %d %d %d%s\n", _count(sides), *sides.T, face_tag[surface.patch_of_face]))
         file.write("\nBODIES\n" + _bodies(surface) + "\nREAD\n")
 
@@ -83,18 +83,6 @@ def _edge_support(surface: Surface) -> Ints:
     return np.where(topo.boundary_edge, along, FREE)
 
 
-def _signed_edges(surface: Surface) -> Ints:
-    """(m,3) edges around each face, numbered from 1, negative where run from head to tail."""
-    F = surface.faces[:, [0, 1, 2, 0]]
-    forward = F[:, :-1] < F[:, 1:]
-    return (surface.topology.edge_of_face[:, [2, 0, 1]] + 1) * np.where(forward, 1, -1)
-
-
-def _formula(normal: tuple[float, float, float]) -> str:
-    parts = zip(normal, "xyz", strict=True)
-    return " + ".join(c if a == 1.0 else f"({a!r})*{c}" for a, c in parts if a != 0.0)
-
-
 def _bodies(surface: Surface) -> str:
     text = ""
     of_face = surface.pressures[surface.patch_of_face]
@@ -108,21 +96,20 @@ def _bodies(surface: Surface) -> str:
 # Reading
 
 
-def read(path: Path, **_: Any) -> MeshData:
+def read(path: Path) -> MeshData:
     """The mesh, tensions, pressures and supports of a datafile; errors name the line."""
-    file = _open(path)
-    if "written by pcmc" in file.header:
-        file.section("read")  # its last line: without it the file is cut off
-    top = file.section("top")
-    known = _parameters(top)
-    ids, X, support, constraint = _vertices(file, known)
-    faces = _faces(file, ids)
-    F, source, notes = triangulate(X, faces.corners, faces.counts)
-    pressure, more = _pressures(file, faces.ids, known)
-    patch_of_face, patches = _patches(file, faces.rest, pressure, known)
-    given = re.search(r"^// origin (\S+) (\S+) (\S+)$", file.header, re.M)
+    header, file = _open(path)
+    if "written by pcmc" in header:
+        file["read"]  # its last line: without it the file is cut off
+    known = _parameters(file["top"])
+    ids, X, support, constraint = _vertices(file["vertices"], known)
+    face_ids, corners, counts, rest = _faces(file["edges"], file["faces"], ids)
+    F, source, notes = triangulate(X, corners, counts)
+    pressure, more = _pressures(file, face_ids, known)
+    patch_of_face, patches = _patches(header, file["faces"], rest, pressure, known)
+    given = re.search(r"^// origin (\S+) (\S+) (\S+)$", header, re.M)
     origin = np.array([float(c) for c in given.groups()]) if given else np.zeros(3)
-    plane = _plane(file, constraint, origin, known)
+    plane = _plane(file["top"], constraint, origin, known)
     return MeshData(X + origin, F, patch_of_face[source], patches, support, plane, notes=(*notes, *more))
 
 
@@ -130,7 +117,6 @@ def read(path: Path, **_: Any) -> MeshData:
 class _Section:
     """A part of the file. A form feed stands for a line end that does not end an element."""
 
-    name: str
     text: str
     first_line: int
 
@@ -154,24 +140,17 @@ class _Section:
         return matches
 
 
-@dataclass(frozen=True)
-class _File:
-    header: str
-    sections: Mapping[str, _Section]
+class _Sections(dict[str, _Section]):
+    """The sections by name."""
 
-    def section(self, name: str) -> _Section:
-        if name not in self.sections:
-            known = ", ".join(k for k in self.sections if k != "top") or "none"
-            raise FileError(
-                f"no {name} section (found: {known}); the file is cut off or is not a Surface Evolver"
-                " datafile",
-                where=name,
-                found=known,
-            )
-        return self.sections[name]
+    def __missing__(self, name: str) -> _Section:
+        known = ", ".join(k for k in self if k != "top") or "none"
+        text = f"no {name} section (found: {known}); the file is cut off or no Surface Evolver datafile"
+        raise FileError(text, where=name)
 
 
-def _open(path: Path) -> _File:
+def _open(path: Path) -> tuple[str, _Sections]:
+    """The text before the vertices with its comments, and the sections without theirs."""
     text = path.read_text(encoding="utf-8")
     bare = re.sub(r"/\*.*?\*/", lambda m: "\f" * m[0].count("\n") + " ", text, flags=re.S)
     bare = re.sub(r"//[^\n]*", "", bare)
@@ -180,58 +159,43 @@ def _open(path: Path) -> _File:
     starts = [0, *(h.end() for h in heads)]
     ends = [*(h.start() for h in heads), len(bare)]
     names = ["top", *("faces" if h[1].lower() == "facets" else h[1].lower() for h in heads)]
-    sections: dict[str, _Section] = {}
+    sections = _Sections()
     for name, start, end in zip(names, starts, ends, strict=True):
         line = 1 + bare[:start].count("\n") + bare[:start].count("\f")
-        sections.setdefault(name, _Section(name, bare[start:end], line))
+        sections.setdefault(name, _Section(bare[start:end], line))
         if name == "read":
             break  # what follows are commands
     header = re.split(r"^[^\S\n]*vertices\b", text, maxsplit=1, flags=re.I | re.M)[0]
-    return _File(header, sections)
+    return header, sections
 
 
 UNREADABLE = (
-    "string",
-    "quadratic",
-    "lagrange",
-    "simplex_representation",
-    "torus",
-    "torus_filled",
-    "symmetry_group",
-    "#include",
-    "#define",
+    "string|quadratic|lagrange|simplex_representation|torus|torus_filled|symmetry_group|#include|#define"
 )
 
 
 def _parameters(top: _Section) -> dict[str, float]:
     """Named constants of the top section, which coordinates and tensions may use."""
-    for word in UNREADABLE:
-        hit = re.search(rf"^[^\S\n]*{word}\b", top.text, re.I | re.M)
-        if hit:
-            raise top.error(
-                f"{word} is not supported; load the file in Surface Evolver, `dump` it, and read the dump",
-                offset=hit.start(),
-            )
+    foreign = re.search(rf"^[^\S\n]*({UNREADABLE})\b", top.text, re.I | re.M)
+    if foreign:
+        text = f"{foreign[1].lower()} is not supported; load the file in Surface Evolver and `dump` it"
+        raise top.error(f"{text}; read the dump", offset=foreign.start())
     known = {"pi": math.pi}
     for hit in re.finditer(r"^[^\S\n]*parameter\s+(\w+)\s*=\s*([^\n]+)", top.text, re.I | re.M):
         known[hit[1].lower()] = constant(hit[2], known, partial(top.error, offset=hit.start()))
     return known
 
 
-def _vertices(file: _File, known: Mapping[str, float]) -> tuple[Ints, Floats, Ints, Ints]:
+def _vertices(section: _Section, known: Mapping[str, float]) -> tuple[Ints, Floats, Ints, Ints]:
     """Ids, positions, support, and the number of the constraint each vertex lies on (0: none)."""
-    section = file.section("vertices")
     what = "a vertex number and three coordinates"
     listed = section.elements(r"(\d+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)([^\n]*)", what)
     columns = list(zip(*listed, strict=True)) or [()] * 5
-    X = np.empty((len(listed), 3))
-    for d in range(3):
-        X[:, d] = _numbers(columns[1 + d], known, section)
+    X = np.stack([_numbers(column, known, section) for column in columns[1:4]], axis=1)
     code, kinds = pd.factorize(np.array(columns[4], dtype=object))
     support, constraint = np.zeros(len(kinds), dtype=np.int8), np.zeros(len(kinds), dtype=int)
     for k, rest in enumerate(kinds):
-        row = int(np.argmax(code == k))
-        words = rest.lower()
+        row, words = int(np.argmax(code == k)), rest.lower()
         if re.search(r"\bboundary\b", words):
             raise section.error("a vertex on a parametric boundary is not supported", row)
         named = re.search(r"\bconstraints?((?:\s+\d+)+)", words)
@@ -244,16 +208,8 @@ def _vertices(file: _File, known: Mapping[str, float]) -> tuple[Ints, Floats, In
     return np.array(columns[0], dtype=np.int64), X, support[code], constraint[code]
 
 
-@dataclass(frozen=True, eq=False)
-class _Faces:
-    ids: Ints
-    corners: Ints  # vertices of face after face
-    counts: Ints  # corners of each face
-    rest: list[str]  # what follows the edges on each face's line
-
-
-def _faces(file: _File, vertex_ids: Ints) -> _Faces:
-    edges, faces = file.section("edges"), file.section("faces")
+def _faces(edges: _Section, faces: _Section, vertex_ids: Ints) -> tuple[Ints, Ints, Ints, list[str]]:
+    """Ids, vertices of face after face, corners of each face, and what follows the edges on its line."""
     what = "an edge number and two vertices"
     edge_rows = edges.elements(r"(\d+)[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)[^\n]*", what)
     numbers = np.array(edge_rows, dtype=np.int64).reshape(-1, 3)
@@ -270,10 +226,9 @@ def _faces(file: _File, vertex_ids: Ints) -> _Faces:
     following[last] = last - counts + 1
     open_at = np.flatnonzero(head != tail[following])
     if len(open_at):
-        text = "the edges of the face do not follow each other head to tail"
-        raise faces.error(text, row[open_at[0]])
+        raise faces.error("the edges of the face do not follow each other head to tail", row[open_at[0]])
     ids = np.array([f[0] for f in listed], dtype=np.int64)
-    return _Faces(ids, tail, counts, [f[2] for f in listed])
+    return ids, tail, counts, [f[2] for f in listed]
 
 
 def _places(ids: Ints, wanted: Ints, section: _Section, what: str, row: Ints | None = None) -> Ints:
@@ -287,12 +242,12 @@ def _places(ids: Ints, wanted: Ints, section: _Section, what: str, row: Ints | N
     return place
 
 
-def _pressures(file: _File, face_ids: Ints, known: Mapping[str, float]) -> tuple[Floats, tuple[str, ...]]:
+def _pressures(file: _Sections, face_ids: Ints, known: Mapping[str, float]) -> tuple[Floats, tuple[str, ...]]:
     """(m,) pressure along each face's normal: the sum over the bodies on its two sides."""
     pressure = np.zeros(len(face_ids))
-    if "bodies" not in file.sections:
+    if "bodies" not in file:
         return pressure, ("the file has no bodies, so no patch is under pressure",)
-    section, without = file.section("bodies"), []
+    section, without = file["bodies"], []
     listed = section.elements(r"(\d+)((?:[^\S\n]+-?\d+)*)([^\n]*)", "a body number and its faces")
     for row, (number, members, rest) in enumerate(listed):
         signed = np.array(members.split(), dtype=np.int64)
@@ -307,10 +262,9 @@ def _pressures(file: _File, face_ids: Ints, known: Mapping[str, float]) -> tuple
 
 
 def _patches(
-    file: _File, rest: list[str], pressure: Floats, known: Mapping[str, float]
+    header: str, section: _Section, rest: list[str], pressure: Floats, known: Mapping[str, float]
 ) -> tuple[Ints, tuple[Patch, ...]]:
     """Faces of the same patch number, tension and pressure are a patch."""
-    section = file.section("faces")
     code, kinds = pd.factorize(np.array(rest, dtype=object))
     number, tension = np.zeros(len(kinds)), np.ones(len(kinds))
     for k, words in enumerate(kinds):
@@ -322,7 +276,7 @@ def _patches(
     rows_, of_face = np.unique(
         np.stack([number[code], tension[code], pressure], axis=1), axis=0, return_inverse=True
     )
-    names = dict(re.findall(r"^// patch (\d+) ([^\n]+)$", file.header, re.M))
+    names = dict(re.findall(r"^// patch (\d+) ([^\n]+)$", header, re.M))
     once = len(np.unique(rows_[:, 0])) == len(rows_)
     patches = [
         Patch(names.get(str(int(a)), f"patch {k}") if once else f"patch {k}", t, p)
@@ -331,15 +285,12 @@ def _patches(
     return of_face.ravel(), tuple(patches)
 
 
-def _plane(file: _File, constraint: Ints, origin: Floats, known: Mapping[str, float]) -> Plane | None:
+def _plane(top: _Section, constraint: Ints, origin: Floats, known: Mapping[str, float]) -> Plane | None:
     """Π: the one constraint that sliding vertices lie on, as seen from the file's origin."""
-    top = file.section("top")
     used = np.unique(constraint[constraint > 0])
     if len(used) > 1:
-        raise top.error(
-            f"sliding vertices lie on constraints {', '.join(map(str, used))}; pcmc supports one plane"
-            " for all of them"
-        )
+        text = f"sliding vertices lie on constraints {', '.join(map(str, used))}"
+        raise top.error(f"{text}; pcmc supports one plane for all of them")
     wanted = int(used[0]) if len(used) else 1
     pattern = rf"^[^\S\n]*constraint\s+{wanted}\b[^\n]*\s+(?:formula|function)\s*:?\s*([^\n]+)"
     hit = re.search(pattern, top.text, re.I | re.M)
@@ -367,10 +318,8 @@ def _numbers(
     try:
         return np.array(words, dtype=np.float64)
     except ValueError:
-        code, kinds = pd.factorize(np.array(words, dtype=object))
-
-    def value(k: int) -> float:
-        at = int(np.argmax(code == k)) if row is None else row
-        return constant(kinds[k], known, lambda text: section.error(text, at))
-
-    return np.array([value(k) for k in range(len(kinds))])[code]
+        rows = range(len(words)) if row is None else [row]
+        values = [
+            constant(word, known, partial(section.error, row=k)) for k, word in zip(rows, words, strict=True)
+        ]
+        return np.array(values)

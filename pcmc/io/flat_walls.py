@@ -8,12 +8,12 @@ the file has the meshes without them and a text with all walls; the reader puts 
 from __future__ import annotations
 
 import json
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools
 from ..base.errors import FileError
 from ..surface import Patch, Surface
 from ..surface.geometry import bounding_size
@@ -46,26 +46,26 @@ def restore_walls(data: MeshData) -> MeshData:
     """
     if data.walls is None:
         return data
-    walls = _Walls.parsed(data.walls)
-    names = {walls.patches[k].name for k in walls.patch}
+    walls, above, shown = _parsed(data.walls)
+    names = {walls.patches[k].name for k in walls.patch_of_face}
     is_wall = np.array([p.name in names for p in data.patches])[data.patch_of_face]
     sheets = np.unique(data.faces[~is_wall])
     reach = ROUNDING * bounding_size(data.vertices)
-    far, near = cKDTree(data.vertices[sheets]).query(walls.vertices[walls.above])
-    if np.count_nonzero(is_wall) != walls.shown or np.any(far > reach):
+    far, near = cKDTree(data.vertices[sheets]).query(walls.vertices[above])
+    if np.count_nonzero(is_wall) != shown or np.any(far > reach):
         return replace(data, walls=None, notes=(*data.notes, CHANGED))
-    n, below = len(data.vertices), ~walls.above
+    n, below = len(data.vertices), ~above
     place = np.empty(len(below), dtype=np.int64)
-    place[walls.above], place[below] = sheets[near], n + np.arange(np.count_nonzero(below))
+    place[above], place[below] = sheets[near], n + np.arange(np.count_nonzero(below))
     X = np.concatenate([data.vertices, walls.vertices[below]])
     X[place] = walls.vertices  # those above too: to rest on Π they must lie on it to the last digit
     support = np.zeros(len(X), dtype=np.int8)
     support[:n] = 0 if data.support is None else data.support
-    support[place] = walls.support
+    support[place] = np.asarray(walls.support)
     patches = list(data.patches)
     patches += [p for p in walls.patches if p.name in names - {q.name for q in patches}]
     number = {p.name: k for k, p in enumerate(patches)}
-    patch = np.array([number.get(p.name, -1) for p in walls.patches])[walls.patch]
+    patch = np.array([number.get(p.name, -1) for p in walls.patches])[walls.patch_of_face]
     beside = cKDTree(data.vertices).query(walls.vertices[below])[1]
     whole = replace(
         data,
@@ -80,38 +80,24 @@ def restore_walls(data: MeshData) -> MeshData:
     return replace(without_unused(whole), notes=data.notes)
 
 
-@dataclass(frozen=True, eq=False)
-class _Walls:
-    """The walls that ``encode_walls`` wrote."""
-
-    vertices: Floats
-    support: Ints
-    above: Bools
-    faces: Ints
-    patch: Ints
-    patches: list[Patch]
-    shown: int
-
-    @classmethod
-    def parsed(cls, text: str) -> _Walls:
-        try:
-            values = json.loads(text)
-            walls = cls(
-                vertices=np.array(values["vertices"], dtype=np.float64).reshape(-1, 3),
-                support=np.array(values["support"], dtype=np.int8),
-                above=np.array(values["above"], dtype=bool),
-                faces=np.array(values["faces"], dtype=np.int64).reshape(-1, 3),
-                patch=np.array(values["patch"], dtype=np.int64),
-                patches=[Patch(*p) for p in values["patches"]],
-                shown=int(values["shown"]),
-            )
-            n = len(walls.vertices)
-            if not n == len(walls.support) == len(walls.above) > walls.faces.max():
-                raise ValueError
-            if not len(walls.faces) == len(walls.patch) or walls.patch.max() >= len(walls.patches):
-                raise ValueError
-        except (ValueError, KeyError, TypeError):
-            raise FileError(
-                f"the description of walls in it is damaged: {text!r:.60}", where=KEY, found=text[:60]
-            ) from None
-        return walls
+def _parsed(text: str) -> tuple[MeshData, Bools, int]:
+    """The walls, which of their vertices lie on other patches, and how many of their faces are shown."""
+    try:
+        values = json.loads(text)
+        walls = MeshData(
+            np.array(values["vertices"], dtype=np.float64).reshape(-1, 3),
+            np.array(values["faces"], dtype=np.int64).reshape(-1, 3),
+            np.array(values["patch"], dtype=np.int64),
+            tuple(Patch(*p) for p in values["patches"]),
+            support := np.array(values["support"], dtype=np.int8),
+        )
+        above, shown = np.array(values["above"], dtype=bool), int(values["shown"])
+        if not len(walls.vertices) == len(support) == len(above) > walls.faces.max():
+            raise ValueError
+        if not len(walls.faces) == len(walls.patch_of_face) or walls.patch_of_face.max() >= len(
+            walls.patches
+        ):
+            raise ValueError
+    except (ValueError, KeyError, TypeError):
+        raise FileError(f"the description of walls in it is damaged: {text!r:.60}", where=KEY) from None
+    return walls, above, shown

@@ -52,13 +52,8 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], walls: st
         used, local = np.unique(faces, return_inverse=True)
         mesh = trimesh.Trimesh(turned[used], local.reshape(-1, 3), process=False)
         mesh.vertex_attributes.update({key: values[used] for key, values in data.items()})
-        material = trimesh.visual.material.PBRMaterial(
-            name=patch.name,
-            baseColorFactor=[*color, 1.0],
-            metallicFactor=0.0,
-            roughnessFactor=0.9,
-            doubleSided=True,
-        )
+        shine = {"metallicFactor": 0.0, "roughnessFactor": 0.9, "doubleSided": True}
+        material = trimesh.visual.material.PBRMaterial(patch.name, baseColorFactor=[*color, 1.0], **shine)
         mesh.visual = trimesh.visual.TextureVisuals(material=material)
         scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name, transform=place)
     scene.metadata["pcmc"] = metadata_text(surface)
@@ -80,17 +75,11 @@ def read(path: Path) -> MeshData:
         try:
             scene = trimesh.load_scene(path, process=False)
         except FileNotFoundError as error:
-            raise FileError(
-                f"its part {error} is missing; keep the files of a .gltf in one folder", where=str(error)
-            ) from None
+            text = f"its part {error} is missing; keep the files of a .gltf in one folder"
+            raise FileError(text, where=str(error)) from None
     mesh = from_meshes(scene, path.stem, parse_metadata(scene.metadata.get("pcmc")))
     X = mesh.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
     scalars = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_") and k != SUPPORT}
     support = mesh.scalars.get(SUPPORT)
-    return replace(
-        mesh,
-        vertices=X,
-        scalars=scalars,
-        support=None if support is None else np.round(support).astype(np.int8),
-        walls=scene.metadata.get(KEY),
-    )
+    held = None if support is None else np.round(support).astype(np.int8)
+    return replace(mesh, vertices=X, scalars=scalars, support=held, walls=scene.metadata.get(KEY))

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..surface.geometry import area_vectors, segment_lengths
+from ..surface.topology import Topology, topology
 from .mesh_data import MeshData
 
 GAP = 0.05  # of the boundary edges next to it: closer vertices are one, drawn twice
@@ -28,23 +29,14 @@ def import_warnings(data: MeshData) -> tuple[str, ...]:
     """
     if data.support is not None or not len(data.faces):
         return ()
-    return tuple(filter(None, (_open_seam(data), _opposed_patches(data), _wrong_up(data))))
+    topo = topology(data.faces, data.patch_of_face, len(data.vertices))
+    seam = _open_seam(data.vertices, topo.edges[topo.boundary_edge])
+    return tuple(filter(None, (seam, _opposed_patches(data, topo), _wrong_up(data))))
 
 
-def _directed(data: MeshData) -> tuple[Ints, Ints]:
-    """(3m,2) the edges of all faces as they run, and (3m,) the number of the edge that each is."""
-    F = data.faces
-    run = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
-    number = np.unique(np.sort(run, axis=1), axis=0, return_inverse=True)[1]
-    return run, number.ravel()
-
-
-def _open_seam(data: MeshData) -> str:
-    run, number = _directed(data)
-    outer = run[(np.bincount(number) == 1)[number]]
+def _open_seam(X: Floats, outer: Ints) -> str:
     if not len(outer):
         return ""
-    X: Floats = data.vertices
     length = segment_lengths(X, outer)
     beside = np.full(len(X), np.inf)
     np.minimum.at(beside, outer.ravel(), np.repeat(length, 2))
@@ -62,17 +54,12 @@ def _open_seam(data: MeshData) -> str:
     )
 
 
-def _opposed_patches(data: MeshData) -> str:
-    run, number = _directed(data)
-    patch = np.tile(data.patch_of_face, 3)
-    order = np.argsort(number, kind="stable")
-    pairs = order[(np.bincount(number) == 2)[number[order]]].reshape(-1, 2)
-    one, two = pairs.T
-    wrong = (patch[one] != patch[two]) & (run[one] == run[two]).all(axis=1)
-    if not wrong.any():
+def _opposed_patches(data: MeshData, topo: Topology) -> str:
+    wrong = np.flatnonzero(topo.one_way_edge & topo.seam_edge)
+    if not len(wrong):
         return ""
-    first = np.flatnonzero(wrong)[0]
-    a, b = (data.patches[patch[k]].name for k in sorted((one[first], two[first])))
+    faces = np.flatnonzero((topo.edge_of_face == wrong[0]).any(axis=1))
+    a, b = (data.patches[k].name for k in data.patch_of_face[faces])
     return (
         f"patches {a!r} and {b!r} are turned against each other: their pressures act to opposite"
         " sides; unless you want that, reverse the faces of one"

@@ -8,14 +8,20 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, unknown
+from ..base.validate import choice
 from ..surface import Patch, Plane, Surface, checks
 from ..surface.geometry import bounding_size
 from ..surface.topology import topology
 
 FREE, SLIDING, FIXED = 0, 1, 2
+HELD = {"fixed": FIXED, "sliding": SLIDING}  # names of groups and layers of supports
+TOLERANCE = 1e-7  # of the size, to merge vertices; single precision keeps this much
 ROUNDING = 1e-6  # of the size: the most that a format rounds by
 
 
@@ -62,35 +68,47 @@ def without_unused(data: MeshData) -> MeshData:
     used[data.faces] = True
     if used.all():
         return data
-    number = np.cumsum(used) - 1
     note = f"{np.count_nonzero(~used)} vertices that no face uses were left out"
-    return replace(
-        data,
-        vertices=data.vertices[used],
-        faces=number[data.faces],
-        support=None if data.support is None else data.support[used],
-        scalars={k: v[used] if len(v) == len(used) else v for k, v in data.scalars.items()},
-        notes=(*data.notes, note),
-    )
+    return replace(_selected(data, np.flatnonzero(used), np.cumsum(used) - 1), notes=(*data.notes, note))
 
 
 def merged(data: MeshData) -> MeshData:
     """The same with vertices at one place merged: patches written as separate meshes need it."""
     if data.joined:
         return data
-    from .merge import coincident  # scipy.spatial is slow to import, and rarely needed
-
     keep, place = coincident(checks.positions(data.vertices))
     if len(keep) == len(data.vertices):
         return data
-    support = None
-    if data.support is not None:
-        support = np.zeros(len(keep), dtype=np.int8)
-        np.maximum.at(support, place, data.support)
+    selected = _selected(data, keep, place)
+    if data.support is not None and selected.support is not None:
+        np.maximum.at(selected.support, place, data.support)
+    return selected
+
+
+def coincident(X: Floats) -> tuple[Ints, Ints]:
+    """Which vertices to keep, and the index among them of every vertex.
+
+    Vertices closer than TOLERANCE times the diagonal of the bounding box become one, the first of them.
+
+    >>> keep, place = coincident(np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1e-9], [0, 1, 0.0]]))
+    >>> keep.tolist(), place.tolist()
+    ([0, 1, 3], [0, 1, 0, 2])
+    """
+    one, two = cKDTree(X).query_pairs(TOLERANCE * bounding_size(X), output_type="ndarray").T
+    graph = coo_array((np.ones(len(one), dtype=bool), (one, two)), shape=(len(X), len(X)))
+    group = connected_components(graph, directed=False)[1]  # groups are numbered by their first vertex
+    return np.unique(group, return_index=True)[1], group
+
+
+def _selected(data: MeshData, keep: Ints, place: Ints) -> MeshData:
+    """The same with the vertices ``keep``; ``place`` is the new index of every vertex."""
     n = len(data.vertices)
-    scalars = {k: v[keep] if len(v) == n else v for k, v in data.scalars.items()}
     return replace(
-        data, vertices=data.vertices[keep], faces=place[data.faces], support=support, scalars=scalars
+        data,
+        vertices=data.vertices[keep],
+        faces=place[data.faces],
+        support=None if data.support is None else data.support[keep],
+        scalars={k: v[keep] if len(v) == n else v for k, v in data.scalars.items()},
     )
 
 
@@ -103,40 +121,25 @@ def to_surface(
     plane: Plane | None = None,
 ) -> Surface:
     """The Surface of the data; arguments that are given replace the file's values."""
-    n = len(data.vertices)
-    support = data.support
-    if isinstance(fixed, str) and fixed != "boundary":
-        raise OptionError(unknown("fixed", fixed, ["boundary"]), what="fixed", found=fixed)
-    if isinstance(fixed, str) or (fixed is None and support is None):
+    n, X = len(data.vertices), data.vertices
+    support = np.full(n, FREE) if data.support is None else data.support
+    sliding = support == SLIDING if on_plane is None else checks.mask(on_plane, n, "on_plane")
+    if isinstance(fixed, str):
+        choice("fixed", fixed, ["boundary"])
         held = topology(data.faces, data.patch_of_face, n).on_boundary
-    elif fixed is None:
-        held = np.asarray(support == FIXED)
-    else:
+    elif fixed is not None:
         held = checks.mask(fixed, n, "fixed")
-    if on_plane is not None:
-        sliding = checks.mask(on_plane, n, "on_plane")
+    elif data.support is not None:
+        held = support == FIXED
     else:
-        sliding = np.zeros(n, dtype=bool) if support is None else support == SLIDING
-    if fixed is None and support is None:
-        held = held & ~sliding
-    patches = _changed(data.patches, "tension", tensions)
+        held = topology(data.faces, data.patch_of_face, n).on_boundary & ~sliding
+    patches = _changed(_changed(data.patches, "tension", tensions), "pressure", pressures)
     plane = plane or data.plane or Plane()
-    return Surface(
-        _on(plane, data.vertices, sliding & ~held),
-        data.faces,
-        data.patch_of_face,
-        _changed(patches, "pressure", pressures),
-        held,
-        sliding,
-        plane,
-    )
-
-
-def _on(plane: Plane, X: Floats, sliding: Bools) -> Floats:
-    """Sliding vertices that rounding moved off the plane, back onto it."""
     height, size = plane.height(X), bounding_size(X)
-    near = sliding & (np.abs(height) < ROUNDING * size) & (np.abs(height) > 1e-12 * size)
-    return X - np.where(near, height, 0.0)[:, None] * np.array(plane.normal) if near.any() else X
+    rounded = sliding & ~held & (np.abs(height) < ROUNDING * size) & (np.abs(height) > 1e-12 * size)
+    if rounded.any():  # back onto the plane
+        X = X - np.where(rounded, height, 0.0)[:, None] * np.array(plane.normal)
+    return Surface(X, data.faces, data.patch_of_face, patches, held, sliding, plane)
 
 
 def _changed(

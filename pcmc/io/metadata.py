@@ -12,13 +12,8 @@ from ..surface import Patch, Plane, Surface
 
 def metadata_text(surface: Surface) -> str:
     """Patches, plane and counts as JSON, for the comment or metadata of a format."""
-    point, normal = surface.plane.point, surface.plane.normal
-    values = {
-        "patches": [astuple(p) for p in surface.patches],
-        "plane": [point, normal],
-        "counts": [surface.n, surface.m],
-    }
-    return json.dumps(values)
+    patches, plane = [astuple(p) for p in surface.patches], astuple(surface.plane)
+    return json.dumps({"patches": patches, "plane": plane, "counts": [surface.n, surface.m]})
 
 
 @dataclass(frozen=True)
@@ -36,12 +31,8 @@ class Metadata:
     def check_counts(self, vertices: int, faces: int) -> None:
         """Raise FileError when the file lacks some of the mesh that was written."""
         if self.counts is not None and self.counts != (vertices, faces):
-            raise FileError(
-                f"cut off or changed: {self.counts[0]} vertices and {self.counts[1]} faces were"
-                f" written, but the file has {vertices} and {faces}",
-                found=(vertices, faces),
-                expected=self.counts,
-            )
+            written = f"{self.counts[0]} vertices and {self.counts[1]} faces"
+            raise FileError(f"cut off or changed: {written} were written; it has {vertices} and {faces}")
 
 
 def parse_metadata(text: str | None) -> Metadata:
@@ -54,7 +45,6 @@ def parse_metadata(text: str | None) -> Metadata:
         plane = Plane(*(tuple(v) for v in values["plane"]))
         counts = (int(values["counts"][0]), int(values["counts"][1]))
     except (ValueError, KeyError, TypeError, IndexError):
-        raise FileError(
-            f"the pcmc metadata in it are damaged: {text[:60]!r}", where="metadata", found=text[:60]
-        ) from None
+        message = f"the pcmc metadata in it are damaged: {text[:60]!r}"
+        raise FileError(message, where="metadata", found=text[:60]) from None
     return Metadata({p.name: p for p in patches}, plane, counts)

@@ -59,20 +59,12 @@ def read(path: Path) -> MeshData:
         arrays = {name: archive[name] for name in archive.files}
         meta = json.loads(str(arrays.pop("meta")))
         if meta["format"] != FORMAT:
-            raise FileError(
-                f"expected the format {FORMAT!r}, found {meta['format']!r}",
-                where="format",
-                found=meta["format"],
-                expected=FORMAT,
-            )
-        if meta["version"] > VERSION:
-            raise FileError(
-                f"written by a newer pcmc (format {meta['version']}, this one reads up to"
-                f" {VERSION}); update pcmc",
-                where="version",
-                found=meta["version"],
-                expected=VERSION,
-            )
+            text = f"expected the format {FORMAT!r}, found {meta['format']!r}"
+            raise FileError(text, where="format", found=meta["format"], expected=FORMAT)
+        newer = meta["version"]
+        if newer > VERSION:
+            text = f"written by a newer pcmc (format {newer}, this one reads up to {VERSION}); update pcmc"
+            raise FileError(text, where="version", found=newer, expected=VERSION)
         metadata = parse_metadata(meta["description"])
         return MeshData(
             arrays.pop("vertices"),
@@ -98,8 +90,6 @@ def _plain(value: Any) -> Any:
         return value.name.lower()
     if isinstance(value, pd.DataFrame):
         return value.to_dict(orient="records")
-    raise FileError(
-        f"certificate: cannot write a {type(value).__name__}; use numbers, texts, arrays and tables",
-        where="certificate",
-        found=type(value).__name__,
-    )
+    found = type(value).__name__
+    text = f"certificate: cannot write a {found}; use numbers, texts, arrays and tables"
+    raise FileError(text, where="certificate", found=found)

@@ -13,13 +13,12 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..surface import Surface
-from .mesh_data import FIXED, FREE, SLIDING, MeshData, support_of
+from .mesh_data import FREE, HELD, MeshData, support_of
 from .metadata import metadata_text, parse_metadata
 from .polygons import triangulate
 from .text import format_rows
 
 MARK = "# pcmc "
-HELD = {"fixed": FIXED, "sliding": SLIDING}
 VERTEX = re.compile(r"^[^\S\n]*v[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\n]*$", re.M)
 FACE = re.compile(r"^[^\S\n]*f[^\S\n]+([^\n]+)$", re.M)
 POINT = re.compile(r"^[^\S\n]*p[^\S\n]+([\d \t]+)$", re.M)
@@ -59,23 +58,17 @@ def read(path: Path) -> MeshData:
             groups.append(np.full(len(count), names.index(name)))
         if name in HELD:
             points = np.array(" ".join(POINT.findall(part)).split(), dtype=np.int64)
-            _within(points, len(X), text, offset)
+            if len(points) and not (points.min() >= 1 and points.max() <= len(X)):
+                raise _error(text, offset + 1, f"a point here is outside 1..{len(X)}", "p")
             support[points - 1] = HELD[name]
     if not names:
         raise FileError("the file has no faces", where="faces", found=0)
     F, source, notes = triangulate(X, np.concatenate(corners), np.concatenate(counts))
     metadata.check_counts(len(X), len(F))
-    known = comment is not None or bool(support.any())
-    return MeshData(
-        X,
-        F,
-        np.concatenate(groups)[source],
-        metadata.named(names),
-        support if known else None,
-        metadata.plane,
-        notes=notes,
-        joined=metadata.counts is not None,
-    )
+    known = support if comment or support.any() else None
+    patch, patches = np.concatenate(groups)[source], metadata.named(names)
+    joined = metadata.counts is not None
+    return MeshData(X, F, patch, patches, known, metadata.plane, notes=notes, joined=joined)
 
 
 def _vertices(text: str) -> Floats:
@@ -127,11 +120,6 @@ def _faces(text: str, part: str, offset: int, n: int) -> tuple[Ints, Ints]:
         wrong = f"names a vertex outside 1..{n}" if len(bad) else "has fewer than three corners"
         raise _error(text, offset + line.start(), f"the face {wrong}", line[0])
     return counts, corner - 1
-
-
-def _within(points: Ints, n: int, text: str, offset: int) -> None:
-    if len(points) and not (points.min() >= 1 and points.max() <= n):
-        raise _error(text, offset + 1, f"a point here is outside 1..{n}", "p")
 
 
 def _error(text: str, offset: int, wrong: str, found: str) -> FileError:

@@ -41,11 +41,8 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any)
     for name, values in scalars.items():
         key = re.sub(r"\s+", "_", name)
         if key in RESERVED:
-            raise FileError(
-                f"scalars: .ply files use the name {name!r} themselves; rename the scalar",
-                where=name,
-                found=name,
-            )
+            text = f"scalars: .ply files use the name {name!r} themselves; rename the scalar"
+            raise FileError(text, where=name, found=name)
         (vertex if len(values) == surface.n else face)[key] = np.asarray(values, dtype="<f8")
     header = [
         "ply",
@@ -83,21 +80,23 @@ def _table(columns: Mapping[str, Any]) -> Any:
 
 @dataclass(frozen=True)
 class _Element:
-    """An element of the header: single properties before and after at most one list."""
+    """An element of the header; a property is (name, type), at most one is (name, type, type of items)."""
 
     name: str
     size: int
-    before: list[tuple[str, str]]
-    items: tuple[str, str, str] | None  # name, type of the count, type of the items
-    after: list[tuple[str, str]]
+    properties: list[tuple[str, ...]]
 
-    def row(self, count: int) -> list[tuple[str, str, tuple[int, ...]]]:
+    @property
+    def lists(self) -> tuple[str, ...] | None:
+        """The property that is a list."""
+        return next((p for p in self.properties if len(p) == 3), None)
+
+    def row(self, count: int) -> np.dtype[Any]:
         """dtype of a row whose list has ``count`` items."""
-        row: list[tuple[str, str, tuple[int, ...]]] = [(name, kind, ()) for name, kind in self.before]
-        if self.items is not None:
-            name, of_count, of_items = self.items
-            row += [(f"{name} count", of_count, ()), (name, of_items, (count,))]
-        return row + [(name, kind, ()) for name, kind in self.after]
+        fields: list[tuple[Any, ...]] = []
+        for name, kind, *items in self.properties:
+            fields += [(f"{name} count", kind), (name, items[0], (count,))] if items else [(name, kind)]
+        return np.dtype(fields)
 
 
 def read(path: Path) -> MeshData:
@@ -105,14 +104,14 @@ def read(path: Path) -> MeshData:
     data = path.read_bytes()
     header, form, start = _header(data)
     comment = re.search(rf"^{MARK}(.*)$", header, re.M)
-    elements = _elements(header, {"binary_big_endian": ">"}.get(form, "<"))
+    order = ">" if form == "binary_big_endian" else "<"
+    kinds = {name: "<f8" if form == "ascii" else order + kind for name, kind in TYPES.items()}
+    elements = _elements(header, kinds)
     if form == "ascii":
         try:
-            body = np.array(data[start:].split(), dtype=np.float64)
+            data, start = np.array(data[start:].split(), dtype=np.float64).tobytes(), 0
         except ValueError as error:
             raise FileError(f"its body is not all numbers ({error})", where="body") from None
-        elements = [_as_numbers(e) for e in elements]
-        data, start = body.tobytes(), 0
     tables: dict[str, dict[str, Any]] = {}
     for element in elements:
         tables[element.name], start = _rows(element, data, start)
@@ -136,95 +135,77 @@ def _header(data: bytes) -> tuple[str, str, int]:
     header = data[: end.start()].decode("utf-8", "replace").replace("\r", "")
     form = re.search(r"^format (ascii|binary_little_endian|binary_big_endian) ", header, re.M)
     if form is None:
-        raise FileError(
-            "its header names no known format", where="header", expected="ascii or binary_…_endian"
-        )
+        raise FileError("its header names no known format", where="header")
     return header, form[1], end.end()
 
 
-def _elements(header: str, order: str) -> list[_Element]:
+def _elements(header: str, kinds: Mapping[str, str]) -> list[_Element]:
     elements: list[_Element] = []
     for number, line in enumerate(header.split("\n"), 1):
-        words = line.split()
         try:
-            match words:
+            match line.split():
                 case ["element", name, count]:
-                    elements.append(_Element(name, int(count), [], None, []))
+                    elements.append(_Element(name, int(count), []))
                 case ["property", "list", of_count, of_items, name]:
-                    last = elements.pop()
-                    if last.items is not None:
-                        raise FileError(
-                            f"line {number}: pcmc reads one list per element, this is a second", where=number
-                        )
-                    items = (name, order + TYPES[of_count], order + TYPES[of_items])
-                    elements.append(_Element(last.name, last.size, last.before, items, []))
+                    if elements[-1].lists:
+                        text = f"line {number}: pcmc reads one list per element, this is a second"
+                        raise FileError(text, where=number)
+                    elements[-1].properties.append((name, kinds[of_count], kinds[of_items]))
                 case ["property", kind, name]:
-                    last = elements[-1]
-                    single = last.before if last.items is None else last.after
-                    single.append((name, order + TYPES[kind]))
+                    elements[-1].properties.append((name, kinds[kind]))
         except FileError:
             raise
         except (KeyError, IndexError, ValueError):
-            raise FileError(
-                f"line {number}: not a line of a PLY header: {line[:60]!r}", where=number, found=line
-            ) from None
+            text = f"line {number}: not a line of a PLY header: {line[:60]!r}"
+            raise FileError(text, where=number) from None
     names = [e.name for e in elements]
     if "vertex" not in names or "face" not in names[names.index("vertex") :]:
-        raise FileError(
-            f"its header must list vertices, then faces; found {', '.join(names) or 'none'}",
-            where="header",
-            found=names,
-        )
-    missing = set("xyz") - {name for name, _ in elements[names.index("vertex")].before}
+        text = f"its header must list vertices, then faces; found {', '.join(names) or 'none'}"
+        raise FileError(text, where="header")
+    missing = set("xyz") - {p[0] for p in elements[names.index("vertex")].properties if len(p) == 2}
     if missing:
         raise FileError(f"its vertices have no property {min(missing)}", where="vertex")
     return elements
 
 
-def _as_numbers(element: _Element) -> _Element:
-    """The same with every number a double, as the words of a text become."""
-    before, after = ([(name, "<f8") for name, _ in part] for part in (element.before, element.after))
-    items = None if element.items is None else (element.items[0], "<f8", "<f8")
-    return _Element(element.name, element.size, before, items, after)
-
-
 def _rows(element: _Element, data: bytes, start: int) -> tuple[dict[str, Any], int]:
     """Columns of an element that starts at a byte, a list's items one after the other; and its end."""
-    counts: Ints = np.zeros(element.size, dtype=np.int64)
-    offsets: Ints | None = None
-    if element.items is not None and element.size:
-        counts, offsets = _list_counts(element, data, start)
+    counts, offsets = _layout(element, data, start)
+    _enough(element, data, int(offsets[-1]))
     kinds = np.unique(counts)
     if len(kinds) <= 1:
-        dtype = np.dtype(element.row(int(kinds[0]) if len(kinds) else 0))
-        _enough(element, data, start + element.size * dtype.itemsize)
-        table = np.frombuffer(data, dtype, element.size, start)
-        columns = {name: table[name].ravel() for name in dtype.names or ()}
-        return columns, start + element.size * dtype.itemsize
-    assert offsets is not None
-    _enough(element, data, int(offsets[-1]))
-    return _mixed(element, np.frombuffer(data, np.uint8), counts, offsets), int(offsets[-1])
+        table = np.frombuffer(data, element.row(int(kinds.sum())), element.size, start)
+        return {name: table[name].ravel() for name in table.dtype.names or ()}, int(offsets[-1])
+    columns: dict[str, Any] = {}
+    ends, octets = np.cumsum(counts), np.frombuffer(data, np.uint8)
+    for count in kinds:  # rows of one length together
+        dtype, chosen = element.row(int(count)), np.flatnonzero(counts == count)
+        table = octets[offsets[chosen][:, None] + np.arange(dtype.itemsize)].view(dtype).ravel()
+        for key in dtype.names or ():
+            listed = bool(dtype[key].shape)
+            place = (ends[chosen] - count)[:, None] + np.arange(count) if listed else chosen
+            size = ends[-1] if listed else element.size
+            columns.setdefault(key, np.zeros(size, dtype[key].base))[place] = table[key]
+    return columns, int(offsets[-1])
 
 
-def _list_counts(element: _Element, data: bytes, start: int) -> tuple[Ints, Ints | None]:
-    """Items in each row's list; where lists differ, also where each row starts and the last ends."""
-    base = np.dtype(element.row(0))
-    assert element.items is not None
-    assert base.fields is not None
-    name, of_count, of_items = element.items
-    at = base.fields[f"{name} count"][1]
-    item = np.dtype(of_items).itemsize
+def _layout(element: _Element, data: bytes, start: int) -> tuple[Ints, Ints]:
+    """Items in each row's list, and where each row starts and the last ends."""
+    base, rows = element.row(0), np.arange(element.size + 1)
+    if element.lists is None or not element.size:
+        return np.zeros(element.size, np.int64), start + base.itemsize * rows
+    name, item = element.lists[0], np.dtype(element.lists[2]).itemsize
 
     def count_at(offset: int) -> int:
         _enough(element, data, offset + base.itemsize)
-        return int(np.frombuffer(data, of_count, 1, offset + at)[0])
+        return int(np.frombuffer(data, base, 1, offset)[f"{name} count"][0])
 
     first = count_at(start)
-    row = base.itemsize + first * item
-    if first >= 0 and start + element.size * row <= len(data):
-        table = np.frombuffer(data, np.dtype(element.row(first)), element.size, start)
+    size = base.itemsize + first * item
+    if first >= 0 and start + element.size * size <= len(data):
+        table = np.frombuffer(data, element.row(first), element.size, start)
         if (table[f"{name} count"] == first).all():
-            return np.full(element.size, first), None
+            return np.full(element.size, first), start + size * rows
     counts, offsets = np.empty(element.size, np.int64), np.empty(element.size + 1, np.int64)
     for k in range(element.size):  # each row says only where the next one starts
         offsets[k], counts[k] = start, count_at(start)
@@ -235,27 +216,7 @@ def _list_counts(element: _Element, data: bytes, start: int) -> tuple[Ints, Ints
     return counts, offsets
 
 
-def _mixed(element: _Element, data: Any, counts: Ints, offsets: Ints) -> dict[str, Any]:
-    """Columns of rows of different lengths, read together by length."""
-    assert element.items is not None
-    name = element.items[0]
-    columns: dict[str, Any] = {}
-    ends = np.cumsum(counts)
-    for count in np.unique(counts):
-        dtype = np.dtype(element.row(int(count)))
-        chosen = np.flatnonzero(counts == count)
-        table = data[offsets[chosen][:, None] + np.arange(dtype.itemsize)].view(dtype).ravel()
-        for key in dtype.names or ():
-            size = ends[-1] if key == name else element.size
-            place = (ends[chosen] - count)[:, None] + np.arange(count) if key == name else chosen
-            columns.setdefault(key, np.zeros(size, dtype[key].base))[place] = table[key]
-    return columns
-
-
 def _enough(element: _Element, data: bytes, end: int) -> None:
     if end > len(data):
-        raise FileError(
-            f"cut off: the file ends before its {element.size} {element.name} elements do",
-            where=element.name,
-            expected=element.size,
-        )
+        text = f"cut off: the file ends before its {element.size} {element.name} elements do"
+        raise FileError(text, where=element.name)

@@ -31,12 +31,8 @@ def triangulate(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tup
     """
     few = np.flatnonzero(counts < 3)
     if len(few):
-        raise FileError(
-            f"face {few[0]} has {counts[few[0]]} corners; a face needs three or more",
-            where=int(few[0]),
-            found=int(counts[few[0]]),
-            expected="three or more corners",
-        )
+        text = f"face {few[0]} has {counts[few[0]]} corners; a face needs three or more"
+        raise FileError(text, where=int(few[0]))
     if (counts == 3).all():
         return corners.reshape(-1, 3), np.arange(len(counts)), ()
     start = np.cumsum(counts) - counts
@@ -48,7 +44,10 @@ def triangulate(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tup
         origin.append(np.repeat(chosen, k - 2))
     source = np.concatenate(origin)
     order = np.argsort(source, kind="stable")
-    return np.concatenate(triangles)[order], source[order], (_note(counts),)
+    quads, more = np.count_nonzero(counts == 4), np.count_nonzero(counts > 4)
+    parts = [f"{quads} quads" if quads else "", f"{more} polygons" if more else ""]
+    note = f"{' and '.join(filter(None, parts))} were cut into triangles"
+    return np.concatenate(triangles)[order], source[order], (note,)
 
 
 def _best_fans(X: Floats, polygon: Ints, number: Ints) -> Ints:
@@ -58,32 +57,18 @@ def _best_fans(X: Floats, polygon: Ints, number: Ints) -> Ints:
         return polygon[:, None, :]
     relative = X[polygon] - X[polygon[:, :1]]
     vector_area = np.cross(relative, np.roll(relative, -1, axis=1)).sum(axis=1)
-    fans = np.stack([_fan(np.roll(polygon, -s, axis=1)) for s in range(k)])
+    turned = np.stack([np.roll(polygon, -s, axis=1) for s in range(k)])
+    first = np.repeat(turned[:, :, :1], k - 2, axis=2)
+    fans = np.stack([first, turned[:, :, 1:-1], turned[:, :, 2:]], axis=3)
     side = np.sign(np.einsum("sptd,pd->spt", area_vectors(X[fans]), vector_area))
     quality = triangle_quality(X, fans.reshape(-1, 3)).reshape(side.shape)
     worst = (side * quality).min(axis=2)
     best = worst.argmax(axis=0)
     bad = np.flatnonzero(worst.max(axis=0) <= 0.0)
     if len(bad):
-        raise FileError(
-            f"face {number[bad[0]]} is a polygon of {k} corners that no fan of triangles fills;"
-            " cut it into triangles in the program that wrote it",
-            where=int(number[bad[0]]),
-            found=int(k),
-        )
+        text = f"face {number[bad[0]]} is a polygon of {k} corners that no fan of triangles fills; cut it"
+        raise FileError(f"{text} in the program that wrote it", where=int(number[bad[0]]), found=int(k))
     return fans[best, np.arange(len(polygon))]
-
-
-def _fan(polygon: Ints) -> Ints:
-    k = polygon.shape[1]
-    first = np.repeat(polygon[:, :1], k - 2, axis=1)
-    return np.stack([first, polygon[:, 1:-1], polygon[:, 2:]], axis=2)
-
-
-def _note(counts: Ints) -> str:
-    quads, more = np.count_nonzero(counts == 4), np.count_nonzero(counts > 4)
-    parts = [f"{quads} quads" if quads else "", f"{more} polygons" if more else ""]
-    return f"{' and '.join(filter(None, parts))} were cut into triangles"
 
 
 def from_polygons(
@@ -110,12 +95,8 @@ def from_polygons(
     if corners.min() < 0 or corners.max() >= len(X):
         bad = int(np.flatnonzero((corners < 0) | (corners >= len(X)))[0])
         face = int(np.searchsorted(np.cumsum(counts), bad, side="right"))
-        raise FileError(
-            f"face {face} names vertex {corners[bad]}, which is outside 0..{len(X) - 1}",
-            where=face,
-            found=int(corners[bad]),
-            expected=f"0..{len(X) - 1}",
-        )
+        text = f"face {face} names vertex {corners[bad]}, which is outside 0..{len(X) - 1}"
+        raise FileError(text, where=face)
     X = np.array(X, dtype=np.float64)
     F, source, notes = triangulate(X, corners.astype(np.int64), counts.astype(np.int64))
     metadata.check_counts(len(X), len(F))
@@ -127,28 +108,17 @@ def from_polygons(
         known = label == "patch" and values.min() >= 0 and values.max() < len(described)
         names = [described[int(v)] if known else f"patch {v}" for v in values.tolist()]
     support = point_data.get("support")
-    scalars = {
-        **{k: _column(v) for k, v in point_data.items() if k != "support" and _one(v, len(X))},
-        **{k: _column(v)[source] for k, v in cell_data.items() if k != label and _one(v, len(counts))},
-    }
+    support = None if support is None else np.asarray(support).ravel().astype(np.int8)
+    scalars = _scalars(point_data, "support", len(X))
+    scalars |= {k: v[source] for k, v in _scalars(cell_data, label, len(counts)).items()}
+    patches, joined = metadata.named(names), metadata.counts is not None
     return MeshData(
-        X,
-        F,
-        patch[source],
-        metadata.named(names),
-        None if support is None else np.asarray(support).ravel().astype(np.int8),
-        metadata.plane,
-        scalars,
-        notes=notes,
-        joined=metadata.counts is not None,
+        X, F, patch[source], patches, support, metadata.plane, scalars, notes=notes, joined=joined
     )
 
 
-def _one(values: Any, size: int) -> bool:
-    """Whether there is one number for each."""
-    array = np.asarray(values)
-    return array.size == size and np.issubdtype(array.dtype, np.number)
-
-
-def _column(values: Any) -> Floats:
-    return np.asarray(values, dtype=np.float64).ravel()
+def _scalars(data: Mapping[str, Any], other: str | None, size: int) -> dict[str, Floats]:
+    """The data of one number each, but for the one of the name ``other``."""
+    columns = {k: np.asarray(v).ravel() for k, v in data.items() if k != other}
+    numbers = {k: v for k, v in columns.items() if len(v) == size and np.issubdtype(v.dtype, np.number)}
+    return {k: v.astype(np.float64) for k, v in numbers.items()}

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
@@ -19,13 +20,11 @@ from ..surface.colours import patch_colors
 from ..surface.geometry import bounding_size
 from . import flat_walls
 from .libraries import load_library, translated_errors
-from .merge import TOLERANCE
-from .mesh_data import FIXED, FREE, SLIDING, MeshData, support_of
+from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of
 from .metadata import Metadata, metadata_text, parse_metadata
 from .polygons import triangulate
 
 KEY = "pcmc"
-HELD = {"fixed": FIXED, "sliding": SLIDING}
 VERSION = 7  # of Rhino's format
 COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255)}
 
@@ -82,11 +81,9 @@ def read(path: Path) -> MeshData:
         model = rhino.File3dm.Read(str(path))
     if model is None:
         raise FileError("not a Rhino file, or cut off")
-    X, corners, counts, label = [], [], [], []
-    names: list[str] = []
+    X, corners, counts, named = [], [], [], []
     held: dict[int, list[Floats]] = {FIXED: [], SLIDING: []}
-    metadata, others, start = Metadata(), 0, 0
-    walls: str | None = None
+    metadata, walls, others, start = Metadata(), None, 0, 0
     for item in model.Objects:
         place, geometry = item.Attributes.LayerIndex, item.Geometry
         layer = model.Layers[place] if 0 <= place < len(model.Layers) else None
@@ -96,40 +93,28 @@ def read(path: Path) -> MeshData:
             metadata = parse_metadata(text)
             walls = layer.GetUserString(flat_walls.KEY) or walls
         if isinstance(geometry, rhino.Mesh):
-            points = _coordinates(geometry.Vertices.ToPoint3dArray())
+            X.append(_coordinates(geometry.Vertices.ToPoint3dArray()))
             faces = np.array([geometry.Faces[k] for k in range(geometry.Faces.Count)]).reshape(-1, 4)
             size = np.where(faces[:, 2] == faces[:, 3], 3, 4)  # a triangle names its last corner twice
-            names += [] if name in names else [name]
-            X.append(points)
             corners.append(faces[np.arange(4) < size[:, None]] + start)
             counts.append(size)
-            label.append(np.full(len(size), names.index(name)))
-            start += len(points)
+            named += [name] * len(size)
+            start += len(X[-1])
         elif isinstance(geometry, rhino.PointCloud) and name in HELD:
             held[HELD[name]].append(_coordinates(geometry.GetPoints()))
         else:
             others += 1
     if not X:
-        raise FileError(
-            f"the file has no meshes ({others} other objects); mesh the surfaces in Rhino",
-            where="meshes",
-            found=0,
-        )
+        text = f"the file has no meshes ({others} other objects); mesh the surfaces in Rhino"
+        raise FileError(text, where="meshes", found=0)
     points = np.concatenate(X)
     F, source, notes = triangulate(points, np.concatenate(corners), np.concatenate(counts))
     if others:
         notes = (*notes, f"{others} objects that are not meshes were left out")
     support = _supports(points, held) if metadata.plane is not None or any(held.values()) else None
-    return MeshData(
-        points,
-        F,
-        np.concatenate(label)[source],
-        metadata.named(names),
-        support,
-        metadata.plane,
-        notes=notes,
-        walls=walls,
-    )
+    patch, names = pd.factorize(np.array(named, dtype=object))
+    patches = metadata.named(names.tolist())
+    return MeshData(points, F, patch[source], patches, support, metadata.plane, notes=notes, walls=walls)
 
 
 def _coordinates(points: Any) -> Floats:

@@ -18,6 +18,7 @@ from ..surface.geometry import area_vectors
 from ..surface.surface import FAR
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData
+from .metadata import Metadata
 from .text import format_rows
 from .trimesh_scene import from_meshes
 
@@ -55,28 +56,21 @@ def read(path: Path) -> MeshData:
     _complete(path)
     with translated_errors("STL"):
         scene = trimesh.load_scene(path, file_type="stl", process=False)
-    return from_meshes(scene, path.stem)
+    return from_meshes(scene, path.stem, Metadata())
 
 
 def _complete(path: Path) -> None:
     """Text must end with ``endsolid``, binary must have all its triangles: trimesh checks neither."""
     data = path.read_bytes()
     if data[:5] == b"solid" and b"facet" in data[:2000]:
-        last = data.rstrip().rsplit(b"\n", 1)[-1].strip()
-        if not last.startswith(b"endsolid"):
-            line = data.rstrip().count(b"\n") + 1
-            raise FileError(
-                f"line {line}: cut off before 'endsolid', found {last[:40].decode()!r}",
-                where=line,
-                found=last[:40].decode(),
-                expected="endsolid",
-            )
+        lines = data.rstrip().split(b"\n")
+        last = lines[-1].strip()[:40].decode()
+        if not last.startswith("endsolid"):
+            text = f"line {len(lines)}: cut off before 'endsolid', found {last!r}"
+            raise FileError(text, where=len(lines))
         return
     count = int.from_bytes(data[80:84], "little")
-    if len(data) < 84 or len(data) < 84 + 50 * count:
-        raise FileError(
-            f"not an STL file, or cut off: {count} triangles need {84 + 50 * count} bytes, found {len(data)}",
-            where=count,
-            found=len(data),
-            expected=84 + 50 * count,
-        )
+    size = 84 + 50 * count
+    if len(data) < size:
+        found = f"{count} triangles need {size} bytes, found {len(data)}"
+        raise FileError(f"not an STL file, or cut off: {found}", where=count)

@@ -34,11 +34,8 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any)
     mesh.cell_data["patch"] = surface.patch_of_face
     for name, values in scalars.items():
         if name in RESERVED:
-            raise FileError(
-                f"scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar",
-                where=name,
-                found=name,
-            )
+            text = f"scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"
+            raise FileError(text, where=name, found=name)
         (mesh.point_data if len(values) == surface.n else mesh.cell_data)[name] = values
     mesh.field_data["pcmc"] = [metadata_text(surface)]
     if path.suffix.lower() == ".vtu":
@@ -54,7 +51,9 @@ def read(path: Path) -> MeshData:
     with translated_errors(path.suffix[1:]), pyvista.vtk_verbosity("off"), warnings.catch_warnings():
         warnings.simplefilter("error")  # VTK's errors come as warnings
         mesh = pyvista.read(path)
-        corners, counts, chosen = (_polygons if isinstance(mesh, pyvista.PolyData) else _cells)(mesh)
+        if isinstance(mesh, pyvista.PolyData):
+            mesh = (mesh.triangulate() if mesh.n_strips else mesh).cast_to_unstructured_grid()
+        corners, counts, chosen = _cells(mesh)
         points, text = np.asarray(mesh.points), mesh.field_data.get("pcmc")
         point_data = {k: np.asarray(v) for k, v in mesh.point_data.items()}
         cell_data = {k: np.asarray(v)[chosen] for k, v in mesh.cell_data.items()}
@@ -62,27 +61,13 @@ def read(path: Path) -> MeshData:
     return from_polygons(points, corners, counts, point_data, cell_data, metadata, path.stem)
 
 
-def _polygons(mesh: Any) -> tuple[Ints, Ints, Ints]:
-    """Corners, corners per face, and the faces' places among all cells."""
-    if mesh.n_strips:
-        mesh = mesh.triangulate()
-    polys = mesh.GetPolys()
-    convert = load_library("pyvista").convert_array
-    counts = np.diff(convert(polys.GetOffsetsArray()))
-    first = mesh.n_verts + mesh.n_lines
-    return convert(polys.GetConnectivityArray()), counts, first + np.arange(len(counts))
-
-
 def _cells(mesh: Any) -> tuple[Ints, Ints, Ints]:
+    """Corners, corners per face, and the faces' places among all cells."""
     solid = np.flatnonzero(mesh.celltypes >= FIRST_SOLID)
     if len(solid):
-        raise FileError(
-            f"cell {solid[0]} is of VTK's type {mesh.celltypes[solid[0]]}; pcmc reads triangles, quads"
-            " and polygons",
-            where=int(solid[0]),
-            found=int(mesh.celltypes[solid[0]]),
-            expected=FLAT,
-        )
+        kind = int(mesh.celltypes[solid[0]])
+        text = f"cell {solid[0]} is of VTK's type {kind}; pcmc reads triangles, quads and polygons"
+        raise FileError(text, where=int(solid[0]), found=kind)
     chosen = np.flatnonzero(np.isin(mesh.celltypes, FLAT))
     offsets = np.asarray(mesh.cell_offsets)
     counts = np.diff(offsets)[chosen]
