@@ -1,4 +1,7 @@
-"""Following a branch of equilibria as tensions or pressures change, through folds."""
+"""Following a branch of equilibria as tensions or pressures change, through folds.
+
+Gives ``follow`` and ``Direction``. May import ``design`` and the rooms below it.
+"""
 
 from .branch import Branch, follow
 from .direction import Direction

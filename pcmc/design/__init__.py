@@ -1,4 +1,7 @@
-"""Design: the tensions and pressures with which a surface meets its targets."""
+"""Design: the tensions and pressures with which a surface meets its targets.
+
+Gives ``meet``, ``sensitivities`` and their values. May import ``solvers`` and the rooms below it.
+"""
 
 from .meeting import meet
 from .outcome import Design, DesignStatus

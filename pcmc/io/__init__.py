@@ -1,4 +1,7 @@
-"""Surfaces from files and to files, by suffix."""
+"""Surfaces from files and to files, by suffix: a file here per format.
+
+Gives ``read``, ``write`` and ``load``. May import ``meshing`` and the rooms below it.
+"""
 
 from __future__ import annotations
 

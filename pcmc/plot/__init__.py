@@ -1,6 +1,7 @@
 """Pictures of surfaces (pyvista) and of curves (matplotlib); needs the extra ``plot``, no display.
 
-With a path every function writes a PNG; each returns the picture as an (h,w,3) array of bytes.
+With a path every function writes a PNG; each returns the picture as an (h,w,3) array of bytes. May import
+``continuation`` and the rooms below it.
 """
 
 from .arrows import reactions, vectors

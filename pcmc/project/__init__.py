@@ -1,5 +1,7 @@
 """A whole design in one TOML file: plan, solver, remeshing, targets, output.
 
+Gives ``run`` and ``load`` to sweeps, the page and the command. May import ``plot`` and the rooms below it.
+
 ``sections()`` lists every section and key of a project file; ``reference()`` prints the list::
 
     [plan]
