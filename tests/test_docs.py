@@ -11,9 +11,7 @@ DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 
 def block(page, language):
-    return re.search(rf"```{language}\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), re.S)[
-        1
-    ]
+    return re.search(rf"```{language}\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), re.S)[1]
 
 
 def test_the_project_file_of_the_how_to_is_certified_and_meets_its_target(tmp_path):

@@ -1,8 +1,8 @@
 """A page in the browser, or in JupyterLab, that moves a surface by sliders for its tensions and pressures.
 
 ``pcmc.explore.serve(surface)`` opens the page and waits until Ctrl-C; ``pcmc.explore.show(surface)`` is the
-page as the output of a notebook's cell. Both need only the core install and a browser with WebGL 2. May import
-``project`` and the rooms below it.
+page as the output of a notebook's cell. Both need only the core install and a browser with WebGL 2.
+May import ``project`` and the rooms below it.
 """
 
 from __future__ import annotations
