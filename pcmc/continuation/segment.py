@@ -79,8 +79,6 @@ class Segment:
         by_parameter = state.mesh.line.energy_derivative(state.surface, state.X)
         return by_position + by_parameter * tangent.slope
 
-    # -- turning points and goals --------------------------------------------------------------
-
     def turning_point(self, name: str) -> float | None:
         """t at which a quantity is extreme; None where its derivatives at the ends have one sign."""
         from scipy.optimize import minimize_scalar  # slow to import
@@ -119,8 +117,6 @@ class Segment:
             if off[k + 1] == 0.0:
                 return ends[k + 1]
         return None
-
-    # -- changes of index ----------------------------------------------------------------------
 
     def index_changes(self) -> list[tuple[float, int]]:
         """Each t at which eigenvalues change sign, and how many do so there."""

@@ -1,7 +1,7 @@
 """Design: the tensions and pressures with which a surface meets its targets."""
 
-from .meeting import meet
 from .outcome import Design, DesignStatus
+from .search import meet
 from .sensitivity import sensitivities
 from .targets import Parameter, Target
 

@@ -140,17 +140,8 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     kind[shared] = POINT
     curve, beside = curve[~shared[curve]], beside[~shared[curve]]
     idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
-    return VertexClasses(
-        active=active,
-        faces=faces,
-        patch_of_face=patch,
-        topology=topo,
-        kind=kind,
-        curve=curve,
-        beside=beside,
-        idle=idle,
-        level=np.zeros(surface.n, dtype=bool) if level is None else level,
-    )
+    level = np.zeros(surface.n, dtype=bool) if level is None else level
+    return VertexClasses(active, faces, patch, topo, kind, curve, beside, idle, level)
 
 
 def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionSpace:
