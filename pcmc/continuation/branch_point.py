@@ -58,14 +58,9 @@ class Tangent:
 
 @dataclass(frozen=True, eq=False)
 class BranchPoint:
-    """A point of the branch.
+    """A point of the branch; ``index`` is the number of its negative eigenvalues.
 
-    Attributes
-    ----------
-    state : X and λ, with energy, volume, height and quality.
-    tangent : of the branch there.
-    eigenvalues : all negative ones and at least one more, ascending, force/length³.
-    index : number of negative eigenvalues.
+    ``eigenvalues`` are all negative ones and at least one more, ascending, force/length³.
     """
 
     state: State

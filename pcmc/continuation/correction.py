@@ -51,14 +51,7 @@ class ContactChanged(NotOnBranch):
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """The equation g(X, λ) = 0 beside equilibrium; g is of order 1.
-
-    Attributes
-    ----------
-    value : g.
-    gradient : ∂g/∂X (n,3).
-    rate : ∂g/∂λ.
-    """
+    """The equation g(X, λ) = 0 beside equilibrium: g, of order 1, with ∂g/∂X (n,3) and ∂g/∂λ."""
 
     value: Callable[[State], float]
     gradient: Callable[[State], Floats]
@@ -146,14 +139,7 @@ class BorderedMatrix:
 
 
 def correct(start: State, constraint: Constraint, tolerance: float) -> State:
-    """The point of the branch near a state that also meets the constraint.
-
-    Raises
-    ------
-    NotOnBranch : Newton's method does not converge, or a tension would reach 0.
-    MeshCollapsed : triangles collapse.
-    ContactChanged : a junction comes down to Π on the way.
-    """
+    """The point of the branch near a state that meets the constraint too; NotOnBranch where there is none."""
     mesh, at = start.mesh, start
     last, slow = np.inf, 0
     _check_tensions(at)

@@ -51,8 +51,7 @@ class Direction:
         for key in ("tensions", "pressures"):
             weights = getattr(self, key)
             if not isinstance(weights, Mapping):
-                expected = "weights by patch name, such as {'roof': 1.0}"
-                validate.refuse(f"Direction.{key}", weights, expected)
+                validate.refuse(f"Direction.{key}", weights, "weights by patch name, such as {'roof': 1.0}")
             for name, weight in weights.items():
                 if validate.number(f"Direction.{key}", weight, where=name) == 0.0:
                     validate.refuse(f"Direction.{key}", weight, "a weight other than 0", name)
@@ -162,6 +161,7 @@ def _common_value(surface: Surface, w: Floats, u: Floats) -> float:
         if abs(other - value) > SAME_VALUE * max(abs(value), abs(other)):
             message = f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}"
             hint = "give weights in proportion to the surface's own values, or relative=True"
-            values = {"found": float(other), "expected": float(value)}
-            raise OptionError(f"{message}: {hint}", what="parameter", where=name, **values)
+            raise OptionError(
+                f"{message}: {hint}", what="parameter", where=name, found=float(other), expected=float(value)
+            )
     return float(value)

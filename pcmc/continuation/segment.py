@@ -31,13 +31,9 @@ def crosses_goal(before: State, after: State, goals: Mapping[str, float]) -> boo
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """The branch between two of its points.
+    """The branch between two of its points, which are ``length`` of arclength apart.
 
-    Attributes
-    ----------
-    start, end : its ends.
-    length : arclength t of ``end`` from ``start``.
-    solve : t -> the state on the branch there, on the mesh of ``start``.
+    ``solve`` gives the state on the branch at t from ``start``, on the mesh of ``start``.
     """
 
     start: BranchPoint

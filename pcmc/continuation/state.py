@@ -89,14 +89,7 @@ class BranchMesh:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Positions on a mesh, and a value of the parameter.
-
-    Attributes
-    ----------
-    X : (n,3) positions.
-    parameter : λ.
-    iterations : Newton steps that led here.
-    """
+    """Positions X (n,3) on a mesh, a value of the parameter λ, and the Newton steps that led there."""
 
     mesh: BranchMesh
     X: Floats

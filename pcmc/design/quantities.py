@@ -36,12 +36,9 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Quantity:
-    """How a quantity is measured.
+    """How a quantity is measured, ``of`` as in ``Target``.
 
-    Attributes
-    ----------
-    measure : (surface, of) -> Measurement, ``of`` as in ``Target``.
-    size : surface -> its usual size, by which misfits are divided where the value wanted is 0.
+    Misfits are divided by its usual ``size`` where the value wanted is 0.
     """
 
     measure: Callable[[Surface, Any], Measurement]

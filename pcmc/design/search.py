@@ -205,11 +205,6 @@ class Search:
             raise SurfaceError(f"meet: no equilibrium was found to start from; {hint}", what="surface")
         return first
 
-    def solve_near(self, here: Iterate, x: Floats) -> Iterate | None:
-        """The solution with these unknowns, from one nearby; None where none is found."""
-        small = (np.abs(x - here.x) < SMALL_CHANGE * self.sizes(here)).all()
-        return self.solve_from(here.result.surface, x, {"min_quality": 0.0} if small else {})
-
     def solve_from(self, start: Surface, x: Floats, quality: dict[str, float]) -> Iterate | None:
         """Solve once, from a surface, unless its boundary cannot carry the load.
 
@@ -261,10 +256,7 @@ class Search:
         return bool(np.abs(at.r).max() <= self.tolerance)
 
     def gauss_newton(self, here: Iterate) -> tuple[Floats, float]:
-        """The step to the least linearised misfit within the bounds, at most ``trust`` long; that misfit.
-
-        The misfit is that of the whole step.
-        """
+        """Step of least linearised misfit within bounds, cut to ``trust``; the misfit of the whole step."""
         size = self.sizes(here)
         A = here.jacobian * size
         mu = DAMPING * float(np.linalg.norm(A, 2)) or 1.0
@@ -289,7 +281,9 @@ class Search:
         for attempt in range(TRIES):
             if self.solves >= self.max_solves:
                 return DesignStatus.SOLVES
-            there = self.solve_near(here, here.x + t * plan.step)
+            x = here.x + t * plan.step
+            small = (np.abs(x - here.x) < SMALL_CHANGE * self.sizes(here)).all()
+            there = self.solve_from(here.result.surface, x, {"min_quality": 0.0} if small else {})
             if there is not None and there.phi < here.phi:
                 self.trust = max(t * longest, min(1.0, 2.0 * t * longest) if not attempt else 0.0)
                 return there

@@ -84,12 +84,9 @@ def sensitivities(
     response = _LinearResponse.of(surface)
     shown = response.part.surface
     motions = np.stack([response.motion(p, parameters) for p in parameters])
-    return pd.DataFrame(
-        [_slopes(shown, measure(shown, t), parameters, motions) for t in targets],
-        index=[t.label for t in targets],
-        columns=[p.label for p in parameters],
-        dtype=float,
-    )
+    slopes = [_slopes(shown, measure(shown, t), parameters, motions) for t in targets]
+    rows, columns = [t.label for t in targets], [p.label for p in parameters]
+    return pd.DataFrame(slopes, rows, columns, dtype=float)
 
 
 def _slopes(
@@ -116,10 +113,7 @@ def _patch_rates(surface: Surface, parameter: Parameter, parameters: Sequence[Pa
 
 @dataclass(frozen=True, eq=False)
 class _LinearResponse:
-    """The equations of a surface at rest, linearised and factorised.
-
-    ``walls_follow``: whether walls hang from a crest that moves.
-    """
+    """The equations of a surface at rest, factorised; ``walls_follow``: walls hang from a moving crest."""
 
     part: StandingPart
     walls_follow: bool

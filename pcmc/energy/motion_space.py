@@ -147,8 +147,7 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
 def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionSpace:
     """Basis of the motion space of the surface with its vertices at X (n,3)."""
     n = surface.n
-    basis = np.zeros((n, 3, 3))
-    dimension = np.zeros(n, dtype=np.int64)
+    basis, dimension = np.zeros((n, 3, 3)), np.zeros(n, dtype=np.int64)
     moving = ~(surface.fixed | classes.idle)
 
     sheet = moving & (classes.kind == SHEET)
@@ -163,11 +162,8 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     ring = curve[straight]
     basis[ring, 0], basis[ring, 1] = perpendicular(tangent[ring])
     dimension[ring] = 2
-
-    ends = np.flatnonzero(moving & (classes.kind == POINT))
-    point = np.concatenate([ends, curve[~straight]])
-    basis[point] = np.eye(3)
-    dimension[point] = 3
+    point = np.concatenate([np.flatnonzero(moving & (classes.kind == POINT)), curve[~straight]])
+    basis[point], dimension[point] = np.eye(3), 3
 
     sliding = np.flatnonzero(moving & surface.on_plane)
     if len(sliding):

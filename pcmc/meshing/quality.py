@@ -104,14 +104,9 @@ def towards_star_centres(
 def redistribute(part: StandingPart, X: Floats, aim: float, *, slide: bool) -> tuple[Floats, float]:
     """The best of a few sweeps of redistribution, (n,3), and the quality of its worst triangle.
 
-    Sweeps end where that is at least ``aim``. Each vertex moves towards the middle of its star, without
-    the part in the motion space, which would change the shape; walls follow their crest.
-
-    Parameters
-    ----------
-    part : the standing part of the surface; triangles of walls that can pinch do not count.
-    X : (n,3) where its vertices are.
-    slide : whether junction vertices at rest on Π may slide along their junction.
+    Sweeps end where that is at least ``aim``; triangles of walls that can pinch do not count. Each vertex
+    moves from X (n,3) towards the middle of its star, without the part in the motion space, which would
+    change the shape; walls follow their crest. With ``slide``, junction vertices at rest on Π slide too.
     """
     surface, classes, faces = part.surface, part.classes, part.quality_faces
     best, worst = X, worst_quality(X, faces)

@@ -109,12 +109,7 @@ def _refine_once(surface: Surface, project: Projection | None) -> Surface:
         middle[held] = projected
     a, b, c = surface.faces.T
     bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
-    return Surface(
-        np.concatenate([surface.vertices, middle]),
-        np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3),
-        np.repeat(surface.patch_of_face, 4),
-        surface.patches,
-        np.concatenate([surface.fixed, held]),
-        np.concatenate([surface.on_plane, slides]),
-        surface.plane,
-    )
+    X, patch = np.concatenate([surface.vertices, middle]), np.repeat(surface.patch_of_face, 4)
+    F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
+    fixed, sliding = np.concatenate([surface.fixed, held]), np.concatenate([surface.on_plane, slides])
+    return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane)

@@ -196,15 +196,11 @@ def _cut_once(mesh: _Mesh, counts: Ints, support: Bools) -> tuple[_Mesh, Ints, B
     number = len(mesh.X) + np.arange(len(ends))
     F, patch = _cut_triangles(mesh.F, mesh.patch, ends, number, len(mesh.X))
     halves = np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)
-    new = _Mesh(
-        np.concatenate([mesh.X, start + share * (end - start)]),
-        F,
-        patch,
-        np.concatenate([mesh.curves[~cut], *halves]),
-        np.concatenate([mesh.fixed, support[cut, 0]]),
-        np.concatenate([mesh.sliding, support[cut, 1]]),
-        np.arange(len(mesh.X) + len(ends)),
-    )
+    X = np.concatenate([mesh.X, start + share * (end - start)])
+    curves = np.concatenate([mesh.curves[~cut], *halves])
+    fixed = np.concatenate([mesh.fixed, support[cut, 0]])
+    sliding = np.concatenate([mesh.sliding, support[cut, 1]])
+    new = _Mesh(X, F, patch, curves, fixed, sliding, np.arange(len(X)))
     counts = np.concatenate([counts[~cut], first, pieces - first])
     return new, counts, np.concatenate([support[~cut], support[cut], support[cut]])
 
@@ -328,15 +324,11 @@ def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Sur
         faces.append(vertex[mesh.F[chosen]])
         patch.append(mesh.patch[chosen])
     used, inverse = np.unique(np.concatenate(faces), return_inverse=True)
-    return Surface(
-        np.concatenate([mesh.X for mesh in meshes])[used],
-        inverse.reshape(-1, 3),
-        np.concatenate(patch),
-        surface.patches,
-        np.concatenate([mesh.fixed for mesh in meshes])[used],
-        np.concatenate([mesh.sliding for mesh in meshes])[used],
-        surface.plane,
-    )
+    F, patch_of_face = inverse.reshape(-1, 3), np.concatenate(patch)
+    X = np.concatenate([mesh.X for mesh in meshes])[used]
+    fixed = np.concatenate([mesh.fixed for mesh in meshes])[used]
+    sliding = np.concatenate([mesh.sliding for mesh in meshes])[used]
+    return Surface(X, F, patch_of_face, surface.patches, fixed, sliding, surface.plane)
 
 
 def _patch_angles(mesh: _Mesh, count: int) -> Floats:

@@ -176,12 +176,9 @@ class Surface:
         checks.mesh(X, F, patch, self.topology, self.patches, fixed | sliding, height)
         checks.on_plane(height, sliding, X, self.size)
         if not (fixed.any() or sliding.any()):
-            warnings.warn(
-                "no vertex is fixed or on the plane: translations are free, so only closed"
-                " surfaces have an equilibrium; pass fixed= or on_plane= to hold it",
-                FreeSurfaceWarning,
-                stacklevel=3,
-            )
+            message = "no vertex is fixed or on the plane: translations are free, so only closed surfaces"
+            message += " have an equilibrium; pass fixed= or on_plane= to hold it"
+            warnings.warn(message, FreeSurfaceWarning, stacklevel=3)
 
     @property
     def n(self) -> int:

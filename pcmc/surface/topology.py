@@ -142,13 +142,11 @@ class Topology:
         from scipy.sparse.csgraph import depth_first_order
 
         chosen = np.flatnonzero(mask)
-        pairs = self.edges[chosen]
-        split, original = _split_at(pairs, stop, self.vertex_count)
+        split, original = _split_at(self.edges[chosen], stop, self.vertex_count)
         graph = _adjacency(split, len(original))
         label = components(split, len(original))
         sheets = self._sheets_of_edges(chosen)
-        curves = []
-        degree = np.bincount(split.ravel(), minlength=len(original))
+        curves, degree = [], np.bincount(split.ravel(), minlength=len(original))
         for part, first_edge in zip(*np.unique(label[split[:, 0]], return_index=True), strict=True):
             members = np.flatnonzero((label == part) & (degree > 0))
             ends = members[degree[members] == 1]
