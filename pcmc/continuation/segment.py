@@ -121,8 +121,7 @@ class Segment:
         def eigenvalue(t: float, rank: int) -> float:
             if t not in known:
                 known[t] = self.point(t).eigenvalues
-            values = known[t]
-            return float(values[min(rank, len(values) - 1)])
+            return float(known[t][min(rank, len(known[t]) - 1)])
 
         low, high = sorted((self.start.index, self.end.index))
         places = sorted(

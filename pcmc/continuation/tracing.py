@@ -255,16 +255,15 @@ class Tracer:
             return events
         if length <= 2.0 * EVENT_ACCURACY:
             return self.events_between(start, end, length)
-        located = []
-        if segment.fold is not None:
-            at = segment.point(segment.fold).state
-            located.append((segment.fold, self.event("fold", at, segment.fold, start.index, end.index)))
-        sign = 1 if end.index > start.index else -1
-        index = start.index
+        located, fold = [], segment.fold
+        if fold is not None:
+            at = segment.point(fold).state
+            located.append((fold, self.event("fold", at, fold, start.index, end.index)))
+        index, sign = start.index, 1 if end.index > start.index else -1
         for t, count in segment.index_changes():
-            event = self.event("index", segment.point(t).state, t, index, index + sign * count)
-            located.append((t, event))
-            index += sign * count
+            after = index + sign * count
+            located.append((t, self.event("index", segment.point(t).state, t, index, after)))
+            index = after
         return [event for _, event in sorted(located, key=lambda pair: pair[0])]
 
     def events_between(self, before: BranchPoint, after: BranchPoint, length: float) -> list[dict[str, Any]]:

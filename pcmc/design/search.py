@@ -332,8 +332,7 @@ class Search:
             },
             index=[p.label for p in self.parameters],
         )
-        history = pd.DataFrame(self.rows)
-        return Design(status, here.result, targets, parameters, self.solves, history)
+        return Design(status, here.result, targets, parameters, self.solves, pd.DataFrame(self.rows))
 
 
 @dataclass(frozen=True, eq=False)
