@@ -11,9 +11,8 @@ from pcmc import Direction, Parameter, follow, solve
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.continuation import Ending, FollowOptions
 from pcmc.continuation.correction import NotOnBranch, correct, fixed_parameter
-from pcmc.continuation.mesh import BranchMesh
 from pcmc.continuation.segment import root
-from pcmc.continuation.state import QUANTITIES, State
+from pcmc.continuation.state import QUANTITIES, BranchMesh, State
 from pcmc.continuation.tracing import Tracer
 
 

@@ -75,9 +75,8 @@ class MissingExtra(ImportError):
     """A library that this part of pcmc needs is not installed."""
 
     def __init__(self, library: str, extra: str) -> None:
-        super().__init__(
-            f"{library} is not installed; install it with: python -m pip install 'pcmc-surfaces[{extra}]'"
-        )
+        command = f"python -m pip install 'pcmc-surfaces[{extra}]'"
+        super().__init__(f"{library} is not installed; install it with: {command}")
 
 
 class FreeSurfaceWarning(UserWarning):

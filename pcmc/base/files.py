@@ -41,7 +41,11 @@ def atomic_writes(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path
         yield written
         with defer_interrupts():
             for path, old in zip(wanted, backups, strict=True):
-                _back_up(path, old)
+                if path.is_file():
+                    try:
+                        os.link(path, old)
+                    except OSError:  # not every file system has links
+                        shutil.copy2(path, old)
             _replace(wanted, written, backups)
     finally:
         for path in (*written, *backups):
@@ -65,16 +69,6 @@ def folder(path: Path) -> Iterator[None]:
 def _beside(path: Path) -> Path:
     """A new name in the same folder, with the same suffix."""
     return path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")
-
-
-def _back_up(path: Path, old: Path) -> None:
-    """Give the file at ``path``, if there is one, a second name."""
-    if not path.is_file():
-        return
-    try:
-        os.link(path, old)
-    except OSError:  # not every file system has links
-        shutil.copy2(path, old)
 
 
 def _replace(wanted: list[Path], written: list[Path], backups: list[Path]) -> None:

@@ -128,8 +128,7 @@ def follow(
     chosen = validate.build(FollowOptions, "follow", options)
     if chosen.remesh is not None and find_spec("mmgpy") is None:
         raise MissingExtra("mmgpy", "remesh")
-    direction = _direction(parameter)
-    goals = _goals(stop, until)
+    direction, goals = _direction(parameter), _goals(stop, until)
     line = direction.line(surface)
     if stop is not None and stop != line.value:
         chosen = replace(chosen, step=math.copysign(chosen.step, stop - line.value))

@@ -11,8 +11,7 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Floats
 from ..stability.modes import Stiffness, lowest
 from .correction import BorderedMatrix
-from .mesh import BranchMesh
-from .state import State
+from .state import BranchMesh, State
 
 TANGENT_ACCURACY = 1e-6  # relative, to which the tangent's linear system is solved
 DENSE = 12  # unknowns below which all eigenvalues are computed at once
@@ -59,14 +58,9 @@ class Tangent:
 
 @dataclass(frozen=True, eq=False)
 class BranchPoint:
-    """A point of the branch.
+    """A point of the branch; ``index`` is the number of its negative eigenvalues.
 
-    Attributes
-    ----------
-    state : X and λ, with energy, volume, height and quality.
-    tangent : of the branch there.
-    eigenvalues : all negative ones and at least one more, ascending, force/length³.
-    index : number of negative eigenvalues.
+    ``eigenvalues`` are all negative ones and at least one more, ascending, force/length³.
     """
 
     state: State
@@ -88,13 +82,9 @@ def branch_point(at: State, before: Tangent | float) -> BranchPoint:
     s, slope = matrix.solve(np.zeros(at.space.size), sense, TANGENT_ACCURACY)
     direction, weights = at.motion(s), at.area_weights
     length = Tangent(direction, slope, weights, scale).length(direction, slope)
-    stiffness = matrix.stiffness
-    return BranchPoint(
-        at,
-        Tangent(direction / length, slope / length, weights, scale),
-        _eigenvalues(stiffness),
-        stiffness.negative,
-    )
+    tangent = Tangent(direction / length, slope / length, weights, scale)
+    stiffness = at.mesh.stiffness(at.space, at.X, matrix.values, matrix.factor)
+    return BranchPoint(at, tangent, _eigenvalues(stiffness), stiffness.negative)
 
 
 def _eigenvalues(stiffness: Stiffness) -> Floats:

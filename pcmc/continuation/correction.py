@@ -24,10 +24,8 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..base.arrays import Floats
-from ..stability.factorisation import Factor, SingularMatrix
-from ..stability.modes import Stiffness
-from .mesh import BranchMesh
-from .state import State
+from ..stability.factorisation import SingularMatrix
+from .state import BranchMesh, State
 
 ITERATIONS = 12  # most Newton steps of a correction
 SLOW = 0.8  # ratio of successive residuals; three in a row above it end the correction
@@ -53,14 +51,7 @@ class ContactChanged(NotOnBranch):
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """The equation g(X, λ) = 0 beside equilibrium; g is of order 1.
-
-    Attributes
-    ----------
-    value : g.
-    gradient : ∂g/∂X (n,3).
-    rate : ∂g/∂λ.
-    """
+    """The equation g(X, λ) = 0 beside equilibrium: g, of order 1, with ∂g/∂X (n,3) and ∂g/∂λ."""
 
     value: Callable[[State], float]
     gradient: Callable[[State], Floats]
@@ -105,15 +96,13 @@ class BorderedMatrix:
 
     def __init__(self, at: State, row: Floats, rate: float) -> None:
         self.at, self.row, self.rate = at, row, rate
-        self.values, self.factor = _hessian(at)
+        try:
+            self.values, self.factor = at.mesh.hessian(at.surface, at.space, at.X)
+        except SingularMatrix as error:
+            raise NotOnBranch(f"the Hessian has no factorisation ({error})") from None
         f = at.parameter_derivative
         size = float(np.linalg.norm(f)) or 1.0
         self.unit = size / float(np.linalg.norm(row) + abs(rate))
-
-    @property
-    def stiffness(self) -> Stiffness:
-        """H with its mass and inertia."""
-        return self.at.mesh.stiffness(self.at.space, self.at.X, self.values, self.factor)
 
     def solve(self, right: Floats, last: float, accuracy: float) -> tuple[Floats, float]:
         """(s, δλ) with  J s + f δλ = right,  ⟨row, motion⟩ + rate δλ = last."""
@@ -150,14 +139,7 @@ class BorderedMatrix:
 
 
 def correct(start: State, constraint: Constraint, tolerance: float) -> State:
-    """The point of the branch near a state that also meets the constraint.
-
-    Raises
-    ------
-    NotOnBranch : Newton's method does not converge, or a tension would reach 0.
-    MeshCollapsed : triangles collapse.
-    ContactChanged : a junction comes down to Π on the way.
-    """
+    """The point of the branch near a state that meets the constraint too; NotOnBranch where there is none."""
     mesh, at = start.mesh, start
     last, slow = np.inf, 0
     _check_tensions(at)
@@ -166,7 +148,7 @@ def correct(start: State, constraint: Constraint, tolerance: float) -> State:
         if at.residual <= tolerance and abs(g) <= CONSTRAINT_TOLERANCE:
             return at
         size = at.residual + abs(g)
-        slow = slow + 1 if not size < SLOW * last else 0
+        slow = 0 if size < SLOW * last else slow + 1
         if slow >= 3 or not np.isfinite(at.residual + g):
             break
         last = size
@@ -187,10 +169,3 @@ def correct(start: State, constraint: Constraint, tolerance: float) -> State:
 def _check_tensions(at: State) -> None:
     if not at.mesh.line.allows(at.parameter):
         raise NotOnBranch(f"a tension would reach 0 at the parameter {at.parameter:g}")
-
-
-def _hessian(at: State) -> tuple[Floats, Factor]:
-    try:
-        return at.mesh.hessian(at.surface, at.space, at.X)
-    except SingularMatrix as error:
-        raise NotOnBranch(f"the Hessian has no factorisation ({error})") from None

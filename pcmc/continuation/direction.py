@@ -16,8 +16,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..energy import kernels
-from ..energy.functional import apply_supports
+from ..energy.functional import apply_supports, weighted
 from ..surface import Surface
 from ..surface.wall_pressures import wall_pressure_changes
 
@@ -52,15 +51,13 @@ class Direction:
         for key in ("tensions", "pressures"):
             weights = getattr(self, key)
             if not isinstance(weights, Mapping):
-                expected = "weights by patch name, such as {'roof': 1.0}"
-                validate.refuse(f"Direction.{key}", weights, expected)
+                validate.refuse(f"Direction.{key}", weights, "weights by patch name, such as {'roof': 1.0}")
             for name, weight in weights.items():
                 if validate.number(f"Direction.{key}", weight, where=name) == 0.0:
                     validate.refuse(f"Direction.{key}", weight, "a weight other than 0", name)
         if not self.tensions and not self.pressures:
-            raise OptionError(
-                "Direction: name at least one patch whose tension or pressure varies", what="Direction"
-            )
+            message = "Direction: name at least one patch whose tension or pressure varies"
+            raise OptionError(message, what="Direction")
 
     @classmethod
     def ratio(cls, surface: Surface, upper: str, lower: str) -> Direction:
@@ -68,27 +65,19 @@ class Direction:
         denominator = surface.patches[surface.patch_index(lower)].tension
         surface.patch_index(upper)
         if denominator == 0.0:
-            raise OptionError(
-                f"Direction.ratio: the tension of {lower!r} is 0, so no ratio to it exists",
-                what="lower",
-                found=lower,
-            )
+            message = f"Direction.ratio: the tension of {lower!r} is 0, so no ratio to it exists"
+            raise OptionError(message, what="lower", found=lower)
         return cls({upper: denominator})
 
     def line(self, surface: Surface) -> ParameterLine:
         """The tensions and pressures along this direction, starting from those of a surface."""
-        w = _rates(surface, self.tensions)
-        u = _rates(surface, self.pressures)
+        w, u = _rates(surface, self.tensions), _rates(surface, self.pressures)
         value = 0.0 if self.relative else _common_value(surface, w, u)
         u = u + wall_pressure_changes(surface, u, {surface.patch_index(name) for name in self.pressures})
         if not (surface.tensions[w != 0.0] > 0.0).all():
             name = surface.patches[int(np.argmax((w != 0.0) & (surface.tensions <= 0.0)))].name
-            raise OptionError(
-                f"the tension of {name!r} is 0, where its triangles stop pulling; start from a tension > 0",
-                what="parameter",
-                where=name,
-                found=0.0,
-            )
+            message = f"the tension of {name!r} is 0, where its triangles stop pulling; start from one > 0"
+            raise OptionError(message, what="parameter", where=name, found=0.0)
         return ParameterLine(value, surface.tensions - w * value, surface.pressures - u * value, w, u)
 
 
@@ -145,22 +134,12 @@ class ParameterLine:
 
     def energy_derivative(self, surface: Surface, X: Floats) -> float:
         """∂E/∂λ = Σ w_i A_i - Σ u_i V_i at X (n,3)."""
-        areas, volumes, _ = _measured(surface, X, self.tension_rates, self.pressure_rates)
+        areas, volumes, _ = weighted(surface, X=X)
         return float(self.tension_rates @ areas - self.pressure_rates @ volumes)
 
     def gradient(self, surface: Surface, X: Floats) -> Floats:
         """∂∇E/∂λ = Σ w_i ∇A_i - Σ u_i ∇V_i (n,3), supports applied."""
-        return weighted_gradient(surface, X, self.tension_rates, self.pressure_rates)
-
-
-def weighted_gradient(surface: Surface, X: Floats, areas: Floats, volumes: Floats) -> Floats:
-    """Σ areas_i ∇A_i - Σ volumes_i ∇V_i (n,3), supports applied."""
-    return apply_supports(surface, _measured(surface, X, areas, volumes)[2])
-
-
-def _measured(surface: Surface, X: Floats, areas: Floats, volumes: Floats) -> tuple[Floats, Floats, Floats]:
-    """A_i and V_i (k,) at X, and Σ areas_i ∇A_i - Σ volumes_i ∇V_i (n,3)."""
-    return kernels.measure(kernels.energy_mesh(surface, areas, volumes), X)
+        return apply_supports(surface, weighted(surface, self.tension_rates, self.pressure_rates, X)[2])
 
 
 def _rates(surface: Surface, weights: Mapping[str, float]) -> Floats:
@@ -180,12 +159,9 @@ def _common_value(surface: Surface, w: Floats, u: Floats) -> float:
     ]
     for name, other in others:
         if abs(other - value) > SAME_VALUE * max(abs(value), abs(other)):
+            message = f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}"
+            hint = "give weights in proportion to the surface's own values, or relative=True"
             raise OptionError(
-                f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}: give"
-                " weights in proportion to the surface's own values, or relative=True",
-                what="parameter",
-                where=name,
-                found=float(other),
-                expected=float(value),
+                f"{message}: {hint}", what="parameter", where=name, found=float(other), expected=float(value)
             )
     return float(value)

@@ -57,8 +57,7 @@ class FollowOptions:
     def __post_init__(self) -> None:
         validate.choice("control", self.control, CONTROLS)
         if validate.number("step", self.step) == 0.0:
-            hint = "its sign is that of the first change of λ"
-            validate.refuse("step", self.step, "a number other than 0", hint=hint)
+            validate.refuse("step", self.step, "a number ≠ 0, with the sign of the first change of λ")
         validate.positive("smallest", self.smallest)
         validate.number("largest", self.largest, least=self.smallest)
         validate.integer("steps", self.steps)

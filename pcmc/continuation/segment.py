@@ -31,13 +31,9 @@ def crosses_goal(before: State, after: State, goals: Mapping[str, float]) -> boo
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """The branch between two of its points.
+    """The branch between two of its points, which are ``length`` of arclength apart.
 
-    Attributes
-    ----------
-    start, end : its ends.
-    length : arclength t of ``end`` from ``start``.
-    solve : t -> the state on the branch there, on the mesh of ``start``.
+    ``solve`` gives the state on the branch at t from ``start``, on the mesh of ``start``.
     """
 
     start: BranchPoint
@@ -79,8 +75,6 @@ class Segment:
         by_parameter = state.mesh.line.energy_derivative(state.surface, state.X)
         return by_position + by_parameter * tangent.slope
 
-    # -- turning points and goals --------------------------------------------------------------
-
     def turning_point(self, name: str) -> float | None:
         """t at which a quantity is extreme; None where its derivatives at the ends have one sign."""
         from scipy.optimize import minimize_scalar  # slow to import
@@ -120,8 +114,6 @@ class Segment:
                 return ends[k + 1]
         return None
 
-    # -- changes of index ----------------------------------------------------------------------
-
     def index_changes(self) -> list[tuple[float, int]]:
         """Each t at which eigenvalues change sign, and how many do so there."""
         known = {0.0: self.start.eigenvalues, self.length: self.end.eigenvalues}
@@ -129,8 +121,7 @@ class Segment:
         def eigenvalue(t: float, rank: int) -> float:
             if t not in known:
                 known[t] = self.point(t).eigenvalues
-            values = known[t]
-            return float(values[min(rank, len(values) - 1)])
+            return float(known[t][min(rank, len(known[t]) - 1)])
 
         low, high = sorted((self.start.index, self.end.index))
         places = sorted(

@@ -1,7 +1,4 @@
-"""Positions X and a parameter λ, and the equations of equilibrium there.
-
-r(X, λ) = B(X)ᵀ ∇E(X; λ) = 0
-"""
+"""A mesh on a branch, and on it positions X and a parameter λ, with the equations r = B(X)ᵀ ∇E(X; λ) = 0."""
 
 from __future__ import annotations
 
@@ -10,35 +7,94 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Floats
-from ..energy.functional import energy_and_gradient, energy_at, patch_volumes
+from ..base.arrays import Bools, Floats, Ints
+from ..contact.pinching import excess_pull, place_pinched_walls, place_wall_rows, standing_part
+from ..energy.functional import apply_supports, energy_and_gradient, energy_at, patch_volumes, weighted
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
+from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
+from ..meshing.quality import worst_quality
+from ..solvers.smoother import HarmonicExtension
+from ..stability.factorisation import Factor, Factoriser, factoriser
+from ..stability.modes import Stiffness, full_matrix, lumped_mass
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
-from .direction import weighted_gradient
-from .mesh import BranchMesh
+from ..surface.topology import SHEET
+from .direction import ParameterLine
 
 QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a goal may name
 
 
-@dataclass(frozen=True, eq=False)
-class State:
-    """Positions on a mesh, and a value of the parameter.
+class BranchMesh:
+    """What the points of a branch share as long as neither the mesh nor the contact with Π changes.
 
     Attributes
     ----------
-    X : (n,3) positions.
-    parameter : λ.
-    iterations : Newton steps that led here.
+    full, line : the surface with all its walls; its tensions and pressures as functions of λ.
+    part : the standing part of the surface, without the walls that vanish where a junction rests on Π.
+    surface, classes, quality_faces : those of ``part``.
+    walls, resting : the walls that can pinch, and (n,) which junction vertices rest on Π.
+    loaded : (patches,) 1 for the patches under pressure, 0 for walls.
     """
+
+    def __init__(self, surface: Surface, line: ParameterLine, backend: str | None = None) -> None:
+        self.full, self.line, self._backend = surface, line, backend
+        self.part = part = standing_part(surface)
+        self.surface, self.walls, self.resting = part.surface, part.walls, part.resting
+        self.classes, self.quality_faces = part.classes, part.quality_faces
+        self.loaded: Floats = (~surface.walls).astype(float)
+        self._curves_move = bool(((self.classes.kind != SHEET) & ~self.surface.fixed).any())
+        self._extension: HarmonicExtension | None = None
+        self._dimension: Ints | None = None
+
+    def hessian(self, surface: Surface, space: MotionSpace, X: Floats) -> tuple[Floats, Factor]:
+        """Values of Bᵀ(∂²E)B in its sparsity pattern, and its factor, valid until the next call."""
+        if self._dimension is None or not np.array_equal(self._dimension, space.dimension):
+            self._dimension = space.dimension
+            self._pattern: Pattern = hessian_pattern(self.classes, space)
+            self._factoriser: Factoriser = factoriser(self._pattern, self._backend)
+        values = assemble(surface, self.classes, space, self._pattern, X)
+        return values, self._factoriser.factor(values)
+
+    def stiffness(self, space: MotionSpace, X: Floats, values: Floats, factor: Factor) -> Stiffness:
+        """The Hessian just factorised, with its mass and its inertia."""
+        matrix, mass = full_matrix(self._pattern, values), lumped_mass(space, self.classes, X)
+        return Stiffness(space, matrix, mass, factor, np.zeros((space.size, 0)), factor.negative)
+
+    def motion(self, space: MotionSpace, X: Floats, s: Floats) -> Floats:
+        """The motion Bs (n,3), in which the insides of the sheets follow their curves."""
+        if self._extension is None and self._curves_move:
+            self._extension = HarmonicExtension(self.surface, self.classes, X, self._backend)
+        d = space.to_vectors(s)
+        return d if self._extension is None else self._extension.extend(space, d)
+
+    def full_surface(self, X: Floats) -> Surface:
+        """The surface with all its walls; those that vanish lie on Π."""
+        if not self.resting.any():
+            return self.full.moved(X)
+        return self.full.moved(place_pinched_walls(self.full, self.walls, self.resting, X))
+
+    def surface_in_contact(self, X: Floats) -> Surface:
+        """The full surface, with the vertices that came down to Π placed on it."""
+        X, down = X.copy(), self.reaches_plane(X)
+        normal = np.array(self.surface.plane.normal)
+        X[down] -= self.surface.plane.height(X[down])[:, None] * normal
+        return self.full_surface(place_wall_rows(self.surface, self.walls, X))
+
+    def reaches_plane(self, X: Floats) -> Bools:
+        """(n,) bool, junction vertices that stood off Π and are now on it or beyond."""
+        standing_off = self.walls.top_free & ~self.resting
+        return standing_off & (self.walls.side * self.surface.plane.height(X) <= 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Positions X (n,3) on a mesh, a value of the parameter λ, and the Newton steps that led there."""
 
     mesh: BranchMesh
     X: Floats
     parameter: float
     iterations: int = 0
-
-    # -- equilibrium ---------------------------------------------------------------------------
 
     @cached_property
     def surface(self) -> Surface:
@@ -76,8 +132,6 @@ class State:
         """∂r along motions of the vertices."""
         return linearise(self.surface, self.mesh.classes, self.space, self.X, self.gradient)
 
-    # -- quantities ----------------------------------------------------------------------------
-
     @cached_property
     def energy(self) -> float:
         """E, force·length."""
@@ -91,8 +145,8 @@ class State:
     @cached_property
     def volume_gradient(self) -> Floats:
         """(n,3) gradient of the volume, supports applied, length²."""
-        loaded = self.mesh.loaded
-        return weighted_gradient(self.mesh.surface, self.X, np.zeros_like(loaded), -loaded)
+        surface = self.mesh.surface
+        return apply_supports(surface, weighted(surface, 0.0, -self.mesh.loaded, self.X)[2])
 
     @cached_property
     def highest_vertex(self) -> int:
@@ -107,7 +161,7 @@ class State:
     @cached_property
     def quality(self) -> float:
         """Quality of the worst triangle outside walls that can pinch."""
-        return self.mesh.quality(self.X)
+        return worst_quality(self.X, self.mesh.quality_faces)
 
     @cached_property
     def area_weights(self) -> Floats:
@@ -118,14 +172,13 @@ class State:
     @property
     def overpulled(self) -> bool:
         """Whether a resting junction is pulled off Π harder than its wall can hold."""
-        return bool(self.mesh.excess_pull(self.parameter, self.X).any())
-
-    # -- motions -------------------------------------------------------------------------------
+        walls, resting = self.mesh.walls, self.mesh.resting
+        return bool(resting.any() and excess_pull(self.surface.moved(self.X), walls, resting).any())
 
     @cached_property
     def aligned(self) -> Floats:
         """X (n,3) with the rows of walls below their crest; motions count from here."""
-        return self.mesh.place_walls(self.X, self.space)
+        return place_wall_rows(self.mesh.surface, self.mesh.walls, self.X, self.space)
 
     def motion(self, s: Floats) -> Floats:
         """The motion Bs (n,3), in which the insides of the sheets follow their curves."""
@@ -133,4 +186,4 @@ class State:
 
     def moved(self, d: Floats) -> Floats:
         """X + d (n,3), with the rows of walls below their crest."""
-        return self.mesh.place_walls(self.X + d, self.space)
+        return place_wall_rows(self.mesh.surface, self.mesh.walls, self.X + d, self.space)

@@ -14,6 +14,7 @@ from typing import Any
 
 from ..base.errors import OptionError, SurfaceError
 from ..energy.rigid_motions import rigid_modes, rigid_motions
+from ..meshing.quality import redistribute, turns_over
 from ..meshing.remeshing import remesh
 from ..solvers import solve
 from ..solvers.result import Callback, Progress, Status
@@ -31,13 +32,13 @@ from .correction import (
     fixed_volume,
 )
 from .direction import ParameterLine
-from .mesh import BranchMesh
 from .options import Ending, FollowOptions
 from .segment import EVENT_ACCURACY, Segment, crosses_goal
-from .state import State
+from .state import BranchMesh, State
 
 START_RESIDUAL = 1e-4  # relative residual up to which a surface is near enough to a branch to start
 QUALITY_LOSS = 0.7  # ratio of triangle qualities, new to old, below which a step is refused
+CLEARLY_BETTER = 1.02  # ratio of the qualities of a redistributed mesh and the old one
 CONTACT_STEP = 0.02  # length of a step at which a new contact, solved for by itself, is near enough
 BEND = 0.1  # correction over step length that the next step aims at
 MAX_BEND = 0.5  # correction over step length above which a step is refused
@@ -81,35 +82,25 @@ class Tracer:
         start = State(mesh, mesh.surface.vertices, self.line.value)
         free = rigid_modes(start.space, rigid_motions(mesh.surface), start.X).shape[1]
         if free:
-            raise SurfaceError(
-                f"follow: nothing holds the surface against {free} rigid motions, so it would"
-                " drift instead of following the parameter; hold it with fixed= or on_plane=",
-                what="surface",
-                found=free,
-                expected=0,
-            )
+            message = f"follow: nothing holds the surface against {free} rigid motions"
+            hint = "it would drift instead of following the parameter; hold it with fixed= or on_plane="
+            raise SurfaceError(f"{message}; {hint}", what="surface", found=free, expected=0)
         if not (start.parameter_derivative.any() or mesh.resting.any()):  # a wall may come back
-            raise OptionError(
-                "the parameter changes no force: its patches have no free vertex, or they are flat"
-                " and only their tension varies",
-                what="parameter",
-            )
+            reasons = "its patches have no free vertex, or they are flat and only their tension varies"
+            raise OptionError(f"the parameter changes no force: {reasons}", what="parameter")
         try:
             if not start.residual <= START_RESIDUAL:
                 raise NotOnBranch(f"relative residual {start.residual:.1e}")
             if start.overpulled:
                 raise NotOnBranch("a junction is pulled off the plane harder than its wall can hold")
-            constraint = fixed_parameter(start.parameter, self.line.scale)
-            corrected = correct(start, constraint, self.options.tolerance)
+            given = fixed_parameter(start.parameter, self.line.scale)
+            corrected = correct(start, given, self.options.tolerance)
             return branch_point(corrected, math.copysign(1.0, self.options.step))
         except NotOnBranch as reason:
-            raise SurfaceError(
-                f"follow: the surface is not at rest ({reason}); solve it first, with"
-                " pcmc.solve(surface, target='stationary').surface where it is a saddle",
-                what="surface",
-                found=start.residual,
-                expected=START_RESIDUAL,
-            ) from None
+            message = f"follow: the surface is not at rest ({reason}); solve it first, with"
+            message += " pcmc.solve(surface, target='stationary').surface where it is a saddle"
+            found = start.residual
+            raise SurfaceError(message, what="surface", found=found, expected=START_RESIDUAL) from None
 
     def run(self) -> tuple[Ending, str]:
         """Follow the branch to its end; why it ends, and the last difficulty."""
@@ -148,8 +139,6 @@ class Tracer:
             length = min(longer * length, self.options.largest)
         return Ending.STEPS, difficulty
 
-    # -- one step ------------------------------------------------------------------------------
-
     def step(self, length: float) -> Step:
         """The next point, at this length, or nearer if a goal is."""
         here = self.here.state
@@ -162,7 +151,7 @@ class Tracer:
         bend = self.bend(there, length)
         if there.iterations > MANY_ITERATIONS and there.mesh is here.mesh:
             raise NotOnBranch("the correction hardly converges")
-        if here.mesh.flips(here.X, there.X):
+        if turns_over(here.X, there.X, here.mesh.quality_faces):
             raise MeshCollapsed("triangles turn over")
         if there.quality < QUALITY_LOSS * min(here.quality, self.options.min_quality):
             raise MeshCollapsed("triangles collapse")
@@ -211,13 +200,8 @@ class Tracer:
     def solve_contact(self, near: State) -> State:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
         surface = self.line.surface_at(near.mesh.surface_in_contact(near.X), near.parameter)
-        result = solve(
-            surface,
-            "newton",
-            target="stationary",
-            tolerance=self.options.tolerance,
-            backend=self.options.backend,
-        )
+        tolerance, backend = self.options.tolerance, self.options.backend
+        result = solve(surface, "newton", target="stationary", tolerance=tolerance, backend=backend)
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
             raise KeyboardInterrupt
         if not result.converged:
@@ -225,14 +209,12 @@ class Tracer:
         mesh = self.mesh(result.surface)
         return State(mesh, mesh.surface.vertices, near.parameter, result.iterations)
 
-    # -- the mesh ------------------------------------------------------------------------------
-
     def maintain_mesh(self) -> None:
         """Redistribute the vertices where triangles are poor, or remesh, and return to the branch."""
         here, tangent, wanted = self.here.state, self.here.tangent, self.options.min_quality
         if here.quality < wanted:
-            X = here.mesh.redistribute(here.X, wanted)
-            if X is not None:
+            X, quality = redistribute(here.mesh.part, here.X, wanted, slide=False)
+            if quality > CLEARLY_BETTER * here.quality:
                 self.continue_from(State(here.mesh, X, here.parameter), tangent)
         here, tangent = self.here.state, self.here.tangent
         if self.options.remesh is not None and here.quality < wanted:
@@ -252,8 +234,7 @@ class Tracer:
         here = self.here
         constraint = fixed_arclength(start, tangent.row, tangent.rate)
         try:
-            corrected = correct(start, constraint, self.options.tolerance)
-            after = branch_point(corrected, tangent)
+            after = branch_point(correct(start, constraint, self.options.tolerance), tangent)
         except NotOnBranch:
             return
         if crosses_goal(here.state, after.state, self.goals):
@@ -264,45 +245,32 @@ class Tracer:
             self.events += events
             self.here = after
 
-    # -- events --------------------------------------------------------------------------------
-
     def events_on(self, segment: Segment) -> list[dict[str, Any]]:
         """The events on a segment, in their order."""
         start, end, length = segment.start, segment.end, segment.length
         if not segment.same_mesh:
             events = self.events_between(start, end, length)
             if (start.state.mesh.resting != end.state.mesh.resting).any():
-                contact = self.event("contact", end.state, length, start.index, end.index)
-                events.insert(0, contact)
+                events.insert(0, self.event("contact", end.state, length, start.index, end.index))
             return events
         if length <= 2.0 * EVENT_ACCURACY:
             return self.events_between(start, end, length)
-        located = []
-        if segment.fold is not None:
-            at = segment.point(segment.fold).state
-            event = self.event("fold", at, segment.fold, start.index, end.index)
-            located.append((segment.fold, event))
-        sign = 1 if end.index > start.index else -1
-        index = start.index
+        located, fold = [], segment.fold
+        if fold is not None:
+            at = segment.point(fold).state
+            located.append((fold, self.event("fold", at, fold, start.index, end.index)))
+        index, sign = start.index, 1 if end.index > start.index else -1
         for t, count in segment.index_changes():
-            event = self.event("index", segment.point(t).state, t, index, index + sign * count)
-            located.append((t, event))
-            index += sign * count
+            after = index + sign * count
+            located.append((t, self.event("index", segment.point(t).state, t, index, after)))
+            index = after
         return [event for _, event in sorted(located, key=lambda pair: pair[0])]
 
     def events_between(self, before: BranchPoint, after: BranchPoint, length: float) -> list[dict[str, Any]]:
         """Events between two points that are too near, or too different, to search between them."""
-        kinds = {
-            "fold": before.tangent.slope * after.tangent.slope < 0.0,
-            "index": before.index != after.index,
-        }
-        return [
-            self.event(kind, after.state, length, before.index, after.index)
-            for kind, occurs in kinds.items()
-            if occurs
-        ]
-
-    # -- tables --------------------------------------------------------------------------------
+        folds = before.tangent.slope * after.tangent.slope < 0.0
+        kinds = ["fold"] * folds + ["index"] * (before.index != after.index)
+        return [self.event(kind, after.state, length, before.index, after.index) for kind in kinds]
 
     def event(self, kind: str, at: State, t: float, before: int, after: int) -> dict[str, Any]:
         """A row of the table of events, t from here."""

@@ -3,8 +3,8 @@
 Gives ``meet``, ``sensitivities`` and their values. May import ``solvers`` and the rooms below it.
 """
 
-from .meeting import meet
 from .outcome import Design, DesignStatus
+from .search import meet
 from .sensitivity import sensitivities
 from .targets import Parameter, Target
 

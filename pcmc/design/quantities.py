@@ -16,6 +16,7 @@ from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..certificate.balance import held_lengths, reactions
 from ..energy import kernels
+from ..energy.functional import weighted
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d, vertex_sums
 
@@ -35,12 +36,9 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Quantity:
-    """How a quantity is measured.
+    """How a quantity is measured, ``of`` as in ``Target``.
 
-    Attributes
-    ----------
-    measure : (surface, of) -> Measurement, ``of`` as in ``Target``.
-    size : surface -> its usual size, by which misfits are divided where the value wanted is 0.
+    Misfits are divided by its usual ``size`` where the value wanted is 0.
     """
 
     measure: Callable[[Surface, Any], Measurement]
@@ -72,9 +70,8 @@ def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
     weight /= np.where(upright, 1.0, twice)[:, None]
     over = np.flatnonzero((weight >= -1e-9).all(axis=1) & ~upright)
     if not len(over):
-        raise OptionError(
-            f"height at ({point[0]:g}, {point[1]:g}): no patch is over that point", what="of", found=point
-        )
+        message = f"height at ({point[0]:g}, {point[1]:g}): no patch is over that point"
+        raise OptionError(message, what="of", found=point)
     heights = np.einsum("fc,fc->f", weight[over], corner[over, :, 2])
     face = over[heights.argmax()]
     normal = area_vectors(surface.vertices[F[face]])
@@ -86,14 +83,14 @@ def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
 def _area(surface: Surface, of: str | None) -> Measurement:
     """A_i, length²."""
     one = _chosen_patches(surface, of)
-    areas, _, slope = _measured(surface, one, np.zeros_like(one))
+    areas, _, slope = weighted(surface, one)
     return Measurement(float(one @ areas), slope)
 
 
 def _volume(surface: Surface, of: str | None) -> Measurement:
     """V_i seen from the point p of Π, however far: V = V_o + ⅓ ⟨o - p, Σ A_T ν_T⟩, o the surface's origin."""
     one = _chosen_patches(surface, of)
-    _, volumes, slope = _measured(surface, np.zeros_like(one), -one)
+    _, volumes, slope = weighted(surface, 0.0, -one)
     X, F = surface.vertices, surface.faces[_faces_of(surface, of)]
     away = surface.origin - np.array(surface.plane.point)
     vector = area_vectors(X[F]).sum(axis=0)
@@ -143,17 +140,6 @@ def _reaction(surface: Surface, of: str | None) -> Measurement:
     return Measurement(value, slope, by_tension @ pull, by_pressure @ pull)
 
 
-def _pressure_forces(surface: Surface, pressure: Floats) -> Floats:
-    """(n,3) ⅓ Σ p A_T ν_T over the triangles at each vertex, with these pressures (k,).
-
-    Not ∇(p V): at a boundary that includes the sides of the cone whose volume V is, and they are no
-    part of the surface.
-    """
-    third = area_vectors(surface.vertices[surface.faces]) / 3.0
-    pushes = third * pressure[surface.patch_of_face, None]
-    return vertex_sums(pushes, surface.faces, surface.n)
-
-
 def _force_gradient(surface: Surface, v: int, pull: Floats) -> Floats:
     """(n,3) derivative of ⟨pull, f_v⟩, f_v = Σ α ∂A - ⅓ Σ p A_T ν_T at v."""
     around = np.flatnonzero((surface.faces == v).any(axis=1))
@@ -178,14 +164,11 @@ def _force_by_patch(surface: Surface, v: int) -> tuple[Floats, Floats]:
     for i in np.unique(surface.patch_of_face[(surface.faces == v).any(axis=1)]):
         one = np.zeros(len(surface.patches))
         one[i] = 1.0
-        by_tension[i] = _measured(surface, one, 0.0 * one)[2][v]
-        by_pressure[i] = -_pressure_forces(surface, one)[v]
+        by_tension[i] = weighted(surface, one)[2][v]
+        # not ∇V_i: at a boundary that includes the sides of the cone, which are no part of the surface
+        pushes = area_vectors(surface.vertices[surface.faces]) / 3.0 * one[surface.patch_of_face, None]
+        by_pressure[i] = -vertex_sums(pushes, surface.faces, surface.n)[v]
     return by_tension, by_pressure
-
-
-def _measured(surface: Surface, tension: Floats, pressure: Floats) -> tuple[Floats, Floats, Floats]:
-    """Areas, volumes (k,) and ∇(Σ αA - pV) (n,3) with these tensions and pressures."""
-    return kernels.measure(kernels.energy_mesh(surface, tension, pressure), surface.vertices)
 
 
 def _chosen_patches(surface: Surface, of: str | None) -> Floats:

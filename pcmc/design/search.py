@@ -1,4 +1,4 @@
-"""The search for targets: least misfit by Gauss-Newton steps with exact sensitivities and bounds.
+"""``meet``, the search for targets: least misfit by Gauss-Newton steps with exact sensitivities and bounds.
 
 The misfit is φ = ‖r‖, r the relative distances of the quantities from the values wanted; every point
 tried is a solve that starts from the last solution. Sheets are nearly linear in 1/α, so 1/α is the
@@ -12,7 +12,7 @@ the reachable limit.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,8 +20,9 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import lsq_linear
 
+from ..base import validate
 from ..base.arrays import Bools, Floats
-from ..base.errors import SurfaceError
+from ..base.errors import OptionError, SurfaceError
 from ..certificate.balance import coarseness, load_ratio
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
@@ -29,7 +30,7 @@ from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 from .outcome import Design, DesignStatus
 from .sensitivity import sensitivities
-from .targets import Parameter, Target, measure
+from .targets import Parameter, Target, as_parameters, as_targets, measure
 
 LEAST_CHANGE = 1e-3  # part of an unknown that a step must change to be worth a solve near failing ones
 FOLD_GAP = 1e-3  # relative distance of the misfit from its value at a fold where the search ends
@@ -44,6 +45,66 @@ INFLATION = 4.0  # of a solve, which starts near its solution: a surface that gr
 ITERATIONS = 60  # of a solve, for the same reason
 SMALL_CHANGE = 0.02  # of an unknown: below it the mesh is not improved, as quantities depend on it a little
 OVERLOADED = "overloaded"  # in place of a solve's status where none was tried
+
+
+def meet(
+    surface: Surface,
+    targets: Target | Iterable[Target],
+    vary: Parameter | str | Iterable[Parameter | str],
+    *,
+    tolerance: float = 1e-7,
+    solves: int = 40,
+    callback: Callable[[pd.Series], object] | None = None,
+    **options: Any,
+) -> Design:
+    """Find tensions and pressures with which the surface at rest meets the targets.
+
+    Parameters
+    ----------
+    surface : where to start; it need not be at rest.
+    targets : one or several, each with a value or limits.
+    vary : the parameters, or names of patches for their tensions. All others stay the same.
+    tolerance : largest relative misfit of a target that counts as met.
+    solves : largest number of solves.
+    callback : called with each new row of the history. Raise StopIteration in it to stop with the best
+        surface so far, as Ctrl-C does; any other exception passes through.
+    options : of the solver, as in ``pcmc.solve`` with ``method="newton"``.
+
+    Returns
+    -------
+    Design
+        If the targets are out of reach, its ``status`` says so; that is no exception.
+
+    Raises
+    ------
+    OptionError : an unknown patch, a target without a value, bad bounds, a quantity that cannot be
+        measured.
+    SurfaceError : no equilibrium was found to start from, however high the tensions.
+
+    Examples
+    --------
+    The pyramid's height h obeys α h / √(1 + h²) = p / 3, so h = 0.75 needs α = 5/9:
+
+    >>> from pcmc import Patch, Surface
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
+    >>> pyramid = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                   [Patch("roof", 1.0)], fixed=range(4))
+    >>> design = meet(pyramid, Target("apex", "roof", 0.75), "roof")
+    >>> design.met, round(design.surface.patches[0].tension, 6)
+    (True, 0.555556)
+    """
+    if not isinstance(surface, Surface):
+        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
+    aims, parameters = as_targets(targets), as_parameters(vary)
+    for target in aims:
+        if not target.limits:
+            raise OptionError(f"{target.label}: give value, at_most or at_least", what=target.label)
+        measure(surface, target)
+    if callback is not None and not callable(callback):
+        validate.refuse("callback", callback, "a function of a row")
+    validate.positive("tolerance", tolerance)
+    validate.integer("solves", solves, least=1)
+    return Search(surface, aims, parameters, tolerance, solves, callback, options).run()
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +186,6 @@ class Search:
                 return self.design(there, here)
             here, before = there, here
 
-    # -- solves --------------------------------------------------------------------------------
-
     def initial_unknowns(self) -> Floats:
         """The unknowns of the surface given, within their bounds."""
         values = np.array([p.value(self.surface) for p in self.parameters])
@@ -142,17 +201,9 @@ class Search:
                 break
             x = stiffer
         if first is None:
-            raise SurfaceError(
-                "meet: no equilibrium was found to start from; raise the tensions that do not vary,"
-                " or the bounds of those that do",
-                what="surface",
-            )
+            hint = "raise the tensions that do not vary, or the bounds of those that do"
+            raise SurfaceError(f"meet: no equilibrium was found to start from; {hint}", what="surface")
         return first
-
-    def solve_near(self, here: Iterate, x: Floats) -> Iterate | None:
-        """The solution with these unknowns, from one nearby; None where none is found."""
-        small = (np.abs(x - here.x) < SMALL_CHANGE * self.sizes(here)).all()
-        return self.solve_from(here.result.surface, x, {"min_quality": 0.0} if small else {})
 
     def solve_from(self, start: Surface, x: Floats, quality: dict[str, float]) -> Iterate | None:
         """Solve once, from a surface, unless its boundary cannot carry the load.
@@ -204,13 +255,8 @@ class Search:
         """Whether every target is met."""
         return bool(np.abs(at.r).max() <= self.tolerance)
 
-    # -- steps ---------------------------------------------------------------------------------
-
     def gauss_newton(self, here: Iterate) -> tuple[Floats, float]:
-        """The step to the least linearised misfit within the bounds, at most ``trust`` long; that misfit.
-
-        The misfit is that of the whole step.
-        """
+        """Step of least linearised misfit within bounds, cut to ``trust``; the misfit of the whole step."""
         size = self.sizes(here)
         A = here.jacobian * size
         mu = DAMPING * float(np.linalg.norm(A, 2)) or 1.0
@@ -235,7 +281,9 @@ class Search:
         for attempt in range(TRIES):
             if self.solves >= self.max_solves:
                 return DesignStatus.SOLVES
-            there = self.solve_near(here, here.x + t * plan.step)
+            x = here.x + t * plan.step
+            small = (np.abs(x - here.x) < SMALL_CHANGE * self.sizes(here)).all()
+            there = self.solve_from(here.result.surface, x, {"min_quality": 0.0} if small else {})
             if there is not None and there.phi < here.phi:
                 self.trust = max(t * longest, min(1.0, 2.0 * t * longest) if not attempt else 0.0)
                 return there
@@ -248,8 +296,6 @@ class Search:
     def sizes(self, here: Iterate) -> Floats:
         """(parameters,) the unit for changes of each unknown."""
         return np.maximum(np.abs(here.x), 0.05 * (self.bounds[1] - self.bounds[0]))
-
-    # -- tables --------------------------------------------------------------------------------
 
     def record(self, x: Floats, status: str, trial: Trial | None = None) -> None:
         """Add a row to the history, and call the callback with it."""
@@ -286,8 +332,7 @@ class Search:
             },
             index=[p.label for p in self.parameters],
         )
-        history = pd.DataFrame(self.rows)
-        return Design(status, here.result, targets, parameters, self.solves, history)
+        return Design(status, here.result, targets, parameters, self.solves, pd.DataFrame(self.rows))
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,7 @@ from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
 from ..contact.pinching import StandingPart, excess_pull, place_wall_rows, standing_part
-from ..energy import kernels
-from ..energy.functional import energy_and_gradient
+from ..energy.functional import energy_and_gradient, weighted
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..energy.projected_hessian import assemble, hessian_pattern
@@ -85,12 +84,9 @@ def sensitivities(
     response = _LinearResponse.of(surface)
     shown = response.part.surface
     motions = np.stack([response.motion(p, parameters) for p in parameters])
-    return pd.DataFrame(
-        [_slopes(shown, measure(shown, t), parameters, motions) for t in targets],
-        index=[t.label for t in targets],
-        columns=[p.label for p in parameters],
-        dtype=float,
-    )
+    slopes = [_slopes(shown, measure(shown, t), parameters, motions) for t in targets]
+    rows, columns = [t.label for t in targets], [p.label for p in parameters]
+    return pd.DataFrame(slopes, rows, columns, dtype=float)
 
 
 def _slopes(
@@ -117,10 +113,7 @@ def _patch_rates(surface: Surface, parameter: Parameter, parameters: Sequence[Pa
 
 @dataclass(frozen=True, eq=False)
 class _LinearResponse:
-    """The equations of a surface at rest, linearised and factorised.
-
-    ``walls_follow``: whether walls hang from a crest that moves.
-    """
+    """The equations of a surface at rest, factorised; ``walls_follow``: walls hang from a moving crest."""
 
     part: StandingPart
     walls_follow: bool
@@ -139,13 +132,8 @@ class _LinearResponse:
         left = np.hypot(np.linalg.norm(space.to_coordinates(gradient)), unheld)
         residual = float(left) / force_scale(shown, classes, X)
         if residual > TOLERANCE:
-            raise SurfaceError(
-                f"sensitivities: the surface is not at rest (relative residual {residual:.1e});"
-                " solve it first",
-                what="surface",
-                found=residual,
-                expected=TOLERANCE,
-            )
+            message = f"sensitivities: the surface is not at rest (residual {residual:.1e}); solve it first"
+            raise SurfaceError(message, what="surface", found=residual, expected=TOLERANCE)
         pattern = hessian_pattern(classes, space)
         try:
             factor = factoriser(pattern).factor(assemble(shown, classes, space, pattern, X))
@@ -157,13 +145,16 @@ class _LinearResponse:
 
     def motion(self, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
         """dX/dλ (n,3) for one of the parameters."""
-        right = -self.space.to_coordinates(self._force(parameter, parameters))
+        shown = self.part.surface
+        rates = _patch_rates(shown, parameter, parameters)
+        force = weighted(shown, rates) if parameter.kind == "tension" else weighted(shown, 0.0, rates)
+        right = -self.space.to_coordinates(force[2])
         if not np.any(right):
-            return np.zeros_like(self.part.surface.vertices)
+            return np.zeros_like(shown.vertices)
         size = self.space.size
         residuals: list[float] = []
         s, _ = gmres(
-            LinearOperator((size, size), self._apply_jacobian, dtype=float),
+            LinearOperator((size, size), lambda s: self.jacobian.times(self._vertex_motion(s)), dtype=float),
             right,
             M=LinearOperator((size, size), self.factor.solve, dtype=float),
             rtol=ACCURACY,
@@ -175,17 +166,6 @@ class _LinearResponse:
         if not residuals or residuals[-1] > NO_SOLUTION:
             raise SurfaceError(AT_FOLD, what="surface")
         return self._vertex_motion(s)
-
-    def _apply_jacobian(self, s: Floats) -> Floats:
-        """J s (N,)."""
-        return self.jacobian.times(self._vertex_motion(s))
-
-    def _force(self, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
-        """∂(∇E)/∂λ (n,3)."""
-        shown = self.part.surface
-        one, zero = _patch_rates(shown, parameter, parameters), np.zeros(len(shown.patches))
-        tension, pressure = (one, zero) if parameter.kind == "tension" else (zero, one)
-        return kernels.measure(kernels.energy_mesh(shown, tension, pressure), shown.vertices)[2]
 
     def _vertex_motion(self, s: Floats) -> Floats:
         """B s (n,3); walls that hang from their crest follow it, as in the solver."""

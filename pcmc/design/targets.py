@@ -52,9 +52,8 @@ class Target:
         if self.quantity == "height":
             object.__setattr__(self, "of", _point(self.of))
         elif not (isinstance(self.of, str) or (self.of is None and self.quantity != "curvature")):
-            raise OptionError(
-                f"{self.quantity}: expected the name of a patch, found {self.of!r}", what="of", found=self.of
-            )
+            message = f"{self.quantity}: expected the name of a patch, found {self.of!r}"
+            raise OptionError(message, what="of", found=self.of)
         for key in ("value", "at_most", "at_least"):
             if getattr(self, key) is not None:
                 validate.number(key, getattr(self, key), where=self.label)
@@ -62,12 +61,8 @@ class Target:
             raise OptionError(f"{self.label}: give a value or limits, not both", what="value")
         least, most = self.at_least, self.at_most
         if least is not None and most is not None and most < least:
-            raise OptionError(
-                f"{self.label}: at_most {most:g} is less than at_least {least:g}",
-                what="at_most",
-                found=most,
-                expected=least,
-            )
+            message = f"{self.label}: at_most {most:g} is less than at_least {least:g}"
+            raise OptionError(message, what="at_most", found=most, expected=least)
 
     @property
     def label(self) -> str:
@@ -187,34 +182,22 @@ def as_targets(given: Target | Iterable[Target]) -> list[Target]:
 
 def _as_list(given: Any, kinds: tuple[type, ...], expected: str) -> list[Any]:
     """One value or several, by any iterable, as a list of values of these kinds."""
-
-    def wrong(found: object, where: int | None = None) -> OptionError:
-        several = ", or several of them" if where is None else ""
-        return OptionError(
-            f"expected {expected}{several}, found {'none' if found == [] else repr(found)}",
-            where=where,
-            found=found,
-            expected=expected,
-        )
-
     if isinstance(given, kinds):
         return [given]
-    if isinstance(given, str | bytes) or not isinstance(given, Iterable):
-        raise wrong(given)
-    values = list(given)
-    if not values:
-        raise wrong(values)
-    for k, value in enumerate(values):
-        if not isinstance(value, kinds):
-            raise wrong(value, k)
-    return values
+    single = isinstance(given, str | bytes) or not isinstance(given, Iterable)
+    values = [] if single else list(given)
+    wrong = next((k for k, value in enumerate(values) if not isinstance(value, kinds)), None)
+    if values and wrong is None:
+        return values
+    found = values[wrong] if wrong is not None else given if single else values
+    message = f"expected {expected}, or several of them, found {found!r}"
+    raise OptionError(message, where=wrong, found=found, expected=expected)
 
 
 def _point(of: Any) -> tuple[float, float]:
     try:
         x, y = (float(c) for c in of)
     except (TypeError, ValueError):
-        raise OptionError(
-            f"height: expected a point (x, y) of Π, found {of!r}", what="of", found=of
-        ) from None
+        message = f"height: expected a point (x, y) of Π, found {of!r}"
+        raise OptionError(message, what="of", found=of) from None
     return validate.number("height: x", x), validate.number("height: y", y)

@@ -10,11 +10,11 @@ from typing import Literal
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Bools, Floats
-from ..base.errors import OptionError, unknown
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
-from . import kernels
+from .functional import weighted
 
 Method = Literal["cotangent", "variational"]
 METHODS: tuple[Method, ...] = ("cotangent", "variational")
@@ -39,11 +39,9 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     >>> mean_curvature(pyramid, "variational").round(6).tolist()
     [nan, nan, nan, nan, 1.06066]
     """
-    if method not in METHODS:
-        raise OptionError(
-            unknown("mean curvature method", method, METHODS), what="method", found=method, expected=METHODS
-        )
-    area_gradient, area_vector, star_area = _star(surface)
+    validate.choice("method", method, METHODS)
+    area_gradient = weighted(surface, np.ones(len(surface.patches)))[2]
+    area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces)
     along = np.einsum("ij,ij->i", area_gradient, area_vector)
     with np.errstate(divide="ignore", invalid="ignore"):
         if method == "cotangent":
@@ -76,12 +74,3 @@ def curvature_error(surface: Surface, method: Method = "cotangent") -> Floats:
 def _within_one_sheet(surface: Surface) -> Bools:
     """(n,) vertices off boundaries and junctions, and where sheets do not just touch."""
     return surface.topology.interior & (surface.topology.fans == 1)
-
-
-def _star(surface: Surface) -> tuple[Floats, Floats, Floats]:
-    """Σ over each vertex's star: area gradient (n,3), area vector Σ A_T ν_T (n,3), area (n,)."""
-    X, F = surface.vertices, surface.faces
-    ones, zeros = np.ones(len(surface.patches)), np.zeros(len(surface.patches))
-    gradient = kernels.measure(kernels.energy_mesh(surface, ones, zeros), X)[2]
-    vector, area = vertex_area_vectors(X, F)
-    return gradient, vector, area

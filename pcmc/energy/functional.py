@@ -63,9 +63,8 @@ def energy_and_gradient(
 
     ``supports=False`` keeps the forces at held vertices, which the supports must carry.
     """
-    areas, volumes, gradient = kernels.measure(
-        kernels.energy_mesh(surface), surface.vertices if X is None else X, workers
-    )
+    X = surface.vertices if X is None else X
+    areas, volumes, gradient = kernels.measure(kernels.energy_mesh(surface), X, workers)
     if supports:
         apply_supports(surface, gradient)
     return total(surface.tensions, areas, surface.pressures, volumes), gradient
@@ -116,20 +115,24 @@ def hessian(surface: Surface) -> csr_array:
     return csr_array(coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
 
 
+def weighted(
+    surface: Surface, tensions: Floats | float = 0.0, pressures: Floats | float = 0.0, X: Floats | None = None
+) -> tuple[Floats, Floats, Floats]:
+    """A_i and V_i (k,), and Σ α ∇A - p ∇V (n,3), supports not applied, with other α and p (k,)."""
+    other = (np.full(len(surface.patches), weights, dtype=float) for weights in (tensions, pressures))
+    return kernels.measure(kernels.energy_mesh(surface, *other), surface.vertices if X is None else X)
+
+
 def patch_areas(surface: Surface) -> Floats:
     """(k,) area A_i of each patch, length²."""
-    return _areas_and_volumes(surface)[0]
+    return kernels.areas_and_volumes(kernels.energy_mesh(surface), surface.vertices)[0]
 
 
 def patch_volumes(surface: Surface) -> Floats:
     """(k,) signed volume V_i of each patch's cone to ``surface.origin``, length³ (10b)."""
-    return _areas_and_volumes(surface)[1]
+    return kernels.areas_and_volumes(kernels.energy_mesh(surface), surface.vertices)[1]
 
 
 def volume(surface: Surface) -> float:
     """The volume under the roof: Σ V_i over the patches that are no walls, length³."""
     return float(patch_volumes(surface)[~surface.walls].sum())
-
-
-def _areas_and_volumes(surface: Surface) -> tuple[Floats, Floats]:
-    return kernels.areas_and_volumes(kernels.energy_mesh(surface), surface.vertices)

@@ -76,24 +76,17 @@ def linearise(
     surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
 ) -> Linearisation:
     """The derivative of the forces of ``surface`` at X, where ∇E is ``gradient`` (n,3)."""
-    curves = _at_curves(surface, classes, space, X, gradient)
-    sheets = _at_sheets(surface, classes, space, X, gradient)
-    return Linearisation(surface, classes, space, X, sheets, *curves)
-
-
-def _at_curves(
-    surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
-) -> tuple[Ints, Floats]:
+    sheet_factor = _sheet_factor(surface, classes, space, X, gradient)
     slides = surface.on_plane[classes.curve]
     rows = np.flatnonzero(space.dimension[classes.curve] == np.where(slides, 1, 2))
     chord = curve_chords(surface, classes, X)[rows]
     chord[slides[rows]] = surface.plane.along(chord[slides[rows]])
     square = np.einsum("ij,ij->i", chord, chord)
     along = np.einsum("ij,ij->i", chord, gradient[classes.curve[rows]])
-    return rows, -along / square
+    return Linearisation(surface, classes, space, X, sheet_factor, rows, -along / square)
 
 
-def _at_sheets(
+def _sheet_factor(
     surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
 ) -> Floats:
     single = (classes.kind == SHEET) & (space.dimension == 1)

@@ -43,13 +43,9 @@ class Mesh(NamedTuple):
 
 def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Floats | None = None) -> Mesh:
     """All triangles of a surface, with its own tensions and pressures (k,) or with others."""
-    return Mesh(
-        surface.faces,
-        surface.patch_of_face,
-        surface.origin,
-        surface.tensions if tension is None else tension,
-        surface.pressures if pressure is None else pressure,
-    )
+    tension = surface.tensions if tension is None else tension
+    pressure = surface.pressures if pressure is None else pressure
+    return Mesh(surface.faces, surface.patch_of_face, surface.origin, tension, pressure)
 
 
 @compiled

@@ -140,24 +140,14 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     kind[shared] = POINT
     curve, beside = curve[~shared[curve]], beside[~shared[curve]]
     idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
-    return VertexClasses(
-        active=active,
-        faces=faces,
-        patch_of_face=patch,
-        topology=topo,
-        kind=kind,
-        curve=curve,
-        beside=beside,
-        idle=idle,
-        level=np.zeros(surface.n, dtype=bool) if level is None else level,
-    )
+    level = np.zeros(surface.n, dtype=bool) if level is None else level
+    return VertexClasses(active, faces, patch, topo, kind, curve, beside, idle, level)
 
 
 def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionSpace:
     """Basis of the motion space of the surface with its vertices at X (n,3)."""
     n = surface.n
-    basis = np.zeros((n, 3, 3))
-    dimension = np.zeros(n, dtype=np.int64)
+    basis, dimension = np.zeros((n, 3, 3)), np.zeros(n, dtype=np.int64)
     moving = ~(surface.fixed | classes.idle)
 
     sheet = moving & (classes.kind == SHEET)
@@ -172,11 +162,8 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     ring = curve[straight]
     basis[ring, 0], basis[ring, 1] = perpendicular(tangent[ring])
     dimension[ring] = 2
-
-    ends = np.flatnonzero(moving & (classes.kind == POINT))
-    point = np.concatenate([ends, curve[~straight]])
-    basis[point] = np.eye(3)
-    dimension[point] = 3
+    point = np.concatenate([np.flatnonzero(moving & (classes.kind == POINT)), curve[~straight]])
+    basis[point], dimension[point] = np.eye(3), 3
 
     sliding = np.flatnonzero(moving & surface.on_plane)
     if len(sliding):

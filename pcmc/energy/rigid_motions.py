@@ -17,25 +17,15 @@ def rigid_motions(surface: Surface) -> Floats:
     Entry (i,0) is the translation, (i,1) the rotation vector, scaled so that the six are orthonormal
     when lengths are measured in sizes of the surface.
     """
-    X = surface.vertices
-    centre = X.mean(axis=0)
-    scale = surface.size
-    normal = np.array(surface.plane.normal)
-    rows = []
-    if surface.fixed.any():
-        arm = (X[surface.fixed] - centre) / scale
-        for axis in np.eye(3):
-            rows.append(_row(arm, axis))
-    if surface.on_plane.any():
-        rows.append(_row((X[surface.on_plane] - centre) / scale, normal))
-    if not rows:
-        free = np.eye(6)
-    else:
-        resisted = np.concatenate(rows)
+    arm = (surface.vertices - surface.vertices.mean(axis=0)) / surface.size
+    held, free = surface.fixed, np.eye(6)
+    if not surface.free.all():
+        rows = [_row(arm[held], axis) for axis in np.eye(3)]
+        resisted = np.concatenate([*rows, _row(arm[surface.on_plane], np.array(surface.plane.normal))])
         _, s, vt = np.linalg.svd(resisted.T @ resisted)
         free = vt[s <= 1e-10 * s[0]]
     motions = free.reshape(-1, 2, 3).copy()
-    motions[:, 1] /= scale
+    motions[:, 1] /= surface.size
     return motions
 
 

@@ -1,4 +1,4 @@
-"""Quality of triangles: 1 for an equilateral one, 0 for a degenerate one."""
+"""Quality of triangles: 1 for an equilateral one, 0 for a degenerate one; redistribution that raises it."""
 
 from __future__ import annotations
 
@@ -8,36 +8,21 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
+from ..contact.pinching import StandingPart, place_wall_rows
 from ..energy.functional import apply_supports
+from ..energy.motion_space import motion_space
 from ..surface import Surface
 from ..surface.geometry import angles, cross, dot, face_areas, norm, point, segment_lengths, sub
 from ..surface.topology import SHEET
 
 SQRT3 = sqrt(3.0)
-
-
-def triangle_quality(X: Floats, F: Ints) -> Floats:
-    """q = 4√3 area / Σ edge² (m,), 1 for an equilateral triangle, 0 for a degenerate one.
-
-    >>> triangle_quality(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])).round(6)
-    array([0.866025])
-    """
-    return _qualities(X, F)
-
-
-def worst_quality(X: Floats, F: Ints) -> float:
-    """The smallest triangle quality, 1 where there are no triangles."""
-    return float(_worst(X, F))
+SWEEPS = 20  # of redistribution, at most
+SWEEPS = 20  # of redistribution, at most
 
 
 def compare(X: Floats, Y: Floats, F: Ints) -> tuple[bool, float, float]:
     """Whether a triangle turns over on the way from X to Y, and the worst quality at X and at Y."""
     return turns_over(X, Y, F), worst_quality(X, F), worst_quality(Y, F)
-
-
-def turns_over(X: Floats, Y: Floats, F: Ints) -> bool:
-    """Whether a triangle's normal turns by a right angle or more from X to Y."""
-    return bool(_turns(X, Y, F))
 
 
 @inlined
@@ -49,7 +34,12 @@ def _area_and_edges(X: Floats, F: Ints, f: int) -> tuple[float, float]:
 
 
 @compiled
-def _qualities(X: Floats, F: Ints) -> Floats:
+def triangle_quality(X: Floats, F: Ints) -> Floats:
+    """q = 4√3 area / Σ edge² (m,), 1 for an equilateral triangle, 0 for a degenerate one.
+
+    >>> triangle_quality(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])).round(6)
+    array([0.866025])
+    """
     out = np.zeros(len(F))
     for f in range(len(F)):
         area, squared_edges = _area_and_edges(X, F, f)
@@ -59,7 +49,8 @@ def _qualities(X: Floats, F: Ints) -> Floats:
 
 
 @compiled
-def _worst(X: Floats, F: Ints) -> float:
+def worst_quality(X: Floats, F: Ints) -> float:
+    """The smallest triangle quality, 1 where there are no triangles."""
     worst = 1.0
     for f in range(len(F)):
         area, squared_edges = _area_and_edges(X, F, f)
@@ -69,7 +60,8 @@ def _worst(X: Floats, F: Ints) -> float:
 
 
 @compiled
-def _turns(X: Floats, Y: Floats, F: Ints) -> bool:
+def turns_over(X: Floats, Y: Floats, F: Ints) -> bool:
+    """Whether a triangle's normal turns by a right angle or more from X to Y."""
     for f in range(len(F)):
         i, j, k = F[f, 0], F[f, 1], F[f, 2]
         before = cross(sub(point(X, j), point(X, i)), sub(point(X, k), point(X, i)))
@@ -98,19 +90,35 @@ def towards_star_centres(
     vertices ``curve`` (c,) towards the middle of their neighbours ``beside`` (c,2), elsewhere not at
     all; fixed vertices stay and sliding ones keep to Π.
     """
-    F = surface.faces
-    corners = X[F]
+    corners, corner = X[surface.faces], surface.faces.T.ravel()
     area = face_areas(corners)
-    centroid = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0
-    corner = F.T.ravel()
+    moment = area[:, None] * ((corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0)
     total = np.bincount(corner, np.tile(area, 3), len(X))[:, None]
-    weighted = _summed(corner, np.tile(area[:, None] * centroid, (3, 1)), len(X))
+    weighted = np.stack([np.bincount(corner, np.tile(m, 3), len(X)) for m in moment.T], axis=1)
     move = np.where(total > 0.0, weighted / np.where(total > 0.0, total, 1.0) - X, 0.0)
     move[kind != SHEET] = 0.0
     move[curve] = 0.5 * (X[beside[:, 0]] + X[beside[:, 1]]) - X[curve]
     return apply_supports(surface, step * move)
 
 
-def _summed(place: Ints, values: Floats, n: int) -> Floats:
-    """(n,3) the sum of the values (k,3) at each place."""
-    return np.stack([np.bincount(place, column, n) for column in values.T], axis=1)
+def redistribute(part: StandingPart, X: Floats, aim: float, *, slide: bool) -> tuple[Floats, float]:
+    """The best of a few sweeps of redistribution, (n,3), and the quality of its worst triangle.
+
+    Sweeps end where that is at least ``aim``; triangles of walls that can pinch do not count. Each vertex
+    moves from X (n,3) towards the middle of its star, without the part in the motion space, which would
+    change the shape; walls follow their crest. With ``slide``, junction vertices at rest on Π slide too.
+    """
+    surface, classes, faces = part.surface, part.classes, part.quality_faces
+    best, worst = X, worst_quality(X, faces)
+    for _ in range(SWEEPS):
+        move = towards_star_centres(surface, X, classes.kind, classes.curve, classes.beside)
+        if not slide:
+            move[part.resting] = 0.0
+        space = motion_space(surface, classes, X)
+        X = place_wall_rows(surface, part.walls, X + move - space.project(move), space)
+        quality = worst_quality(X, faces)
+        if quality > worst:
+            best, worst = X, quality
+        if quality >= aim:
+            break
+    return best, worst

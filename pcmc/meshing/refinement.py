@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..contact.pinching import midpoints
 from ..surface import Surface
@@ -98,37 +98,18 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
 
 def _refine_once(surface: Surface, project: Projection | None) -> Surface:
     edges = surface.topology.edges
-    X, middle = surface.vertices, midpoints(surface, edges)
+    middle = midpoints(surface, edges)
     held, slides = held_midpoints(surface)
     if project is not None:
-        middle[held] = _projected(project, middle[held])
-    return Surface(
-        np.concatenate([X, middle]),
-        _children(surface.faces, surface.topology.edge_of_face, surface.n),
-        np.repeat(surface.patch_of_face, 4),
-        surface.patches,
-        np.concatenate([surface.fixed, held]),
-        np.concatenate([surface.on_plane, slides]),
-        surface.plane,
-    )
-
-
-def _children(F: Ints, edge_of_face: Ints, n: int) -> Ints:
-    """(4m,3): the triangles at the three corners, then the middle one; orientation is kept."""
-    a, b, c = F.T
-    bc, ca, ab = n + edge_of_face.T  # an edge's number is opposite its corner
-    corners = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1)
-    return corners.reshape(-1, 3)
-
-
-def _projected(project: Projection, points: Floats) -> Floats:
-    projected = np.asarray(project(points.copy()), dtype=float)
-    if projected.shape != points.shape:
-        raise OptionError(
-            f"project: expected a function that returns shape {points.shape} for {len(points)}"
-            f" points, it returned {projected.shape}",
-            what="project",
-            found=projected.shape,
-            expected=points.shape,
-        )
-    return projected
+        projected = np.asarray(project(middle[held].copy()), dtype=float)
+        if projected.shape != middle[held].shape:
+            expected, found = middle[held].shape, projected.shape
+            message = f"project: expected a function that returns shape {expected}, it returned {found}"
+            raise OptionError(message, what="project", found=found, expected=expected)
+        middle[held] = projected
+    a, b, c = surface.faces.T
+    bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
+    X, patch = np.concatenate([surface.vertices, middle]), np.repeat(surface.patch_of_face, 4)
+    F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
+    fixed, sliding = np.concatenate([surface.fixed, held]), np.concatenate([surface.on_plane, slides])
+    return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane)

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
-from ..base.errors import MissingExtra, OptionError, SurfaceError
+from ..base.errors import MissingExtra, SurfaceError
 from ..contact.pinching import lift, standing_part
 from ..surface import Surface
 from ..surface.geometry import angles, area_vectors, face_areas, segment_lengths
@@ -74,11 +74,14 @@ def remesh(
     (True, True)
     """
     check_lengths(edge_length, near_curves, growth, chord)
-    _check_count(surface, edge_length)
-    surface = _raised(surface)
+    count = face_areas(surface.vertices[surface.faces]).sum() / (math.sqrt(3.0) / 4.0 * edge_length**2)
+    if count > MOST:
+        hint = f"it makes about {count:.2g}; choose a larger one"
+        validate.refuse("edge_length", edge_length, f"at most {MOST} triangles", hint=hint)
+    part = standing_part(surface)
+    surface = lift(surface, part.walls, part.resting, RAISED)
     old = _cut_curves(surface, edge_length if near_curves is None else near_curves)
-    candidates = []
-    mesh = old
+    candidates, mesh = [], old
     for _ in range(PASSES):
         size = _sizes(mesh, edge_length, growth)
         mesh = _remesh_with_mmg(mesh, size, growth, CHORD * edge_length if chord is None else chord)
@@ -87,12 +90,6 @@ def remesh(
         if angles(mesh.X[mesh.F]).min() >= GOOD_ANGLE:
             break
     return _assembled(surface, old, candidates)
-
-
-def _raised(surface: Surface) -> Surface:
-    """The surface with walls of height > 0 below the junctions that rest on Π."""
-    part = standing_part(surface)
-    return lift(surface, part.walls, part.resting, RAISED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,20 +124,6 @@ def check_lengths(
     validate.number("growth", growth, above=1.0)
 
 
-def _check_count(surface: Surface, edge_length: float) -> None:
-    """Refuse an edge length so small that its triangles would fill the memory."""
-    area = face_areas(surface.vertices[surface.faces]).sum()
-    count = area / (math.sqrt(3.0) / 4.0 * edge_length**2)
-    if count > MOST:
-        raise OptionError(
-            f"edge_length: {edge_length:g} makes about {count:.2g} triangles; choose a length that"
-            f" makes at most {MOST}",
-            what="edge_length",
-            found=edge_length,
-            expected=f"at most {MOST} triangles",
-        )
-
-
 def _curve_edges(surface: Surface) -> Bools:
     """(e,) the edges that must stay: curves, and edges held inside a patch."""
     fixed, sliding = held_midpoints(surface)
@@ -156,15 +139,8 @@ def _cut_curves(surface: Surface, length: float) -> _Mesh:
         counts = _pieces(surface, length)
     topo, stay = surface.topology, _curve_edges(surface)
     fixed_edge, sliding_edge = held_midpoints(surface)
-    mesh = _Mesh(
-        surface.vertices,
-        surface.faces,
-        surface.patch_of_face,
-        topo.edges[stay],
-        surface.fixed,
-        surface.on_plane,
-        np.arange(surface.n),
-    )
+    X, F, patch, number = surface.vertices, surface.faces, surface.patch_of_face, np.arange(surface.n)
+    mesh = _Mesh(X, F, patch, topo.edges[stay], surface.fixed, surface.on_plane, number)
     support = np.stack([fixed_edge[stay], sliding_edge[stay]], axis=1)
     while (counts > 1).any():
         mesh, counts, support = _cut_once(mesh, counts, support)
@@ -194,9 +170,8 @@ def _edge_normals(surface: Surface, chosen: Ints) -> Floats:
     """(c,2,3) unit normals at the ends of edges inside sheets, of the edge's own sheet."""
     X, F, topo = surface.vertices, surface.faces, surface.topology
     vector = area_vectors(X[F])
-    key, place = np.unique(
-        (surface.patch_of_face[:, None].astype(np.int64) * surface.n + F).ravel(), return_inverse=True
-    )
+    corner = surface.patch_of_face[:, None].astype(np.int64) * surface.n + F
+    key, place = np.unique(corner.ravel(), return_inverse=True)
     total = np.zeros((len(key), 3))
     np.add.at(total, place, np.repeat(vector, 3, axis=0))
     total /= np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
@@ -220,18 +195,12 @@ def _cut_once(mesh: _Mesh, counts: Ints, support: Bools) -> tuple[_Mesh, Ints, B
     start, end = mesh.X[ends[:, 0]], mesh.X[ends[:, 1]]
     number = len(mesh.X) + np.arange(len(ends))
     F, patch = _cut_triangles(mesh.F, mesh.patch, ends, number, len(mesh.X))
-    curves = np.concatenate(
-        [mesh.curves[~cut], np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)]
-    )
-    new = _Mesh(
-        np.concatenate([mesh.X, start + share * (end - start)]),
-        F,
-        patch,
-        curves,
-        np.concatenate([mesh.fixed, support[cut, 0]]),
-        np.concatenate([mesh.sliding, support[cut, 1]]),
-        np.arange(len(mesh.X) + len(ends)),
-    )
+    halves = np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)
+    X = np.concatenate([mesh.X, start + share * (end - start)])
+    curves = np.concatenate([mesh.curves[~cut], *halves])
+    fixed = np.concatenate([mesh.fixed, support[cut, 0]])
+    sliding = np.concatenate([mesh.sliding, support[cut, 1]])
+    new = _Mesh(X, F, patch, curves, fixed, sliding, np.arange(len(X)))
     counts = np.concatenate([counts[~cut], first, pieces - first])
     return new, counts, np.concatenate([support[~cut], support[cut], support[cut]])
 
@@ -297,21 +266,12 @@ def _remesh_with_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> 
     tool.set_required_vertices(fixed.astype(np.int32))
     tool.set_required_triangles(_corners_to_keep(mesh).astype(np.int32))
     tool["metric"] = size[:, None]
+    least, most = 0.3 * float(size.min()), 1.3 * float(size.max())
     try:
-        tool.remesh(
-            hmin=0.3 * float(size.min()),
-            hmax=1.3 * float(size.max()),
-            hausd=chord,
-            hgrad=growth,
-            angle=0,
-            verbose=-1,
-        )
+        tool.remesh(hmin=least, hmax=most, hausd=chord, hgrad=growth, angle=0, verbose=-1)
     except RuntimeError as error:
-        raise SurfaceError(
-            f"MMG cannot remesh this surface ({error}); repair degenerate triangles first, or choose"
-            " another edge length",
-            what="surface",
-        ) from None
+        hint = "repair degenerate triangles first, or choose another edge length"
+        raise SurfaceError(f"MMG cannot remesh this surface ({error}); {hint}", what="surface") from None
     X, reference = tool.get_vertices_with_refs()
     F, patch = tool.get_triangles_with_refs()
     place = np.append(-1, fixed)[reference]
@@ -320,15 +280,9 @@ def _remesh_with_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> 
     number[place[known]] = np.flatnonzero(known)
     curves = number[mesh.curves]
     _check_curves(mesh, curves, F, len(X))
-    return _Mesh(
-        X,
-        F.astype(np.int64),
-        patch - 1,
-        curves,
-        known & mesh.fixed[place],
-        known & mesh.sliding[place],
-        np.where(known, mesh.source[place], -1),
-    )
+    source = np.where(known, mesh.source[place], -1)
+    fixed, sliding = known & mesh.fixed[place], known & mesh.sliding[place]
+    return _Mesh(X, F.astype(np.int64), patch - 1, curves, fixed, sliding, source)
 
 
 def _corners_to_keep(mesh: _Mesh) -> Ints:
@@ -348,13 +302,8 @@ def _check_curves(before: _Mesh, curves: Ints, F: Ints, n: int) -> None:
     lost |= ~np.isin(curves.min(axis=1) * n + curves.max(axis=1), edges)
     if lost.any():
         place = before.X[before.curves[np.argmax(lost), 0]].tolist()
-        raise SurfaceError(
-            f"MMG lost {lost.sum()} edges of curves, the first at {place}; choose a smaller edge length",
-            what="surface",
-            where=place,
-            found=int(lost.sum()),
-            expected=0,
-        )
+        message = f"MMG lost {lost.sum()} edges of curves, the first at {place}; choose a smaller edge length"
+        raise SurfaceError(message, what="surface", where=place)
 
 
 def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Surface:
@@ -375,15 +324,11 @@ def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Sur
         faces.append(vertex[mesh.F[chosen]])
         patch.append(mesh.patch[chosen])
     used, inverse = np.unique(np.concatenate(faces), return_inverse=True)
-    return Surface(
-        np.concatenate([mesh.X for mesh in meshes])[used],
-        inverse.reshape(-1, 3),
-        np.concatenate(patch),
-        surface.patches,
-        np.concatenate([mesh.fixed for mesh in meshes])[used],
-        np.concatenate([mesh.sliding for mesh in meshes])[used],
-        surface.plane,
-    )
+    F, patch_of_face = inverse.reshape(-1, 3), np.concatenate(patch)
+    X = np.concatenate([mesh.X for mesh in meshes])[used]
+    fixed = np.concatenate([mesh.fixed for mesh in meshes])[used]
+    sliding = np.concatenate([mesh.sliding for mesh in meshes])[used]
+    return Surface(X, F, patch_of_face, surface.patches, fixed, sliding, surface.plane)
 
 
 def _patch_angles(mesh: _Mesh, count: int) -> Floats:

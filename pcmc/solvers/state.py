@@ -20,8 +20,7 @@ from ..contact.pinching import (
 )
 from ..energy.functional import energy_and_gradient, energy_at
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
-from ..meshing.quality import compare, worst_quality
-from ..meshing.redistribution import redistribute
+from ..meshing.quality import compare, redistribute, worst_quality
 from ..surface import Surface
 
 LOW = 5e-3  # height, in spacings along the junction, at which a sinking vertex is set to rest

@@ -24,7 +24,7 @@ def positions(vertices: npt.ArrayLike) -> Floats:
     """(n,3) finite floats, a copy of its own."""
     X = _array(vertices, "vertices", np.float64)
     if X.ndim != 2 or X.shape[1] != 3 or not len(X):
-        _refuse_shape("vertices", X, "(n, 3) with n > 0")
+        refuse_shape("vertices", X, "(n, 3) with n > 0")
     bad = np.flatnonzero(~np.isfinite(X).all(axis=1))
     if len(bad):
         _refuse_rows("vertices", X, bad, "is not finite", hint="replace or remove it")
@@ -35,20 +35,20 @@ def within_reach(X: Floats) -> None:
     """Coordinates up to LARGEST: a solver may run beyond, but not start there."""
     bad = np.flatnonzero((np.abs(X) > LARGEST).any(axis=1))
     if len(bad):
-        fault = f"is farther out than {LARGEST:g}"
-        _refuse_rows("vertices", X, bad, fault, hint="use a larger unit of length")
+        _refuse_rows(
+            "vertices", X, bad, f"is farther out than {LARGEST:g}", hint="use a larger unit of length"
+        )
 
 
 def face_array(faces: npt.ArrayLike, n: int) -> Ints:
     """(m,3) int32 vertex indices within 0..n-1, no vertex twice in a face."""
     F = _integers(faces, "faces")
     if F.ndim != 2 or F.shape[1] != 3 or not len(F):
-        _refuse_shape("faces", F, "(m, 3) with m > 0")
+        refuse_shape("faces", F, "(m, 3) with m > 0")
     bad = np.flatnonzero(((F < 0) | (n <= F)).any(axis=1))
     if len(bad):
         _refuse_rows("faces", F, bad, "names a vertex outside the range", f"0..{n - 1}")
-    twice = (F[:, 0] == F[:, 1]) | (F[:, 1] == F[:, 2]) | (F[:, 2] == F[:, 0])
-    bad = np.flatnonzero(twice)
+    bad = np.flatnonzero((F[:, [1, 2, 0]] == F).any(axis=1))
     if len(bad):
         _refuse_rows("faces", F, bad, "has a vertex twice", hint="remove the face")
     return F.astype(np.int32)
@@ -61,25 +61,18 @@ def patch_array(patch_of_face: npt.ArrayLike, m: int, patches: Sequence[Any]) ->
         validate.refuse("patches", patches, "a sequence of Patch", error=SurfaceError)
     double = [name for place, name in enumerate(names) if name in names[:place]]
     if double:
-        raise SurfaceError(
-            f"patches: the name {double[0]!r} is used twice; names must be unique",
-            what="patches",
-            found=double[0],
-        )
+        message = f"patches: the name {double[0]!r} is used twice; names must be unique"
+        raise SurfaceError(message, what="patches", found=double[0])
     P = _integers(patch_of_face, "patch_of_face")
     if P.shape != (m,):
-        _refuse_shape("patch_of_face", P, f"({m},), one entry per face")
+        refuse_shape("patch_of_face", P, f"({m},), one entry per face")
     bad = np.flatnonzero((P < 0) | (len(names) <= P))
     if len(bad):
-        fault = "names a patch outside the range"
-        _refuse_rows("patch_of_face", P, bad, fault, f"0..{len(names) - 1}")
+        _refuse_rows("patch_of_face", P, bad, "names a patch outside the range", f"0..{len(names) - 1}")
     empty = np.flatnonzero(np.bincount(P, minlength=len(names)) == 0)
     if len(empty):
-        raise SurfaceError(
-            f"patch {names[empty[0]]!r} (index {empty[0]}) has no faces; remove it",
-            what="patches",
-            where=names[empty[0]],
-        )
+        message = f"patch {names[empty[0]]!r} (index {empty[0]}) has no faces; remove it"
+        raise SurfaceError(message, what="patches", where=names[empty[0]])
     return P.astype(np.int32)
 
 
@@ -88,7 +81,7 @@ def mask(chosen: Any, n: int, what: str) -> Bools:
     given = np.asarray(list(chosen) if isinstance(chosen, range | set | frozenset) else chosen)
     if given.dtype == bool:
         if given.shape != (n,):
-            _refuse_shape(what, given, f"({n},) for a mask")
+            refuse_shape(what, given, f"({n},) for a mask")
         return given.copy()
     result = np.zeros(n, dtype=bool)
     if given.size:
@@ -107,8 +100,7 @@ def mesh(
     names = [p.name for p in patches]
     unused = np.flatnonzero(np.bincount(F.ravel(), minlength=len(X)) == 0)
     if len(unused):
-        fault = "belongs to no face"
-        _refuse_rows("vertices", X, unused, fault, hint="remove it and renumber the faces")
+        _refuse_rows("vertices", X, unused, "belongs to no face", hint="remove it and renumber the faces")
     longest = (edge_vectors(X[F]) ** 2).sum(axis=2).max(axis=1)
     flat = 2.0 * face_areas(X[F]) <= ZERO_AREA * longest
     if flat.any():
@@ -121,12 +113,8 @@ def mesh(
     same = _first_double(pair[:, 0] * len(topo.edges) + pair[:, 1])
     if same is not None:
         first, second = same
-        raise SurfaceError(
-            f"faces[{second}] is the same triangle as faces[{first}] = {F[first].tolist()}; remove one",
-            what="faces",
-            where=second,
-            found=F[second].tolist(),
-        )
+        message = f"faces[{second}] is the same triangle as faces[{first}] = {F[first].tolist()}; remove one"
+        raise SurfaceError(message, what="faces", where=second, found=F[second].tolist())
     _oriented(F, patch, topo, names)
 
 
@@ -172,24 +160,14 @@ def _oriented(F: Ints, patch: Ints, topo: Topology, names: Sequence[str]) -> Non
     one, two = double
     ends = sorted((int(start[one]), int(end[one])))
     many = np.count_nonzero(key // 2 == key[one] // 2)
-    if many > 2:
-        raise SurfaceError(
-            f"patch {names[within[one]]!r}: {many} of its faces share edge {ends} (faces"
-            f" {one // 3} and {two // 3} among them); split it into patches that each have at"
-            " most two faces at an edge",
-            what="faces",
-            where=two // 3,
-            found=many,
-            expected="at most 2 faces of a patch at an edge",
-        )
-    raise SurfaceError(
-        f"patch {names[within[one]]!r} is not consistently oriented: faces {one // 3} and"
-        f" {two // 3} run along edge {ends} the same way; reverse one of them",
-        what="faces",
-        where=two // 3,
-        found=ends,
-        expected="opposite directions along a shared edge",
+    fault = (
+        f": {many} of its faces share edge {ends} (faces {one // 3} and {two // 3} among them);"
+        " split it into patches that each have at most two faces at an edge"
+        if many > 2
+        else f" is not consistently oriented: faces {one // 3} and {two // 3} run along edge {ends}"
+        " the same way; reverse one of them"
     )
+    raise SurfaceError(f"patch {names[within[one]]!r}{fault}", what="faces", where=two // 3)
 
 
 def _first_double(key: Ints) -> tuple[int, int] | None:
@@ -207,11 +185,7 @@ def _array(values: npt.ArrayLike, what: str, dtype: Any) -> Any:
     try:
         return np.array(values, dtype=dtype, order="C")
     except (TypeError, ValueError) as error:
-        raise SurfaceError(
-            f"{what}: expected a regular array of numbers ({error})",
-            what=what,
-            expected="a regular array of numbers",
-        ) from None
+        raise SurfaceError(f"{what}: expected a regular array of numbers ({error})", what=what) from None
 
 
 def _integers(values: npt.ArrayLike, what: str) -> Ints:
@@ -221,23 +195,15 @@ def _integers(values: npt.ArrayLike, what: str) -> Ints:
         bad = np.argwhere((given != np.floor(given)) | (np.abs(given) > 2**53))
         if len(bad):
             place = tuple(bad[0].tolist())
-            raise SurfaceError(
-                f"{what}{list(place)}: expected a whole number, found {given[place]}",
-                what=what,
-                where=place if len(place) > 1 else place[0],
-                found=float(given[place]),
-                expected="a whole number",
-            )
+            message = f"{what}{list(place)}: expected a whole number, found {given[place]}"
+            raise SurfaceError(message, what=what, where=place if len(place) > 1 else place[0])
     return np.asarray(given.astype(np.int64))
 
 
-def _refuse_shape(what: str, array: Any, expected: str) -> NoReturn:
-    raise SurfaceError(
-        f"{what}: expected shape {expected}, found {array.shape}",
-        what=what,
-        found=array.shape,
-        expected=expected,
-    )
+def refuse_shape(what: str, array: Any, expected: object) -> NoReturn:
+    """Refuse an array of another shape than expected."""
+    message = f"{what}: expected shape {expected}, found {array.shape}"
+    raise SurfaceError(message, what=what, found=array.shape, expected=expected)
 
 
 def _refuse_rows(
@@ -247,10 +213,5 @@ def _refuse_rows(
     first = int(bad[0])
     limits = "" if expected is None else f" {expected}"
     count = f" ({len(bad)} such entries)" if len(bad) > 1 else ""
-    raise SurfaceError(
-        f"{what}[{first}] = {rows[first].tolist()} {fault}{limits}{count}{hint and f'; {hint}'}",
-        what=what,
-        where=first,
-        found=rows[first].tolist(),
-        expected=expected,
-    )
+    message = f"{what}[{first}] = {rows[first].tolist()} {fault}{limits}{count}{hint and f'; {hint}'}"
+    raise SurfaceError(message, what=what, where=first, found=rows[first].tolist(), expected=expected)

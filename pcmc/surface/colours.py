@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+
 import numpy as np
 
 from ..base.arrays import Floats
@@ -23,12 +25,5 @@ def rgb(color: str) -> Floats:
 
 def patch_colors(surface: Surface) -> Floats:
     """(k,3) RGB: one palette for sheets under pressure, another for walls."""
-    result, sheets, walls = [], 0, 0
-    for patch in surface.patches:
-        if patch.auxiliary:
-            result.append(rgb(WALLS[walls % len(WALLS)]))
-            walls += 1
-        else:
-            result.append(rgb(SHEETS[sheets % len(SHEETS)]))
-            sheets += 1
-    return np.array(result)
+    sheets, walls = cycle(SHEETS), cycle(WALLS)
+    return np.array([rgb(next(walls if wall else sheets)) for wall in surface.walls])

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
-from ..base.errors import FreeSurfaceWarning, OptionError, SurfaceError, unknown
+from ..base.errors import FreeSurfaceWarning, SurfaceError
 from . import checks
 from .geometry import Vector, bounding_size
 from .topology import Topology, topology
@@ -51,14 +51,8 @@ class Patch:
         tension = self._number("tension", least=0.0, hint="0 makes a wall that does not pull")
         pressure = self._number("pressure")
         if tension == 0.0 and pressure != 0.0:
-            raise SurfaceError(
-                f"tension of {self.name!r}: expected > 0 for a patch under pressure {pressure:g}, found"
-                " 0; only a wall between equal pressures (pressure=0) may have tension 0",
-                what="tension",
-                where=self.name,
-                found=0.0,
-                expected="> 0",
-            )
+            hint = f"a patch under pressure {pressure:g} must pull; a wall (pressure=0) may have tension 0"
+            validate.refuse("tension", 0.0, "> 0", self.name, hint, SurfaceError)
 
     def _number(self, key: str, least: float | None = None, hint: str = "") -> float:
         value, where, most = getattr(self, key), self.name, checks.LARGEST
@@ -99,12 +93,7 @@ class Plane:
             object.__setattr__(self, key, vector)
         length = math.sqrt(sum(c * c for c in self.normal))
         if length == 0.0:
-            raise SurfaceError(
-                "Plane.normal: expected a vector of positive length, found (0, 0, 0)",
-                what="Plane.normal",
-                found=self.normal,
-                expected="a vector of positive length",
-            )
+            validate.refuse("Plane.normal", self.normal, "a vector of positive length", error=SurfaceError)
         object.__setattr__(self, "normal", tuple(c / length for c in self.normal))
 
     @cached_property
@@ -171,9 +160,7 @@ class Surface:
 
     def __post_init__(self) -> None:
         if not isinstance(self.plane, Plane):
-            raise SurfaceError(
-                f"plane: expected a Plane, found {self.plane!r}", what="plane", found=self.plane
-            )
+            validate.refuse("plane", self.plane, "a Plane", error=SurfaceError)
         X = checks.positions(self.vertices)
         checks.within_reach(X)
         F = checks.face_array(self.faces, len(X))
@@ -189,12 +176,9 @@ class Surface:
         checks.mesh(X, F, patch, self.topology, self.patches, fixed | sliding, height)
         checks.on_plane(height, sliding, X, self.size)
         if not (fixed.any() or sliding.any()):
-            warnings.warn(
-                "no vertex is fixed or on the plane: translations are free, so only closed"
-                " surfaces have an equilibrium; pass fixed= or on_plane= to hold it",
-                FreeSurfaceWarning,
-                stacklevel=3,
-            )
+            message = "no vertex is fixed or on the plane: translations are free, so only closed surfaces"
+            message += " have an equilibrium; pass fixed= or on_plane= to hold it"
+            warnings.warn(message, FreeSurfaceWarning, stacklevel=3)
 
     @property
     def n(self) -> int:
@@ -272,9 +256,7 @@ class Surface:
     def patch_index(self, name: str) -> int:
         """Index of the patch called ``name``."""
         names = [p.name for p in self.patches]
-        if name not in names:
-            raise OptionError(unknown("patch", name, names), what="patch", found=name)
-        return names.index(name)
+        return names.index(validate.choice("patch", name, names))
 
     def moved(self, vertices: npt.ArrayLike) -> Surface:
         """The same surface with its vertices elsewhere, (n,3); faces, supports, patches are shared.
@@ -283,12 +265,7 @@ class Surface:
         """
         X = checks.positions(vertices)
         if X.shape != self.vertices.shape:
-            raise SurfaceError(
-                f"vertices: expected shape {self.vertices.shape}, found {X.shape}",
-                what="vertices",
-                found=X.shape,
-                expected=self.vertices.shape,
-            )
+            checks.refuse_shape("vertices", X, self.vertices.shape)
         checks.on_plane(self.plane.height(X), self.on_plane, X, self.size)
         X.setflags(write=False)
         return self._with(vertices=X)

@@ -90,22 +90,17 @@ class Topology:
     @cached_property
     def seam_edge(self) -> Bools:
         """(e,) bool: edges between two triangles of different patches, with no wall between them."""
-        low, high = self._patch_range
+        patches = np.repeat(self.patch_of_face, 3)
+        low = np.full(len(self.edges), np.iinfo(np.int32).max, dtype=np.int32)
+        high = np.full(len(self.edges), -1, dtype=np.int32)
+        np.minimum.at(low, self.edge_of_face.ravel(), patches)
+        np.maximum.at(high, self.edge_of_face.ravel(), patches)
         return (self.valence == 2) & (low != high)
 
     @cached_property
     def curve_edge(self) -> Bools:
         """(e,) bool: boundary, junction and seam edges."""
         return self.boundary_edge | self.junction_edge | self.seam_edge
-
-    @cached_property
-    def _patch_range(self) -> tuple[Ints, Ints]:
-        patches = np.repeat(self.patch_of_face, 3)
-        low = np.full(len(self.edges), np.iinfo(np.int32).max, dtype=np.int32)
-        high = np.full(len(self.edges), -1, dtype=np.int32)
-        np.minimum.at(low, self.edge_of_face.ravel(), patches)
-        np.maximum.at(high, self.edge_of_face.ravel(), patches)
-        return low, high
 
     @cached_property
     def vertex_kind(self) -> Ints:
@@ -143,20 +138,20 @@ class Topology:
         """(n,) int: label of the connected part that each vertex belongs to."""
         return components(self.edges, self.vertex_count)
 
-    def _curves(self, mask: Bools, stop: np.ndarray) -> tuple[Curve, ...]:
+    def _curves(self, mask: Bools, stop: Bools) -> tuple[Curve, ...]:
+        from scipy.sparse.csgraph import depth_first_order
+
         chosen = np.flatnonzero(mask)
-        pairs = self.edges[chosen]
-        split, original = _split_at(pairs, stop, self.vertex_count)
+        split, original = _split_at(self.edges[chosen], stop, self.vertex_count)
         graph = _adjacency(split, len(original))
         label = components(split, len(original))
         sheets = self._sheets_of_edges(chosen)
-        curves = []
-        degree = np.bincount(split.ravel(), minlength=len(original))
+        curves, degree = [], np.bincount(split.ravel(), minlength=len(original))
         for part, first_edge in zip(*np.unique(label[split[:, 0]], return_index=True), strict=True):
             members = np.flatnonzero((label == part) & (degree > 0))
             ends = members[degree[members] == 1]
             closed = not len(ends)
-            order = _chain(graph, members[0] if closed else ends[0], closed)
+            order = depth_first_order(graph, members[0] if closed else ends[0], directed=False)[0]
             curves.append(Curve(original[order], closed, sheets[first_edge]))
         return tuple(curves)
 
@@ -239,24 +234,6 @@ def _split_at(pairs: Ints, stop: Bools, vertex_count: int) -> tuple[Ints, Ints]:
     original = np.concatenate([np.arange(vertex_count), flat[ends]])
     flat[ends] = vertex_count + np.arange(len(ends))
     return flat.reshape(-1, 2), original
-
-
-def _chain(graph: csr_array, start: int, closed: bool) -> Ints:
-    """Vertices of a path or a ring in order from ``start``."""
-    from scipy.sparse.csgraph import breadth_first_order
-
-    order, before = breadth_first_order(graph, start, directed=False)
-    if not closed or len(order) < 3:
-        return order
-    # A ring is reached from both sides: walk one side out and the other back.
-    step = np.zeros(graph.shape[0], dtype=np.int8)
-    branch = {int(order[1]): 0, int(order[2]): 1}
-    side = np.zeros(len(order), dtype=np.int8)
-    for place, vertex in enumerate(order[1:], start=1):
-        parent = int(before[vertex])
-        side[place] = branch[int(vertex)] if parent == start else step[parent]
-        step[vertex] = side[place]
-    return np.concatenate([order[:1], order[1:][side[1:] == 0], order[1:][side[1:] == 1][::-1]])
 
 
 @compiled
