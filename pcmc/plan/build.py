@@ -13,12 +13,11 @@ from ..base.errors import PlanError, PlanWarning, SurfaceError
 from ..meshing.angles import improve_angles
 from ..surface import Patch, Surface
 from .arrangement import Arrangement, arrange, hole_points
-from .coordinates import to_local, to_space
-from .curves import Curve
-from .data import PlanData
+from .curves import Curve, to_local, to_space
 from .heights import dome, harmonic_heights
-from .lines import SNAP, Drawn, Kind, Line
+from .lines import SNAP, Kind, Line
 from .parts import EDGES, Area
+from .plan import Plan
 from .planar import PlanarMesh, locate, signed_areas, triangulate
 from .walls import UpperEdge, WallMesh, build_walls
 
@@ -27,7 +26,7 @@ MAX_RISE = 10.0  # of the initial surface, over the size of the plan
 GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan
 
 
-def build_surface(plan: PlanData) -> Surface:
+def build_surface(plan: Plan) -> Surface:
     """The mesh of the plan at its initial height, with its walls and supports."""
     _check_size(plan)
     lines, on_edge = _lines(plan)
@@ -59,9 +58,11 @@ def build_surface(plan: PlanData) -> Surface:
     )
 
 
-def _meshed(plan: PlanData, drawn: Arrangement, holes: Sequence[Sequence[float]]) -> PlanarMesh:
+def _meshed(plan: Plan, drawn: Arrangement, holes: Sequence[Sequence[float]]) -> PlanarMesh:
     try:
-        return triangulate(drawn.points, drawn.segments, plan.edge_length, holes)
+        return triangulate(
+            drawn.points, np.concatenate([chain.edges for chain in drawn.chains]), plan.edge_length, holes
+        )
     except SurfaceError as error:
         raise PlanError(
             f"lines of the plan are too close to each other for edges of length"
@@ -71,7 +72,7 @@ def _meshed(plan: PlanData, drawn: Arrangement, holes: Sequence[Sequence[float]]
         ) from None
 
 
-def _check_size(plan: PlanData) -> None:
+def _check_size(plan: Plan) -> None:
     """Refuse lengths that are probably mistakes, before they fill the memory."""
 
     def error(key: str, problem: str) -> PlanError:
@@ -103,11 +104,11 @@ def _check_size(plan: PlanData) -> None:
             )
 
 
-def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:
+def _lines(plan: Plan) -> tuple[list[Line], list[Curve]]:
     """The lines to draw, in the coordinates of Π, and the supports that lie on the boundary."""
     lines = [Line("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
     lines += [Line(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
-    boundary = [Drawn(line) for line in lines]
+    boundary = list(lines)
     lines += [Line(f"divider {d.name!r}", Kind.DIVIDER, d.curve.local(plan.plane)) for d in plan.dividers]
     on_edge, snap = [], SNAP * plan.edge_length
     for number, support in enumerate(plan.supports, start=1):
@@ -121,7 +122,7 @@ def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:
 
 
 def _supports(
-    plan: PlanData, drawn: Arrangement, lines: Sequence[Line], on_edge: Sequence[Curve], n: int
+    plan: Plan, drawn: Arrangement, lines: Sequence[Line], on_edge: Sequence[Curve], n: int
 ) -> tuple[Bools, Bools]:
     """(n,) fixed and sliding vertices."""
     edge = {line.name: hole.edge for line, hole in zip(lines[1:], plan.holes, strict=False)}
@@ -136,7 +137,7 @@ def _supports(
             masks[held][chain.vertices] = True
             boundary[chain.vertices] = True
     for support in on_edge:
-        strip = Drawn(Line("support", Kind.SUPPORT, support))
+        strip = Line("support", Kind.SUPPORT, support)
         for vertex in np.flatnonzero(boundary):
             if strip.nearest(drawn.points[vertex])[1] <= SNAP * plan.edge_length:
                 masks["fixed"][vertex] = True
@@ -159,7 +160,7 @@ def _warn_of_free_edges(drawn: Arrangement, lines: Sequence[Line], held: Bools) 
             warnings.warn(text, PlanWarning, stacklevel=4)
 
 
-def _heights(plan: PlanData, drawn: Arrangement, mesh: PlanarMesh, held: Bools) -> tuple[Floats, Floats]:
+def _heights(plan: Plan, drawn: Arrangement, mesh: PlanarMesh, held: Bools) -> tuple[Floats, Floats]:
     """(n,) the heights of the surface that the boundary spans, and of the initial surface."""
     given = np.full(len(mesh.points), np.nan)
     given[: len(drawn.heights)] = drawn.heights
@@ -167,7 +168,7 @@ def _heights(plan: PlanData, drawn: Arrangement, mesh: PlanarMesh, held: Bools) 
     return base, base + dome(mesh.points, mesh.triangles, held, plan.rise)
 
 
-def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
+def _patches(plan: Plan, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
     """The plan's patches and the patch of each triangle."""
     count = int(mesh.region.max()) + 1
     area = signed_areas(mesh.points, mesh.triangles)
@@ -235,7 +236,7 @@ def _located(areas: Sequence[Area], mesh: PlanarMesh, count: int, centroid: Floa
 
 
 def _walls(
-    plan: PlanData,
+    plan: Plan,
     drawn: Arrangement,
     lines: Sequence[Line],
     triangles: Ints,
@@ -289,7 +290,7 @@ def _beside(triangles: Ints, pressure: Floats, one: int, two: int) -> float:
     return float(pressure[left].sum() - pressure[right].sum())
 
 
-def _wall_patch(plan: PlanData, kinds: Sequence[tuple[int, float]], number: int) -> Patch:
+def _wall_patch(plan: Plan, kinds: Sequence[tuple[int, float]], number: int) -> Patch:
     divider = plan.dividers[kinds[number][0]]
     alike = [k for k, (line, _) in enumerate(kinds) if line == kinds[number][0]]
     suffix = f"-{alike.index(number) + 1}" if len(alike) > 1 else ""

@@ -14,7 +14,7 @@ from ..meshing.quality import edge_lengths
 from ..surface import Patch, Plane, Surface
 from ..surface.geometry import bounding_size
 from ..surface.topology import Curve
-from .coordinates import to_local, to_space
+from .curves import to_space
 from .planar import triangulate
 
 BOTTOMS = ("sliding", "held")
@@ -134,7 +134,7 @@ def build_walls(
     SurfaceError
         If an upper edge is not above the floor.
     """
-    local = to_local(vertices, plane)
+    local = plane.to_local(vertices)
     floor = np.zeros(len(vertices)) if floor is None else floor
     tolerance = 1e-9 * bounding_size(vertices)
     builder = _Builder(local, floor, fixed, edge_length, tolerance)
