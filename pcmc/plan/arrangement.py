@@ -97,13 +97,10 @@ def arrange(lines: Sequence[Line], edge_length: float, spots: Floats, stops: Flo
 
 def hole_points(drawn: Arrangement, lines: Sequence[Line]) -> list[tuple[float, float]]:
     """A point inside each hole, as its edges enclose it."""
-    points = []
-    for number, line in enumerate(lines):
-        if line.kind is Kind.HOLE:
-            rim = np.concatenate([c.vertices[:-1] for c in drawn.chains if c.line == number])
-            inside = shapely.Polygon(drawn.points[rim]).representative_point()
-            points.append((inside.x, inside.y))
-    return points
+    holes = [number for number, line in enumerate(lines) if line.kind is Kind.HOLE]
+    rims = [np.concatenate([c.vertices[:-1] for c in drawn.chains if c.line == hole]) for hole in holes]
+    points = [shapely.Polygon(drawn.points[rim]).representative_point() for rim in rims]
+    return [(point.x, point.y) for point in points]
 
 
 def _crossings(lines: Sequence[Line]) -> Iterator[Places]:

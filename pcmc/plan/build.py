@@ -96,8 +96,7 @@ def _drafted(plan: Plan) -> _Draft:
 def _check_size(plan: Plan) -> None:
     """Refuse lengths that are probably mistakes, before they fill the memory."""
 
-    def error(key: str, problem: str) -> PlanError:
-        value = getattr(plan, key)
+    def error(key: str, value: float, problem: str) -> PlanError:
         return PlanError(f"{key}={value:g} {problem}", what=key, found=value)
 
     x, y = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2].T
@@ -105,14 +104,14 @@ def _check_size(plan: Plan) -> None:
     count = area / (np.sqrt(0.1875) * plan.edge_length**2)
     size = float(np.hypot(np.ptp(x), np.ptp(y)))
     if count > MAX_TRIANGLES:
-        limit = f"at most {MAX_TRIANGLES} are allowed"
-        raise error("edge_length", f"would make about {count:.2g} triangles; {limit}")
+        problem = f"would make about {count:.2g} triangles; at most {MAX_TRIANGLES} are allowed"
+        raise error("edge_length", plan.edge_length, problem)
     if plan.edge_length > size:
         problem = f"is longer than the plan, {size:.4g} from corner to corner; use a smaller one"
-        raise error("edge_length", problem)
+        raise error("edge_length", plan.edge_length, problem)
     if plan.rise is not None and plan.rise > MAX_RISE * size:
-        limit = f"{MAX_RISE:g} times the plan's size, {size:.4g}"
-        raise error("rise", f"is more than {limit}; use a smaller one")
+        problem = f"is more than {MAX_RISE:g} times the plan's size, {size:.4g}; use a smaller one"
+        raise error("rise", plan.rise, problem)
     for hole in plan.holes:
         xy = hole.curve.local(plan.plane).at(hole.curve.dense)[:, :2]
         extent = float(np.ptp(xy, axis=0).max())

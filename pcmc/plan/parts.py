@@ -115,12 +115,10 @@ def hole_of(spec: Any, number: int) -> Hole:
 
 
 def _part_of(kind: Any, spec: Any, what: str) -> Any:
-    if isinstance(spec, kind):
-        return spec
     if isinstance(spec, Mapping) and "curve" in spec:
         check_keys(spec, kind, what)
         return kind(**spec)
-    return kind(spec)
+    return spec if isinstance(spec, kind) else kind(spec)
 
 
 def areas_of(spec: Any) -> tuple[Area, ...]:

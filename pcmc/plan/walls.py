@@ -22,14 +22,8 @@ BOTTOMS = ("sliding", "held")
 
 @dataclass(frozen=True, eq=False)
 class UpperEdge:
-    """The upper edge of a wall.
-
-    Attributes
-    ----------
-    vertices : (k,) int, vertices along it; first = last if it is closed.
-    label : of the wall's faces.
-    held : whether its bottom is fixed; else it slides on Π.
-    """
+    """The upper edge of a wall: vertices (k,) along it, first = last if it is closed; the label of the
+    wall's faces; whether its bottom is held, or else slides on Π."""
 
     vertices: Ints
     label: int
@@ -82,15 +76,12 @@ def add_walls(
     validate.choice("bottom", bottom, BOTTOMS)
     names = [p.name for p in surface.patches]
     borders = [c for c in surface.topology.junctions if len(set(c.sheets)) == len(c.sheets) == 2]
-    pair_of = [(names[c.sheets[0]], names[c.sheets[1]]) for c in borders]
-    chosen = _tensions(tension, set(pair_of))
-    walled = [(c, pair) for c, pair in zip(borders, pair_of, strict=True) if pair in chosen]
+    chosen = _tensions(tension, {(names[a], names[b]) for a, b in (c.sheets for c in borders)})
+    walled = [c for c in borders if (names[c.sheets[0]], names[c.sheets[1]]) in chosen]
     if not walled:
         return surface
-    pressure = {p.name: p.pressure for p in surface.patches}
-    label, patches = _labels([c for c, _ in walled], [pair for _, pair in walled], chosen, pressure)
-    chains = [_directed(surface, c) for c, _ in walled]
-    tops = [UpperEdge(chain, k, bottom == "held") for chain, k in zip(chains, label, strict=True)]
+    label, patches = _labels(surface, walled, chosen)
+    tops = [UpperEdge(_directed(surface, c), k, bottom == "held") for c, k in zip(walled, label, strict=True)]
     if edge_length is None:
         edge_length = float(edge_lengths(surface)[surface.topology.seam_edge].mean())
     walls = build_walls(surface.vertices, tops, edge_length, surface.plane, surface.fixed)
@@ -216,33 +207,27 @@ class _Builder:
 
 
 def _labels(
-    borders: Sequence[Curve],
-    pairs: Sequence[tuple[str, str]],
-    tension: Mapping[tuple[str, str], float],
-    pressure: Mapping[str, float],
+    surface: Surface, borders: Sequence[Curve], tension: Mapping[tuple[str, str], float]
 ) -> tuple[list[int], list[Patch]]:
-    """A label for each border, and the labels' patches: one for each pair of names.
+    """A label for each border, and the labels' patches: one for each pair of patches.
 
     Where a pair's borders cross (four quarters, a and b in turn), each border is a patch of its
     own: a patch must not have four faces at an edge.
     """
-    label, names = [], []
-    for place, pair in enumerate(pairs):
-        ends = [
-            b.vertices[[0, -1]] for b, p in zip(borders, pairs, strict=True) if p == pair and not b.closed
-        ]
+    kinds = []
+    for place, border in enumerate(borders):
+        ends = [c.vertices[[0, -1]] for c in borders if c.sheets == border.sheets and not c.closed]
         crossing = bool(ends) and np.bincount(np.concatenate(ends)).max() > 2
-        name = (pair, place if crossing else -1)
-        if name not in names:
-            names.append(name)
-        label.append(names.index(name))
+        kinds.append((border.sheets, place if crossing else -1))
+    names = list(dict.fromkeys(kinds))
     patches = []
-    for pair, number in names:
-        alike = [n for p, n in names if p == pair]
+    for sheets, number in names:
+        a, b = (surface.patches[k] for k in sheets)
+        alike = [n for s, n in names if s == sheets]
         suffix = "" if number < 0 else f"-{alike.index(number) + 1}"
-        between = pressure[pair[0]] - pressure[pair[1]]
-        patches.append(Patch(f"wall-{pair[0]}-{pair[1]}{suffix}", tension[pair], between, wall=True))
-    return label, patches
+        value = tension[a.name, b.name]
+        patches.append(Patch(f"wall-{a.name}-{b.name}{suffix}", value, a.pressure - b.pressure, wall=True))
+    return [names.index(kind) for kind in kinds], patches
 
 
 def _directed(surface: Surface, border: Curve) -> Ints:
