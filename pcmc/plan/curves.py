@@ -58,11 +58,6 @@ class Piece:
         length = float(np.linalg.norm(tangent))
         return tangent / length if length > 0.0 else tangent
 
-    @property
-    def straight(self) -> bool:
-        """Whether the piece is a segment of a line given by its two ends."""
-        return not self.sweep and len(self.points) == 2
-
     def reversed(self) -> Piece:
         """The same piece from its end to its start."""
         if not self.sweep:
@@ -104,7 +99,7 @@ class Curve:
     @cached_property
     def dense(self) -> Floats:
         """(k,) ascending parameters, dense enough to measure lengths by chords."""
-        steps = [1 if piece.straight else DENSE for piece in self.pieces]
+        steps = [DENSE if piece.sweep or len(piece.points) > 2 else 1 for piece in self.pieces]
         parts = [i + np.arange(count) / count for i, count in enumerate(steps)]
         return np.append(np.concatenate(parts), float(len(self.pieces)))
 

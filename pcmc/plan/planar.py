@@ -18,6 +18,7 @@ from ..surface.topology import components
 CLEARANCE = 0.62  # of the edge length: distance of free points from the segments
 CROWDED = 0.6  # of the edge length: free points nearer to another point are removed
 GOOD_ANGLE = 30.0  # degrees; sharper triangles get more points
+ROUNDS = 12  # of relaxation
 OUTSIDE = -1
 SIDES = [[1, 2], [2, 0], [0, 1]]  # corners of a triangle
 
@@ -39,11 +40,7 @@ class PlanarMesh:
 
 
 def triangulate(
-    points: Floats,
-    segments: Ints,
-    edge_length: float,
-    holes: Sequence[Sequence[float]] = (),
-    rounds: int = 12,
+    points: Floats, segments: Ints, edge_length: float, holes: Sequence[Sequence[float]] = ()
 ) -> PlanarMesh:
     """Nearly equilateral triangles in the area that the segments enclose.
 
@@ -61,7 +58,6 @@ def triangulate(
     segments : (s,2) int, required edges between them, which meet only at their ends.
     edge_length : of the triangles, length.
     holes : a point (x, y) inside each region to leave out.
-    rounds : of relaxation.
 
     Raises
     ------
@@ -84,9 +80,9 @@ def triangulate(
     np.minimum.at(spacing, segments.ravel(), np.repeat(segment_lengths(fixed, segments), 2))
     everything = np.concatenate([fixed, _lattice(fixed, segments, edge_length)])
     mesh = _inside(everything, segments, holes, len(fixed))
-    for step in range(rounds):
+    for step in range(ROUNDS):
         X = mesh.points
-        if step % 4 == 0 and step < rounds - 4:
+        if step % 4 == 0 and step < ROUNDS - 4:
             wanted = _wanted(X, fixed, spacing, edge_length)
             X = X[_spaced_out(X, CROWDED * wanted, len(fixed))]
             if len(X) == len(mesh.points):
