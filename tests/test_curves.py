@@ -6,8 +6,7 @@ from refusals import refused
 
 from pcmc import Plane
 from pcmc.base.errors import OptionError
-from pcmc.plan.coordinates import to_local, to_space
-from pcmc.plan.curves import arc, bezier, circle, curve, join, polyline
+from pcmc.plan.curves import arc, bezier, circle, curve, join, polyline, to_local, to_space
 
 
 def test_lengths_in_closed_form():

@@ -13,9 +13,8 @@ import numpy.typing as npt
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import OptionError, unknown
+from ..base.errors import OptionError
 from ..surface import Plane
-from .coordinates import to_local
 
 CORNER = math.radians(10.0)  # a joint that turns by more is a corner
 EDGE_TURN = math.radians(45.0)  # largest turn of a bend along one edge
@@ -42,7 +41,11 @@ class Piece:
             centre, u, v = self.points
             angle = (self.sweep * t)[:, None]
             return centre + np.cos(angle) * u + np.sin(angle) * v
-        return _casteljau(self.points, t)
+        level = np.broadcast_to(self.points, (len(t), *self.points.shape))
+        s = t[:, None, None]
+        while level.shape[1] > 1:  # de Casteljau
+            level = (1.0 - s) * level[:, :-1] + s * level[:, 1:]
+        return level[:, 0]
 
     def direction(self, end: int) -> Floats:
         """(d,) unit tangent at the start (0) or at the end (1)."""
@@ -55,11 +58,6 @@ class Piece:
         length = float(np.linalg.norm(tangent))
         return tangent / length if length > 0.0 else tangent
 
-    @property
-    def straight(self) -> bool:
-        """Whether the piece is a segment of a line given by its two ends."""
-        return not self.sweep and len(self.points) == 2
-
     def reversed(self) -> Piece:
         """The same piece from its end to its start."""
         if not self.sweep:
@@ -67,6 +65,13 @@ class Piece:
         centre, u, v = self.points
         c, s = math.cos(self.sweep), math.sin(self.sweep)
         return Piece(np.stack([centre, u * c + v * s, u * s - v * c]), self.sweep)
+
+    def local(self, plane: Plane) -> Piece:
+        """The piece in the coordinates of Π."""
+        local = to_local(self.points, plane)
+        if self.sweep and self.points.shape[1] == 3:  # the last two rows are vectors, not points
+            local[1:] = (self.points @ plane.axes.T)[1:]
+        return Piece(local, self.sweep)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +99,7 @@ class Curve:
     @cached_property
     def dense(self) -> Floats:
         """(k,) ascending parameters, dense enough to measure lengths by chords."""
-        steps = [1 if piece.straight else DENSE for piece in self.pieces]
+        steps = [DENSE if piece.sweep or len(piece.points) > 2 else 1 for piece in self.pieces]
         parts = [i + np.arange(count) / count for i, count in enumerate(steps)]
         return np.append(np.concatenate(parts), float(len(self.pieces)))
 
@@ -113,8 +118,8 @@ class Curve:
     def corners(self) -> Floats:
         """(c,) parameters of the joints where the curve turns by more than 10°; no open ends."""
         joints = np.arange(0 if self.closed else 1, len(self.pieces))
-        turns = [_angle(self.pieces[j - 1].direction(1), self.pieces[j].direction(0)) for j in joints]
-        return joints[np.array(turns, dtype=float) > CORNER].astype(float)
+        cosines = [self.pieces[j - 1].direction(1) @ self.pieces[j].direction(0) for j in joints]
+        return joints[np.arccos(np.clip(np.array(cosines, dtype=float), -1.0, 1.0)) > CORNER].astype(float)
 
     def parameter(self, length: Floats) -> Floats:
         """(n,) parameters at lengths (n,) along the curve."""
@@ -154,7 +159,19 @@ class Curve:
 
     def local(self, plane: Plane) -> Curve:
         """The curve in the coordinates of Π: two along it, and the height above it."""
-        return replace(self, pieces=tuple(_local(piece, plane) for piece in self.pieces))
+        return replace(self, pieces=tuple(piece.local(plane) for piece in self.pieces))
+
+
+def to_local(points: Floats, plane: Plane) -> Floats:
+    """(n,3) coordinates on Π and heights above it, of plane (n,2) or space points (n,3)."""
+    if points.shape[-1] == 3:
+        return plane.to_local(points)
+    return np.concatenate([points, np.zeros((*points.shape[:-1], 1))], axis=-1)
+
+
+def to_space(local: Floats, plane: Plane) -> Floats:
+    """(n,3) positions of points given by coordinates on Π and height."""
+    return local @ plane.axes + np.array(plane.point)
 
 
 def polyline(points: npt.ArrayLike, closed: bool = False) -> Curve:
@@ -167,13 +184,13 @@ def polyline(points: npt.ArrayLike, closed: bool = False) -> Curve:
     if closed and len(P) > 2 and np.array_equal(P[0], P[-1]):
         P = P[:-1]
     if closed and len(P) < 3:
-        raise _error("polyline", f"closed, it needs 3 points, found {len(P)}", None, len(P), 3)
+        raise _error("polyline", f"closed, it needs 3 points, found {len(P)}", found=len(P), expected=3)
     following = np.roll(P, -1, axis=0) if closed else P[1:]
     double = np.flatnonzero((P[: len(following)] == following).all(axis=1))
     if len(double):
         first = int(double[0])
-        both = f"points {first} and {(first + 1) % len(P)} are both {P[first].tolist()}"
-        raise _error("polyline", f"{both}; remove one", first)
+        both = f"points {first} and {(first + 1) % len(P)}"
+        raise _error("polyline", f"{both} are both {P[first].tolist()}; remove one", where=first)
     pieces = tuple(Piece(np.stack(ends)) for ends in zip(P, following, strict=False))
     return _closed_if_ends_meet(Curve(pieces, closed))
 
@@ -204,8 +221,10 @@ def arc(start: npt.ArrayLike, through: npt.ArrayLike, end: npt.ArrayLike) -> Cur
         raise _error("arc", "its three points lie on one line; use a polyline")
     centre = a + (0.5 * vv * (uu - uv) * u + 0.5 * uu * (vv - uv) * v) / area
     first = a - centre
-    across = (b - centre) - ((b - centre) @ first) / (first @ first) * first
-    second = _toward(across, c - centre, first)
+    across, other = (p - centre - ((p - centre) @ first) / (first @ first) * first for p in (b, c))
+    if np.linalg.norm(across) <= 1e-12 * np.linalg.norm(first):  # through is opposite start
+        across = other
+    second = across * (np.linalg.norm(first) / np.linalg.norm(across))
     angles = [math.atan2((p - centre) @ second, (p - centre) @ first) for p in (b, c)]
     through_angle, sweep = (angle % (2 * math.pi) for angle in angles)
     if through_angle > sweep:
@@ -220,10 +239,8 @@ def circle(centre: npt.ArrayLike, radius: float) -> Curve:
     6.28
     """
     c = _points([centre], "circle", 1)[0]
-    validate.number("circle: radius", radius, above=0.0)
-    u, v = np.zeros_like(c), np.zeros_like(c)
-    u[0] = v[1] = radius
-    return Curve((Piece(np.stack([c, u, v]), 2.0 * math.pi),), closed=True)
+    axes = validate.positive("circle: radius", radius) * np.eye(2, len(c))
+    return Curve((Piece(np.concatenate([[c], axes]), 2.0 * math.pi),), closed=True)
 
 
 def join(*curves: Curve) -> Curve:
@@ -236,18 +253,17 @@ def join(*curves: Curve) -> Curve:
         raise _error("join", "give at least one curve")
     closed = [number for number, curve in enumerate(curves) if curve.closed]
     if closed and len(curves) > 1:
-        problem = f"curve {closed[0]} is closed; only open curves can be joined"
-        raise _error("join", problem, closed[0])
-    dimensions = {curve.pieces[0].points.shape[1] for curve in curves}
-    if len(dimensions) > 1:
+        raise _error("join", f"curve {closed[0]} is closed; only open curves can be joined", where=closed[0])
+    if len({curve.pieces[0].points.shape[1] for curve in curves}) > 1:
         raise _error("join", "some curves are plane and some in space; give all in space")
     tolerance = 1e-9 * max(curve.length for curve in curves)
     for number in range(1, len(curves)):
         before, after = _end(curves[number - 1], 1), _end(curves[number], 0)
         if np.linalg.norm(after - before) > tolerance:
-            problem = f"curve {number} starts at {after.tolist()}"
-            before_it = f"curve {number - 1} ends at {before.tolist()}"
-            raise _error("join", f"{problem}, but {before_it}", number)
+            gap = (
+                f"curve {number} starts at {after.tolist()}, but curve {number - 1} ends at {before.tolist()}"
+            )
+            raise _error("join", gap, where=number)
     return _closed_if_ends_meet(Curve(tuple(piece for curve in curves for piece in curve.pieces)))
 
 
@@ -275,40 +291,27 @@ def curve(spec: Any, closed: bool = False) -> Curve:
 
 
 def _from_mapping(spec: Mapping[str, Any]) -> Curve:
-    makers: dict[str, Any] = {
-        "polyline": polyline,
-        "bezier": bezier,
-        "arc": lambda points: arc(*_points(points, "arc", 3, exactly=True)),
-        "circle": lambda circle_spec: circle(**_circle_keys(circle_spec)),
-    }
-    extra = [key for key in spec if key not in makers and key != "closed"]
-    if extra:
-        raise OptionError(
-            unknown("curve", extra[0], makers), what="curve", found=extra[0], expected=tuple(makers)
-        )
-    kinds = [key for key in spec if key in makers]
+    known = ("polyline", "bezier", "arc", "circle")
+    kinds = [key for key in spec if key != "closed"]
+    for key in kinds:
+        validate.choice("curve", key, known)
     if len(kinds) != 1:
-        raise OptionError(
-            f"a curve needs exactly one of {', '.join(makers)}; found {list(spec)}",
-            what="curve",
-            found=list(spec),
-            expected=tuple(makers),
-        )
-    if "closed" in spec and kinds != ["polyline"]:
-        raise OptionError(
-            f"only a polyline has the key closed; a {kinds[0]} is closed if it ends at its start",
-            what="closed",
-        )
-    if kinds == ["polyline"]:
-        return polyline(spec["polyline"], closed=bool(spec.get("closed", False)))
-    made: Curve = makers[kinds[0]](spec[kinds[0]])
-    return made
-
-
-def _circle_keys(spec: Any) -> dict[str, Any]:
-    if not isinstance(spec, Mapping) or set(spec) != {"centre", "radius"}:
-        raise _error("circle", f"expected centre and radius, found {spec!r}", None, spec)
-    return dict(spec)
+        problem = f"a curve needs exactly one of {', '.join(known)}; found {list(spec)}"
+        raise OptionError(problem, what="curve", found=list(spec), expected=known)
+    (kind,) = kinds
+    value = spec[kind]
+    if kind == "polyline":
+        return polyline(value, closed=bool(spec.get("closed", False)))
+    if "closed" in spec:
+        problem = f"only a polyline has the key closed; a {kind} is closed if it ends at its start"
+        raise OptionError(problem, what="closed")
+    if kind == "bezier":
+        return bezier(value)
+    if kind == "arc":
+        return arc(*_points(value, "arc", 3, exactly=True))
+    if not isinstance(value, Mapping) or set(value) != {"centre", "radius"}:
+        raise _error("circle", f"expected centre and radius, found {value!r}", found=value)
+    return circle(**value)
 
 
 def _closed_if_ends_meet(path: Curve) -> Curve:
@@ -321,47 +324,28 @@ def _end(path: Curve, end: int) -> Floats:
     return path.at([float(end * len(path.pieces))])[0]
 
 
-def _error(
-    what: str, problem: str, where: object = None, found: object = None, expected: object = None
-) -> OptionError:
+def _error(what: str, problem: str, **fields: object) -> OptionError:
     """The error about a kind of curve."""
-    return OptionError(f"{what}: {problem}", what=what, where=where, found=found, expected=expected)
+    return OptionError(f"{what}: {problem}", what=what, **fields)
 
 
 def _points(points: Any, what: str, least: int, exactly: bool = False) -> Floats:
+    """(k,2) or (k,3) the points, checked."""
     try:
         P = np.array(points)
-        if P.dtype.kind not in "iuf":  # numpy would take the text "8" for a number
-            raise ValueError
     except (TypeError, ValueError):
-        problem = "expected points, all [x, y] or all [x, y, z]"
-        raise _error(what, problem, None, points) from None
+        P = np.array("ragged")
+    if P.dtype.kind not in "iuf":  # numpy would take the text "8" for a number
+        raise _error(what, "expected points, all [x, y] or all [x, y, z]", found=points)
     P = P.astype(float)
     if P.ndim != 2 or P.shape[1] not in (2, 3):
-        problem = f"expected points [x, y] or [x, y, z], found shape {P.shape}"
-        raise _error(what, problem, None, P.shape)
+        raise _error(what, f"expected points [x, y] or [x, y, z], found shape {P.shape}", found=P.shape)
     if len(P) < least or (exactly and len(P) != least):
-        raise _error(what, f"expected {least} points, found {len(P)}", None, len(P), least)
+        raise _error(what, f"expected {least} points, found {len(P)}", found=len(P), expected=least)
     bad = np.flatnonzero(~np.isfinite(P).all(axis=1))
     if len(bad):
-        raise _error(what, f"point {bad[0]} = {P[bad[0]].tolist()} is not finite", int(bad[0]))
+        raise _error(what, f"point {bad[0]} = {P[bad[0]].tolist()} is not finite", where=int(bad[0]))
     return P
-
-
-def _local(piece: Piece, plane: Plane) -> Piece:
-    if piece.points.shape[1] == 2 or not piece.sweep:
-        return Piece(to_local(piece.points, plane), piece.sweep)
-    turned = piece.points @ plane.axes.T
-    turned[0] = to_local(piece.points[0], plane)
-    return Piece(turned, piece.sweep)
-
-
-def _casteljau(control: Floats, t: Floats) -> Floats:
-    level = np.broadcast_to(control, (len(t), *control.shape))
-    s = t[:, None, None]
-    while level.shape[1] > 1:
-        level = (1.0 - s) * level[:, :-1] + s * level[:, 1:]
-    return level[:, 0]
 
 
 def _first_step(control: Floats) -> Floats:
@@ -369,14 +353,3 @@ def _first_step(control: Floats) -> Floats:
     steps = control[1:] - control[0]
     moved = np.flatnonzero((steps != 0.0).any(axis=1))
     return steps[moved[0]] if len(moved) else steps[0]
-
-
-def _angle(u: Floats, v: Floats) -> float:
-    return math.acos(float(np.clip(u @ v, -1.0, 1.0)))
-
-
-def _toward(across: Floats, other: Floats, first: Floats) -> Floats:
-    """The vector a quarter turn from ``first`` in the arc's plane, as long as it."""
-    if np.linalg.norm(across) <= 1e-12 * np.linalg.norm(first):
-        across = other - (other @ first) / (first @ first) * first
-    return across * (np.linalg.norm(first) / np.linalg.norm(across))

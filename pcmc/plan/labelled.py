@@ -7,17 +7,16 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError, SurfaceError, unknown
 from ..surface import Patch, Plane, Surface, checks
 from ..surface.geometry import area_vectors
-from ..surface.topology import topology
+from ..surface.topology import components, topology
 from .parts import EDGES
+from .planar import SIDES, twins
 from .walls import add_walls
 
 
@@ -83,19 +82,14 @@ def _welded(X: Floats, F: Ints, distance: float) -> tuple[Floats, Ints]:
     validate.number("weld", distance, least=0.0)
     group = np.arange(len(X))
     if distance > 0.0:
-        pairs = cKDTree(X).query_pairs(distance, output_type="ndarray")
-        graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(X), len(X)))
-        label = connected_components(graph, directed=False)[1]
+        label = components(cKDTree(X).query_pairs(distance, output_type="ndarray"), len(X))
         group = np.unique(label, return_index=True)[1][label]
     F = group[F]
     flat = (F[:, [1, 2, 0]] == F).any(axis=1)
     if flat.any():
-        raise SurfaceError(
-            f"faces[{np.argmax(flat)}] vanishes when vertices nearer than weld={distance:g} are"
-            " merged; use a smaller weld",
-            what="faces",
-            where=int(np.argmax(flat)),
-        )
+        first = int(np.argmax(flat))
+        merged = f"when vertices nearer than weld={distance:g} are merged; use a smaller weld"
+        raise SurfaceError(f"faces[{first}] vanishes {merged}", what="faces", where=first)
     used, inverse = np.unique(F, return_inverse=True)
     return X[used], inverse.reshape(-1, 3)
 
@@ -106,12 +100,8 @@ def _names(labels: npt.ArrayLike | None, m: int) -> tuple[list[str], Ints]:
         return ["surface"], np.zeros(m, dtype=np.int64)
     given = np.asarray(labels)
     if given.shape != (m,):
-        raise SurfaceError(
-            f"labels: expected shape ({m},), one per face, found {given.shape}",
-            what="labels",
-            found=given.shape,
-            expected=(m,),
-        )
+        problem = f"labels: expected shape ({m},), one per face, found {given.shape}"
+        raise SurfaceError(problem, what="labels", found=given.shape, expected=(m,))
     known, first, inverse = np.unique(given, return_index=True, return_inverse=True)
     order = np.argsort(first)
     return [str(known[k]) for k in order], np.argsort(order)[inverse]
@@ -135,36 +125,23 @@ def _oriented(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Ints:
     Every face has two sides: a graph of 2 m nodes connects the sides that belong to the same side of
     a patch, so its components are the sides of patches.
     """
-    m = len(F)
-    one, two, same = _neighbours(F, patch, len(X))
+    m, n = len(F), len(X)
+    edge, place = F[:, SIDES].reshape(-1, 2), np.repeat(patch, 3)
+    pairs = twins((place * n + edge.min(axis=1)) * n + edge.max(axis=1))
+    one, two = pairs.T // 3
     # two faces that run along their edge the same way are oriented differently
-    start = np.concatenate([one, one + m])
-    end = np.concatenate([np.where(same, two + m, two), np.where(same, two, two + m)])
-    graph = coo_array((np.ones(len(start)), (start, end)), shape=(2 * m, 2 * m))
-    side = connected_components(graph, directed=False)[1]
+    same = edge[pairs[:, 0], 0] == edge[pairs[:, 1], 0]
+    ends = [np.where(same, two + m, two), np.where(same, two, two + m)]
+    side = components(np.stack([np.concatenate([one, one + m]), np.concatenate(ends)], axis=1), 2 * m)
     both = np.flatnonzero(side[:m] == side[m:])
     if len(both):
-        raise SurfaceError(
-            f"the patch of face {both[0]} has only one side (like a Möbius strip); cut it into two patches",
-            what="faces",
-            where=int(both[0]),
-        )
+        problem = f"the patch of face {both[0]} has only one side (like a Möbius strip)"
+        raise SurfaceError(f"{problem}; cut it into two patches", what="faces", where=int(both[0]))
     part = np.minimum(side[:m], side[m:])
     turned = side[:m] != part
     weight = _outwardness(X, F, patch, plane) * np.where(turned, -1.0, 1.0)
     flip = turned ^ (np.bincount(part, weight, 2 * m)[part] < 0.0)
     return np.where(flip[:, None], F[:, ::-1], F)
-
-
-def _neighbours(F: Ints, patch: Ints, n: int) -> tuple[Ints, Ints, Bools]:
-    """Pairs of faces that share an edge within a patch, and whether both run along it the same way."""
-    edge = F[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
-    face = np.repeat(np.arange(len(F)), 3)
-    key = (patch[face] * n + edge.min(axis=1)) * n + edge.max(axis=1)
-    order = np.argsort(key, kind="stable")
-    _, first, count = np.unique(key[order], return_index=True, return_counts=True)
-    one, two = order[first[count == 2]], order[first[count == 2] + 1]
-    return face[one], face[two], edge[one, 0] == edge[two, 0]
 
 
 def _outwardness(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Floats:

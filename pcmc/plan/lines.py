@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -40,19 +41,22 @@ class Line:
         """Whether the line is part of the plan's boundary."""
         return self.kind in (Kind.OUTLINE, Kind.HOLE)
 
+    @cached_property
+    def xy(self) -> Floats:
+        """(k,2) its projection on Π as a dense polyline."""
+        return self.curve.at(self.curve.dense)[:, :2]
 
-class Drawn:
-    """A line with its projection on Π as a dense polyline."""
+    @cached_property
+    def reach(self) -> Floats:
+        """(k,) the length of that polyline up to each of its points."""
+        return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.xy, axis=0), axis=1))])
 
-    def __init__(self, line: Line) -> None:
-        self.line, self.curve = line, line.curve
-        self.name, self.kind = line.name, line.kind
-        self.xy = self.curve.at(self.curve.dense)[:, :2]
-        steps = np.linalg.norm(np.diff(self.xy, axis=0), axis=1)
-        if not steps.any():
+    @cached_property
+    def shape(self) -> Any:
+        """The polyline as a shapely LineString."""
+        if self.reach[-1] == 0.0:
             raise self.error("has no length in plan")
-        self.reach = np.concatenate([[0.0], np.cumsum(steps)])
-        self.shape: Any = shapely.LineString(self.xy)
+        return shapely.LineString(self.xy)
 
     def error(self, problem: str, where: object = None, found: object = None) -> PlanError:
         """The error about this line: its name, and what is wrong with it."""
@@ -75,14 +79,14 @@ def point_text(xy: Floats) -> str:
     return f"({xy[0]:.6g}, {xy[1]:.6g})"
 
 
-def overlap(one: Drawn, other: Drawn, where: str) -> PlanError:
+def overlap(one: Line, other: Line, where: str) -> PlanError:
     """The error for two lines that coincide along some length."""
     return one.error(f"runs along {other.name} {where}; leave that part out", where, other.name)
 
 
-def check_line(one: Drawn) -> None:
+def check_line(one: Line) -> None:
     """Boundaries are closed, and no line crosses itself."""
-    if one.line.bounds and not one.curve.closed:
+    if one.bounds and not one.curve.closed:
         gap = float(np.linalg.norm(one.xy[-1] - one.xy[0]))
         ends = f"it starts at {point_text(one.xy[0])} and ends at {point_text(one.xy[-1])}"
         raise one.error(f"is open: {ends}, {gap:.3g} apart; close it", found=gap)
@@ -94,10 +98,10 @@ def check_line(one: Drawn) -> None:
         raise one.error(f"crosses itself at {point_text(place)}", tuple(place.tolist()))
 
 
-def check_holes(drawn: Sequence[Drawn]) -> None:
+def check_holes(lines: Sequence[Line]) -> None:
     """Holes lie inside the outline and apart from each other."""
-    outline = shapely.Polygon(drawn[0].xy)
-    holes = [(one, shapely.Polygon(one.xy)) for one in drawn if one.kind is Kind.HOLE]
+    outline = shapely.Polygon(lines[0].xy)
+    holes = [(one, shapely.Polygon(one.xy)) for one in lines if one.kind is Kind.HOLE]
     for place, (one, area) in enumerate(holes):
         if not outline.contains_properly(area):
             where = "crosses or touches" if outline.intersects(area) else "lies outside"
@@ -108,19 +112,19 @@ def check_holes(drawn: Sequence[Drawn]) -> None:
                 raise other.error(problem, found=one.name)
 
 
-def inside(drawn: Sequence[Drawn]) -> Callable[[Floats], bool]:
+def inside(lines: Sequence[Line]) -> Callable[[Floats], bool]:
     """A function that tests whether a point is inside the outline and outside all holes."""
-    area = shapely.Polygon(drawn[0].xy, [one.xy for one in drawn if one.kind is Kind.HOLE])
+    area = shapely.Polygon(lines[0].xy, [one.xy for one in lines if one.kind is Kind.HOLE])
     return lambda xy: bool(shapely.contains_xy(area, *xy))
 
 
-def lines_at(drawn: Sequence[Drawn], xy: Floats, snap: float, leave_out: int = -1) -> list[tuple[int, float]]:
+def lines_at(lines: Sequence[Line], xy: Floats, snap: float, leave_out: int = -1) -> list[tuple[int, float]]:
     """Lines that pass through a point, with their parameter there."""
-    near = [(number, *one.nearest(xy)) for number, one in enumerate(drawn) if number != leave_out]
+    near = [(number, *one.nearest(xy)) for number, one in enumerate(lines) if number != leave_out]
     return [(number, t) for number, t, distance in near if distance <= snap]
 
 
-def crossing(one: Drawn, s: float, two: Drawn, t: float) -> tuple[float, float]:
+def crossing(one: Line, s: float, two: Line, t: float) -> tuple[float, float]:
     """The parameters at which two curves cross, by Newton's method from initial guesses."""
 
     def apart(s: float, t: float) -> Floats:

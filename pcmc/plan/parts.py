@@ -84,12 +84,7 @@ class Area:
         except (TypeError, ValueError):
             points = np.empty(0)
         if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
-            raise OptionError(
-                f"patch {self.name!r}: at must be a point [x, y] or a list of points, found {self.at!r}",
-                what="at",
-                where=self.name,
-                found=self.at,
-            )
+            validate.refuse("at", self.at, "a point [x, y] or a list of points", self.name)
 
 
 def curve_of(spec: Any, what: str, closed: bool = False) -> Curve:
@@ -120,12 +115,10 @@ def hole_of(spec: Any, number: int) -> Hole:
 
 
 def _part_of(kind: Any, spec: Any, what: str) -> Any:
-    if isinstance(spec, kind):
-        return spec
     if isinstance(spec, Mapping) and "curve" in spec:
         check_keys(spec, kind, what)
         return kind(**spec)
-    return kind(spec)
+    return spec if isinstance(spec, kind) else kind(spec)
 
 
 def areas_of(spec: Any) -> tuple[Area, ...]:
@@ -146,11 +139,7 @@ def support_of(spec: Any, number: int) -> Any:
     if isinstance(spec, Sequence | np.ndarray) and len(spec) in (2, 3) and np.ndim(spec) == 1:
         point = np.array(spec, dtype=float)
         if not np.isfinite(point).all():
-            raise OptionError(
-                f"support {number}: the point {point.tolist()} is not finite",
-                what=f"support {number}",
-                found=point.tolist(),
-            )
+            raise OptionError(f"support {number}: {point.tolist()} is not finite", what=f"support {number}")
         return point
     return curve_of(spec, f"support {number}")
 
@@ -162,6 +151,4 @@ def check_keys(values: Any, kind: Any, what: str) -> None:
     known = tuple(f.name for f in fields(kind))
     for key in values:
         if key not in known:
-            raise OptionError(
-                unknown(f"{what} key", key, known), what=what, where=key, found=key, expected=known
-            )
+            raise OptionError(unknown(f"{what} key", key, known), what=what, where=key, expected=known)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
+from ..base import validate
 from ..base.errors import MissingExtra, OptionError
 from ..surface import Plane, Surface
-from .data import PlanData
-from .parts import check_keys
+from .parts import EDGES, areas_of, check_keys, curve_of, divider_of, hole_of, support_of
 
 
 @dataclass(frozen=True, eq=False)
-class Plan(PlanData):
+class Plan:
     """A roof given by the lines of its plan.
 
     Curves are Curves or their plain data (see ``curve``).
@@ -58,6 +58,41 @@ class Plan(PlanData):
     >>> [p.name for p in plan.surface().patches]
     ['west', 'east', 'wall 1']
     """
+
+    outline: Any
+    dividers: Sequence[Any] = ()
+    holes: Sequence[Any] = ()
+    patches: Any = ()
+    edge_length: float = 1.0
+    edge: str = "fixed"
+    supports: Sequence[Any] = ()
+    plane: Plane = field(default_factory=Plane)
+    rise: float | None = None
+    tension: float | None = None
+
+    def __post_init__(self) -> None:
+        parsed = {
+            "outline": curve_of(self.outline, "outline", closed=True),
+            "dividers": tuple(divider_of(d, k) for k, d in enumerate(self.dividers, 1)),
+            "holes": tuple(hole_of(h, k) for k, h in enumerate(self.holes, 1)),
+            "patches": areas_of(self.patches),
+            "supports": tuple(support_of(s, k) for k, s in enumerate(self.supports, 1)),
+        }
+        for key, value in parsed.items():
+            object.__setattr__(self, key, value)
+        validate.choice("edge of the outline", self.edge, EDGES)
+        validate.positive("edge_length", self.edge_length)
+        if self.rise is not None:
+            validate.positive("rise", self.rise)
+        if bool(self.patches) == (self.tension is not None):
+            raise OptionError(
+                "a plan needs either patches, each with its tension, or one tension= for all", what="tension"
+            )
+        names = [d.name for d in self.dividers if d.wall is not None] + [a.name for a in self.patches]
+        for place, name in enumerate(names):
+            if name in names[:place]:
+                problem = f"the name {name!r} is used twice; each patch and wall needs its own"
+                raise OptionError(problem, what="name", found=name)
 
     def surface(self) -> Surface:
         """The mesh of the plan at its initial height, with its walls and supports."""

@@ -6,20 +6,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..meshing.angles import improve_angles
-from ..surface.geometry import angles, cross_2d
+from ..surface.geometry import angles, cross_2d, segment_lengths
+from ..surface.topology import components
 
 CLEARANCE = 0.62  # of the edge length: distance of free points from the segments
 CROWDED = 0.6  # of the edge length: free points nearer to another point are removed
 GOOD_ANGLE = 30.0  # degrees; sharper triangles get more points
+ROUNDS = 12  # of relaxation
 OUTSIDE = -1
+SIDES = [[1, 2], [2, 0], [0, 1]]  # corners of a triangle
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +40,7 @@ class PlanarMesh:
 
 
 def triangulate(
-    points: Floats,
-    segments: Ints,
-    edge_length: float,
-    holes: Sequence[Sequence[float]] = (),
-    rounds: int = 12,
+    points: Floats, segments: Ints, edge_length: float, holes: Sequence[Sequence[float]] = ()
 ) -> PlanarMesh:
     """Nearly equilateral triangles in the area that the segments enclose.
 
@@ -61,7 +58,6 @@ def triangulate(
     segments : (s,2) int, required edges between them, which meet only at their ends.
     edge_length : of the triangles, length.
     holes : a point (x, y) inside each region to leave out.
-    rounds : of relaxation.
 
     Raises
     ------
@@ -78,14 +74,15 @@ def triangulate(
     """
     fixed = np.asarray(points, dtype=float)
     segments = np.asarray(segments, dtype=np.int64)
-    validate.number("edge_length", edge_length, above=0.0)
+    validate.positive("edge_length", edge_length)
     _check(fixed, segments, edge_length)
-    spacing = _spacing(fixed, segments, edge_length)
+    spacing = np.full(len(fixed), float(edge_length))  # at each point its shortest segment
+    np.minimum.at(spacing, segments.ravel(), np.repeat(segment_lengths(fixed, segments), 2))
     everything = np.concatenate([fixed, _lattice(fixed, segments, edge_length)])
     mesh = _inside(everything, segments, holes, len(fixed))
-    for step in range(rounds):
+    for step in range(ROUNDS):
         X = mesh.points
-        if step % 4 == 0 and step < rounds - 4:
+        if step % 4 == 0 and step < ROUNDS - 4:
             wanted = _wanted(X, fixed, spacing, edge_length)
             X = X[_spaced_out(X, CROWDED * wanted, len(fixed))]
             if len(X) == len(mesh.points):
@@ -120,24 +117,11 @@ def _check(points: Floats, segments: Ints, edge_length: float) -> None:
     near = cKDTree(points).query_pairs(1e-9 * edge_length)
     if near:
         i, j = min(near)
-        raise SurfaceError(
-            f"points {i} and {j} coincide at {points[i].tolist()}; merge them", what="points", where=(i, j)
-        )
+        problem = f"points {i} and {j} coincide at {points[i].tolist()}; merge them"
+        raise SurfaceError(problem, what="points", where=(i, j))
     if len(segments) < 3:
-        raise SurfaceError(
-            f"segments: at least 3 are needed to enclose an area, found {len(segments)}",
-            what="segments",
-            found=len(segments),
-            expected=3,
-        )
-
-
-def _spacing(points: Floats, segments: Ints, edge_length: float) -> Floats:
-    """(k,) the edge length near each given point: its shortest segment, or ``edge_length``."""
-    length = np.linalg.norm(points[segments[:, 1]] - points[segments[:, 0]], axis=1)
-    spacing = np.full(len(points), float(edge_length))
-    np.minimum.at(spacing, segments.ravel(), np.repeat(length, 2))
-    return spacing
+        problem = f"segments: at least 3 are needed to enclose an area, found {len(segments)}"
+        raise SurfaceError(problem, what="segments", found=len(segments), expected=3)
 
 
 def _lattice(points: Floats, segments: Ints, h: float) -> Floats:
@@ -165,43 +149,35 @@ def _inside(points: Floats, segments: Ints, holes: Sequence[Sequence[float]], k:
     """The triangulation inside the outline and outside the holes; points used elsewhere only go."""
     T = _constrained(points, segments)
     part, outer = _parts(T, segments, len(points))
-    mesh = PlanarMesh(points, T, part)
-    dropped = set(outer.tolist())
-    located = locate(mesh, np.reshape(holes, (-1, 2)).astype(float))
+    located = locate(PlanarMesh(points, T, part), np.reshape(holes, (-1, 2)).astype(float))
     for place, triangle in enumerate(located):
         if triangle == OUTSIDE or part[triangle] in outer:
-            raise OptionError(
-                f"the point {list(holes[place])} of hole {place} lies outside the outline",
-                what="holes",
-                where=place,
-            )
-        dropped.add(int(part[triangle]))
-    kept = ~np.isin(part, sorted(dropped))
+            problem = f"the point {list(holes[place])} of hole {place} lies outside the outline"
+            raise OptionError(problem, what="holes", where=place)
+    kept = ~np.isin(part, [*outer, *part[located]])
     if not kept.any():
         raise SurfaceError("the segments enclose no area; close the outline", what="segments")
     used = np.zeros(len(points), dtype=bool)
-    used[T[kept].ravel()] = True
-    used[:k] = True
-    renumbered = np.cumsum(used) - 1
+    used[T[kept]] = used[:k] = True
     region = np.unique(part[kept], return_inverse=True)[1]
-    return PlanarMesh(points[used], renumbered[T[kept]], region)
+    return PlanarMesh(points[used], (np.cumsum(used) - 1)[T[kept]], region)
+
+
+def twins(key: Ints) -> Ints:
+    """(k,2) the places of each key that occurs exactly twice."""
+    order = np.argsort(key, kind="stable")
+    _, first, count = np.unique(key[order], return_index=True, return_counts=True)
+    return order[np.stack([first[count == 2], first[count == 2] + 1], axis=1)]
 
 
 def _parts(T: Ints, segments: Ints, n: int) -> tuple[Ints, Ints]:
     """(t,) the part of each triangle, where segments separate parts, and the parts outside."""
-    key = _edge_keys(T[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), n)
-    triangle = np.repeat(np.arange(len(T)), 3)
-    on_segment = np.isin(key, _edge_keys(segments, n))
-    order = np.argsort(key, kind="stable")
-    paired = np.flatnonzero(key[order][1:] == key[order][:-1])
-    one, two = order[paired], order[paired + 1]
-    single = np.ones(len(key), dtype=bool)
-    single[one] = single[two] = False
-    joined = ~on_segment[one]
-    pairs = (triangle[one[joined]], triangle[two[joined]])
-    graph = coo_array((np.ones(len(pairs[0])), pairs), shape=(len(T), len(T)))
-    part = connected_components(graph, directed=False)[1]
-    return part, np.unique(part[triangle[single & ~on_segment]])
+    key = _edge_keys(T[:, SIDES].reshape(-1, 2), n)
+    free = ~np.isin(key, _edge_keys(segments, n))
+    pairs = twins(key)
+    part = components(pairs[free[pairs[:, 0]]] // 3, len(T))
+    free[pairs] = False
+    return part, np.unique(part[np.flatnonzero(free) // 3])
 
 
 def _edge_keys(edges: Ints, n: int) -> Ints:
@@ -226,22 +202,19 @@ def _constrained(points: Floats, segments: Ints) -> Ints:
 
 def _absent(segments: Ints, T: Ints, n: int) -> Ints:
     """Numbers of the segments that are not edges of the triangles."""
-    present = _edge_keys(T[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), n)
+    present = _edge_keys(T[:, SIDES].reshape(-1, 2), n)
     return np.flatnonzero(~np.isin(_edge_keys(segments, n), present))
 
 
 def _crossing(X: Floats, a: int, b: int) -> SurfaceError:
-    return SurfaceError(
-        f"segment {X[a].tolist()} - {X[b].tolist()} crosses another segment or passes through a"
-        " point; split it there",
-        what="segments",
-        where=(a, b),
-    )
+    crossed = "crosses another segment or passes through a point; split it there"
+    problem = f"segment {X[a].tolist()} - {X[b].tolist()} {crossed}"
+    return SurfaceError(problem, what="segments", where=(a, b))
 
 
 def _with_segment(X: Floats, T: Ints, a: int, b: int) -> Ints:
     """The triangulation with edge (a, b); the triangles that it crosses are replaced (Anglada, 1997)."""
-    E = T[:, [[1, 2], [2, 0], [0, 1]]]
+    E = T[:, SIDES]
     u, v = X[E[..., 0]], X[E[..., 1]]
     foreign = ~np.isin(E, [a, b]).any(axis=2)
     along = X[b] - X[a]
@@ -276,16 +249,15 @@ def _delaunay_below(X: Floats, a: int, b: int, rim: list[int]) -> list[tuple[int
     u, v = X[a] - X[rim], X[b] - X[rim]
     apex = int(np.argmax(np.arctan2(cross_2d(u, v), (u * v).sum(axis=1))))
     c = rim[apex]
-    left, right = rim[:apex], rim[apex + 1 :]
-    return [(a, b, c), *_delaunay_below(X, a, c, left), *_delaunay_below(X, c, b, right)]
+    left, right = _delaunay_below(X, a, c, rim[:apex]), _delaunay_below(X, c, b, rim[apex + 1 :])
+    return [(a, b, c), *left, *right]
 
 
 def _relaxed(mesh: PlanarMesh, k: int) -> Floats:
     """Free points moved to the area-weighted mean of the centroids around them."""
     X, T = mesh.points, mesh.triangles
     area = np.abs(signed_areas(X, T))
-    moment = np.zeros_like(X)
-    weight = np.zeros(len(X))
+    moment, weight = np.zeros_like(X), np.zeros(len(X))
     np.add.at(moment, T.ravel(), np.repeat(area[:, None] * X[T].mean(axis=1), 3, axis=0))
     np.add.at(weight, T.ravel(), np.repeat(area, 3))
     moved = X.copy()

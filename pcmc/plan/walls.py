@@ -14,7 +14,7 @@ from ..meshing.quality import edge_lengths
 from ..surface import Patch, Plane, Surface
 from ..surface.geometry import bounding_size
 from ..surface.topology import Curve
-from .coordinates import to_local, to_space
+from .curves import to_space
 from .planar import triangulate
 
 BOTTOMS = ("sliding", "held")
@@ -22,14 +22,8 @@ BOTTOMS = ("sliding", "held")
 
 @dataclass(frozen=True, eq=False)
 class UpperEdge:
-    """The upper edge of a wall.
-
-    Attributes
-    ----------
-    vertices : (k,) int, vertices along it; first = last if it is closed.
-    label : of the wall's faces.
-    held : whether its bottom is fixed; else it slides on Π.
-    """
+    """The upper edge of a wall: vertices (k,) along it, first = last if it is closed; the label of the
+    wall's faces; whether its bottom is held, or else slides on Π."""
 
     vertices: Ints
     label: int
@@ -82,20 +76,14 @@ def add_walls(
     validate.choice("bottom", bottom, BOTTOMS)
     names = [p.name for p in surface.patches]
     borders = [c for c in surface.topology.junctions if len(set(c.sheets)) == len(c.sheets) == 2]
-    pair_of = [(names[c.sheets[0]], names[c.sheets[1]]) for c in borders]
-    chosen = _tensions(tension, set(pair_of))
-    walled = [(c, pair) for c, pair in zip(borders, pair_of, strict=True) if pair in chosen]
+    chosen = _tensions(tension, {(names[a], names[b]) for a, b in (c.sheets for c in borders)})
+    walled = [c for c in borders if (names[c.sheets[0]], names[c.sheets[1]]) in chosen]
     if not walled:
         return surface
-    pressure = {p.name: p.pressure for p in surface.patches}
-    label, patches = _labels([c for c, _ in walled], [pair for _, pair in walled], chosen, pressure)
-    tops = [
-        UpperEdge(_directed(surface, c), label[place], bottom == "held")
-        for place, (c, _) in enumerate(walled)
-    ]
+    label, patches = _labels(surface, walled, chosen)
+    tops = [UpperEdge(_directed(surface, c), k, bottom == "held") for c, k in zip(walled, label, strict=True)]
     if edge_length is None:
-        seam = surface.topology.seam_edge
-        edge_length = float(edge_lengths(surface)[seam].mean())
+        edge_length = float(edge_lengths(surface)[surface.topology.seam_edge].mean())
     walls = build_walls(surface.vertices, tops, edge_length, surface.plane, surface.fixed)
     return Surface(
         np.concatenate([surface.vertices, walls.vertices]),
@@ -134,19 +122,13 @@ def build_walls(
     SurfaceError
         If an upper edge is not above the floor.
     """
-    local = to_local(vertices, plane)
-    floor = np.zeros(len(vertices)) if floor is None else floor
-    tolerance = 1e-9 * bounding_size(vertices)
-    builder = _Builder(local, floor, fixed, edge_length, tolerance)
+    builder = _Builder(vertices, plane, edge_length, fixed, floor)
     for top in tops:
-        builder.check(top)
         builder.add_wall(top)
-    new = np.array(builder.new).reshape(-1, 3)
-    faces = np.concatenate(builder.faces) if builder.faces else np.zeros((0, 3), dtype=np.int64)
-    label = np.concatenate(builder.labels) if builder.labels else np.zeros(0, dtype=np.int64)
-    held, sliding = (np.zeros(len(new), dtype=bool) for _ in range(2))
-    held[sorted(builder.fixed_new)] = True
-    sliding[sorted(builder.sliding_new)] = True
+    n = len(vertices)
+    new = np.array(builder.points[n:]).reshape(-1, 3)
+    held, sliding = (np.isin(np.arange(len(new)) + n, list(ids)) for ids in (builder.held, builder.sliding))
+    faces, label = np.concatenate(builder.faces), np.concatenate(builder.labels)
     return WallMesh(to_space(new, plane), faces, label, held, sliding & ~held)
 
 
@@ -154,118 +136,98 @@ class _Builder:
     """The walls built so far, in the coordinates of Π; new vertices are numbered after the mesh's own."""
 
     def __init__(
-        self, local: Floats, floor: Floats, fixed: Bools, edge_length: float, tolerance: float
+        self, vertices: Floats, plane: Plane, edge_length: float, fixed: Bools, floor: Floats | None
     ) -> None:
-        self.local, self.floor, self.fixed = local, floor, fixed
-        self.edge_length, self.tolerance = edge_length, tolerance
-        self.new: list[Floats] = []
-        self.faces: list[Ints] = []
-        self.labels: list[Ints] = []
-        self.fixed_new: set[int] = set()
-        self.sliding_new: set[int] = set()
+        self.local = plane.to_local(vertices)
+        self.tolerance = 1e-9 * bounding_size(vertices)
+        self.edge_length, self.fixed = edge_length, fixed
+        self.floor = np.zeros(len(vertices)) if floor is None else floor
+        self.points = list(self.local)
+        self.faces: list[Ints] = [np.zeros((0, 3), dtype=np.int64)]
+        self.labels: list[Ints] = [np.zeros(0, dtype=np.int64)]
+        self.held: set[int] = set()
+        self.sliding: set[int] = set()
         self.lines: dict[int, list[int]] = {}
+
+    def add_points(self, points: Sequence[Floats] | Floats) -> list[int]:
+        """The numbers of new points."""
+        self.points += list(points)
+        return list(range(len(self.points) - len(points), len(self.points)))
 
     def check(self, top: UpperEdge) -> None:
         height = self.local[top.vertices, 2] - self.floor[top.vertices]
         inner = np.ones(len(height), dtype=bool)
-        inner[[0, -1]] = False
-        inner |= (height <= self.tolerance).all()
+        inner[[0, -1]] = (height <= self.tolerance).all()
         bad = np.flatnonzero((height < -self.tolerance) | (inner & (height <= self.tolerance)))
         if len(bad):
-            vertex = top.vertices[bad[0]]
-            raise SurfaceError(
+            vertex = int(top.vertices[bad[0]])
+            problem = (
                 f"no room for a wall under vertex {vertex}, {height[bad[0]]:.3g} above the wall's"
                 f" bottom, at {self.local[vertex].round(6).tolist()} ({len(bad)} such vertices);"
-                " raise it, or use shorter edges if both ends of the wall are held",
-                what="vertices",
-                where=int(vertex),
-                found=float(height[bad[0]]),
+                " raise it, or use shorter edges if both ends of the wall are held"
             )
+            raise SurfaceError(problem, what="vertices", where=vertex, found=float(height[bad[0]]))
 
-    def line(self, vertex: int, held: bool) -> list[int]:
+    def line(self, vertex: int, supported: set[int]) -> list[int]:
         """Vertices of the vertical line under a vertex, from the foot up to the vertex itself."""
         if vertex not in self.lines:
             x, y, top = self.local[vertex]
             bottom = self.floor[vertex]
             rows = 0 if top - bottom <= self.tolerance else max(1, round((top - bottom) / self.edge_length))
-            first = len(self.new)
-            self.new += [np.array([x, y, bottom + (top - bottom) * k / rows]) for k in range(rows)]
-            self.lines[vertex] = [*(len(self.local) + first + np.arange(rows)), vertex]
+            new = [np.array([x, y, bottom + (top - bottom) * k / rows]) for k in range(rows)]
+            self.lines[vertex] = [*self.add_points(new), vertex]
             if self.fixed[vertex]:
-                self.fixed_new |= set(range(first, first + rows))
+                self.held.update(self.lines[vertex][:-1])
         ids = self.lines[vertex]
-        if len(ids) > 1:
-            (self.fixed_new if held else self.sliding_new).add(ids[0] - len(self.local))
+        supported.update(ids[:-1][:1])
         return ids
 
     def add_wall(self, top: UpperEdge) -> None:
-        chain = top.vertices
-        along = self._along(chain)
-        left, right = self.line(int(chain[0]), top.held), self.line(int(chain[-1]), top.held)
-        foot = self._foot(chain[1:-1], top.held)
+        self.check(top)
+        chain, supported = top.vertices, self.held if top.held else self.sliding
+        steps = np.linalg.norm(np.diff(self.local[chain, :2], axis=0), axis=1)
+        along = np.concatenate([[0.0], np.cumsum(steps)])
+        left, right = self.line(int(chain[0]), supported), self.line(int(chain[-1]), supported)
+        middle = chain[1:-1]
+        foot = self.add_points(np.column_stack([self.local[middle, :2], self.floor[middle]]))
+        supported.update(foot)
         # counter-clockwise from the left foot; a line without rows is the chain's end itself
         start, end = left[:-1], right[:-1]
         ids = np.array([*start[:1], *foot, *end, *chain[::-1], *start[:0:-1]], dtype=np.int64)
         sides = [np.zeros(len(start[:1])), np.full(len(end), along[-1]), np.zeros(len(start[1:]))]
         s = np.concatenate([sides[0], along[1:-1], sides[1], along[::-1], sides[2]])
-        height = np.array([self._position(i)[2] for i in ids])
+        outline = np.stack([s, [self.points[i][2] for i in ids]], axis=1)
         ring = np.arange(len(ids))
-        mesh = triangulate(
-            np.stack([s, height], axis=1), np.stack([ring, np.roll(ring, -1)], axis=1), self.edge_length
-        )
-        inner = mesh.points[len(ids) :]
-        first = len(self.local) + len(self.new)
-        ground_xy = np.stack([np.interp(inner[:, 0], along, self.local[chain, k]) for k in (0, 1)], axis=1)
-        self.new += list(np.column_stack([ground_xy, inner[:, 1]]))
-        number = np.concatenate([ids, first + np.arange(len(inner))])
+        mesh = triangulate(outline, np.stack([ring, np.roll(ring, -1)], axis=1), self.edge_length)
+        s, height = mesh.points[len(ids) :].T
+        x, y = (np.interp(s, along, self.local[chain, k]) for k in (0, 1))
+        number = np.array([*ids, *self.add_points(np.column_stack([x, y, height]))])
         self.faces.append(number[mesh.triangles])
         self.labels.append(np.full(len(mesh.triangles), top.label))
 
-    def _along(self, chain: Ints) -> Floats:
-        steps = np.linalg.norm(np.diff(self.local[chain, :2], axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])
-
-    def _foot(self, vertices: Ints, held: bool) -> Ints:
-        first = len(self.new)
-        places = np.column_stack([self.local[vertices, :2], self.floor[vertices]])
-        self.new += list(places)
-        added = range(first, len(self.new))
-        (self.fixed_new if held else self.sliding_new).update(added)
-        return len(self.local) + np.array(added, dtype=np.int64)
-
-    def _position(self, vertex: int) -> Floats:
-        n = len(self.local)
-        return self.local[vertex] if vertex < n else self.new[vertex - n]
-
 
 def _labels(
-    borders: Sequence[Curve],
-    pairs: Sequence[tuple[str, str]],
-    tension: Mapping[tuple[str, str], float],
-    pressure: Mapping[str, float],
+    surface: Surface, borders: Sequence[Curve], tension: Mapping[tuple[str, str], float]
 ) -> tuple[list[int], list[Patch]]:
-    """A label for each border, and the labels' patches: one for each pair of names.
+    """A label for each border, and the labels' patches: one for each pair of patches.
 
     Where a pair's borders cross (four quarters, a and b in turn), each border is a patch of its
     own: a patch must not have four faces at an edge.
     """
-    label, names = [], []
-    for place, pair in enumerate(pairs):
-        ends = [
-            b.vertices[[0, -1]] for b, p in zip(borders, pairs, strict=True) if p == pair and not b.closed
-        ]
+    kinds = []
+    for place, border in enumerate(borders):
+        ends = [c.vertices[[0, -1]] for c in borders if c.sheets == border.sheets and not c.closed]
         crossing = bool(ends) and np.bincount(np.concatenate(ends)).max() > 2
-        name = (pair, place if crossing else -1)
-        if name not in names:
-            names.append(name)
-        label.append(names.index(name))
+        kinds.append((border.sheets, place if crossing else -1))
+    names = list(dict.fromkeys(kinds))
     patches = []
-    for pair, number in names:
-        alike = [n for p, n in names if p == pair]
+    for sheets, number in names:
+        a, b = (surface.patches[k] for k in sheets)
+        alike = [n for s, n in names if s == sheets]
         suffix = "" if number < 0 else f"-{alike.index(number) + 1}"
-        between = pressure[pair[0]] - pressure[pair[1]]
-        patches.append(Patch(f"wall-{pair[0]}-{pair[1]}{suffix}", tension[pair], between, wall=True))
-    return label, patches
+        value = tension[a.name, b.name]
+        patches.append(Patch(f"wall-{a.name}-{b.name}{suffix}", value, a.pressure - b.pressure, wall=True))
+    return [names.index(kind) for kind in kinds], patches
 
 
 def _directed(surface: Surface, border: Curve) -> Ints:
@@ -289,11 +251,6 @@ def _tensions(
         pair = (a, b) if (a, b) in borders else (b, a)
         if pair not in borders:
             known = [f"{p}-{q}" for p, q in sorted(borders)]
-            raise OptionError(
-                unknown("border", f"{a}-{b}", known),
-                what="tension",
-                where=(a, b),
-                expected=tuple(sorted(borders)),
-            )
+            raise OptionError(unknown("border", f"{a}-{b}", known), what="tension", where=(a, b))
         by_pair[pair] = float(value)
     return by_pair
