@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 
@@ -188,9 +186,9 @@ def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floa
     >>> (3 * reactions_per_length(square)).round(9)[1].tolist()  # tension -1, 1; a third of p A = 2
     [-1.5, 1.5, -1.0]
     """
+    share = held_lengths(surface)
     if forces is None:
         forces = reactions(standing_part(surface).surface)
-    share = held_lengths(surface)
     result = np.full((surface.n, 3), np.nan)
     result[share > 0.0] = forces[share > 0.0] / share[share > 0.0, None]
     return result
@@ -200,19 +198,19 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
     """One row per junction curve: where it is, the forces left per length, Σ α n of its triangles."""
     topo = surface.topology
     imbalance = np.linalg.norm(conormal_sum(surface), axis=1)
-    number = {tuple(edge): i for i, edge in enumerate(topo.edges[_seams(topo)].tolist())}
-    chosen = np.flatnonzero(_seams(topo))
+    seams = np.flatnonzero(topo.junction_edge | topo.seam_edge)
+    number = {tuple(edge): i for i, edge in zip(seams, topo.edges[seams].tolist(), strict=True)}
     rows = []
     for curve in topo.junctions:
         pairs, lengths = _segments(surface, curve)
-        edges = chosen[[number[tuple(pair)] for pair in np.sort(pairs, axis=1).tolist()]]
-        total = float(lengths.sum())
+        edges = [number[tuple(pair)] for pair in np.sort(pairs, axis=1).tolist()]
+        total, mean = float(lengths.sum()), float(lengths.mean()) or 1.0
         rows.append(
             {
                 "junction": " | ".join(surface.patches[i].name for i in curve.sheets),
                 "length": total,
                 **_middle(surface, curve),
-                "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max()) / _mean(lengths),
+                "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max()) / mean,
                 "sum_alpha_n_mean": float(imbalance[edges] @ lengths) / total if total else 0.0,
                 "sum_alpha_n_max": float(imbalance[edges].max()),
             }
@@ -220,9 +218,8 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def boundary_table(surface: Surface) -> pd.DataFrame:
-    """One row per held boundary curve: where it is, the force on it, the largest force per length."""
-    forces = reactions(surface)
+def boundary_table(surface: Surface, forces: Floats) -> pd.DataFrame:
+    """One row per held boundary curve: where it is, its share of the reactions (n,3), most per length."""
     held = surface.fixed | surface.on_plane
     loops = surface.topology.boundary_loops
     # the reaction of a corner is shared equally by its curves, so that the rows add up to the total
@@ -268,11 +265,3 @@ def _middle(surface: Surface, curve: Curve) -> dict[str, float]:
         place = np.array([np.interp(0.5 * along[-1], along, column) for column in points.T])
     place = np.where(np.abs(place) <= ROUNDING * surface.size, 0.0, place)
     return {f"middle_{axis}": float(value) for axis, value in zip("xyz", place, strict=True)}
-
-
-def _seams(topo: Any) -> Bools:
-    return np.asarray(topo.junction_edge | topo.seam_edge)
-
-
-def _mean(lengths: Floats) -> float:
-    return float(lengths.mean()) or 1.0

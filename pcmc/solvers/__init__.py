@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..base import validate
-from ..base.errors import OptionError, SurfaceError, unknown
+from ..base.errors import SurfaceError
 from ..surface import Surface
 
 if TYPE_CHECKING:
@@ -55,10 +55,7 @@ def find_method(name: str) -> Method:
     ------
     OptionError : there is none, with the nearest name.
     """
-    if name not in METHODS:
-        message = unknown("method", name, METHODS)
-        raise OptionError(message, what="method", found=name, expected=tuple(METHODS))
-    return METHODS[name]()
+    return METHODS[validate.choice("method", name, tuple(METHODS))]()
 
 
 def solve(
@@ -102,13 +99,10 @@ def solve(
     pcmc.base.errors.OptionError: unknown method 'nestrov'; did you mean 'nesterov'? Known: newton, ...
     """
     if not isinstance(surface, Surface):
-        kind = type(surface).__name__
-        message = f"solve: expected a Surface, found {kind}"
-        raise SurfaceError(message, what="surface", found=kind, expected="Surface")
+        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
     solver = find_method(method)
     if callback is not None and not callable(callback):
-        message = f"callback: expected a function of a Progress, found {callback!r}"
-        raise OptionError(message, what="callback", found=callback, expected="a function")
+        validate.refuse("callback", callback, "a function of a Progress")
     if surface.size == 0.0:
         message = "solve: all vertices are at one point; start from a surface that has a size"
         raise SurfaceError(message, what="vertices")

@@ -26,8 +26,9 @@ from scipy.sparse import csc_array, csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
+from ..base import validate
 from ..base.arrays import Floats, Ints
-from ..base.errors import MissingExtra, OptionError, unknown
+from ..base.errors import MissingExtra
 from ..energy.projected_hessian import Pattern
 
 BACKENDS = ("pardiso", "superlu")
@@ -93,10 +94,7 @@ def factoriser(pattern: Pattern, backend: str | None = None) -> Factoriser:
     >>> factor.negative, factor.solve(np.array([3.0, 3.0])).round(12).tolist()
     (1, [1.0, 1.0])
     """
-    chosen = backend or available()[0]
-    if chosen not in BACKENDS:
-        message = unknown("factorisation backend", chosen, BACKENDS)
-        raise OptionError(message, what="backend", found=chosen, expected=BACKENDS)
+    chosen = validate.choice("backend", backend or available()[0], BACKENDS)
     if chosen not in available():
         raise MissingExtra("pypardiso", "fast")
     # MKL refuses a matrix without rows
