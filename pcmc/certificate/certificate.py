@@ -229,9 +229,8 @@ def _softest(surface: Surface, classes: VertexClasses, values: Floats, fields: F
     """The lowest λ in units of α/size², α the mean tension where its mode moves; infinite without one."""
     if not len(values):
         return np.inf
-    X, F = surface.vertices, classes.faces
-    area = face_areas(X[F])
-    moved = area * np.einsum("fij,fij->f", fields[0][F], fields[0][F])
+    F = classes.faces
+    moved = face_areas(surface.vertices[F]) * np.einsum("fij,fij->f", fields[0][F], fields[0][F])
     tension = float(surface.tensions[classes.patch_of_face] @ moved / moved.sum())
     return float(values[0]) * surface.size**2 / tension
 

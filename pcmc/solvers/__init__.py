@@ -70,8 +70,7 @@ def solve(
         NLopt's L-BFGS.
     callback : called with a Progress after each iteration (each evaluation for ``"lbfgs"``). Raise
         StopIteration in it to stop; any other exception passes through.
-    options : fields of the method's options class: ``NewtonOptions``, ``NesterovOptions``,
-        ``LbfgsOptions``.
+    options : fields of the method's options class: ``NewtonOptions``, ``NesterovOptions``, ``LbfgsOptions``.
 
     Returns
     -------

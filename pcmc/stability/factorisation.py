@@ -137,13 +137,7 @@ class _SuperLU:
         _finite(data)
         matrix = csc_array((data[self._source], self._indices, self._indptr), self._full.shape)
         try:
-            lu = splu(
-                matrix,
-                permc_spec=self._ordering,
-                diag_pivot_thresh=0.0,
-                panel_size=4,
-                options={"SymmetricMode": True},
-            )
+            lu = splu(matrix, self._ordering, 0.0, panel_size=4, options={"SymmetricMode": True})
         except RuntimeError as error:
             raise SingularMatrix(str(error)) from None
         factor = _SuperLUFactor(matrix, lu, self._order)
@@ -165,8 +159,7 @@ class _SuperLUFactor:
             raise SingularMatrix("a zero pivot forced a row exchange, so the inertia is unknown")
         pivots = self.lu.U.diagonal()
         largest = np.abs(self.matrix.data).max(initial=0.0)
-        zero = int(np.count_nonzero(np.abs(pivots) < ZERO * largest))
-        if zero:
+        if zero := int(np.count_nonzero(np.abs(pivots) < ZERO * largest)):
             raise SingularMatrix(f"{zero} pivots are zero to rounding")
         return int(np.count_nonzero(pivots < 0.0))
 
@@ -224,15 +217,13 @@ class _Pardiso:
     @contextmanager
     def _threads(self) -> Iterator[None]:
         """MKL uses one thread within the block if the matrix is small."""
-        if self._pattern.size > ONE_THREAD:
-            yield
-            return
         set_threads = self._solver.libmkl.MKL_Set_Num_Threads_Local
-        before = set_threads(1)
+        before = set_threads(1) if self._pattern.size <= ONE_THREAD else None
         try:
             yield
         finally:
-            set_threads(before)
+            if before is not None:
+                set_threads(before)
 
 
 @cache
