@@ -46,14 +46,10 @@ METHODS: Mapping[str, Callable[[], Method]] = {"newton": _newton, "nesterov": _n
 
 
 def find_method(name: str) -> Method:
-    """The solver of this name and the class of its options.
+    """The solver of this name and the class of its options; OptionError names the nearest one.
 
     >>> find_method("lbfgs").options().memory
     10
-
-    Raises
-    ------
-    OptionError : there is none, with the nearest name.
     """
     return METHODS[validate.choice("method", name, tuple(METHODS))]()
 

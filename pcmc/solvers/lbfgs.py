@@ -108,10 +108,7 @@ class Objective:
         self.halt: Callable[[], object] = lambda: None
 
     def __call__(self, s: Floats, out: Floats) -> float:
-        """E at s, ∂E/∂s into ``out``.
-
-        NLopt may call again after ``halt``, and must not see an exception at any time.
-        """
+        """E at s, ∂E/∂s into ``out``; NLopt may call again after ``halt``, and must see no exception."""
         if self.status is None and self.raised is None:
             try:
                 point = self.visit(self.coordinates.positions(s))

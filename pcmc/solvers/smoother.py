@@ -62,13 +62,17 @@ class Smoother:
         return out @ self._axes
 
 
+def _one_unknown_each(vertices: Bools) -> MotionSpace:
+    basis = np.zeros((len(vertices), 3, 3))
+    basis[:, 0, 0] = 1.0
+    return MotionSpace.of(basis, vertices.astype(np.int64))
+
+
 class _Coordinate:
     """L_α over the vertices whose coordinate is free."""
 
     def __init__(self, surface: Surface, classes: VertexClasses, free: Bools, backend: str | None) -> None:
-        basis = np.zeros((surface.n, 3, 3))
-        basis[:, 0, 0] = 1.0
-        self._space = MotionSpace.of(basis, free.astype(np.int64))
+        self._space = _one_unknown_each(free)
         self._surface, self._classes, self._free = surface, classes, free
         self._pattern = hessian_pattern(classes, self._space)
         self._factoriser = factoriser(self._pattern, backend)
@@ -95,9 +99,7 @@ class HarmonicExtension:
         self, surface: Surface, classes: VertexClasses, X: Floats, backend: str | None = None
     ) -> None:
         used = ~classes.idle
-        basis = np.zeros((surface.n, 3, 3))
-        basis[:, 0, 0] = 1.0
-        space = MotionSpace.of(basis, used.astype(np.int64))
+        space = _one_unknown_each(used)
         equal = surface.retensioned({p.name: 1.0 for p in surface.patches})
         pattern = hessian_pattern(classes, space)
         data = assemble(equal, classes, space, pattern, X, hessian=0.0, stiffness=1.0)

@@ -115,12 +115,6 @@ class State:
         else:
             self.measure()
 
-    def go_back(self, X: Floats, version: int) -> None:
-        """Go back to X if it belongs to the present version, and measure."""
-        if version == self.version:
-            self.X = X
-        self.measure()
-
     def displaced(self, d: Floats) -> tuple[Floats, Bools]:
         """X + d, and the junction vertices that this brings down to Π, where they are placed.
 

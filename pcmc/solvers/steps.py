@@ -244,10 +244,7 @@ class Stepper:
         return state.space.to_vectors(self._limit_drift(s) if len(self._motions) else s)
 
     def _limit_drift(self, s: Floats) -> Floats:
-        """s with its rigid part shortened, which only slides the mesh along the surface.
-
-        A shortened step may raise the residual; the next ones lower it again.
-        """
+        """s with its rigid part shortened, which only slides the mesh; the residual may rise for a while."""
         state = self.state
         rigid = rigid_modes(state.space, self._motions, state.X)
         drift = rigid @ (rigid.T @ s)
@@ -270,13 +267,11 @@ class Stepper:
         return self._extension.extend(self.state.space, d)
 
     def _improved(self, t: float, slope: float, energy: float, norm: float) -> bool:
-        """Whether the step just taken lowers the residual enough or, towards a minimum, E.
-
-        Where no support resists some rigid motion, every other step may raise the residual.
-        """
+        """Whether the step just taken lowers the residual enough or, towards a minimum, E."""
         if self.state.norm < (1.0 - 0.3 * t) * norm:
             self._residual_raised = False
             return True
+        # where no support resists some rigid motion, every other step may raise the residual
         if len(self._motions) and not self._residual_raised and self.state.norm < 2.0 * norm:
             self._residual_raised = True
             return True

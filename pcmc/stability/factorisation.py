@@ -36,7 +36,6 @@ ZERO = 1e-13  # of the largest entry: a pivot below is zero to rounding
 TINY = float(np.finfo(float).tiny)
 ONE_THREAD = 10_000  # rows; up to here MKL is fastest with one thread
 
-
 IPARM = {  # MKL's parameters by their numbers from 1
     1: 1,  # the values below instead of the defaults
     2: 2,  # fill-in reduced by METIS
