@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import standing_part
 from ..energy import kernels
+from ..energy.functional import apply_supports
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths, vertex_sums
 from ..surface.topology import Curve
@@ -76,9 +75,7 @@ def unbalanced(surface: Surface, pinchable: Bools) -> str:
     Π and is stronger than its sheets: it comes down to rest on Π. ``pinchable`` (k,) marks such walls.
     """
     names, strongest, others = _strained(surface, pinchable, 1.0 + 1e-9)
-    if not names:
-        return ""
-    return f"the tensions at the junction {names} cannot balance: {strongest} > {others}"
+    return names and f"the tensions at the junction {names} cannot balance: {strongest} > {others}"
 
 
 def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
@@ -88,9 +85,7 @@ def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
     for ``unbalanced``.
     """
     names, strongest, others = _strained(surface, pinchable, HARDLY)
-    if not names:
-        return ""
-    return (
+    return names and (
         f"the tensions at the junction {names} could balance only with its sheets nearly on each other:"
         f" {strongest} against {others}"
     )
@@ -101,29 +96,26 @@ def _strained(surface: Surface, pinchable: Bools, share: float) -> tuple[str, st
     held = surface.fixed | surface.on_plane
     for curve in surface.topology.junctions:
         strongest = max(curve.sheets, key=lambda patch: surface.tensions[patch])
-        tensions = sorted(surface.tensions[list(curve.sheets)])
-        if pinchable[strongest] or held[curve.vertices].all():
-            continue
-        if tensions[-1] > share * sum(tensions[:-1]):
+        *others, largest = sorted(surface.tensions[list(curve.sheets)])
+        excused = pinchable[strongest] or held[curve.vertices].all()
+        if largest > share * sum(others) and not excused:
             names = " | ".join(surface.patches[i].name for i in curve.sheets)
-            return names, f"{tensions[-1]:g}", " + ".join(f"{t:g}" for t in tensions[:-1])
+            return names, f"{largest:g}", " + ".join(f"{t:g}" for t in others)
     return "", "", ""
 
 
 def pressures_left_over(surface: Surface) -> str:
     """Names free edges where pressures do not cancel, so that the shape depends on Π's point; or empty."""
-    left = surface.uncancelled
-    edges = np.flatnonzero(left)
+    edges = np.flatnonzero(surface.uncancelled)
     if not len(edges):
         return ""
-    edge = edges[0]
-    at = (surface.topology.edge_of_face == edge).any(axis=1)
+    at = (surface.topology.edge_of_face == edges[0]).any(axis=1)
     names = " | ".join(surface.patches[k].name for k in np.unique(surface.patch_of_face[at]))
-    place = surface.vertices[surface.topology.edges[edge]].mean(axis=0).round(4).tolist()
+    place = surface.vertices[surface.topology.edges[edges[0]]].mean(axis=0).round(4).tolist()
     return (
         f"along {len(edges)} edges that nothing holds ({names} near {place}) the pressures do not"
-        f" cancel: {abs(left[edge]):.3g} is left over and acts from there to the point of Π, so the"
-        " shape depends on that point; give a wall the pressure of one room less that of the other"
+        f" cancel: {abs(surface.uncancelled[edges[0]]):.3g} is left over and acts from there to the point of"
+        " Π, so the shape depends on that point; give a wall the pressure of one room less that of the other"
     )
 
 
@@ -150,9 +142,8 @@ def conormal_sum(surface: Surface) -> Floats:
 
 def held_lengths(surface: Surface) -> Floats:
     """(n,) half the length of the boundary edges at each vertex that are held at both ends, length."""
-    held = surface.fixed | surface.on_plane
     ends = surface.topology.edges[surface.topology.boundary_edge]
-    ends = ends[held[ends].all(axis=1)]
+    ends = ends[(surface.fixed | surface.on_plane)[ends].all(axis=1)]
     half = 0.5 * segment_lengths(surface.vertices, ends)
     return np.asarray(np.bincount(ends.ravel(), np.repeat(half, 2), surface.n), dtype=float)
 
@@ -169,11 +160,7 @@ def reactions(surface: Surface) -> Floats:
     forces = kernels.measure(kernels.energy_mesh(surface, pressure=zero), X)[2]
     third = area_vectors(X[F]) / 3.0
     forces -= vertex_sums(third * surface.pressures[surface.patch_of_face, None], F, surface.n)
-    out = np.zeros_like(forces)
-    out[surface.fixed] = forces[surface.fixed]
-    sliding = surface.on_plane
-    out[sliding] = forces[sliding] - surface.plane.along(forces[sliding])
-    return out
+    return forces - apply_supports(surface, forces.copy())
 
 
 def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floats:
@@ -188,31 +175,29 @@ def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floa
     >>> (3 * reactions_per_length(square)).round(9)[1].tolist()  # tension -1, 1; a third of p A = 2
     [-1.5, 1.5, -1.0]
     """
+    share = held_lengths(surface)[:, None]
     if forces is None:
         forces = reactions(standing_part(surface).surface)
-    share = held_lengths(surface)
-    result = np.full((surface.n, 3), np.nan)
-    result[share > 0.0] = forces[share > 0.0] / share[share > 0.0, None]
-    return result
+    return np.divide(forces, share, out=np.full((surface.n, 3), np.nan), where=share > 0.0)
 
 
 def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
     """One row per junction curve: where it is, the forces left per length, Σ α n of its triangles."""
     topo = surface.topology
     imbalance = np.linalg.norm(conormal_sum(surface), axis=1)
-    number = {tuple(edge): i for i, edge in enumerate(topo.edges[_seams(topo)].tolist())}
-    chosen = np.flatnonzero(_seams(topo))
+    seams = np.flatnonzero(topo.junction_edge | topo.seam_edge)
+    number = {tuple(edge): i for i, edge in zip(seams, topo.edges[seams].tolist(), strict=True)}
     rows = []
     for curve in topo.junctions:
         pairs, lengths = _segments(surface, curve)
-        edges = chosen[[number[tuple(pair)] for pair in np.sort(pairs, axis=1).tolist()]]
-        total = float(lengths.sum())
+        edges = [number[tuple(pair)] for pair in np.sort(pairs, axis=1).tolist()]
+        total, mean = float(lengths.sum()), float(lengths.mean()) or 1.0
         rows.append(
             {
                 "junction": " | ".join(surface.patches[i].name for i in curve.sheets),
                 "length": total,
                 **_middle(surface, curve),
-                "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max()) / _mean(lengths),
+                "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max()) / mean,
                 "sum_alpha_n_mean": float(imbalance[edges] @ lengths) / total if total else 0.0,
                 "sum_alpha_n_max": float(imbalance[edges].max()),
             }
@@ -220,9 +205,8 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def boundary_table(surface: Surface) -> pd.DataFrame:
-    """One row per held boundary curve: where it is, the force on it, the largest force per length."""
-    forces = reactions(surface)
+def boundary_table(surface: Surface, forces: Floats) -> pd.DataFrame:
+    """One row per held boundary curve: where it is, its share of the reactions (n,3), most per length."""
     held = surface.fixed | surface.on_plane
     loops = surface.topology.boundary_loops
     # the reaction of a corner is shared equally by its curves, so that the rows add up to the total
@@ -235,15 +219,13 @@ def boundary_table(surface: Surface) -> pd.DataFrame:
     for curve in loops:
         if not held[curve.vertices].any():
             continue
-        total = parts[curve.vertices].sum(axis=0)
+        total = parts[curve.vertices].sum(axis=0).tolist()
         rows.append(
             {
                 "boundary": " | ".join(surface.patches[i].name for i in curve.sheets),
                 "length": float(_segments(surface, curve)[1].sum()),
                 **_middle(surface, curve),
-                "reaction_x": float(total[0]),
-                "reaction_y": float(total[1]),
-                "reaction_z": float(total[2]),
+                **dict(zip(("reaction_x", "reaction_y", "reaction_z"), total, strict=True)),
                 "per_length_max": float(per_length[curve.vertices].max()),
             }
         )
@@ -268,11 +250,3 @@ def _middle(surface: Surface, curve: Curve) -> dict[str, float]:
         place = np.array([np.interp(0.5 * along[-1], along, column) for column in points.T])
     place = np.where(np.abs(place) <= ROUNDING * surface.size, 0.0, place)
     return {f"middle_{axis}": float(value) for axis, value in zip("xyz", place, strict=True)}
-
-
-def _seams(topo: Any) -> Bools:
-    return np.asarray(topo.junction_edge | topo.seam_edge)
-
-
-def _mean(lengths: Floats) -> float:
-    return float(lengths.mean()) or 1.0

@@ -13,13 +13,14 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats, Ints
-from ..contact.pinching import StandingPart, excess_pull, standing_part
+from ..contact.pinching import excess_pull, standing_part
 from ..energy.curvature import METHODS, curvature_error, mean_curvature
 from ..energy.functional import energy_and_gradient, patch_areas, volume
 from ..energy.motion_space import VertexClasses, force_scale, motion_space
+from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import Stiffness, lowest, surface_stiffness
+from ..stability.modes import lowest, stiffness
 from ..surface import Surface
 from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
@@ -148,23 +149,31 @@ def certify(
     ('STABLE', 0, True)
     """
     part = standing_part(surface)
-    standing, classes = part.surface, part.classes
-    X = standing.vertices
-    space = motion_space(standing, classes, X)
-    value, forces = energy_and_gradient(standing, X, supports=False)
-    left = space.project(forces)
-    scale = force_scale(standing, classes, X)
+    standing, classes, X = part.surface, part.classes, part.surface.vertices
     unheld = excess_pull(standing, part.walls, part.resting)
-    in_motion_space = np.linalg.norm(space.to_coordinates(forces))
-    residual = float(np.hypot(in_motion_space, np.linalg.norm(unheld))) / scale
-    quality, walls_quality = _quality(part)
-    system = None
+    value, forces = energy_and_gradient(standing, X, supports=False)
+    enclosed = volume(surface)
+    scale = force_scale(standing, classes, X)
+    space = motion_space(standing, classes, X)
+    rigid = rigid_modes(space, rigid_motions(standing), X)
+    in_motion_space = space.to_coordinates(forces)
+    residual = float(np.hypot(np.linalg.norm(in_motion_space), np.linalg.norm(unheld))) / scale
+    left = space.to_vectors(in_motion_space)
+
+    qualities = triangle_quality(X, standing.faces)
+    in_wall = part.walls.pinchable[standing.patch_of_face]
+    quality = float(qualities[~in_wall].min(initial=1.0))
+    index, eigenvalues, fields = None, np.empty(0), np.empty((0, 0, 3))
     if residual <= tolerance and quality > COLLAPSED:
         with suppress(SingularMatrix):
-            system = surface_stiffness(surface)
-    index = None if system is None else system.negative
-    eigenvalues, fields = _lowest_modes(system, modes)
+            system = stiffness(standing, classes, space, rigid)
+            index = system.negative
+            if modes > 0 and space.size > 2:
+                eigenvalues, fields = lowest(system, modes)
+
+    patches = _patch_table(surface, standing, qualities)
     ratio, support_forces = load_ratio(standing), reactions(standing)
+    notes = _pulled_off(unheld), pressures_left_over(standing)
     verdict, reason = judge(
         Findings(
             surface=surface,
@@ -181,32 +190,26 @@ def certify(
     )
     return Certificate(
         verdict=verdict,
-        detail="; ".join(filter(None, (reason, _pulled_off(unheld), pressures_left_over(standing)))),
+        detail="; ".join(filter(None, (reason, *notes))),
         residual=residual,
         scale=scale,
         energy=value,
-        volume=volume(surface),
+        volume=enclosed,
         index=index,
         eigenvalues=eigenvalues,
         modes=fields,
-        curvature_error=_largest(pd.Series(np.abs(curvature_error(standing, "variational")))),
+        curvature_error=_largest(patches["variational_max"]),
         quality=quality,
-        walls_quality=walls_quality,
-        patches=_patch_table(surface, standing),
+        walls_quality=float(qualities[in_wall].min(initial=1.0)),
+        patches=patches,
         junctions=junction_table(standing, left),
-        boundaries=boundary_table(standing),
+        boundaries=boundary_table(standing, support_forces),
         load=load(standing),
         support=float((support_forces @ np.array(surface.plane.normal)).sum()),
         reactions=support_forces,
         pinched=np.flatnonzero(part.resting),
         load_ratio=ratio,
     )
-
-
-def _lowest_modes(system: Stiffness | None, count: int) -> tuple[Floats, Floats]:
-    if system is None or count < 1 or len(system.mass) < 3:
-        return np.empty(0), np.empty((0, 0, 3))
-    return lowest(system, count)
 
 
 def _own_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> Floats:
@@ -226,9 +229,8 @@ def _softest(surface: Surface, classes: VertexClasses, values: Floats, fields: F
     """The lowest λ in units of α/size², α the mean tension where its mode moves; infinite without one."""
     if not len(values):
         return np.inf
-    X, F = surface.vertices, classes.faces
-    area = face_areas(X[F])
-    moved = area * np.einsum("fij,fij->f", fields[0][F], fields[0][F])
+    F = classes.faces
+    moved = face_areas(surface.vertices[F]) * np.einsum("fij,fij->f", fields[0][F], fields[0][F])
     tension = float(surface.tensions[classes.patch_of_face] @ moved / moved.sum())
     return float(values[0]) * surface.size**2 / tension
 
@@ -244,19 +246,10 @@ def _pulled_off(excess: Floats) -> str:
     )
 
 
-def _quality(part: StandingPart) -> tuple[float, float]:
-    """Smallest triangle quality outside walls that can pinch, and in them."""
-    surface = part.surface
-    quality = triangle_quality(surface.vertices, surface.faces)
-    in_wall = part.walls.pinchable[surface.patch_of_face]
-    return float(quality[~in_wall].min(initial=1.0)), float(quality[in_wall].min(initial=1.0))
-
-
-def _patch_table(surface: Surface, standing: Surface) -> pd.DataFrame:
+def _patch_table(surface: Surface, standing: Surface, quality: Floats) -> pd.DataFrame:
     errors = {method: np.abs(curvature_error(standing, method)) for method in METHODS}
     curvature = mean_curvature(standing, "variational")
     areas = patch_areas(surface)
-    quality = triangle_quality(standing.vertices, standing.faces)
     rows = []
     for index, patch in enumerate(surface.patches):
         faces = standing.patch_of_face == index

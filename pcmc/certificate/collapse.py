@@ -77,8 +77,7 @@ def _slips(surface: Surface, pinchable: Bools, place: Floats, reach: float) -> b
 
 def _along(X: Floats, held: Ints, end: int, beside: int) -> bool:
     """Whether the edge from ``end`` to ``beside`` lies along one of the held edges (k,2) there."""
-    mine = held[(held == end).any(axis=1)]
-    sides = X[mine.sum(axis=1) - end] - X[end]
+    sides = X[held[(held == end).any(axis=1)].sum(axis=1) - end] - X[end]
     edge = X[beside] - X[end]
     lengths = np.linalg.norm(sides, axis=1) * np.linalg.norm(edge)
     return bool((sides @ edge > np.cos(np.radians(ALONG)) * lengths).any())

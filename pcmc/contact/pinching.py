@@ -18,7 +18,7 @@ from ..energy.functional import energy_and_gradient
 from ..energy.motion_space import MotionSpace, VertexClasses, vertex_classes
 from ..surface import Surface
 from ..surface.checks import lying
-from ..surface.geometry import area_vectors
+from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
 from ..surface.topology import topology
 from .wall_rows import WallRows, join_rows, wall_rows
 
@@ -58,8 +58,7 @@ def find_walls(surface: Surface) -> Walls:
     roof_edge[topo.edge_of_face[roof]] = True
     roof_vertex[surface.faces[roof]] = True
     pinchable = np.zeros(len(surface.patches), dtype=bool)
-    none = np.empty(0, dtype=np.int64)
-    rows, top_edges, wall_below = [], [none.reshape(0, 2)], [none]
+    rows, top_edges, wall_below = [], [np.empty((0, 2), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for index, patch in enumerate(surface.patches):
         if not patch.auxiliary:
             continue
@@ -91,10 +90,9 @@ def place_wall_rows(surface: Surface, walls: Walls, X: Floats, space: MotionSpac
 
     With a motion space given, they move within the wall only: they keep their distance across it.
     """
-    rows = walls.rows
+    rows, change = walls.rows, np.zeros_like(X)
     if not len(rows.vertices):
         return X
-    change = np.zeros_like(X)
     change[rows.vertices] = rows.places(surface, X) - X[rows.vertices]
     if space is not None:
         change -= space.project(change)
@@ -132,8 +130,7 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
 
 def resting_vertices(surface: Surface, walls: Walls) -> Bools:
     """(n,) junction vertices that rest on Π, by their positions."""
-    height = surface.plane.height(surface.vertices)
-    return walls.top_free & lying(height, surface.vertices)
+    return walls.top_free & lying(surface.plane.height(surface.vertices), surface.vertices)
 
 
 def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surface:
@@ -146,19 +143,13 @@ def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surf
     X = surface.vertices.copy()
     X[resting] -= surface.plane.height(X[resting])[:, None] * np.array(surface.plane.normal)
     owner = _owners(surface.n, walls, resting)
-    X = X[owner]
-    F = owner[surface.faces]
+    X, F = X[owner], owner[surface.faces]
     apart = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
     flat = _lie_on_plane(walls, resting)[F].all(axis=1)
     left = apart & ~(flat & surface.walls[surface.patch_of_face])
     F, patch = np.ascontiguousarray(F[left]), np.ascontiguousarray(surface.patch_of_face[left])
-    return surface._with(
-        vertices=X,
-        faces=F,
-        patch_of_face=patch,
-        topology=topology(F, patch, surface.n),
-        on_plane=surface.on_plane | resting,
-    )
+    topo, on_plane = topology(F, patch, surface.n), surface.on_plane | resting
+    return surface._with(vertices=X, faces=F, patch_of_face=patch, topology=topo, on_plane=on_plane)
 
 
 def resting_links(walls: Walls, resting: Bools) -> Ints:
@@ -170,8 +161,7 @@ def resting_links(walls: Walls, resting: Bools) -> Ints:
 def beside_resting(walls: Walls, resting: Bools) -> Bools:
     """(n,) standing junction vertices next to a resting one."""
     mask = np.zeros(len(resting), dtype=bool)
-    for one, other in (walls.top_edges.T, walls.top_edges.T[::-1]):
-        mask[one[resting[other]]] = True
+    mask[resting_links(walls, resting)[:, 1]] = True
     return mask & walls.top_free & ~resting
 
 
@@ -195,8 +185,8 @@ class StandingPart:
     def of(cls, surface: Surface, walls: Walls, resting: Bools) -> StandingPart:
         """The part that stands where the given vertices rest."""
         part = remove_pinched_walls(surface, walls, resting)
-        links, beside = resting_links(walls, resting), beside_resting(walls, resting)
-        return cls(part, walls, resting, vertex_classes(part, links, beside))
+        classes = vertex_classes(part, resting_links(walls, resting), beside_resting(walls, resting))
+        return cls(part, walls, resting, classes)
 
     @property
     def quality_faces(self) -> Ints:
@@ -213,11 +203,11 @@ def standing_part(surface: Surface) -> StandingPart:
     >>> standing_part(square).surface is square
     True
     """
-    cache = vars(surface)  # where a cached property would put it
-    if "standing_part" not in cache:
+    part: StandingPart | None = vars(surface).get("standing_part")
+    if part is None:
         walls = find_walls(surface)
-        cache["standing_part"] = StandingPart.of(surface, walls, resting_vertices(surface, walls))
-    part: StandingPart = cache["standing_part"]
+        part = StandingPart.of(surface, walls, resting_vertices(surface, walls))
+        vars(surface)["standing_part"] = part  # where a cached property would put it
     return part
 
 
@@ -234,8 +224,8 @@ def pull_and_capacity(surface: Surface, walls: Walls, resting: Bools) -> tuple[F
     tension = surface.tensions[walls.wall_below]
     half = 0.5 * tension * np.linalg.norm(surface.plane.along(end - start), axis=1)
     capacity = np.zeros(surface.n)
-    np.add.at(capacity, walls.top_edges[:, 0], half)
-    np.add.at(capacity, walls.top_edges[:, 1], half)
+    for end in walls.top_edges.T:
+        np.add.at(capacity, end, half)
     return pull, np.where(resting, capacity, 0.0)
 
 
@@ -251,11 +241,10 @@ def excess_pull(surface: Surface, walls: Walls, resting: Bools) -> Floats:
 
 def top_spacing(surface: Surface, walls: Walls) -> Floats:
     """(n,) the shorter top edge at each vertex of one, length; infinite elsewhere."""
-    ends = surface.vertices[walls.top_edges]
-    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    lengths = segment_lengths(surface.vertices, walls.top_edges)
     spacing = np.full(surface.n, np.inf)
-    np.minimum.at(spacing, walls.top_edges[:, 0], lengths)
-    np.minimum.at(spacing, walls.top_edges[:, 1], lengths)
+    for end in walls.top_edges.T:
+        np.minimum.at(spacing, end, lengths)
     return spacing
 
 
@@ -281,8 +270,7 @@ def place_pinched_walls(surface: Surface, walls: Walls, resting: Bools, X: Float
     stands[remove_pinched_walls(surface, walls, resting).faces] = True
     rows = walls.rows
     gone = (resting | walls.corner)[rows.top_ends].all(axis=1) & ~stands[rows.vertices]
-    places = rows.top_places(X)
-    X = X.copy()
+    X, places = X.copy(), rows.top_places(X)
     X[rows.vertices[gone]] = places[gone]
     return X[_owners(surface.n, walls, resting)]
 
@@ -312,4 +300,4 @@ def _pressure_push(surface: Surface) -> Floats:
     vector = area_vectors(surface.vertices[surface.faces])
     force = (surface.pressures * ~surface.walls)[surface.patch_of_face] / 3.0
     push = force * (vector @ np.array(surface.plane.normal))
-    return np.asarray(np.bincount(surface.faces.ravel(), np.repeat(push, 3), surface.n), dtype=float)
+    return vertex_sums(push[:, None], surface.faces, surface.n)[:, 0]

@@ -84,12 +84,9 @@ def join_rows(parts: list[WallRows]) -> WallRows:
     if not parts:
         none = np.empty(0, dtype=int)
         return WallRows(none, np.empty((0, 2), dtype=int), np.empty(0), np.empty(0), np.empty((0, 3)))
-    columns = {
-        column.name: np.concatenate([getattr(part, column.name) for part in parts])
-        for column in fields(WallRows)
-    }
-    first = np.unique(columns["vertices"], return_index=True)[1]
-    return WallRows(**{name: values[first] for name, values in columns.items()})
+    columns = [np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(WallRows)]
+    first = np.unique(columns[0], return_index=True)[1]
+    return WallRows(*(values[first] for values in columns))
 
 
 def _nearest(flat: Floats, vertices: Ints, top_edges: Ints) -> tuple[Ints, Floats]:

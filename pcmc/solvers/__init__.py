@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..base import validate
-from ..base.errors import OptionError, SurfaceError, unknown
+from ..base.errors import SurfaceError
 from ..surface import Surface
 
 if TYPE_CHECKING:
@@ -46,19 +46,12 @@ METHODS: Mapping[str, Callable[[], Method]] = {"newton": _newton, "nesterov": _n
 
 
 def find_method(name: str) -> Method:
-    """The solver of this name and the class of its options.
+    """The solver of this name and the class of its options; OptionError names the nearest one.
 
     >>> find_method("lbfgs").options().memory
     10
-
-    Raises
-    ------
-    OptionError : there is none, with the nearest name.
     """
-    if name not in METHODS:
-        message = unknown("method", name, METHODS)
-        raise OptionError(message, what="method", found=name, expected=tuple(METHODS))
-    return METHODS[name]()
+    return METHODS[validate.choice("method", name, tuple(METHODS))]()
 
 
 def solve(
@@ -73,8 +66,7 @@ def solve(
         NLopt's L-BFGS.
     callback : called with a Progress after each iteration (each evaluation for ``"lbfgs"``). Raise
         StopIteration in it to stop; any other exception passes through.
-    options : fields of the method's options class: ``NewtonOptions``, ``NesterovOptions``,
-        ``LbfgsOptions``.
+    options : fields of the method's options class: ``NewtonOptions``, ``NesterovOptions``, ``LbfgsOptions``.
 
     Returns
     -------
@@ -102,13 +94,10 @@ def solve(
     pcmc.base.errors.OptionError: unknown method 'nestrov'; did you mean 'nesterov'? Known: newton, ...
     """
     if not isinstance(surface, Surface):
-        kind = type(surface).__name__
-        message = f"solve: expected a Surface, found {kind}"
-        raise SurfaceError(message, what="surface", found=kind, expected="Surface")
+        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
     solver = find_method(method)
     if callback is not None and not callable(callback):
-        message = f"callback: expected a function of a Progress, found {callback!r}"
-        raise OptionError(message, what="callback", found=callback, expected="a function")
+        validate.refuse("callback", callback, "a function of a Progress")
     if surface.size == 0.0:
         message = "solve: all vertices are at one point; start from a surface that has a size"
         raise SurfaceError(message, what="vertices")

@@ -93,7 +93,10 @@ class Attempt:
         """Step until the end; ``status`` then gives the reason."""
         self.status = until_stopped(self._iterate)
         if self.status is Status.STOPPED:  # perhaps in the middle of a step
-            self.state.go_back(*self._shown)
+            X, version = self._shown
+            if version == self.state.version:
+                self.state.X = X
+            self.state.measure()
         self.history.evaluations += self.state.evaluations
         self.history.factorisations += self.stepper.factorisations
         return self

@@ -29,8 +29,7 @@ class LbfgsOptions:
     ----------
     tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 or None to go on until no step helps.
     evaluations : the most evaluations of E and ∇E; NLopt counts no iterations.
-    memory : number of pairs of moves and gradient changes that approximate the Hessian; 0 lets NLopt
-        choose.
+    memory : number of pairs of moves and gradient changes that approximate the Hessian; 0 lets NLopt choose.
     inflation : diverged when the bounding box is more than this many times its first diagonal.
     """
 
@@ -109,10 +108,7 @@ class Objective:
         self.halt: Callable[[], object] = lambda: None
 
     def __call__(self, s: Floats, out: Floats) -> float:
-        """E at s, ∂E/∂s into ``out``.
-
-        NLopt may call again after ``halt``, and must not see an exception at any time.
-        """
+        """E at s, ∂E/∂s into ``out``; NLopt may call again after ``halt``, and must see no exception."""
         if self.status is None and self.raised is None:
             try:
                 point = self.visit(self.coordinates.positions(s))
@@ -156,10 +152,9 @@ def lbfgs(surface: Surface, options: LbfgsOptions | None = None, callback: Callb
     Returns
     -------
     Result
-        The surface of least energy seen. ``history``: ``evaluation``, ``energy``,
-        ``gradient_squared``; its last row is the returned surface, measured once more where the
-        last trial was not the best. Status STALLED when NLopt's line search finds no step (NLopt
-        reports this as an error with an empty message).
+        The surface of least energy seen. ``history``: ``evaluation``, ``energy``, ``gradient_squared``; its
+        last row is the returned surface, measured once more where the last trial was not the best. Status
+        STALLED when NLopt's line search finds no step (NLopt reports this as an error with an empty message).
 
     Examples
     --------
@@ -213,7 +208,6 @@ def _optimize(objective: Objective) -> Status:
 
 def _better(new: Point, best: Point) -> bool:
     """Whether it has less energy, or the same to rounding and less force."""
-    noise = NOISE * abs(best.energy)
-    if abs(new.energy - best.energy) > noise:
+    if abs(new.energy - best.energy) > NOISE * abs(best.energy):
         return new.energy < best.energy
     return new.squared < best.squared

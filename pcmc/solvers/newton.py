@@ -92,8 +92,7 @@ def _solve_level(surface: Surface, options: NewtonOptions, history: History, lev
     first = Attempt(surface, options, history, level).run()
     if first.status not in LOST:
         return first
-    rows = len(history.rows)
-    minimum = options.target == "minimum"
+    rows, minimum = len(history.rows), options.target == "minimum"
     other_way = replace(options, target="stationary")
     second = Attempt(surface, other_way, history, level, 0 if minimum else DESCENTS).run()
     if second.status is Status.STOPPED:
@@ -115,11 +114,8 @@ def _solve_level(surface: Surface, options: NewtonOptions, history: History, lev
 def _refuse_loose_parts(surface: Surface) -> None:
     """Refuse a part with an open edge and no support: nothing stops it from moving away."""
     topo = surface.topology
-    held = np.zeros(topo.components.max() + 1, dtype=bool)
-    held[topo.components[surface.fixed | surface.on_plane]] = True
-    open_edge = np.zeros_like(held)
-    open_edge[topo.components[topo.edges[topo.boundary_edge, 0]]] = True
-    loose = np.flatnonzero(open_edge & ~held)
+    open_parts = topo.components[topo.edges[topo.boundary_edge, 0]]
+    loose = np.setdiff1d(open_parts, topo.components[surface.fixed | surface.on_plane])
     if len(loose):
         vertex = int(np.flatnonzero(topo.components == loose[0])[0])
         face = int(np.flatnonzero((surface.faces == vertex).any(axis=1))[0])
@@ -129,5 +125,4 @@ def _refuse_loose_parts(surface: Surface) -> None:
             " and no support; hold it with fixed= or on_plane=, or remove it",
             what=name,
             where=vertex,
-            expected="a fixed or sliding vertex in each open part",
         )

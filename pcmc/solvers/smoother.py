@@ -15,8 +15,8 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..energy.motion_space import MotionSpace, VertexClasses, perpendicular
-from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
-from ..stability.factorisation import Factor, Factoriser, factoriser
+from ..energy.projected_hessian import assemble, hessian_pattern
+from ..stability.factorisation import factoriser
 from ..surface import Surface
 from ..surface.topology import SHEET
 
@@ -29,72 +29,60 @@ class Smoother:
     """L_α at one shape, factorised.
 
     Fixed vertices hold all coordinates, sliding ones only that normal to Π; so the coordinates along Π
-    have one factorisation, the normal one another.
+    have one factorisation, the normal one another: ``factorisations`` counts those of each ``refresh``.
     """
 
     def __init__(self, surface: Surface, classes: VertexClasses, backend: str | None = None) -> None:
         floor = FLOOR * float(surface.tensions.max())
         tensions = {p.name: max(p.tension, floor) for p in surface.patches}
-        self._surface = surface.retensioned(tensions, dict.fromkeys(tensions, 0.0))
-        self._classes = replace(
-            classes,
-            active=np.ones(surface.m, dtype=bool),
-            faces=surface.faces,
-            patch_of_face=surface.patch_of_face,
-            topology=surface.topology,
-        )
+        moderated = surface.retensioned(tensions, dict.fromkeys(tensions, 0.0))
+        faces = {name: getattr(surface, name) for name in ("faces", "patch_of_face", "topology")}
+        all_faces = replace(classes, active=np.ones(surface.m, dtype=bool), **faces)
         used = np.bincount(surface.faces.ravel(), minlength=surface.n) > 0
         normal = np.array(surface.plane.normal)
         first, second = perpendicular(normal[None])
         self._axes = np.stack([first[0], second[0], normal])
-        along = used & ~surface.fixed
-        across = along & ~surface.on_plane
-        self._along = _Coordinate(self._surface, self._classes, along, backend)
-        self._across = self._along
-        if (along != across).any():
-            self._across = _Coordinate(self._surface, self._classes, across, backend)
-
-    @property
-    def factorisations(self) -> int:
-        """Number of matrices that each ``refresh`` factorises."""
-        return 1 if self._across is self._along else 2
+        free = [used & ~surface.fixed]  # along Π; and across, if other vertices are free there
+        if (free[0] & surface.on_plane).any():
+            free.append(free[0] & ~surface.on_plane)
+        self._coordinates = [_Coordinate(moderated, all_faces, mask, backend) for mask in free]
+        self.factorisations = len(free)
 
     def refresh(self, X: Floats) -> None:
         """Compute L_α at the positions X (n,3) and factorise it."""
-        self._along.refresh(X)
-        if self._across is not self._along:
-            self._across.refresh(X)
+        for coordinate in self._coordinates:
+            coordinate.refresh(X)
 
     def solve(self, forces: Floats) -> Floats:
         """L_α⁻¹ forces (n,3), zero where a support holds the coordinate."""
         local = forces @ self._axes.T
         out = np.empty_like(local)
-        out[:, :2] = self._along.solve(local[:, :2])
-        out[:, 2:] = self._across.solve(local[:, 2:])
+        out[:, :2] = self._coordinates[0].solve(local[:, :2])
+        out[:, 2:] = self._coordinates[-1].solve(local[:, 2:])
         return out @ self._axes
+
+
+def _one_unknown_each(vertices: Bools) -> MotionSpace:
+    basis = np.zeros((len(vertices), 3, 3))
+    basis[:, 0, 0] = 1.0
+    return MotionSpace.of(basis, vertices.astype(np.int64))
 
 
 class _Coordinate:
     """L_α over the vertices whose coordinate is free."""
 
     def __init__(self, surface: Surface, classes: VertexClasses, free: Bools, backend: str | None) -> None:
-        basis = np.zeros((surface.n, 3, 3))
-        basis[:, 0, 0] = 1.0
-        self._space = MotionSpace.of(basis, free.astype(np.int64))
+        self._space = _one_unknown_each(free)
         self._surface, self._classes, self._free = surface, classes, free
-        self._pattern: Pattern = hessian_pattern(classes, self._space)
-        self._factoriser: Factoriser = factoriser(self._pattern, backend)
-        self._factor: Factor | None = None
+        self._pattern = hessian_pattern(classes, self._space)
+        self._factoriser = factoriser(self._pattern, backend)
 
     def refresh(self, X: Floats) -> None:
-        data = assemble(
-            self._surface, self._classes, self._space, self._pattern, X, hessian=0.0, stiffness=1.0
-        )
+        data = assemble(self._surface, self._classes, self._space, self._pattern, X, 0.0, stiffness=1.0)
         data[self._pattern.indptr[:-1]] *= 1.0 + SHIFT
         self._factor = self._factoriser.factor(data)
 
     def solve(self, forces: Floats) -> Floats:
-        assert self._factor is not None, "refresh before solve"
         out = np.zeros_like(forces)
         out[self._free] = self._factor.solve(forces[self._free])
         return out
@@ -111,9 +99,7 @@ class HarmonicExtension:
         self, surface: Surface, classes: VertexClasses, X: Floats, backend: str | None = None
     ) -> None:
         used = ~classes.idle
-        basis = np.zeros((surface.n, 3, 3))
-        basis[:, 0, 0] = 1.0
-        space = MotionSpace.of(basis, used.astype(np.int64))
+        space = _one_unknown_each(used)
         equal = surface.retensioned({p.name: 1.0 for p in surface.patches})
         pattern = hessian_pattern(classes, space)
         data = assemble(equal, classes, space, pattern, X, hessian=0.0, stiffness=1.0)

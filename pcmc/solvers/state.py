@@ -57,8 +57,7 @@ class State:
         self.version = 0
         self._redistributions_left, self._releases_left = REDISTRIBUTIONS, RELEASES
         self._damping: Floats = np.ones(surface.n)  # smaller where a vertex has been lifted in vain
-        # vertices are redistributed where quality and residual are below these
-        self._poor_quality, self._small_residual = min_quality, np.inf
+        self._poor_quality, self._small_residual = min_quality, np.inf  # redistribution is due below these
         self._take(part)
 
     def _take(self, part: StandingPart) -> None:
@@ -101,9 +100,9 @@ class State:
 
     def result_surface(self) -> Surface:
         """The whole surface at X, with pinched walls placed on their resting junctions."""
-        if not self.resting.any():
-            return self.full.moved(self.X)
-        X = place_pinched_walls(self.full, self.walls, self.resting, self.X)
+        X = self.X
+        if self.resting.any():
+            X = place_pinched_walls(self.full, self.walls, self.resting, X)
         return self.full.moved(X)
 
     def move(self, X: Floats, down: Bools) -> None:
@@ -114,12 +113,6 @@ class State:
             self._take(StandingPart.of(self.full, self.walls, self.resting | down))
         else:
             self.measure()
-
-    def go_back(self, X: Floats, version: int) -> None:
-        """Go back to X if it belongs to the present version, and measure."""
-        if version == self.version:
-            self.X = X
-        self.measure()
 
     def displaced(self, d: Floats) -> tuple[Floats, Bools]:
         """X + d, and the junction vertices that this brings down to Π, where they are placed.
@@ -150,9 +143,8 @@ class State:
     def maintain_mesh(self) -> bool:
         """Redistribute the vertices along the shape while triangles are poor; True if they moved."""
         start = self.quality
-        if self._redistributions_left <= 0 or start >= self._poor_quality:
-            return False
-        if not 1e-7 <= self.relative < self._small_residual:
+        due = start < self._poor_quality and 1e-7 <= self.relative < self._small_residual
+        if not due or self._redistributions_left <= 0:
             return False
         self._redistributions_left -= 1
         X, quality = redistribute(self.part, self.X, self.min_quality, slide=True)
@@ -176,8 +168,7 @@ class State:
         full = self.result_surface()
         walls = replace(find_walls(full), side=self.walls.side)
         part = StandingPart.of(full, walls, self.resting)
-        same = np.array_equal(part.surface.faces, self.surface.faces)
-        if same or self._releases_left <= 0:
+        if np.array_equal(part.surface.faces, self.surface.faces) or self._releases_left <= 0:
             return False
         self._releases_left -= 1
         self.full = full
@@ -191,8 +182,7 @@ class State:
         if self._releases_left <= 0 or not lifted.any():
             return False
         self._releases_left -= 1
-        side = np.where(excess < 0.0, -self.walls.side, self.walls.side)
-        walls = replace(self.walls, side=side)
+        walls = replace(self.walls, side=np.where(excess < 0.0, -self.walls.side, self.walls.side))
         self.full = lift(self.result_surface(), walls, lifted, LIFT * self._damping)
         self._damping[lifted] *= DAMPING
         self._take(StandingPart.of(self.full, walls, self.resting & ~lifted))

@@ -71,7 +71,7 @@ class Stepper:
         fresh = self._factor is None
         if not self._factorise_definite():
             return False
-        d = self._direction() if self._shift == 0.0 else self._shifted_direction()
+        d = self._direction()
         start, energy, norm = state.X, state.energy, state.norm
         slope = float((state.gradient * d).sum())
         for t in LENGTHS if fresh else LENGTHS[:1]:
@@ -137,25 +137,21 @@ class Stepper:
         except SingularMatrix:
             return False
         self.factorisations += 1
-        if system.negative == 0:
-            return False
-        modes = lowest(system, 1)[1]
+        modes = lowest(system, 1)[1] if system.negative else np.empty(0)
         if not len(modes):
             return False
         normals, area = vertex_area_vectors(state.X, state.classes.faces)
         unit = modes[0] * (np.sqrt(area.sum() / 3.0) / np.linalg.norm(modes[0], axis=1).max())
         if (unit * normals).sum() < 0.0:
             unit = -unit  # outwards first, whichever way the surface is turned
-        X = self._downhill(unit)
-        if X is None:
-            X = self._downhill(-unit)
-        if X is None:
-            return False
-        state.X = X
-        state.measure()
-        self._factor = None
-        self.kind = "saddle"
-        return True
+        for direction in (unit, -unit):
+            X = self._downhill(direction)
+            if X is not None:
+                state.X = X
+                state.measure()
+                self._factor, self.kind = None, "saddle"
+                return True
+        return False
 
     def _downhill(self, unit: Floats) -> Floats | None:
         """X farthest along a motion of unit length, in doubling steps on which E keeps falling; or None."""
@@ -197,16 +193,12 @@ class Stepper:
                 continue
             self.factorisations += 1
             self._factor, self._shift, self._factor_space = factor, shift, state.space
-            self._added = None if weight == shift else self._added_stiffness()
+            self._added = None
+            if weight != shift:
+                soft = assemble(state.surface, state.classes, state.space, self._pattern, state.X, 0.0, SOFT)
+                self._added = full_matrix(self._pattern, soft)
             return True
         return False
-
-    def _added_stiffness(self) -> csr_array:
-        """The little stiffness that was added to a singular matrix."""
-        state = self.state
-        assert self._pattern is not None
-        data = assemble(state.surface, state.classes, state.space, self._pattern, state.X, 0.0, SOFT)
-        return full_matrix(self._pattern, data)
 
     def _in_factor_basis(self, action: Callable[[Floats], Floats], s: Floats) -> Floats:
         """Apply an action in the basis that the factor was made in to s, given in the present one."""
@@ -218,12 +210,15 @@ class Stepper:
     def _direction(self) -> Floats:
         """-B J⁻¹ r with J the derivative of r itself, by GMRES preconditioned with the factor.
 
-        Stiffness added to the factor is added to J, too: otherwise motions that cost no energy would
-        use up the accuracy.
+        With a shift, J is the shifted matrix, and the factor its inverse. Stiffness added to the factor is
+        added to J, too: otherwise motions that cost no energy would use up the accuracy.
         """
         state, factor, added = self.state, self._factor, self._added
         assert factor is not None
         residual = state.residual
+        if self._shift != 0.0:
+            self._gmres_steps = 0
+            return -state.space.to_vectors(self._in_factor_basis(factor.solve, residual))
         size = (len(residual), len(residual))
         here = linearise(state.surface, state.classes, state.space, state.X, state.gradient)
 
@@ -232,10 +227,12 @@ class Stepper:
             return change if added is None else change + self._in_factor_basis(added.__matmul__, s)
 
         norms: list[float] = []
+        matrix = LinearOperator(size, times, dtype=float)
+        inverse = LinearOperator(size, lambda r: self._in_factor_basis(factor.solve, r), dtype=float)
         s, _ = gmres(
-            LinearOperator(size, times, dtype=float),
+            matrix,
             -residual,
-            M=LinearOperator(size, lambda r: self._in_factor_basis(factor.solve, r), dtype=float),
+            M=inverse,
             rtol=1e-3,
             restart=12,
             maxiter=1,
@@ -247,10 +244,7 @@ class Stepper:
         return state.space.to_vectors(self._limit_drift(s) if len(self._motions) else s)
 
     def _limit_drift(self, s: Floats) -> Floats:
-        """s with its rigid part shortened, which only slides the mesh along the surface.
-
-        A shortened step may raise the residual; the next ones lower it again.
-        """
+        """s with its rigid part shortened, which only slides the mesh; the residual may rise for a while."""
         state = self.state
         rigid = rigid_modes(state.space, self._motions, state.X)
         drift = rigid @ (rigid.T @ s)
@@ -260,11 +254,6 @@ class Stepper:
             return s
         self._residual_raised = False
         return s - (1.0 - room / far) * drift
-
-    def _shifted_direction(self) -> Floats:
-        self._gmres_steps = 0
-        assert self._factor is not None
-        return -self.state.space.to_vectors(self._in_factor_basis(self._factor.solve, self.state.residual))
 
     def _with_sheets(self, d: Floats) -> Floats:
         """The motion d with the insides of the sheets following their curves."""
@@ -278,15 +267,12 @@ class Stepper:
         return self._extension.extend(self.state.space, d)
 
     def _improved(self, t: float, slope: float, energy: float, norm: float) -> bool:
-        """Whether the step just taken lowers the residual enough or, towards a minimum, E.
-
-        Where no support resists some rigid motion, every other step may raise the residual.
-        """
+        """Whether the step just taken lowers the residual enough or, towards a minimum, E."""
         if self.state.norm < (1.0 - 0.3 * t) * norm:
             self._residual_raised = False
             return True
+        # where no support resists some rigid motion, every other step may raise the residual
         if len(self._motions) and not self._residual_raised and self.state.norm < 2.0 * norm:
             self._residual_raised = True
             return True
-        falls = self.state.energy <= energy + 1e-2 * t * slope and slope < 0.0
-        return falls and self.minimum
+        return self.minimum and self.state.energy <= energy + 1e-2 * t * slope and slope < 0.0

@@ -26,15 +26,15 @@ from scipy.sparse import csc_array, csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
+from ..base import validate
 from ..base.arrays import Floats, Ints
-from ..base.errors import MissingExtra, OptionError, unknown
+from ..base.errors import MissingExtra
 from ..energy.projected_hessian import Pattern
 
 BACKENDS = ("pardiso", "superlu")
 ZERO = 1e-13  # of the largest entry: a pivot below is zero to rounding
 TINY = float(np.finfo(float).tiny)
 ONE_THREAD = 10_000  # rows; up to here MKL is fastest with one thread
-
 
 IPARM = {  # MKL's parameters by their numbers from 1
     1: 1,  # the values below instead of the defaults
@@ -93,10 +93,7 @@ def factoriser(pattern: Pattern, backend: str | None = None) -> Factoriser:
     >>> factor.negative, factor.solve(np.array([3.0, 3.0])).round(12).tolist()
     (1, [1.0, 1.0])
     """
-    chosen = backend or available()[0]
-    if chosen not in BACKENDS:
-        message = unknown("factorisation backend", chosen, BACKENDS)
-        raise OptionError(message, what="backend", found=chosen, expected=BACKENDS)
+    chosen = validate.choice("backend", backend or available()[0], BACKENDS)
     if chosen not in available():
         raise MissingExtra("pypardiso", "fast")
     # MKL refuses a matrix without rows
@@ -139,13 +136,7 @@ class _SuperLU:
         _finite(data)
         matrix = csc_array((data[self._source], self._indices, self._indptr), self._full.shape)
         try:
-            lu = splu(
-                matrix,
-                permc_spec=self._ordering,
-                diag_pivot_thresh=0.0,
-                panel_size=4,
-                options={"SymmetricMode": True},
-            )
+            lu = splu(matrix, self._ordering, 0.0, panel_size=4, options={"SymmetricMode": True})
         except RuntimeError as error:
             raise SingularMatrix(str(error)) from None
         factor = _SuperLUFactor(matrix, lu, self._order)
@@ -167,8 +158,7 @@ class _SuperLUFactor:
             raise SingularMatrix("a zero pivot forced a row exchange, so the inertia is unknown")
         pivots = self.lu.U.diagonal()
         largest = np.abs(self.matrix.data).max(initial=0.0)
-        zero = int(np.count_nonzero(np.abs(pivots) < ZERO * largest))
-        if zero:
+        if zero := int(np.count_nonzero(np.abs(pivots) < ZERO * largest)):
             raise SingularMatrix(f"{zero} pivots are zero to rounding")
         return int(np.count_nonzero(pivots < 0.0))
 
@@ -226,15 +216,13 @@ class _Pardiso:
     @contextmanager
     def _threads(self) -> Iterator[None]:
         """MKL uses one thread within the block if the matrix is small."""
-        if self._pattern.size > ONE_THREAD:
-            yield
-            return
         set_threads = self._solver.libmkl.MKL_Set_Num_Threads_Local
-        before = set_threads(1)
+        before = set_threads(1) if self._pattern.size <= ONE_THREAD else None
         try:
             yield
         finally:
-            set_threads(before)
+            if before is not None:
+                set_threads(before)
 
 
 @cache

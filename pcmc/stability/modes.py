@@ -7,6 +7,7 @@ number of negative λ is the Morse index; it is counted by inertia, without comp
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,25 +88,14 @@ def stiffness(
     X = surface.vertices
     pattern = hessian_pattern(classes, space)
     solver = factoriser(pattern, backend)
-    data = assemble(surface, classes, space, pattern, X)
-    try:
-        factor = solver.factor(data)
-        negative = negatives_without(factor, rigid)
-    except SingularMatrix:
-        data = assemble(surface, classes, space, pattern, X, 1.0, SOFT)
-        factor = solver.factor(data)
-        negative = negatives_without(factor, rigid)
-    mass = lumped_mass(space, classes, X)
-    return Stiffness(space, full_matrix(pattern, data), mass, factor, rigid, negative)
-
-
-def surface_stiffness(surface: Surface) -> Stiffness:
-    """The stiffness of the part of a surface that stands; errors as of ``stiffness``."""
-    part = standing_part(surface)
-    X = part.surface.vertices
-    space = motion_space(part.surface, part.classes, X)
-    rigid = rigid_modes(space, rigid_motions(part.surface), X)
-    return stiffness(part.surface, part.classes, space, rigid)
+    for added in (0.0, SOFT):
+        data = assemble(surface, classes, space, pattern, X, 1.0, added)
+        with suppress(SingularMatrix):
+            factor = solver.factor(data)
+            negative = negatives_without(factor, rigid)
+            mass = lumped_mass(space, classes, X)
+            return Stiffness(space, full_matrix(pattern, data), mass, factor, rigid, negative)
+    raise SingularMatrix("the second variation is singular, also with a little stiffness added")
 
 
 def morse_index(surface: Surface) -> int:
@@ -126,7 +116,11 @@ def morse_index(surface: Surface) -> int:
     >>> morse_index(roof)
     0
     """
-    return surface_stiffness(surface).negative
+    part = standing_part(surface)
+    X = part.surface.vertices
+    space = motion_space(part.surface, part.classes, X)
+    rigid = rigid_modes(space, rigid_motions(part.surface), X)
+    return stiffness(part.surface, part.classes, space, rigid).negative
 
 
 def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
