@@ -17,7 +17,6 @@ from ..surface.topology import SHEET
 
 SQRT3 = sqrt(3.0)
 SWEEPS = 20  # of redistribution, at most
-SWEEPS = 20  # of redistribution, at most
 
 
 def compare(X: Floats, Y: Floats, F: Ints) -> tuple[bool, float, float]:

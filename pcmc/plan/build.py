@@ -16,8 +16,7 @@ from .arrangement import Arrangement, arrange, hole_points
 from .curves import Curve, to_local, to_space
 from .heights import dome, harmonic_heights
 from .lines import SNAP, Kind, Line
-from .parts import EDGES, Area
-from .plan import Plan
+from .parts import EDGES, Area, PlanData
 from .planar import PlanarMesh, locate, signed_areas, triangulate
 from .walls import UpperEdge, WallMesh, build_walls
 
@@ -30,7 +29,7 @@ GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in
 class _Draft:
     """A plan with its lines, and its plane mesh, whose first points are those of the lines."""
 
-    plan: Plan
+    plan: PlanData
     lines: Sequence[Line]
     supports_on_edge: Sequence[Curve]
     drawn: Arrangement
@@ -47,7 +46,7 @@ class _Roof:
     pressure: Floats
 
 
-def build_surface(plan: Plan) -> Surface:
+def build_surface(plan: PlanData) -> Surface:
     """The mesh of the plan at its initial height, with its walls and supports."""
     _check_size(plan)
     draft = _drafted(plan)
@@ -79,7 +78,7 @@ def build_surface(plan: Plan) -> Surface:
     )
 
 
-def _drafted(plan: Plan) -> _Draft:
+def _drafted(plan: PlanData) -> _Draft:
     lines, on_edge = _lines(plan)
     spots = np.array([to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)])
     stops = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in on_edge)])
@@ -93,7 +92,7 @@ def _drafted(plan: Plan) -> _Draft:
     return _Draft(plan, lines, on_edge, drawn, mesh)
 
 
-def _check_size(plan: Plan) -> None:
+def _check_size(plan: PlanData) -> None:
     """Refuse lengths that are probably mistakes, before they fill the memory."""
 
     def error(key: str, value: float, problem: str) -> PlanError:
@@ -121,7 +120,7 @@ def _check_size(plan: Plan) -> None:
             raise PlanError(f"{hole.name} {problem}", what=hole.name, found=extent)
 
 
-def _lines(plan: Plan) -> tuple[list[Line], list[Curve]]:
+def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:
     """The lines to draw, in the coordinates of Π, and the supports that lie on the boundary."""
     lines = [Line("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
     lines += [Line(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
@@ -174,7 +173,7 @@ def _warn_of_free_edges(draft: _Draft, held: Bools) -> None:
             warnings.warn(text, PlanWarning, stacklevel=4)
 
 
-def _patches(plan: Plan, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
+def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
     """The plan's patches and the patch of each triangle."""
     count = int(mesh.region.max()) + 1
     area = signed_areas(mesh.points, mesh.triangles)

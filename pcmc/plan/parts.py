@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
 from ..base import validate
 from ..base.errors import OptionError, unknown
+from ..surface import Plane
 from .curves import Curve, curve
 
 EDGES = ("fixed", "sliding", "free")
@@ -152,3 +153,19 @@ def check_keys(values: Any, kind: Any, what: str) -> None:
     for key in values:
         if key not in known:
             raise OptionError(unknown(f"{what} key", key, known), what=what, where=key, expected=known)
+
+
+@dataclass(frozen=True, eq=False)
+class PlanData:
+    """The values of a plan. ``Plan`` says what they mean and checks them."""
+
+    outline: Any
+    dividers: Sequence[Any] = ()
+    holes: Sequence[Any] = ()
+    patches: Any = ()
+    edge_length: float = 1.0
+    edge: str = "fixed"
+    supports: Sequence[Any] = ()
+    plane: Plane = field(default_factory=Plane)
+    rise: float | None = None
+    tension: float | None = None

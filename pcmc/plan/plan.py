@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from ..base import validate
 from ..base.errors import MissingExtra, OptionError
 from ..surface import Plane, Surface
-from .parts import EDGES, areas_of, check_keys, curve_of, divider_of, hole_of, support_of
+from .parts import EDGES, PlanData, areas_of, check_keys, curve_of, divider_of, hole_of, support_of
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(PlanData):
     """A roof given by the lines of its plan.
 
     Curves are Curves or their plain data (see ``curve``).
@@ -58,17 +58,6 @@ class Plan:
     >>> [p.name for p in plan.surface().patches]
     ['west', 'east', 'wall 1']
     """
-
-    outline: Any
-    dividers: Sequence[Any] = ()
-    holes: Sequence[Any] = ()
-    patches: Any = ()
-    edge_length: float = 1.0
-    edge: str = "fixed"
-    supports: Sequence[Any] = ()
-    plane: Plane = field(default_factory=Plane)
-    rise: float | None = None
-    tension: float | None = None
 
     def __post_init__(self) -> None:
         parsed = {

@@ -3,25 +3,57 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..base import validate
 from ..meshing.quality import worst_quality
 from ..surface import Surface
 from .result import Callback, Progress, Status, until_stopped
 from .state import State
 from .steps import Stepper
 
-if TYPE_CHECKING:
-    from .newton import NewtonOptions
-
+TARGETS = ("minimum", "stationary")
 DESCENTS = 5  # smooth steps after a Newton step that did not help
 PATIENCE = 8  # steps without halving the residual, once it is that small
 ROUNDED = 1e-10  # relative residual that counts as zero where rounding lets no step lower it
 COLLAPSED = 1e-3  # triangle quality below which the attempt ends
 POOR = 0.15  # triangle quality that explains why no step helps
 SHRUNK = 5e-2  # of its first size: a surface that nothing holds has vanished
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """Options of the geometric solver.
+
+    Parameters
+    ----------
+    tolerance : converged when ‖Bᵀ∇E‖ ≤ tolerance × the norm of the single triangles' forces, or when it
+        is below 1e-10 of that norm and rounding lets no step lower it further.
+    iterations : the most steps of any kind, on each level and in each attempt.
+    target : ``"minimum"`` leaves saddles; ``"stationary"`` converges to them.
+    levels : number of 1→4 refinements; the surface is solved before the first and after each.
+    min_quality : vertices are redistributed along the shape while the worst triangle has less quality.
+    inflation : diverged when the bounding box is more than this many times its first diagonal.
+    backend : factorisation, ``"pardiso"`` or ``"superlu"``; None for the fastest here.
+    """
+
+    tolerance: float = 1e-12
+    iterations: int = 200
+    target: str = "minimum"
+    levels: int = 0
+    min_quality: float = 0.45
+    inflation: float = 10.0
+    backend: str | None = None
+
+    def __post_init__(self) -> None:
+        validate.number("tolerance", self.tolerance, above=0.0)
+        validate.integer("iterations", self.iterations)
+        validate.choice("target", self.target, TARGETS)
+        validate.integer("levels", self.levels)
+        validate.number("min_quality", self.min_quality, least=0.0, below=1.0)
+        validate.number("inflation", self.inflation, above=1.0)
 
 
 @dataclass

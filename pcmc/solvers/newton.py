@@ -13,54 +13,21 @@ or none was asked for; or, if that is what has failed, with smooth steps first.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..base import validate
 from ..base.errors import SurfaceError
 from ..meshing.refinement import refine
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import morse_index
 from ..surface import Surface
-from .attempt import DESCENTS, POOR, Attempt, History
+from .attempt import DESCENTS, POOR, Attempt, History, NewtonOptions
 from .result import Callback, Result, Status
 
-TARGETS = ("minimum", "stationary")
+__all__ = ["NewtonOptions", "newton"]
+
 LOST = (Status.DEGENERATE, Status.STALLED)  # worth a second attempt
-
-
-@dataclass(frozen=True)
-class NewtonOptions:
-    """Options of the geometric solver.
-
-    Parameters
-    ----------
-    tolerance : converged when ‖Bᵀ∇E‖ ≤ tolerance × the norm of the single triangles' forces, or when it
-        is below 1e-10 of that norm and rounding lets no step lower it further.
-    iterations : the most steps of any kind, on each level and in each attempt.
-    target : ``"minimum"`` leaves saddles; ``"stationary"`` converges to them.
-    levels : number of 1→4 refinements; the surface is solved before the first and after each.
-    min_quality : vertices are redistributed along the shape while the worst triangle has less quality.
-    inflation : diverged when the bounding box is more than this many times its first diagonal.
-    backend : factorisation, ``"pardiso"`` or ``"superlu"``; None for the fastest here.
-    """
-
-    tolerance: float = 1e-12
-    iterations: int = 200
-    target: str = "minimum"
-    levels: int = 0
-    min_quality: float = 0.45
-    inflation: float = 10.0
-    backend: str | None = None
-
-    def __post_init__(self) -> None:
-        validate.number("tolerance", self.tolerance, above=0.0)
-        validate.integer("iterations", self.iterations)
-        validate.choice("target", self.target, TARGETS)
-        validate.integer("levels", self.levels)
-        validate.number("min_quality", self.min_quality, least=0.0, below=1.0)
-        validate.number("inflation", self.inflation, above=1.0)
 
 
 def newton(
