@@ -152,7 +152,7 @@ def certify(
     standing, classes, X = part.surface, part.classes, part.surface.vertices
     unheld = excess_pull(standing, part.walls, part.resting)
     value, forces = energy_and_gradient(standing, X, supports=False)
-    enclosed = volume(surface)
+    enclosed, areas = volume(surface), patch_areas(surface)
     scale = force_scale(standing, classes, X)
     space = motion_space(standing, classes, X)
     rigid = rigid_modes(space, rigid_motions(standing), X)
@@ -171,7 +171,7 @@ def certify(
             if modes > 0 and space.size > 2:
                 eigenvalues, fields = lowest(system, modes)
 
-    patches = _patch_table(surface, standing, qualities)
+    patches = _patch_table(surface, standing, areas, qualities)
     ratio, support_forces = load_ratio(standing), reactions(standing)
     notes = _pulled_off(unheld), pressures_left_over(standing)
     verdict, reason = judge(
@@ -246,10 +246,9 @@ def _pulled_off(excess: Floats) -> str:
     )
 
 
-def _patch_table(surface: Surface, standing: Surface, quality: Floats) -> pd.DataFrame:
+def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Floats) -> pd.DataFrame:
     errors = {method: np.abs(curvature_error(standing, method)) for method in METHODS}
     curvature = mean_curvature(standing, "variational")
-    areas = patch_areas(surface)
     rows = []
     for index, patch in enumerate(surface.patches):
         faces = standing.patch_of_face == index
