@@ -1,4 +1,4 @@
-"""The exceptions of pcmc. A message says what is wrong, where, and what to do."""
+"""The exceptions of pcmc. Each message names the problem, its place, and what to do."""
 
 from __future__ import annotations
 

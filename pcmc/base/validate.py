@@ -1,7 +1,7 @@
 """Checks of single values, for the whole package. Each error names the parameter.
 
-``where`` names the owner of the parameter, such as the patch of a tension; ``hint`` is added to the message
-and says what to do; ``error`` is the exception to raise.
+``where`` names the owner of the parameter, such as the patch of a tension; ``hint``, what to do, ends the
+message; ``error`` is the exception to raise.
 """
 
 from __future__ import annotations

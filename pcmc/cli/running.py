@@ -19,7 +19,7 @@ FAILING = ("strict", "surrogateescape")  # error handlers; the second is the loc
 
 
 def run(arguments: list[str]) -> int:
-    """Run the command; errors become one line on stderr, and the exit code says how it ended."""
+    """Run the command; an error becomes one line on stderr; return the exit code."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for kind in SHOWN:

@@ -84,7 +84,7 @@ def follow(
     Returns
     -------
     Branch
-        If the branch cannot be followed further, its ``ending`` says so; that is no exception.
+        If the branch cannot be followed further, see its ``ending``; no exception is raised.
 
     Raises
     ------

@@ -73,7 +73,7 @@ def meet(
     Returns
     -------
     Design
-        If the targets are out of reach, its ``status`` says so; that is no exception.
+        If the targets are out of reach, see its ``status``; no exception is raised.
 
     Raises
     ------

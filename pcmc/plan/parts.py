@@ -157,7 +157,7 @@ def check_keys(values: Any, kind: Any, what: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class PlanData:
-    """The values of a plan. ``Plan`` says what they mean and checks them."""
+    """The values of a plan; ``Plan`` explains and checks them."""
 
     outline: Any
     dividers: Sequence[Any] = ()

@@ -1,0 +1,238 @@
+"""The verdict: every one of them is reached, and the first rule that applies decides."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from shapes import pyramid, shaken
+from starts import double_bubble, four_fans, spherical_cap, two_squares
+
+from pcmc import Patch, Surface, certify, solve
+from pcmc.certificate import Evidence, Verdict
+from pcmc.certificate.balance import coarseness, load_ratio
+from pcmc.certificate.verdict import Findings, judge
+from pcmc.solvers.result import Status
+
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
+
+
+@pytest.mark.parametrize("surface", [shaken(pyramid(), 0.2), two_squares(4), four_fans(4)])
+def test_forces_left_are_not_converged(surface):
+    found = certify(surface)
+    assert found.verdict is Verdict.NOT_CONVERGED
+    assert found.index is None
+    assert len(found.eigenvalues) == len(found.modes) == 0
+    assert f"{found.residual:.1e}" in found.detail
+    assert found.numbers()["lowest_eigenvalue"] is None
+    assert "Morse index  -" in str(found)
+
+
+def test_the_tolerance_decides():
+    surface = solve(two_squares(4), iterations=3).surface
+    residual = certify(surface).residual
+    assert 1e-12 < residual < 0.1
+    assert certify(surface, tolerance=2 * residual).verdict is Verdict.STABLE
+    assert certify(surface, tolerance=0.5 * residual).verdict is Verdict.NOT_CONVERGED
+
+
+def test_a_neutral_surface():
+    """Walls that meet over a disc: at some tension of theirs a sideways shift costs nothing."""
+
+    def lowest(alpha_aux):
+        found = solve(four_fans(4, alpha_aux=alpha_aux), target="stationary").certificate
+        return found.eigenvalues[0]
+
+    assert lowest(2.0) > 0.0 > lowest(4.0)
+    critical = brentq(lowest, 2.0, 4.0, xtol=1e-3)
+    found = solve(four_fans(4, alpha_aux=critical), target="stationary").certificate
+    assert found.index in (0, 2)
+    near = solve(four_fans(4, alpha_aux=critical - 2e-3), target="stationary").certificate
+    assert near.verdict is Verdict.NEUTRAL
+    assert near.certified
+    assert "softest mode" in near.detail
+
+
+def beside_a_stiff_cap(soft: Surface, times: float) -> Surface:
+    """The cap and, three away, one at rest that is so many times as stiff."""
+    stiff = solve(spherical_cap(0.25, alpha=0.6 * times)).surface
+    patches = [Patch("soft", 0.6), Patch("stiff", 0.6 * times)]
+    return Surface(
+        np.concatenate([soft.vertices, stiff.vertices + np.array([3.0, 0.0, 0.0])]),
+        np.concatenate([soft.faces, soft.n + stiff.faces]),
+        np.repeat([0, 1], [soft.m, stiff.m]),
+        patches,
+        fixed=np.concatenate([soft.fixed, stiff.fixed]),
+    )
+
+
+def test_a_mode_is_soft_beside_the_tension_of_what_it_moves():
+    """Not beside that of another part, or of a wall that is down: both used to make it neutral."""
+    cap = solve(spherical_cap(0.25))
+    found = certify(beside_a_stiff_cap(cap.surface, 1e6))
+    assert found.eigenvalues[0] == pytest.approx(cap.certificate.eigenvalues[0], rel=1e-9)
+    assert found.verdict is Verdict.STABLE
+    down = solve(two_squares(6, alpha_aux=3e3)).certificate
+    assert len(down.pinched) == 5
+    assert down.verdict is Verdict.STABLE
+
+
+def test_strong_forces_do_not_hide_what_a_weak_patch_lacks():
+    found = certify(beside_a_stiff_cap(spherical_cap(0.25), 1e8))
+    assert found.residual < 1e-8
+    assert found.curvature_error > 0.1
+    assert found.verdict is Verdict.NOT_CONVERGED
+    assert found.detail.startswith("the forces left in patch 'soft' are 9.7e-02 of its own")
+    both = solve(beside_a_stiff_cap(spherical_cap(0.25), 1e8), tolerance=1e-18)
+    assert both.certificate.verdict is Verdict.STABLE
+
+
+def test_no_equilibrium_from_the_load_alone():
+    found = certify(spherical_cap(0.25, alpha=0.45))
+    assert found.load_ratio == pytest.approx(1.0 / 0.9, rel=0.03)
+    assert found.verdict is Verdict.NO_EQUILIBRIUM
+    assert f"{found.load_ratio:.2f} times what the boundary's tension could carry" in found.detail
+    huge = certify(spherical_cap(0.25, alpha=1e-40)).detail
+    assert huge == "the pressure is 4.96e+39 times what the boundary's tension could carry"
+    assert certify(spherical_cap(0.25, alpha=0.55)).verdict is Verdict.NOT_CONVERGED
+
+
+@pytest.mark.parametrize("alpha", [0.6, 1.0])
+def test_the_load_ratio_of_a_disc_is_its_radius_over_twice_the_tension(alpha):
+    surface = spherical_cap(0.1, alpha=alpha, exact=True)
+    assert load_ratio(surface) == pytest.approx(0.5 / alpha, rel=2e-3)
+    assert load_ratio(double_bubble(0.8)) == 0.0
+
+
+def test_what_is_fixed_inside_carries_too():
+    """A ring that holds a cap half way lets it stand below the tension of the hemisphere."""
+    cap = spherical_cap(0.1, alpha=0.45)
+    away = np.hypot(*cap.vertices.T[:2])
+    ring = np.abs(away - 0.5) < 0.03
+    held = Surface(cap.vertices, cap.faces, cap.patch_of_face, cap.patches, fixed=cap.fixed | ring)
+    assert load_ratio(cap) == pytest.approx(1.0 / 0.9, rel=3e-3)
+    both_sides = 2.0 * away[ring].mean()
+    assert load_ratio(held) == pytest.approx(1.0 / 0.9 / (1.0 + both_sides), rel=5e-3)
+    assert certify(held).verdict is Verdict.NOT_CONVERGED
+    assert solve(held).certificate.verdict is Verdict.STABLE
+    column = Surface(cap.vertices, cap.faces, cap.patch_of_face, cap.patches, fixed=cap.fixed | (away == 0))
+    star = np.linalg.norm(cap.vertices[1] - cap.vertices[2])
+    carried = 0.45 * (2.0 * np.pi + 0.5 * 6.0 * star)
+    assert load_ratio(column) == pytest.approx(np.pi / carried, rel=4e-3)
+
+
+def test_a_load_just_above_what_tension_carries_is_no_proof_on_a_coarse_mesh():
+    """The smooth cap ends at α = 1/2; that of edge length 0.2 is still there a little below."""
+    surface = spherical_cap(0.2, alpha=0.495)
+    assert 1.0 < load_ratio(surface) < 1.0 + coarseness(surface) < 1.1
+    before = certify(surface)
+    assert before.verdict is Verdict.NOT_CONVERGED
+    assert f"{before.load_ratio:.3f} times what the boundary's tension could carry" in before.detail
+    after = solve(surface)
+    assert after.converged
+    assert after.certificate.verdict is Verdict.STABLE
+    assert after.certificate.load_ratio > 1.0
+
+
+def test_coarseness_falls_with_the_square_of_the_edge_length():
+    coarse, fine = coarseness(spherical_cap(0.2)), coarseness(spherical_cap(0.1))
+    assert coarse == pytest.approx(0.04, rel=0.15)
+    assert coarse / fine == pytest.approx(4.0, rel=0.15)
+    assert coarseness(double_bubble(0.8)) == 0.0
+    assert coarseness(pyramid(0.4)) > 0.5  # at rest down to α = 1/3, where the ratio is 1.5
+
+
+def test_without_any_tension_every_shape_is_at_rest():
+    slack = pyramid().retensioned({"roof": 0.0}, {"roof": 0.0})
+    found = certify(slack)
+    assert found.verdict is Verdict.NEUTRAL
+    assert found.detail == "no patch has a tension: every shape is at rest"
+
+
+def test_a_collapsed_triangle_is_named():
+    surface = solve(spherical_cap(0.25)).surface
+    X = surface.vertices.copy()
+    face = 40
+    a, b, c = surface.faces[face]
+    assert surface.free[c]
+    X[c] = 0.5 * (X[a] + X[b])
+    found = certify(surface.moved(X))
+    assert found.verdict is Verdict.DEGENERATE
+    assert "of patch 'cap' near [" in found.detail
+    assert found.quality < 1e-3
+
+
+def test_evidence_of_the_way_decides_what_the_shape_leaves_open():
+    away = certify(two_squares(4), evidence=Evidence.INFLATED)
+    assert away.verdict is Verdict.NO_EQUILIBRIUM
+    assert "inflates" in away.detail
+    assert certify(two_squares(4)).verdict is Verdict.NOT_CONVERGED
+    gone = certify(two_squares(4), evidence=Evidence.VANISHED)
+    assert gone.verdict is Verdict.NO_EQUILIBRIUM
+    surface = solve(spherical_cap(0.25)).surface
+    assert certify(surface, evidence=Evidence.INFLATED).verdict is Verdict.STABLE
+    assert certify(surface, evidence=Evidence.COLLAPSED).verdict is Verdict.DEGENERATE
+
+
+@pytest.mark.parametrize(
+    ("status", "verdict"),
+    [
+        (Status.DIVERGED, Verdict.NO_EQUILIBRIUM),
+        (Status.VANISHED, Verdict.NO_EQUILIBRIUM),
+        (Status.DEGENERATE, Verdict.DEGENERATE),
+        (Status.STALLED, Verdict.NOT_CONVERGED),
+        (Status.STOPPED, Verdict.NOT_CONVERGED),
+    ],
+)
+def test_a_result_passes_on_how_its_solver_ended(status, verdict):
+    result = replace(solve(two_squares(4), iterations=0), status=status)
+    assert result.certificate.verdict is verdict
+    assert result.certify(modes=0).verdict is verdict
+
+
+def findings(**changes):
+    """Findings about a stable pyramid, but for the changes."""
+    given = {
+        "surface": pyramid(),
+        "pinchable": np.array([False]),
+        "residual": 0.0,
+        "tolerance": 1e-8,
+        "quality": 0.9,
+        "index": 0,
+        "own_residuals": np.zeros(1),
+        "softest": 5.0,
+        "load_ratio": 0.5,
+    }
+    return Findings(**(given | changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "verdict"),
+    [
+        ({}, Verdict.STABLE),
+        ({"softest": 1e-3}, Verdict.NEUTRAL),
+        ({"softest": -1e-3, "index": 1}, Verdict.SADDLE),
+        ({"own_residuals": np.array([1e-4])}, Verdict.NOT_CONVERGED),
+        ({"own_residuals": np.array([1e-6])}, Verdict.STABLE),
+        ({"index": None}, Verdict.NOT_CONVERGED),
+        ({"residual": 1e-7}, Verdict.NOT_CONVERGED),
+        ({"residual": 1e-7, "tolerance": 1e-6}, Verdict.STABLE),
+        ({"quality": 1e-4}, Verdict.DEGENERATE),
+        ({"load_ratio": 1e3}, Verdict.STABLE),
+        ({"residual": 1e-7, "load_ratio": 1e3}, Verdict.NO_EQUILIBRIUM),
+        ({"residual": 1e-7, "load_ratio": 1.1}, Verdict.NOT_CONVERGED),  # the mesh is coarse
+        ({"residual": 1e-7, "load_ratio": 1.1, "evidence": Evidence.COLLAPSED}, Verdict.NO_EQUILIBRIUM),
+        ({"residual": 1e-7, "quality": 1e-4, "load_ratio": 1e3}, Verdict.NO_EQUILIBRIUM),
+        ({"evidence": Evidence.VANISHED}, Verdict.STABLE),
+        ({"surface": pyramid().retensioned({"roof": 0.0}, {"roof": 0.0})}, Verdict.NEUTRAL),
+    ],
+)
+def test_the_first_rule_that_applies_decides(changes, verdict):
+    assert judge(findings(**changes))[0] is verdict
+
+
+def test_every_verdict_names_itself_and_says_what_it_means():
+    for verdict in Verdict:
+        name, meaning = verdict.value.split(": ")
+        assert name.startswith(verdict.name.lower().replace("_", " "))
+        assert len(meaning.split()) > 3
