@@ -61,31 +61,27 @@ class MeshCheck:
         """Whether finer meshes have the same surface."""
         return self.verdict is MeshVerdict.PERSISTS
 
-    def row(self, quantity: str, of: str = "") -> pd.Series:
+    def row(self, quantity: str, of: str = "") -> pd.Series[Any]:
         """The row of one quantity.
 
         Raises
         ------
         OptionError : the table has no such row.
         """
-        known = [f"{row.quantity} of {row.of}" if row.of else row.quantity for row in self.table.itertuples()]
-        name = f"{quantity} of {of}" if of else quantity
-        return self.table.iloc[known.index(validate.choice("quantity", name, known))]
+        pairs = zip(self.table["quantity"].tolist(), self.table["of"].tolist(), strict=True)
+        known = [_name(*pair) for pair in pairs]
+        return self.table.iloc[known.index(validate.choice("quantity", _name(quantity, of), known))]
 
     def numbers(self) -> dict[str, Any]:
-        """The verdict, and value, bar, limit and order of the quantities of the whole surface, for tables.
+        """The verdict, and bar, limit, its bar and order of the quantities of the whole surface, for tables.
 
-        The height is that of the highest patch.
+        The height is that of the highest patch. Keys are such as ``height_error`` and ``volume_limit``.
         """
-        whole = self.table[self.table.of == ""].set_index("quantity")
-        heights = self.table[self.table.quantity == "height"]
-        if len(heights):
-            whole.loc["height"] = heights.loc[heights.value.idxmax()].drop("quantity")
         found: dict[str, Any] = {"mesh_check": self.verdict.name.lower(), "mesh_check_detail": self.detail}
-        for name, row in whole.iterrows():
-            key = str(name).replace(" ", "_")
+        heights = self.table[self.table["quantity"] == "height"].nlargest(1, "value")
+        for row in pd.concat([heights, self.table[self.table["of"] == ""]]).to_dict("records"):
             for column in ("error", "limit", "limit_error", "order"):
-                found[f"{key}_{column}"] = float(row[column])
+                found[f"{row['quantity']}_{column}".replace(" ", "_")] = float(row[column])
         return found
 
     def brief(self) -> str:
@@ -226,6 +222,10 @@ def _table(found: Sequence[dict[Key, Reading]]) -> pd.DataFrame:
             "order": result.order,
         }
     )
+
+
+def _name(quantity: str, of: str) -> str:
+    return f"{quantity} of {of}" if of else quantity
 
 
 def _of(one: dict[Key, Reading], key: Key, name: str) -> float:

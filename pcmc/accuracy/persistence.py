@@ -164,7 +164,7 @@ def _resting_lengths(surface: Surface) -> Floats:
     walls, down = part.walls, part.resting | part.walls.corner
     rests = down[walls.top_edges].all(axis=1) & part.resting[walls.top_edges].any(axis=1)
     lengths = segment_lengths(surface.vertices, walls.top_edges) * rests
-    return np.bincount(walls.wall_below, lengths, len(surface.patches))
+    return np.asarray(np.bincount(walls.wall_below, lengths, len(surface.patches)), dtype=float)
 
 
 def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats) -> Finding:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 
 from ..base.arrays import Floats
 from ..certificate import Certificate
@@ -17,7 +16,10 @@ ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open
 RESIDUALS = 10.0  # that a quantity may change with the forces left, relative
 EIGENVALUES = 1e-12  # of the largest eigenvalue: rounding of the lowest one
 
-Key = tuple[str, tuple[int, ...], bytes]
+STIFFEST = 10.0  # the largest eigenvalue in units of α over the area of a triangle
+
+Curve = tuple[tuple[int, ...], bytes]  # a boundary curve: its sheets, and its vertices in the coarsest mesh
+Key = tuple[str, str, tuple[int, ...], bytes]
 
 
 @dataclass(frozen=True)
@@ -46,59 +48,56 @@ def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[
     """
     share = ROUNDING + RESIDUALS * certificate.residual
     size, tension = surface.size, float(surface.tensions.max())
+    areas = certificate.patches["area"].to_numpy()
     found: dict[Key, Reading] = {}
 
-    def add(quantity: str, of: str, value: float, scale: float, curve: Key | None = None) -> None:
-        key = (quantity, *curve[1:]) if curve else (quantity + " " + of, (), b"")
-        found[key] = Reading(quantity, of, value, value, share * scale)
+    def add(quantity: str, of: str, value: float, scale: float, curve: Curve = ((), b"")) -> None:
+        found[quantity, "" if curve[1] else of, *curve] = Reading(quantity, of, value, value, share * scale)
 
     for k, patch in enumerate(surface.patches):
-        if not patch.auxiliary and (surface.patch_of_face == k).any():
-            value, estimate = _height(surface, k)
-            found["height " + patch.name, (), b""] = Reading(
-                "height", patch.name, value, estimate, share * size
-            )
-    for row in certificate.patches.itertuples():
-        add("area", str(row.patch), float(row.area), size**2)
+        if not patch.auxiliary:
+            height, estimate = _height(surface, k)
+            reading = Reading("height", patch.name, height, estimate, share * size)
+            found["height", patch.name, (), b""] = reading
+    for patch, area in zip(surface.patches, areas.tolist(), strict=True):
+        add("area", patch.name, area, size**2)
     add("volume", "", certificate.volume, size**3)
-    weight = tension * float(certificate.patches.area.sum())
-    add("energy", "", certificate.energy, weight)
+    add("energy", "", certificate.energy, tension * float(areas.sum()))
     add("reaction", "", certificate.support, tension * size)
-    for key, row in _boundaries(surface, certificate, vertices):
-        pull = np.array([row.reaction_x, row.reaction_y, row.reaction_z])
-        add("reaction", row.name, float(pull @ np.array(surface.plane.normal)), tension * size, key)
-        add("thrust", row.name, float(np.linalg.norm(surface.plane.along(pull))), tension * size, key)
-        add("reaction per length", row.name, float(row.per_length_max), tension, key)
+    for curve, name, pull, most in _boundaries(surface, certificate, vertices):
+        add("reaction", name, float(pull @ np.array(surface.plane.normal)), tension * size, curve)
+        add("thrust", name, float(np.linalg.norm(surface.plane.along(pull))), tension * size, curve)
+        add("reaction per length", name, most, tension, curve)
     if len(certificate.eigenvalues):
-        stiffest = 10.0 * tension * surface.m / float(certificate.patches.area.sum())
-        found["lowest eigenvalue ", (), b""] = Reading(
-            "lowest eigenvalue",
-            "",
-            float(certificate.eigenvalues[0]),
-            float(certificate.eigenvalues[0]),
-            share * tension / size**2 + EIGENVALUES * stiffest,
-        )
+        stiffest = STIFFEST * tension * surface.m / float(areas.sum())
+        rounding = share * tension / size**2 + EIGENVALUES * stiffest
+        lowest = float(certificate.eigenvalues[0])
+        key = "lowest eigenvalue"
+        found[key, "", (), b""] = Reading(key, "", lowest, lowest, rounding)
     return found
 
 
-def _boundaries(surface: Surface, certificate: Certificate, vertices: int) -> list[tuple[Key, pd.Series]]:
-    """Rows of the certificate's table of boundaries, with a key and a name; two of one name get places."""
-    held = surface.fixed | surface.on_plane
-    curves = [c for c in surface.topology.boundary_loops if held[c.vertices].any()]
+def _boundaries(
+    surface: Surface, certificate: Certificate, vertices: int
+) -> Iterator[tuple[Curve, str, Floats, float]]:
+    """Each held boundary curve, its name, its reaction (3,) and the largest one per length.
+
+    Of several curves of one name, each is named with its place.
+    """
     table = boundary_table(surface, certificate.reactions)
     if not len(table):
-        return []
-    count = Counter(table.boundary)
+        return
+    held = surface.fixed | surface.on_plane
+    curves = [c for c in surface.topology.boundary_loops if held[c.vertices].any()]
+    names = table["boundary"].astype(str).tolist()
     middles = table[["middle_x", "middle_y", "middle_z"]].to_numpy()
-    names = [
-        name if count[name] == 1 else f"{name} near ({', '.join(f'{c:.3g}' for c in middle)})"
-        for name, middle in zip(table.boundary, middles, strict=True)
-    ]
-    keys = [("", c.sheets, np.sort(c.vertices[c.vertices < vertices]).tobytes()) for c in curves]
-    rows = [row for _, row in table.assign(name=names).iterrows()]
-    for row, name in zip(rows, names, strict=True):
-        row.name = name
-    return list(zip(keys, rows, strict=True))
+    pulls = table[["reaction_x", "reaction_y", "reaction_z"]].to_numpy()
+    most = table["per_length_max"].to_numpy().tolist()
+    for i, curve in enumerate(curves):
+        place = ", ".join(f"{c:.3g}" for c in middles[i])
+        name = names[i] if names.count(names[i]) == 1 else f"{names[i]} near ({place})"
+        old = np.sort(curve.vertices[curve.vertices < vertices])
+        yield (curve.sheets, old.tobytes()), name, pulls[i], most[i]
 
 
 def _height(surface: Surface, patch: int) -> tuple[float, float]:
