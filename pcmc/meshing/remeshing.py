@@ -86,12 +86,11 @@ def remesh(
     surface = lift(surface, part.walls, part.resting, RAISED)
     along_curves = size if near_curves is None else np.minimum(size, near_curves)
     old, wanted = _cut_curves(surface, size, along_curves, project)
+    chord = CHORD * float(wanted.size.max()) if chord is None else chord
     candidates, mesh = [], old
     for _ in range(PASSES):
         size = _sizes(mesh, wanted, growth)
-        mesh = _remesh_with_mmg(
-            mesh, size, growth, CHORD * float(wanted.size.max()) if chord is None else chord
-        )
+        mesh = _remesh_with_mmg(mesh, size, growth, chord)
         mesh = replace(mesh, X=improve_angles(mesh.X, mesh.F, mesh.source < 0, GOOD_ANGLE))
         candidates.append(mesh)
         if angles(mesh.X[mesh.F]).min() >= GOOD_ANGLE:
@@ -187,7 +186,9 @@ def _cut_curves(
         mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
     if project is not None:
         new = mesh.fixed & (np.arange(len(mesh.X)) >= first)
-        mesh.X[new] = projected(project, mesh.X[new])
+        X = mesh.X.copy()
+        X[new] = projected(project, X[new])
+        mesh = replace(mesh, X=X)
     return mesh, background
 
 
