@@ -19,7 +19,7 @@ from ..surface.geometry import angles, area_vectors, face_areas, segment_lengths
 from .angles import improve_angles
 from .quality import edge_lengths
 from .refinement import Projection, held_midpoints, projected, prolongation, refine
-from .sizes import check_sizes, edges_between, limit_growth, place_between, triangles_for
+from .sizes import check_sizes, edges_between, equilateral_area, limit_growth, place_between, triangles_for
 
 CHORD = 0.1  # of the edge length
 MOST = 20_000_000  # triangles; more mean a mistake in the edge length
@@ -28,6 +28,7 @@ GOOD_ANGLE = 25.0  # degrees; no further pass is made when all angles reach it
 LEAST_ANGLE = 20.0  # degrees; a patch that stays below it ...
 WORSE = 0.8  # ... and below this share of its old smallest angle keeps its old triangles, cut
 RAISED = 0.25  # of its spacing: height to which a resting junction is lifted, so that its wall has area
+LARGE = 2.0  # times the area wanted: a larger triangle is split, also between curves
 BLUNT, OBTUSE = 25.0, 100.0  # degrees; for the upper two angles of one that fills a corner well
 
 
@@ -312,7 +313,7 @@ def _remesh_with_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> 
     tool.set_edges(mesh.curves.astype(np.int32), np.ones(len(mesh.curves), dtype=np.int64))
     tool.set_required_edges(np.arange(len(mesh.curves), dtype=np.int32))
     tool.set_required_vertices(fixed.astype(np.int32))
-    tool.set_required_triangles(_corners_to_keep(mesh).astype(np.int32))
+    tool.set_required_triangles(_corners_to_keep(mesh, size).astype(np.int32))
     tool["metric"] = size[:, None]
     least, most = 0.3 * float(size.min()), 1.3 * float(size.max())
     try:
@@ -333,13 +334,15 @@ def _remesh_with_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> 
     return _Mesh(X, F.astype(np.int64), patch - 1, curves, fixed, sliding, source)
 
 
-def _corners_to_keep(mesh: _Mesh) -> Ints:
-    """Triangles between curves that are as good as their corner allows: MMG would split them."""
+def _corners_to_keep(mesh: _Mesh, size: Floats) -> Ints:
+    """Triangles between curves that are as good as their corner allows, and small: MMG would split them."""
     on_curve = np.zeros(len(mesh.X), dtype=bool)
     on_curve[mesh.curves] = True
     between = np.flatnonzero(on_curve[mesh.F].all(axis=1))
-    _, second, largest = np.sort(angles(mesh.X[mesh.F[between]]), axis=1).T
-    return between[(second >= BLUNT) & (largest <= OBTUSE)]
+    corners = mesh.X[mesh.F[between]]
+    _, second, largest = np.sort(angles(corners), axis=1).T
+    small = face_areas(corners) <= LARGE * equilateral_area(size[mesh.F[between]].mean(axis=1))
+    return between[(second >= BLUNT) & (largest <= OBTUSE) & small]
 
 
 def _check_curves(before: _Mesh, curves: Ints, F: Ints, n: int) -> None:

@@ -83,10 +83,15 @@ def place_between(part: Floats, start: Floats, end: Floats) -> Floats:
     return np.where(near, part, bent)
 
 
+def equilateral_area(size: Floats) -> Floats:
+    """(m,) area of equilateral triangles with sides ``size`` (m,), length²."""
+    return np.asarray(math.sqrt(3.0) / 4.0 * size**2)
+
+
 def triangles_for(areas: Floats, size: Floats) -> float:
     """How many equilateral triangles of side ``size`` cover triangles of these areas; both (m,).
 
     >>> round(triangles_for(np.array([1.0]), np.array([0.1])))
     231
     """
-    return float((areas / (math.sqrt(3.0) / 4.0 * size**2)).sum())
+    return float((areas / equilateral_area(size)).sum())
