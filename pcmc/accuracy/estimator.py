@@ -37,6 +37,16 @@ from ..surface import Surface
 
 STEP = 1e-5  # of the size: length of the steps that differences of ∇E are taken over
 
+QUANTITIES = (
+    "height",
+    "area",
+    "volume",
+    "energy",
+    "reaction",
+    "thrust",
+    "reaction per length",
+    "lowest eigenvalue",
+)
 Goal = tuple[str, str]
 """A quantity and the patch or boundary it belongs to, as in a mesh check; "" for the whole."""
 
