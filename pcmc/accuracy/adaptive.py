@@ -260,10 +260,7 @@ class _Search:
         """The end where a further round does not help, and why."""
         here = self.rounds[-1]
         m, check = here.result.surface.m, here.check
-        settled = [
-            r.check.verdict is MeshVerdict.PERSISTS and math.isfinite(r.excess(self.value))
-            for r in self.rounds
-        ]
+        settled = [r.check.persists and math.isfinite(r.excess(self.value)) for r in self.rounds]
         if not any(settled[-3:]) and len(settled) >= 3:
             if check.persists:
                 bars = here.values[~np.isfinite(here.values["error"])]
