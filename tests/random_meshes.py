@@ -65,8 +65,10 @@ def _sheet_with_walls(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray,
     X = _points(rng, int(rng.integers(4, 14)))
     flat = X[:, :2] + 1e-3 * rng.standard_normal((len(X), 2))
     F = Delaunay(flat).simplices
-    area = np.cross(np.append(flat[F[:, 1]] - flat[F[:, 0]], np.zeros((len(F), 1)), 1),
-                    np.append(flat[F[:, 2]] - flat[F[:, 0]], np.zeros((len(F), 1)), 1))[:, 2]
+    area = np.cross(
+        np.append(flat[F[:, 1]] - flat[F[:, 0]], np.zeros((len(F), 1)), 1),
+        np.append(flat[F[:, 2]] - flat[F[:, 0]], np.zeros((len(F), 1)), 1),
+    )[:, 2]
     F = np.where(area[:, None] < 0.0, F[:, ::-1], F)
     side = flat[F].mean(axis=1) @ rng.standard_normal(2) > 0.0
     patch = side.astype(int) if 0 < side.sum() < len(side) else np.zeros(len(F), dtype=int)

@@ -38,7 +38,8 @@ def rigid_modes(space: MotionSpace, motions: Floats, X: Floats) -> Floats:
         return np.zeros((space.size, 0))
     arm = X - X.mean(axis=0)
     fields = [translation + np.cross(rotation, arm) for translation, rotation in motions]
-    parts = np.stack([space.to_coordinates(f) / np.linalg.norm(f) for f in fields], axis=1)
+    lengths = [float(np.linalg.norm(f)) or 1.0 for f in fields]  # 0 where all lies on the axis of rotation
+    parts = np.stack([space.to_coordinates(f) / k for f, k in zip(fields, lengths, strict=True)], axis=1)
     u, s, _ = np.linalg.svd(parts, full_matrices=False)
     return u[:, s > SEEN]
 

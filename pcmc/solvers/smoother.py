@@ -112,7 +112,7 @@ class HarmonicExtension:
         self._weight = np.where(self._prescribed[used], PIN * data[diagonal], 0.0)
         data[diagonal] += self._weight
         # scaled to a diagonal of ones, so that no pivot beside a prescribed vertex looks like zero
-        self._scale = 1.0 / np.sqrt(data[diagonal])
+        self._scale = 1.0 / np.sqrt(np.where(data[diagonal] > 0.0, data[diagonal], 1.0))
         data *= np.repeat(self._scale, np.diff(pattern.indptr)) * self._scale[pattern.indices]
         self._factor = factoriser(pattern, backend).factor(data)
 
