@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from scipy.spatial import Delaunay
 
@@ -75,7 +77,7 @@ def _sheet_with_walls(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray,
     faces, owner, last = F.tolist(), patch.tolist(), int(patch.max()) + 1
     path = [int(rng.choice(F[rng.integers(len(F))]))]
     for _ in range(int(rng.integers(1, 5))):
-        beside = np.setdiff1d(F[(F == path[-1]).any(axis=1)], path)
+        beside = np.setdiff1d(F[(path[-1] == F).any(axis=1)], path)
         if not len(beside):
             break
         path.append(int(rng.choice(beside)))
@@ -87,7 +89,7 @@ def _sheet_with_walls(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray,
             points.append(np.array([*X[v, :2] + rng.choice([0.0, 0.2]) * rng.standard_normal(2), 0.0]))
         else:
             feet[v] = v
-    for a, b in zip(path, path[1:], strict=False):
+    for a, b in itertools.pairwise(path):
         for face in ((a, b, feet[b]), (a, feet[b], feet[a])):
             if len(set(face)) == 3:
                 faces.append(list(face))

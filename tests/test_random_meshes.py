@@ -22,19 +22,19 @@ METHODS = (
 @pytest.mark.slow
 @pytest.mark.parametrize("hundred", range(2))
 def test_random_meshes_end_in_a_verdict_or_a_named_error(hundred):
-    solved = 0
+    solved, refusals = 0, []
     for seed in range(100 * hundred, 100 * hundred + 100):
         try:
             surface = random_surface(seed)
         except SurfaceError as error:
-            assert error.what, f"seed {seed}"
+            refusals.append(error.what)
             continue
         assert np.isfinite(pcmc.energy(surface)), f"seed {seed}"
         assert isinstance(pcmc.certify(surface).verdict, Verdict), f"seed {seed}"
         try:
             result = pcmc.solve(surface, **METHODS[seed // 2 % 4])
         except SurfaceError as error:
-            assert "has an open boundary and no support" in str(error), f"seed {seed}"
+            refusals.append(error.what)
             continue
         assert np.isfinite(result.surface.vertices).all(), f"seed {seed}"
         assert np.abs(result.surface.plane.height(result.surface.vertices)[surface.on_plane]).max(
@@ -43,6 +43,7 @@ def test_random_meshes_end_in_a_verdict_or_a_named_error(hundred):
         assert str(result.certificate), f"seed {seed}"
         solved += 1
     assert solved > 80
+    assert None not in refusals
 
 
 def bridge() -> Surface:

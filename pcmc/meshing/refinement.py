@@ -11,7 +11,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..contact.pinching import midpoints
-from ..surface import Surface
+from ..surface import Surface, expect_surface
 
 Projection = Callable[[Floats], Floats]
 
@@ -57,9 +57,21 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     >>> fine.n, fine.m, int(fine.fixed.sum())  # the diagonal's midpoint is free
     (9, 8, 8)
     """
-    for _ in range(validate.integer("levels", levels)):
+    expect_surface(surface)
+    for _ in range(refinable("levels", levels, surface.m)):
         surface = _refine_once(surface, project)
     return surface
+
+
+def refinable(name: str, levels: object, triangles: int) -> int:
+    """The number of refinements, if so many triangles can be counted in 32 bits afterwards.
+
+    >>> refinable("levels", 3, 1000)
+    3
+    """
+    most = int(np.log2(validate.MOST / triangles) / 2.0)
+    hint = f"each makes four times as many triangles of {triangles}"
+    return validate.integer(name, levels, most=most, hint=hint)
 
 
 def prolongation(surface: Surface) -> csr_array:
