@@ -20,7 +20,10 @@ X, F = pyramid().vertices, pyramid().faces
 HUGE = 10**400
 
 
-def surface(vertices=X, faces=F, patches=(Patch("roof", 1.0),), fixed=range(4), **others) -> Surface:
+ROOF = (Patch("roof", 1.0),)
+
+
+def surface(vertices=X, faces=F, patches=ROOF, fixed=range(4), **others) -> Surface:
     return Surface(vertices, faces, [0] * 4, patches, fixed, **others)
 
 
@@ -83,8 +86,8 @@ def test_a_copy_can_be_written_to_no_more_than_the_surface(again):
 
 
 def test_a_copy_far_from_the_plane_is_seen_from_the_same_point():
-    far = surface(X + [1e6, 0, 0])
-    moved = far.moved(X + [1e6 + 1.0, 0, 0])
+    far = surface(X + np.array([1e6, 0, 0]))
+    moved = far.moved(X + np.array([1e6 + 1.0, 0, 0]))
     for other in (copy.deepcopy(moved), pickle.loads(pickle.dumps(moved))):
         assert (other.origin == far.origin).all()
 
