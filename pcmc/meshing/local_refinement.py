@@ -9,11 +9,14 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Bools, Ints
 from ..base.errors import OptionError
-from ..contact.pinching import lift, standing_part
+from ..contact.pinching import Walls, lift, standing_part
 from ..surface import Surface
+from ..surface.geometry import segment_lengths
 from .quality import edge_lengths
 from .refinement import Projection, new_vertices
 from .remeshing import RAISED, cut_triangles
+
+TALL = 4.0  # heights of a wall over the length of its top edge: a higher column does not come to rest
 
 
 def refine_near(
@@ -77,6 +80,8 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
     A triangle beside a chosen one is cut through its longest side first, and through the other where it
     has a new vertex there too. So no triangle gets an angle below half the smallest one of the triangle
     it comes from, however often this is repeated (Rivara 1984): repeated cuts make few different shapes.
+    Where a wall stands in columns, one below each edge of its junction, a low column is cut from top to
+    foot: no vertex of a row is without one of the junction above, where it has its place once that rests.
 
     Vertex i keeps its number. Junctions, boundaries and the rows of walls stay; a new vertex on an edge
     has the support that ``refine`` gives it. A junction that rests on the plane is lifted off it by a
@@ -102,10 +107,13 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
         return surface
     part = standing_part(surface)
     surface = lift(surface, part.walls, part.resting, RAISED)
-    longest = _longest_sides(surface)
+    longest, columns = _longest_sides(surface), _wall_columns(surface, part.walls)
     first = edge_of_face[np.arange(surface.m), longest]
-    while not cut[first[cut[edge_of_face].any(axis=1)]].all():
+    count = 0
+    while count < cut.sum():
+        count = cut.sum()
         cut[first[cut[edge_of_face].any(axis=1)]] = True
+        cut |= np.isin(columns, columns[cut & (columns >= 0)])
     middle, held, slides = new_vertices(surface, cut, project)
     ends, number = surface.topology.edges[cut], surface.n + np.arange(len(middle))
     F, patch = cut_triangles(surface.faces, surface.patch_of_face, ends, number, surface.n, longest)
@@ -133,3 +141,20 @@ def _longest_sides(surface: Surface) -> Ints:
     rank = np.empty(len(length), dtype=np.int64)
     rank[np.lexsort((np.arange(len(length)), length))] = np.arange(len(length))
     return np.asarray(rank[surface.topology.edge_of_face].argmax(axis=1))
+
+
+def _wall_columns(surface: Surface, walls: Walls) -> Ints:
+    """(e,) the low column below a top edge that an edge crosses, itself included; -1 for none."""
+    edges, n, X = surface.topology.edges, surface.n, surface.vertices
+    height = np.abs(surface.plane.height(X))[walls.top_edges].max(axis=1, initial=0.0)
+    low = walls.top_edges[height <= TALL * segment_lengths(X, walls.top_edges)]
+    above = np.full(n, -1, dtype=np.int64)  # the top vertex straight above
+    rows = walls.rows
+    for end in (0, 1):
+        straight = rows.fraction == end
+        above[rows.vertices[straight]] = rows.top_ends[straight, end]
+    above[walls.top_edges] = walls.top_edges
+    one, other = np.sort(above[edges], axis=1).T
+    key = np.where(one >= 0, one * n + other, -1)
+    tops = np.sort(low, axis=1).astype(np.int64) @ [n, 1]
+    return np.where(np.isin(key, tops), key, -1)
