@@ -118,12 +118,19 @@ def projected(project: Projection, points: Floats) -> Floats:
     return moved
 
 
-def _refine_once(surface: Surface, project: Projection | None) -> Surface:
-    edges = surface.topology.edges
-    middle = midpoints(surface, edges)
-    held, slides = held_midpoints(surface)
+def new_vertices(
+    surface: Surface, cut: Bools, project: Projection | None = None
+) -> tuple[Floats, Bools, Bools]:
+    """Positions (k,3) and supports of new vertices on the edges ``cut`` (e,): fixed, sliding (k,)."""
+    middle = midpoints(surface, surface.topology.edges[cut])
+    held, slides = (mask[cut] for mask in held_midpoints(surface))
     if project is not None:
         middle[held] = projected(project, middle[held])
+    return middle, held, slides
+
+
+def _refine_once(surface: Surface, project: Projection | None) -> Surface:
+    middle, held, slides = new_vertices(surface, np.ones(len(surface.topology.edges), dtype=bool), project)
     a, b, c = surface.faces.T
     bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
     X, patch = np.concatenate([surface.vertices, middle]), np.repeat(surface.patch_of_face, 4)
