@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array  # at run time where it is needed: many surfaces never ask
 
 SHEET, CURVE, POINT = 0, 1, 2
+FEW = 32  # sides in a bucket up to which sorting by insertion is fastest
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,12 +175,9 @@ def topology(faces: Ints, patch_of_face: Ints, vertex_count: int) -> Topology:
     >>> t.edges[~t.boundary_edge].tolist(), t.valence.tolist()
     ([[0, 2]], [1, 2, 1, 1, 1])
     """
-    corners = np.concatenate([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]]).astype(np.int64)
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    key, inverse, count = np.unique(low * vertex_count + high, return_inverse=True, return_counts=True)
-    edges = np.stack([key // vertex_count, key % vertex_count], axis=1).astype(np.int32)
-    edge_of_face = inverse.reshape(3, -1).T.astype(np.int32)
-    return Topology(faces, patch_of_face, vertex_count, edges, np.ascontiguousarray(edge_of_face), count)
+    corners = np.ascontiguousarray(faces, dtype=np.int32)
+    edges, edge_of_face, valence = _number_edges(corners, vertex_count)
+    return Topology(faces, patch_of_face, vertex_count, edges, edge_of_face, valence)
 
 
 def vertex_kind(ends: Ints, vertex_count: int) -> Ints:
@@ -257,3 +255,45 @@ def fans(F: Ints, edge_of_face: Ints, edges: Ints, n: int) -> Ints:
         if parent[k] == k:
             count[edges[k // 2, k % 2]] += 1
     return count
+
+
+@compiled
+def _number_edges(F: Ints, n: int) -> tuple[Ints, Ints, Ints]:
+    """``edges``, ``edge_of_face`` and ``valence`` of a Topology, in time proportional to the faces.
+
+    The sides of the faces are put into the bucket of their lower vertex and sorted there by the higher one.
+    """
+    first = np.zeros(n + 2, dtype=np.int32)
+    for f in range(len(F)):
+        for k in range(3):
+            first[min(F[f, k - 1], F[f, k - 2]) + 2] += 1
+    for v in range(n):
+        first[v + 2] += first[v + 1]
+    higher, place = np.empty((2, 3 * len(F)), dtype=np.int32)
+    for f in range(len(F)):
+        for k in range(3):
+            low, high = min(F[f, k - 1], F[f, k - 2]), max(F[f, k - 1], F[f, k - 2])
+            at = first[low + 1]
+            higher[at], place[at] = high, 3 * f + k
+            first[low + 1] = at + 1  # in the end the buckets of vertex v start at first[v]
+    edges, valence = np.empty((3 * len(F), 2), dtype=np.int32), np.zeros(3 * len(F), dtype=np.int32)
+    edge_of_face = np.empty(3 * len(F), dtype=np.int32)
+    count = 0
+    for v in range(n):
+        start, end = first[v], first[v + 1]
+        if end - start > FEW:
+            order = np.argsort(higher[start:end])
+            higher[start:end], place[start:end] = higher[start:end][order], place[start:end][order]
+        for i in range(start + 1, end):
+            high, where, j = higher[i], place[i], i
+            while j > start and higher[j - 1] > high:
+                higher[j], place[j] = higher[j - 1], place[j - 1]
+                j -= 1
+            higher[j], place[j] = high, where
+        for i in range(start, end):
+            if i == start or higher[i] != higher[i - 1]:
+                edges[count, 0], edges[count, 1] = v, higher[i]
+                count += 1
+            valence[count - 1] += 1
+            edge_of_face[place[i]] = count - 1
+    return edges[:count].copy(), edge_of_face.reshape(-1, 3), valence[:count].copy()
