@@ -80,7 +80,7 @@ def find_walls(surface: Surface) -> Walls:
         wall_below=np.concatenate(wall_below),
         top_free=on_top & ~surface.fixed & ~surface.on_plane,
         corner=on_top & surface.fixed & low,
-        side=np.where(np.where(low, _pressure_push(surface), height) < 0.0, -1.0, 1.0),
+        side=np.where(np.where(low, _pressure_push(surface, low), height) < 0.0, -1.0, 1.0),
         pinchable=pinchable,
     )
 
@@ -304,9 +304,10 @@ def _lie_on_plane(walls: Walls, resting: Bools) -> Bools:
     return down
 
 
-def _pressure_push(surface: Surface) -> Floats:
-    """(n,) force along Π's normal with which the pressure of the sheets pushes each vertex."""
-    vector = area_vectors(surface.vertices[surface.faces])
-    force = (surface.pressures * ~surface.walls)[surface.patch_of_face] / 3.0
-    push = force * (vector @ np.array(surface.plane.normal))
-    return vertex_sums(push[:, None], surface.faces, surface.n)[:, 0]
+def _pressure_push(surface: Surface, at: Bools) -> Floats:
+    """(n,) force of the pressure of sheets along Π's normal on the vertices ``at``; elsewhere 0."""
+    near = at[surface.faces].any(axis=1)
+    F, patch = surface.faces[near], surface.patch_of_face[near]
+    force = (surface.pressures * ~surface.walls)[patch] / 3.0
+    push = force * (area_vectors(surface.vertices[F]) @ np.array(surface.plane.normal))
+    return np.where(at, vertex_sums(push[:, None], F, surface.n)[:, 0], 0.0)

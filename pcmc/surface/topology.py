@@ -66,8 +66,8 @@ class Topology:
     @cached_property
     def one_way_edge(self) -> Bools:
         """(e,) bool: edges between two triangles that run along it the same way: the side changes."""
-        total = np.bincount(self.edge_of_face.ravel(), self.sense.ravel(), len(self.edges))
-        return (self.valence == 2) & (total != 0.0)
+        one_way: Bools = _one_way(self.faces, self.edge_of_face, self.valence)
+        return one_way
 
     @cached_property
     def fans(self) -> Ints:
@@ -187,10 +187,14 @@ def vertex_kind(ends: Ints, vertex_count: int) -> Ints:
 
 
 def components(edges: Ints, vertex_count: int) -> Ints:
-    """(n,) int: label of each vertex's connected part."""
-    from scipy.sparse.csgraph import connected_components
+    """(n,) int: label of each vertex's connected part, in the order of their first vertices.
 
-    return connected_components(_adjacency(edges, vertex_count), directed=False)[1]
+    >>> import numpy as np
+    >>> components(np.array([[3, 1], [2, 4]]), 5).tolist()
+    [0, 1, 2, 1, 2]
+    """
+    label: Ints = _components(np.ascontiguousarray(edges, dtype=np.int32), vertex_count)
+    return label
 
 
 def curve_neighbours(links: Ints, vertex_count: int) -> tuple[Ints, Ints]:
@@ -235,21 +239,51 @@ def _split_at(pairs: Ints, stop: Bools, vertex_count: int) -> tuple[Ints, Ints]:
 
 
 @compiled
+def _join(parent: Ints, a: int, b: int) -> None:
+    """Join the trees of a and b; the root of a tree is its smallest node."""
+    while parent[a] != a:
+        parent[a] = parent[parent[a]]
+        a = parent[a]
+    while parent[b] != b:
+        parent[b] = parent[parent[b]]
+        b = parent[b]
+    parent[max(a, b)] = min(a, b)
+
+
+@compiled
+def _components(edges: Ints, n: int) -> Ints:
+    parent = np.arange(n).astype(np.int32)
+    for e in range(len(edges)):
+        _join(parent, edges[e, 0], edges[e, 1])
+    parts = 0
+    for v in range(n):
+        if parent[v] == v:
+            parent[v] = parts
+            parts += 1
+        else:  # the label of an earlier vertex
+            parent[v] = parent[parent[v]]
+    return parent
+
+
+@compiled
+def _one_way(F: Ints, edge_of_face: Ints, valence: Ints) -> Bools:
+    total = np.zeros(len(valence), dtype=np.int32)
+    for f in range(len(F)):
+        for k in range(3):
+            total[edge_of_face[f, k]] += 1 if F[f, k - 2] < F[f, k - 1] else -1
+    return (valence == 2) & (total != 0)
+
+
+@compiled
 def fans(F: Ints, edge_of_face: Ints, edges: Ints, n: int) -> Ints:
     """(n,) the number of fans of triangles around each vertex that share no edge there."""
-    parent = np.arange(2 * len(edges))  # node 2 e + s is the end edges[e, s] of edge e
+    parent = np.arange(2 * len(edges)).astype(np.int32)  # node 2 e + s is the end edges[e, s] of edge e
     for f in range(len(F)):
         for c in range(3):
             one, two = edge_of_face[f, c - 1], edge_of_face[f, c - 2]
             a = 2 * one + (edges[one, 1] == F[f, c])
             b = 2 * two + (edges[two, 1] == F[f, c])
-            while parent[a] != a:
-                parent[a] = parent[parent[a]]
-                a = parent[a]
-            while parent[b] != b:
-                parent[b] = parent[parent[b]]
-                b = parent[b]
-            parent[max(a, b)] = min(a, b)
+            _join(parent, a, b)
     count = np.zeros(n, dtype=np.int64)
     for k in range(len(parent)):
         if parent[k] == k:
