@@ -15,6 +15,7 @@ from ..contact.pinching import (
     lift,
     place_pinched_walls,
     place_wall_rows,
+    remove_pinched_walls,
     standing_part,
     top_spacing,
 )
@@ -170,12 +171,12 @@ class State:
         """
         full = self.result_surface()
         walls = replace(find_walls(full), side=self.walls.side)
-        part = StandingPart.of(full, walls, self.resting)
-        if np.array_equal(part.surface.faces, self.surface.faces) or self._releases_left <= 0:
+        standing = remove_pinched_walls(full, walls, self.resting).faces
+        if np.array_equal(standing, self.surface.faces) or self._releases_left <= 0:
             return False
         self._releases_left -= 1
         self.full = full
-        self._take(part)
+        self._take(StandingPart.of(full, walls, self.resting))
         return True
 
     def lift_overpulled(self) -> bool:
