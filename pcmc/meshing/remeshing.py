@@ -242,7 +242,7 @@ def _cut_once(mesh: _Mesh, size: Floats, counts: Ints, support: Bools) -> tuple[
     share = place_between(first / pieces, size_start, size_end)
     start, end = mesh.X[ends[:, 0]], mesh.X[ends[:, 1]]
     number = len(mesh.X) + np.arange(len(ends))
-    F, patch = _cut_triangles(mesh.F, mesh.patch, ends, number, len(mesh.X))
+    F, patch = cut_triangles(mesh.F, mesh.patch, ends, number, len(mesh.X))
     halves = np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)
     X = np.concatenate([mesh.X, start + share[:, None] * (end - start)])
     size = np.concatenate([size, size_start + share * (size_end - size_start)])
@@ -254,8 +254,15 @@ def _cut_once(mesh: _Mesh, size: Floats, counts: Ints, support: Bools) -> tuple[
     return new, size, counts, np.concatenate([support[~cut], support[cut], support[cut]])
 
 
-def _cut_triangles(F: Ints, patch: Ints, ends: Ints, number: Ints, n: int) -> tuple[Ints, Ints]:
-    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four."""
+def cut_triangles(
+    F: Ints, patch: Ints, ends: Ints, number: Ints, n: int, first: Ints | None = None
+) -> tuple[Ints, Ints]:
+    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four.
+
+    The edges ``ends`` (k,2) get the vertices ``number`` (k,); old vertices are below n. With two cut sides
+    a line leads to the middle of one of them from the corner opposite: of the side opposite corner
+    ``first`` (m,), where that is given.
+    """
     key = ends.min(axis=1).astype(np.int64) * n + ends.max(axis=1)
     order = np.argsort(key)
     side = F[:, [[1, 2], [2, 0], [0, 1]]].astype(np.int64)
@@ -269,10 +276,13 @@ def _cut_triangles(F: Ints, patch: Ints, ends: Ints, number: Ints, n: int) -> tu
     roll = (np.arange(3) + turn[:, None]) % 3
     a, b, c = np.take_along_axis(F.astype(np.int64), roll, axis=1).T
     p, q, r = np.take_along_axis(middle, roll, axis=1).T  # on the sides opposite a, b, c
+    if first is not None:
+        count[(count == 2) & (first == (turn + 1) % 3)] = -2
     templates = {
         0: [(a, b, c)],
         1: [(a, b, p), (a, p, c)],
         2: [(c, q, p), (q, a, p), (a, b, p)],
+        -2: [(c, q, p), (q, b, p), (a, b, q)],
         3: [(a, r, q), (b, p, r), (c, q, p), (p, q, r)],
     }
     faces, owner = [], []
