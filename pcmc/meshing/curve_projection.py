@@ -1,0 +1,55 @@
+"""Projection onto smooth curves through held vertices, the same for all meshes of one surface."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.arrays import Floats
+from ..surface import Surface
+from .held_curves import CORNER, _continuations, _rises
+from .refinement import Projection, held_midpoints
+
+HALVINGS = 8  # of each edge of a curve that points are projected onto
+NEAREST = 3  # pieces of curve that are compared
+
+
+def onto_held_curves(surface: Surface, corner: float = CORNER) -> Projection:
+    """A function (k,3) → (k,3) that puts points near a surface's held edges on the smooth curves there.
+
+    The curves are those of ``smooth_midpoints``, with each edge cut into 256. All meshes made with one such
+    function, by ``refine``, ``remesh`` or ``check_mesh``, have the same boundary.
+
+    Examples
+    --------
+    >>> from pcmc import Patch
+    >>> angle = 2 * np.pi * np.arange(12) / 12
+    >>> rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> disc = Surface([[0, 0, 0], *rim], [[0, k + 1, (k + 1) % 12 + 1] for k in range(12)], [0] * 12,
+    ...                [Patch("disc", 1.0)], fixed=range(1, 13))
+    >>> float(np.linalg.norm(onto_held_curves(disc)(np.array([[0.95, 0.1, 0.0]]))).round(5))
+    1.0
+    """
+    X, edges = surface.vertices, surface.topology.edges[held_midpoints(surface)[0]]
+    for _ in range(HALVINGS):
+        middle, rise, arcs = X[edges].mean(axis=1), np.zeros((len(edges), 3)), np.zeros(len(edges))
+        edge, *_, beyond = _continuations(X, edges, corner)
+        np.add.at(rise, edge, _rises(X, edges[edge], beyond))
+        np.add.at(arcs, edge, 1.0)
+        number = len(X) + np.arange(len(edges))
+        X = np.concatenate([X, middle + rise / np.maximum(arcs, 1.0)[:, None]])
+        edges = np.concatenate([np.stack([edges[:, 0], number], 1), np.stack([number, edges[:, 1]], 1)])
+    start, side = X[edges[:, 0]], X[edges[:, 1]] - X[edges[:, 0]]
+    tree = cKDTree(start + 0.5 * side)
+
+    def project(points: Floats) -> Floats:
+        if not len(start) or not len(points):
+            return points
+        near = tree.query(points, k=min(NEAREST, len(start)))[1].reshape(len(points), -1)
+        away, along = points[:, None] - start[near], side[near]
+        share = np.einsum("pnd,pnd->pn", away, along) / np.einsum("pnd,pnd->pn", along, along)
+        foot = start[near] + np.clip(share, 0.0, 1.0)[..., None] * along
+        nearest = np.linalg.norm(points[:, None] - foot, axis=2).argmin(axis=1)
+        return np.asarray(foot[np.arange(len(points)), nearest])
+
+    return project
