@@ -32,7 +32,7 @@ from ..surface import Surface
 from ..surface.geometry import face_areas
 from .estimator import Goal, error_shares
 from .goals import Accuracy, accuracies, check_places, goals_in
-from .mesh_check import MeshCheck, check_mesh
+from .mesh_check import MeshCheck, check_mesh, with_bar
 
 TRIANGLES = 50_000  # of the mesh returned, by default at most
 ROUNDS = 12
@@ -100,8 +100,8 @@ class AccurateResult:
         """A sentence, and each quantity with its bar on this mesh and in the limit."""
         head = "; ".join(filter(None, (self.status.value, self.detail)))
         parts = [
-            f"{_name(row)} {row['value']:.6g} ± {row['error']:.2g} on this mesh,"
-            f" {row['limit']:.8g} ± {row['limit_error']:.2g} in the limit, wanted ± {row['accuracy']:g}"
+            f"{_name(row)} {with_bar(row['value'], row['error'])} on this mesh,"
+            f" {with_bar(row['limit'], row['limit_error'])} in the limit, wanted ± {row['accuracy']:g}"
             for row in self.values.to_dict("records")
         ]
         return "; ".join([f"{head} ({self.surface.m} triangles)", *parts])

@@ -103,9 +103,7 @@ class _FineMesh:
             system = None  # the duals are unknown; every quantity takes the shares of the energy
         tension = np.repeat(coarse.tensions[coarse.patch_of_face], 3)
         edge_of_face = coarse.topology.edge_of_face.ravel()
-        k = np.asarray(
-            sqrt(3.0) * np.bincount(edge_of_face, tension, len(coarse.topology.edges)), dtype=float
-        )
+        k: Floats = np.bincount(edge_of_face, tension, len(coarse.topology.edges)).astype(float)
         missing = np.zeros_like(X)
         missing[coarse.n :] = _interpolation_error(coarse, X)
         held = np.where(fine.fixed[:, None], missing, 0.0)

@@ -238,18 +238,18 @@ def _text_table(table: pd.DataFrame) -> str:
         {
             "quantity": table.quantity,
             "of": table.of,
-            "on this mesh": [_with_bar(*pair) for pair in zip(table.value, table.error, strict=True)],
-            "limit": [_with_bar(*pair) for pair in zip(table.limit, table.limit_error, strict=True)],
+            "on this mesh": [with_bar(*pair) for pair in zip(table.value, table.error, strict=True)],
+            "limit": [with_bar(*pair) for pair in zip(table.limit, table.limit_error, strict=True)],
             "order": ["-" if math.isnan(p) else f"{p:.1f}" for p in table.order],
         }
     )
     return lines.to_string(index=False)
 
 
-def _with_bar(value: float, bar: float) -> str:
+def with_bar(value: float, bar: float) -> str:
     """A value and its bar, with two digits of the bar.
 
-    >>> _with_bar(2.71828, 0.0123), _with_bar(1234.5, 45.0), _with_bar(2.0, math.inf), _with_bar(2.0, 1e-12)
+    >>> with_bar(2.71828, 0.0123), with_bar(1234.5, 45.0), with_bar(2.0, math.inf), with_bar(2.0, 1e-12)
     ('2.718 ± 0.012', '1234 ± 45', '2 ± no limit', '2 ± 1e-12')
     """
     if math.isnan(value):

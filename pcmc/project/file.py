@@ -16,6 +16,7 @@ from ..base.errors import FileError, OptionError, PcmcError
 from ..plan import Plan, plan_from
 from ..solvers import find_method
 from ..surface import Surface
+from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
@@ -35,6 +36,7 @@ class Project:
     path : the file.
     plan : of the surface; None if ``path`` holds a surface itself.
     method, options : as in ``pcmc.solve``.
+    wanted : the accuracy asked for.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
     files, picture : the output.
@@ -46,6 +48,7 @@ class Project:
     plan: Plan | None = None
     method: str = "newton"
     options: Mapping[str, Any] = field(default_factory=dict)
+    wanted: AccuracyWanted = AccuracyWanted()
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
     vary: Sequence[Parameter] = ()
@@ -138,6 +141,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     files, picture = output.get("files", []), output.get("picture")
     view, colour = output.get("view", "diagonal"), output.get("colour", "patches")
     with in_file(path, FileError):
+        wanted = take_accuracy(options)
         find_method(method).options(**options)  # refuses bad values before the plan is meshed
         check_names(files, picture)
         check_picture(view, colour)
@@ -146,6 +150,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             plan=plan_from(data["plan"]),
             method=method,
             options=options,
+            wanted=wanted,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
             **(_search(data["targets"]) if "targets" in data else {}),
             files=files,
