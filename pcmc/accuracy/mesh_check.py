@@ -14,13 +14,13 @@ import pandas as pd
 from ..base import validate
 from ..base.errors import FreeSurfaceWarning, OptionError, SurfaceError
 from ..certificate import Certificate, certify
-from ..meshing.held_curves import smooth_midpoints
+from ..meshing.held_curves import curve_doubt, smooth_midpoints
 from ..meshing.refinement import Projection, refine
 from ..solvers import solve
 from ..solvers.result import Callback, Result, Status
 from ..surface import Surface
 from .extrapolation import extrapolate
-from .persistence import MeshVerdict, compared, lost
+from .persistence import MeshVerdict, compared, lost, shape_order
 from .quantities import Key, Reading, readings
 
 MOST = 4_000_000  # triangles of the finest mesh, by default
@@ -176,7 +176,11 @@ def check_mesh(
     if finding is None or len(surfaces) > 1:
         found = compared(surfaces, certificates)
         finding = found if finding is None or found.verdict is MeshVerdict.CHANGES else finding
-    table = _table([readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)])
+    table = _table(
+        [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)],
+        shape_order=shape_order(surfaces),
+        curve_doubt=curve_doubt(first) if boundary == "smooth" else 0.0,
+    )
     return MeshCheck(finding.verdict, finding.reason, finding.place, finding.advice, table, tuple(surfaces))
 
 
@@ -204,13 +208,13 @@ def _solved(start: Surface, callback: Callback | None) -> Result:
     return result
 
 
-def _table(found: Sequence[dict[Key, Reading]]) -> pd.DataFrame:
+def _table(found: Sequence[dict[Key, Reading]], **doubts: float) -> pd.DataFrame:
     """Values, limits, bars and orders; NaN for a quantity that a finer mesh does not have."""
     first = list(found[0].values())
     estimates = np.array([[_of(one, key, "estimate") for key in found[0]] for one in found])
     rounding = np.array([[_of(one, key, "rounding") for key in found[0]] for one in found])
     value = np.array([reading.value for reading in first])
-    result = extrapolate(estimates, np.nanmax(rounding, axis=0), value)
+    result = extrapolate(estimates, np.nanmax(rounding, axis=0), value, **doubts)
     return pd.DataFrame(
         {
             "quantity": [reading.quantity for reading in first],
