@@ -17,6 +17,7 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from ..base import validate
@@ -32,7 +33,7 @@ from ..surface import Surface
 from ..surface.geometry import face_areas
 from .estimator import Goal, error_shares
 from .goals import Accuracy, accuracies, check_places, goals_in
-from .mesh_check import MeshCheck, check_mesh, with_bar
+from .mesh_check import BOUNDARIES, MeshCheck, check_mesh, vertex_numbers, with_bar
 
 TRIANGLES = 50_000  # of the mesh returned, by default at most
 ROUNDS = 12
@@ -112,6 +113,8 @@ def solve_to_accuracy(
     accuracy: Accuracy,
     *,
     accuracy_of: str = "mesh",
+    boundary: str | Projection = "smooth",
+    corners: npt.ArrayLike = (),
     most_triangles: int = TRIANGLES,
     callback: Callable[[Mapping[str, Any]], None] | None = None,
     **options: Any,
@@ -119,7 +122,7 @@ def solve_to_accuracy(
     """Solve on meshes that get finer where the error comes from, until the error bars are small enough.
 
     Start from a coarse mesh: remeshing keeps the vertices of boundaries and junctions. The error bars
-    are those of ``check_mesh``. New vertices of held boundaries lie on smooth curves through the old ones.
+    are those of ``check_mesh``.
 
     Parameters
     ----------
@@ -129,6 +132,8 @@ def solve_to_accuracy(
         per length, lowest eigenvalue; with a patch, as in ``"height of north"``, that patch's alone.
     accuracy_of : ``"mesh"``, the value on the mesh returned is to be so accurate; ``"limit"``, the
         extrapolated value is, which needs far fewer triangles.
+    boundary, corners : as in ``check_mesh``: where new vertices of a held boundary or held line go. The
+        smooth curves are those through the vertices of the first mesh.
     most_triangles : the most that the mesh returned may have; the check solves on 16 times as many.
     callback : called after each round with a row of numbers. StopIteration in it, or Ctrl-C, ends the
         search with the best surface so far.
@@ -156,7 +161,14 @@ def solve_to_accuracy(
         validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
     check_places(wanted, surface)
     _require_mmg()
-    return _Search(wanted, accuracy_of, most_triangles, callback, options).run(surface)
+    project: Projection | None
+    if callable(boundary):
+        project = boundary
+    else:
+        validate.choice("boundary", boundary, BOUNDARIES)
+        sharp = vertex_numbers(corners, surface.n)
+        project = onto_held_curves(surface, corners=sharp) if boundary == "smooth" else None
+    return _Search(wanted, accuracy_of, project, most_triangles, callback, options).run(surface)
 
 
 def size_field(surface: Surface, shares: Floats, triangles: float, growth: float = GROWTH) -> Floats:
@@ -224,6 +236,7 @@ class _Search:
 
     wanted: Mapping[str, float]
     accuracy_of: str
+    project: Projection | None
     most_triangles: int
     callback: Callable[[Mapping[str, Any]], None] | None
     options: Mapping[str, Any]
@@ -232,14 +245,13 @@ class _Search:
     def run(self, surface: Surface) -> AccurateResult:
         """Rounds until one of the ends."""
         first = result = solve(surface, **self.options)
-        project = onto_held_curves(surface)
         status, detail = AccuracyStatus.ROUNDS, f"after {ROUNDS} rounds"
         try:
             for _ in range(ROUNDS):
-                if ended := self._unsolved(result) or self._round(result, project):
+                if ended := self._unsolved(result) or self._round(result):
                     status, detail = ended
                     break
-                surface = self._remeshed(self.rounds[-1], project)
+                surface = self._remeshed(self.rounds[-1])
                 result = solve(surface, **self.options)
         except (StopIteration, KeyboardInterrupt):
             status, detail = AccuracyStatus.STOPPED, ""
@@ -252,9 +264,9 @@ class _Search:
             return AccuracyStatus.STOPPED, ""
         return AccuracyStatus.NOT_AT_REST, f"on {result.surface.m} triangles: {result.message}"
 
-    def _round(self, result: Result, project: Projection) -> End | None:
+    def _round(self, result: Result) -> End | None:
         """Check the mesh of a surface at rest; the end of the search if this is the last round."""
-        check = check_mesh(result, boundary=project)
+        check = check_mesh(result, boundary=self.project or "polygon")
         here = _Round.of(result, check, self.wanted, self.accuracy_of)
         self.rounds.append(here)
         if self.callback is not None:
@@ -271,7 +283,7 @@ class _Search:
         hint = f"raise most_triangles= (now {self.most_triangles}), or ask for less accuracy"
         return AccuracyStatus.TRIANGLES, f"{needed}; {hint}"
 
-    def _remeshed(self, here: _Round, project: Projection) -> Surface:
+    def _remeshed(self, here: _Round) -> Surface:
         """The surface on a mesh with equal shares of the error.
 
         With equal shares N triangles have the error (Σ √η)² / N; the m triangles here have Σ η.
@@ -284,7 +296,7 @@ class _Search:
         evenness = float(np.sqrt(shares).sum() ** 2 / shares.sum()) / surface.m if shares.any() else 1.0
         factor = SPARE * evenness * here.excess if math.isfinite(here.excess) else MOST
         triangles = min(float(np.clip(factor, LEAST, MOST)) * surface.m, self.most_triangles)
-        return remesh(surface, size_field(surface, shares, triangles), growth=GROWTH, project=project)
+        return remesh(surface, size_field(surface, shares, triangles), growth=GROWTH, project=self.project)
 
     def _end(self, status: AccuracyStatus, detail: str, first: Result) -> AccurateResult:
         history = [r.values.assign(round=k + 1, **r.record) for k, r in enumerate(self.rounds)]

@@ -5,20 +5,24 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Ints
 from ..surface import Surface
-from .held_curves import CORNER, _continuations, _rises
-from .refinement import Projection, held_midpoints
+from .held_curves import CORNER, arcs_over, held_edges
+from .refinement import Projection
 
 HALVINGS = 8  # of each edge of a curve that points are projected onto
 NEAREST = 3  # pieces of curve that are compared
 
 
-def onto_held_curves(surface: Surface, corner: float = CORNER) -> Projection:
+def onto_held_curves(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> Projection:
     """A function (k,3) → (k,3) that puts points near a surface's held edges on the smooth curves there.
 
     The curves are those of ``smooth_midpoints``, with each edge cut into 256. All meshes made with one such
     function, by ``refine``, ``remesh`` or ``check_mesh``, have the same boundary.
+
+    Parameters
+    ----------
+    corner, corners : as for ``smooth_midpoints``.
 
     Examples
     --------
@@ -30,14 +34,12 @@ def onto_held_curves(surface: Surface, corner: float = CORNER) -> Projection:
     >>> float(np.linalg.norm(onto_held_curves(disc)(np.array([[0.95, 0.1, 0.0]]))).round(5))
     1.0
     """
-    X, edges = surface.vertices, surface.topology.edges[held_midpoints(surface)[0]]
+    X, edges = surface.vertices, held_edges(surface)
     for _ in range(HALVINGS):
-        middle, rise, arcs = X[edges].mean(axis=1), np.zeros((len(edges), 3)), np.zeros(len(edges))
-        edge, *_, beyond = _continuations(X, edges, corner)
-        np.add.at(rise, edge, _rises(X, edges[edge], beyond))
-        np.add.at(arcs, edge, 1.0)
+        rises, arcs = arcs_over(X, edges, corner, corners)
+        middle = X[edges].mean(axis=1) + rises.sum(axis=1) / np.maximum(arcs.sum(axis=1), 1.0)[:, None]
         number = len(X) + np.arange(len(edges))
-        X = np.concatenate([X, middle + rise / np.maximum(arcs, 1.0)[:, None]])
+        X = np.concatenate([X, middle])
         edges = np.concatenate([np.stack([edges[:, 0], number], 1), np.stack([number, edges[:, 1]], 1)])
     start, side = X[edges[:, 0]], X[edges[:, 1]] - X[edges[:, 0]]
     tree = cKDTree(start + 0.5 * side)

@@ -16,7 +16,7 @@ CORNER = 40.0  # degrees: where held edges turn by more, the curve has a corner
 STRAIGHT = 1e-9  # of the length of an edge: smaller rises of an arc over it count as none
 
 
-def smooth_midpoints(surface: Surface, corner: float = CORNER) -> Floats:
+def smooth_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> Floats:
     """(k,3) places for the new held vertices of ``refine(surface)``, on smooth curves.
 
     Over each held edge stand two arcs, each through its ends and through the next vertex of the curve on
@@ -28,6 +28,7 @@ def smooth_midpoints(surface: Surface, corner: float = CORNER) -> Floats:
     ----------
     corner : angle in degrees. A vertex where two held edges turn by more is a corner. Where several held
         edges meet, the two that turn least go on into each other.
+    corners : vertices that are corners in any case.
 
     Examples
     --------
@@ -39,12 +40,13 @@ def smooth_midpoints(surface: Surface, corner: float = CORNER) -> Floats:
     >>> np.linalg.norm(smooth_midpoints(disc), axis=1).round(12).tolist() == [1.0] * 12
     True
     """
-    edges, rises, arcs = _held_rises(surface, corner)
+    edges = held_edges(surface)
+    rises, arcs = arcs_over(surface.vertices, edges, corner, corners)
     middle = surface.vertices[edges].mean(axis=1)
     return middle + rises.sum(axis=1) / np.maximum(arcs.sum(axis=1), 1.0)[:, None]
 
 
-def curve_doubt(surface: Surface, corner: float = CORNER) -> float:
+def curve_doubt(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> float:
     """How far ``smooth_midpoints`` may be from the curve that was meant, over the rises of the arcs.
 
     With r, s the rises of the two arcs over an edge, this is the mean of |r - s|² / |r + s|² over the held
@@ -59,7 +61,7 @@ def curve_doubt(surface: Surface, corner: float = CORNER) -> float:
     >>> round(curve_doubt(plate), 3)
     0.037
     """
-    _, rises, arcs = _held_rises(surface, corner)
+    rises, arcs = arcs_over(surface.vertices, held_edges(surface), corner, corners)
     both = rises[arcs.all(axis=1)]
     total, apart = (np.linalg.norm(both[:, 0] + sign * both[:, 1], axis=1) for sign in (1.0, -1.0))
     share = np.divide(apart, total, out=np.ones_like(apart), where=total > apart)
@@ -67,15 +69,21 @@ def curve_doubt(surface: Surface, corner: float = CORNER) -> float:
     return float(np.average(share**2, weights=total)) if total.any() else 0.0
 
 
-def _held_rises(surface: Surface, corner: float) -> tuple[Ints, Floats, Bools]:
-    """Held edges (e,2), the rises (e,2,3) of the arcs over them, and which of the two there are (e,2)."""
-    X = surface.vertices
-    edges = surface.topology.edges[held_midpoints(surface)[0]]
+def held_edges(surface: Surface) -> Ints:
+    """(e,2) the edges whose new vertices are held."""
+    return np.asarray(surface.topology.edges[held_midpoints(surface)[0]])
+
+
+def arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> tuple[Floats, Bools]:
+    """The rises (e,2,3) of the arcs over held edges (e,2), and which of the two there are (e,2)."""
     rises, arcs = np.zeros((len(edges), 2, 3)), np.zeros((len(edges), 2), dtype=bool)
     edge, end, beyond = _continuations(X, edges, corner)
+    if corners is not None:
+        smooth = ~np.isin(edges[edge, end], corners)
+        edge, end, beyond = edge[smooth], end[smooth], beyond[smooth]
     rises[edge, end] = _rises(X, edges[edge], beyond)
     arcs[edge, end] = True
-    return edges, rises, arcs
+    return rises, arcs
 
 
 def _continuations(X: Floats, edges: Ints, corner: float) -> tuple[Ints, Ints, Ints]:

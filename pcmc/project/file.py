@@ -37,6 +37,7 @@ class Project:
     plan : of the surface; None if ``path`` holds a surface itself.
     method, options : as in ``pcmc.solve``.
     wanted : the accuracy asked for.
+    mesh_check : whether the result is solved on finer meshes, too; None if the file does not say.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
     files, picture : the output.
@@ -49,6 +50,7 @@ class Project:
     method: str = "newton"
     options: Mapping[str, Any] = field(default_factory=dict)
     wanted: AccuracyWanted = AccuracyWanted()
+    mesh_check: bool | None = None
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
     vary: Sequence[Parameter] = ()
@@ -137,7 +139,7 @@ def surface_of(project: Project) -> Surface:
 def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     """The project with the given data. Errors as in ``load``."""
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
-    method = options.pop("method", "newton")
+    method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
     files, picture = output.get("files", []), output.get("picture")
     view, colour = output.get("view", "diagonal"), output.get("colour", "patches")
     with in_file(path, FileError):
@@ -151,6 +153,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             method=method,
             options=options,
             wanted=wanted,
+            mesh_check=mesh_check,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
             **(_search(data["targets"]) if "targets" in data else {}),
             files=files,
