@@ -279,8 +279,10 @@ class _Search:
         if m < WORTHWHILE * self.most_triangles:
             return None
         known = math.isfinite(here.excess)
-        needed = f"about {m * here.excess:.0f} are needed" if known else "the error is not known"
+        needed = f"about {m * here.excess:.2g} are needed" if known else "the error is not known"
         hint = f"raise most_triangles= (now {self.most_triangles}), or ask for less accuracy"
+        if self.accuracy_of == "mesh":
+            hint += ", or for that of the limit alone (accuracy_of='limit')"
         return AccuracyStatus.TRIANGLES, f"{needed}; {hint}"
 
     def _remeshed(self, here: _Round) -> Surface:

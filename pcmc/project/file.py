@@ -49,7 +49,7 @@ class Project:
     plan: Plan | None = None
     method: str = "newton"
     options: Mapping[str, Any] = field(default_factory=dict)
-    wanted: AccuracyWanted = AccuracyWanted()
+    wanted: AccuracyWanted = field(default_factory=AccuracyWanted)
     mesh_check: bool | None = None
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
