@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any, NoReturn
 
@@ -59,7 +60,7 @@ def patch_array(patch_of_face: npt.ArrayLike, m: int, patches: Sequence[Any]) ->
     names = [getattr(p, "name", None) for p in patches] if isinstance(patches, Iterable) else []
     if not names or None in names:
         validate.refuse("patches", patches, "a sequence of Patch", error=SurfaceError)
-    double = [name for place, name in enumerate(names) if name in names[:place]]
+    double = [name for name, times in Counter(map(str, names)).items() if times > 1]
     if double:
         message = f"patches: the name {double[0]!r} is used twice; names must be unique"
         raise SurfaceError(message, what="patches", found=double[0])
