@@ -31,6 +31,7 @@ from ..surface.geometry import face_areas
 from .estimator import Goal, error_shares
 from .goals import Accuracy, accuracies, check_places, goals_in
 from .mesh_check import MeshCheck, check_mesh
+from .persistence import MeshVerdict
 
 TRIANGLES = 50_000  # of the mesh returned, by default at most
 ROUNDS = 12

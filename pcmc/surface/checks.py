@@ -73,7 +73,8 @@ def face_array(faces: Any, n: int) -> Ints:
 
 def patch_array(patch_of_face: Any, m: int, patches: Sequence[Any]) -> Ints:
     """(m,) int32 indices into ``patches``, every patch used, names unique."""
-    double = [name for name, times in Counter(p.name for p in patches).items() if times > 1]
+    names = [p.name for p in patches]
+    double = [name for name, times in Counter(names).items() if times > 1]
     if double:
         message = f"patches: the name {double[0]!r} is used twice; names must be unique"
         raise SurfaceError(message, what="patches", found=double[0])
