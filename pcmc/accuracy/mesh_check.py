@@ -16,7 +16,7 @@ from ..base import validate
 from ..base.arrays import Ints
 from ..base.errors import FreeSurfaceWarning, OptionError, SurfaceError
 from ..certificate import Certificate, certify
-from ..meshing.held_curves import curve_doubt, smooth_midpoints
+from ..meshing.held_curves import curve_doubt, held_corners, smooth_midpoints
 from ..meshing.refinement import Projection, refine
 from ..solvers import solve
 from ..solvers.result import Callback, Result, Status
@@ -159,7 +159,7 @@ def check_mesh(
     if not isinstance(first, Surface):
         validate.refuse("surface", type(first).__name__, "a Surface or a Result", error=SurfaceError)
     validate.integer("most_triangles", most_triangles)
-    sharp = vertex_numbers(corners, first.n)
+    sharp = np.union1d(vertex_numbers(corners, first.n), held_corners(first))
     finest = first.m * 4 ** (meshes - 1)
     if finest > most_triangles:
         raise OptionError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from typing import Any, NoReturn
@@ -73,7 +74,7 @@ def face_array(faces: Any, n: int) -> Ints:
 def patch_array(patch_of_face: Any, m: int, patches: Sequence[Any]) -> Ints:
     """(m,) int32 indices into ``patches``, every patch used, names unique."""
     names = [p.name for p in patches]
-    double = [name for place, name in enumerate(names) if name in names[:place]]
+    double = [name for name, times in Counter(names).items() if times > 1]
     if double:
         message = f"patches: the name {double[0]!r} is used twice; names must be unique"
         raise SurfaceError(message, what="patches", found=double[0])
