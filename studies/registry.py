@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pcmc.base.errors import OptionError, unknown
 
 from . import (
+    accuracy,
     alpha_grid,
     alpha_grid_geometric,
     calibration,
@@ -39,6 +40,7 @@ MODULES = (
     refinement,
     solvers,
     existence,
+    accuracy,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out
