@@ -26,7 +26,6 @@ from pcmc.meshing.held_curves import onto_held_curves
 from pcmc.meshing.refinement import refine
 from pcmc.plan import Area, Divider, Hole, Plan, circle
 
-from .corners import near_place
 from .folder import Folder
 from .orders import Order, slope
 from .study import Study
@@ -83,13 +82,13 @@ class Family:
 
 FAMILIES = (
     Family("caps", "Example 2, bottom held", held_caps,
-           ("height of large", "volume", "area of wall", "reaction of wall", "lowest eigenvalue")),
+           ("reaction of wall", "height of large", "volume", "area of wall", "lowest eigenvalue")),
     Family("hall", "Example 4", hall,
-           ("height of middle", "volume", "area of left wall", "reaction of left wall", "lowest eigenvalue")),
+           ("reaction of left wall", "height of middle", "volume", "area of left wall", "lowest eigenvalue")),
     Family("roof", "L-shaped roof", roof,
-           ("height of north", "volume", "area of wall 1", "reaction of wall 1", "lowest eigenvalue")),
+           ("reaction of wall 1", "height of north", "volume", "area of wall 1", "lowest eigenvalue")),
 )  # fmt: skip
-DRAWN = ("roof", "height of north")  # whose adaptive mesh is drawn near the re-entrant corner
+DRAWN = ("roof", "reaction of wall 1")  # whose adaptive mesh is drawn near the re-entrant corner
 CORNER = np.array([10.0, 10.0, 0.0])
 
 
@@ -228,7 +227,7 @@ def figure(folder: Folder) -> None:
                 markers=True,
             )
     surface = folder.read_mesh("graded")["at rest"]
-    parts = [near_place(surface, CORNER, surface.size / share) for share in (1, 6, 36)]
+    parts = [_near(surface, surface.size / share) for share in (1, 8, 64)]
     panel(
         parts,
         folder.figure("graded"),
@@ -237,8 +236,23 @@ def figure(folder: Folder) -> None:
         edges=True,
         supports=False,
         columns=3,
-        titles=("made for the height of north", "re-entrant corner, 6 times as large", "36 times as large"),
+        titles=(
+            "made for the reaction of a wall",
+            "re-entrant corner, 8 times as large",
+            "64 times as large",
+        ),
     )
+
+
+def _near(surface: Surface, reach: float) -> Surface:
+    """The roofs' triangles with a vertex this near to the re-entrant corner, seen from above."""
+    roof = ~surface.walls[surface.patch_of_face]
+    away = np.linalg.norm((surface.vertices - CORNER)[:, :2], axis=1)
+    near = roof & (away[surface.faces].min(axis=1) <= reach)
+    used, faces = np.unique(surface.faces[near], return_inverse=True)
+    numbers, patch = np.unique(surface.patch_of_face[near], return_inverse=True)
+    kept = [surface.patches[k] for k in numbers]
+    return Surface(surface.vertices[used], faces.reshape(-1, 3), patch, kept, fixed=surface.fixed[used])
 
 
 STUDY = Study(

@@ -318,7 +318,7 @@ def _draw_mesh(folder: Folder) -> None:
 
     surface = folder.read_mesh(DRAWN)["at rest"]
     place = surface.vertices[ends(surface)[0]]
-    parts = [near_place(surface, place, surface.size / share) for share in (1, 8, 64)]
+    parts = [_near(surface, place, surface.size / share) for share in (1, 8, 64)]
     panel(
         parts,
         folder.figure("graded"),
@@ -331,7 +331,7 @@ def _draw_mesh(folder: Folder) -> None:
     )
 
 
-def near_place(surface: Surface, place: Floats, reach: float) -> Surface:
+def _near(surface: Surface, place: Floats, reach: float) -> Surface:
     """The roofs' triangles within a distance of a place."""
     roof = ~surface.walls[surface.patch_of_face]
     near = roof & (np.linalg.norm(surface.vertices[surface.faces] - place, axis=2).max(axis=1) <= reach)
