@@ -14,13 +14,13 @@ import pandas as pd
 from ..base import validate
 from ..base.errors import FreeSurfaceWarning, OptionError, SurfaceError
 from ..certificate import Certificate, certify
-from ..meshing.held_curves import smooth_midpoints
+from ..meshing.held_curves import curve_doubt, smooth_midpoints
 from ..meshing.refinement import Projection, refine
 from ..solvers import solve
 from ..solvers.result import Callback, Result, Status
 from ..surface import Surface
 from .extrapolation import extrapolate
-from .persistence import MeshVerdict, compared, lost
+from .persistence import MeshVerdict, compared, lost, shape_order
 from .quantities import Key, Reading, readings
 
 MOST = 4_000_000  # triangles of the finest mesh, by default
@@ -176,7 +176,11 @@ def check_mesh(
     if finding is None or len(surfaces) > 1:
         found = compared(surfaces, certificates)
         finding = found if finding is None or found.verdict is MeshVerdict.CHANGES else finding
-    table = _table([readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)])
+    table = _table(
+        [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)],
+        shape_order=shape_order(surfaces),
+        curve_doubt=curve_doubt(first) if boundary == "smooth" else 0.0,
+    )
     return MeshCheck(finding.verdict, finding.reason, finding.place, finding.advice, table, tuple(surfaces))
 
 
@@ -204,13 +208,13 @@ def _solved(start: Surface, callback: Callback | None) -> Result:
     return result
 
 
-def _table(found: Sequence[dict[Key, Reading]]) -> pd.DataFrame:
+def _table(found: Sequence[dict[Key, Reading]], **doubts: float) -> pd.DataFrame:
     """Values, limits, bars and orders; NaN for a quantity that a finer mesh does not have."""
     first = list(found[0].values())
     estimates = np.array([[_of(one, key, "estimate") for key in found[0]] for one in found])
     rounding = np.array([[_of(one, key, "rounding") for key in found[0]] for one in found])
     value = np.array([reading.value for reading in first])
-    result = extrapolate(estimates, np.nanmax(rounding, axis=0), value)
+    result = extrapolate(estimates, np.nanmax(rounding, axis=0), value, **doubts)
     return pd.DataFrame(
         {
             "quantity": [reading.quantity for reading in first],
@@ -238,27 +242,28 @@ def _text_table(table: pd.DataFrame) -> str:
         {
             "quantity": table.quantity,
             "of": table.of,
-            "on this mesh": [_with_bar(*pair) for pair in zip(table.value, table.error, strict=True)],
-            "limit": [_with_bar(*pair) for pair in zip(table.limit, table.limit_error, strict=True)],
+            "on this mesh": [with_bar(*pair) for pair in zip(table.value, table.error, strict=True)],
+            "limit": [with_bar(*pair) for pair in zip(table.limit, table.limit_error, strict=True)],
             "order": ["-" if math.isnan(p) else f"{p:.1f}" for p in table.order],
         }
     )
     return lines.to_string(index=False)
 
 
-def _with_bar(value: float, bar: float) -> str:
+def with_bar(value: float, bar: float) -> str:
     """A value and its bar, with two digits of the bar.
 
-    >>> _with_bar(2.71828, 0.0123), _with_bar(1234.5, 45.0), _with_bar(2.0, math.inf), _with_bar(2.0, 1e-12)
-    ('2.718 ± 0.012', '1234 ± 45', '2 ± no limit', '2 ± 1e-12')
+    >>> with_bar(2.71828, 0.0123), with_bar(1234.5, 45.0), with_bar(2.0, math.inf), with_bar(2.0, 1e-12)
+    ('2.718 ± 0.012', '1234 ± 45', '2 ± unknown', '2 ± 1e-12')
     """
     if math.isnan(value):
         return "none in sight"
     if not math.isfinite(bar):
-        return f"{value:.4g} ± no limit"
+        return f"{value:.4g} ± unknown"
     if bar <= 1e-9 * abs(value) or bar == 0.0:
         return f"{value:.8g} ± {bar:.0e}"
     digits = 1 - math.floor(math.log10(bar))
-    if 0 <= digits <= 9:
-        return f"{value:.{digits}f} ± {bar:.{digits}f}"
+    if -6 <= digits <= 9:
+        shown = max(digits, 0)
+        return f"{round(value, digits):.{shown}f} ± {round(bar, digits):.{shown}f}"
     return f"{value:.4g} ± {bar:.2g}"
