@@ -78,7 +78,8 @@ def extrapolate(
         in another way than the estimates, if both have the same limit.
     shape_order : observed order s of the surface itself, from how far it moves from mesh to mesh. Below
         1.5 a quantity may owe its own better order to errors that cancel. Then its bar is at least
-        |d_1| / (S (S - 1)), S = 2^s: what is left where d_1 shrinks by S with each mesh.
+        |d_1| / (S (S - 1)), S = 2^s: what is left where d_1 shrinks by S with each mesh. If s ≤ 0, no
+        limit is in sight.
     curve_doubt : share of the rise of curved boundaries that is in doubt; 4 × that share of the first
         difference is added.
 
@@ -97,15 +98,16 @@ def extrapolate(
     none, steps = np.full(q.shape[1], np.nan), np.diff(q, axis=0)
     equal = (np.abs(steps[-2:]) <= rounding).all(axis=0) & (len(steps) > 0)
     if len(steps) == 0:
-        order, limit, bar = none, none, none + np.inf
+        order, limit, bar = none, none, np.full_like(none, np.inf)
     elif len(steps) == 1:
         order, limit, bar = none, q[-1] + steps[-1] / 3.0, np.abs(steps[-1]) + rounding
     else:
         order, limit, bar = _three(q[-1], steps[-2], steps[-1], rounding)
-    if len(steps) > 1 and shape_order < UNSETTLED:
+    if shape_order <= 0.0:
+        bar = np.full_like(none, np.inf)
+    elif shape_order < UNSETTLED and len(steps) > 1:
         factor = 2.0**shape_order
-        left = np.abs(steps[-2]) / (factor * (factor - 1.0)) if factor > 1.0 else np.inf * np.abs(steps[-2])
-        bar = np.maximum(bar, np.nan_to_num(left, nan=0.0, posinf=np.inf))
+        bar = np.maximum(bar, np.abs(steps[-2]) / (factor * (factor - 1.0)))
     if curve_doubt > 0.0 and len(steps):
         bar = bar + CURVES * curve_doubt * np.abs(steps[0])
     limit, bar = np.where(np.isinf(bar), np.nan, limit), np.where(np.isnan(limit), np.inf, bar)

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from ..base import validate
+from ..base.arrays import Ints
 from ..base.errors import FreeSurfaceWarning, OptionError, SurfaceError
 from ..certificate import Certificate, certify
-from ..meshing.held_curves import curve_doubt, smooth_midpoints
+from ..meshing.held_curves import curve_doubt, held_corners, smooth_midpoints
 from ..meshing.refinement import Projection, refine
 from ..solvers import solve
 from ..solvers.result import Callback, Result, Status
@@ -77,7 +79,8 @@ class MeshCheck:
 
         The height is that of the highest patch. Keys are such as ``height_error`` and ``volume_limit``.
         """
-        found: dict[str, Any] = {"mesh_check": self.verdict.name.lower(), "mesh_check_detail": self.detail}
+        verdict = self.verdict.name.lower().replace("_", " ")
+        found: dict[str, Any] = {"mesh_verdict": verdict, "mesh_detail": self.detail}
         heights = self.table[self.table["quantity"] == "height"].nlargest(1, "value")
         for row in pd.concat([heights, self.table[self.table["of"] == ""]]).to_dict("records"):
             for column in ("error", "limit", "limit_error", "order"):
@@ -101,6 +104,7 @@ def check_mesh(
     meshes: int = 3,
     *,
     boundary: str | Projection = "smooth",
+    corners: npt.ArrayLike = (),
     callback: Callback | None = None,
     most_triangles: int = MOST,
 ) -> MeshCheck:
@@ -121,6 +125,7 @@ def check_mesh(
         through the old ones, which turn by up to 40° at a vertex (straight lines stay straight);
         ``"polygon"``, on the straight edges; or a function (k,3) → (k,3) that puts points of the edges
         on the exact curve. Vertices that slide on Π stay on it.
+    corners : vertices (k,) at which held curves have corners though they turn by less.
     callback : called with a ``Progress`` after each step of the solver. Where it raises StopIteration,
         the check ends with KeyboardInterrupt, as with Ctrl-C.
     most_triangles : the most that the finest mesh may have.
@@ -128,7 +133,8 @@ def check_mesh(
     Raises
     ------
     OptionError
-        For ``meshes`` below 2, another ``boundary``, or more than ``most_triangles``.
+        For ``meshes`` below 2, another ``boundary``, ``corners`` that are no vertices, or more than
+        ``most_triangles``.
     SurfaceError
         If the surface is not at rest.
 
@@ -153,6 +159,7 @@ def check_mesh(
     if not isinstance(first, Surface):
         validate.refuse("surface", type(first).__name__, "a Surface or a Result", error=SurfaceError)
     validate.integer("most_triangles", most_triangles)
+    sharp = np.union1d(_vertices(corners, first.n), held_corners(first))
     finest = first.m * 4 ** (meshes - 1)
     if finest > most_triangles:
         raise OptionError(
@@ -165,11 +172,11 @@ def check_mesh(
     certificate = surface.certificate if isinstance(surface, Result) else certify(surface)
     _refuse_unsolved(certificate)
     surfaces, certificates = [first], [certificate]
-    finding = None
+    finding, order = None, None
     for _ in range(meshes - 1):
-        result = _solved(_refined(surfaces[-1], boundary), callback)
+        result = _solved(_refined(surfaces[-1], boundary, sharp), callback)
         if not result.converged or result.certificate.index is None:
-            finding = lost(result)
+            finding, order = lost(result), -np.inf
             break
         surfaces.append(result.surface)
         certificates.append(result.certificate)
@@ -178,8 +185,8 @@ def check_mesh(
         finding = found if finding is None or found.verdict is MeshVerdict.CHANGES else finding
     table = _table(
         [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)],
-        shape_order=shape_order(surfaces),
-        curve_doubt=curve_doubt(first) if boundary == "smooth" else 0.0,
+        shape_order=shape_order(surfaces) if order is None else order,
+        curve_doubt=curve_doubt(first, corners=sharp) if boundary == "smooth" else 0.0,
     )
     return MeshCheck(finding.verdict, finding.reason, finding.place, finding.advice, table, tuple(surfaces))
 
@@ -191,11 +198,20 @@ def _refuse_unsolved(certificate: Certificate) -> None:
         raise SurfaceError(message, what="surface", found=certificate.residual)
 
 
-def _refined(surface: Surface, boundary: str | Projection) -> Surface:
+def _vertices(corners: npt.ArrayLike, n: int) -> Ints:
+    """The numbers (k,) of the corners, checked."""
+    numbers = np.asarray(corners)
+    whole = numbers.size == 0 or (numbers.ndim == 1 and np.issubdtype(numbers.dtype, np.integer))
+    if not whole or (numbers.size and not (numbers.min() >= 0 and numbers.max() < n)):
+        validate.refuse("corners", corners, f"whole numbers of vertices, 0..{n - 1}")
+    return numbers.astype(np.int64)
+
+
+def _refined(surface: Surface, boundary: str | Projection, corners: Ints) -> Surface:
     """The surface on a mesh with four times as many triangles."""
     project = boundary if callable(boundary) else None
     if boundary == "smooth":
-        project = lambda _: smooth_midpoints(surface)  # noqa: E731
+        project = lambda _: smooth_midpoints(surface, corners=corners)  # noqa: E731
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FreeSurfaceWarning)  # given with the first surface
         return refine(surface, 1, project)

@@ -18,7 +18,7 @@ HALVINGS = 8  # of each edge of a curve that points are projected onto
 STRAIGHT = 1e-9  # of the length of an edge: smaller rises of an arc over it count as none
 
 
-def smooth_midpoints(surface: Surface, corner: float = CORNER) -> Floats:
+def smooth_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> Floats:
     """(k,3) places for the new held vertices of ``refine(surface)``, on smooth curves.
 
     Over each held edge stand two arcs, each through its ends and through the next vertex of the curve on
@@ -30,6 +30,7 @@ def smooth_midpoints(surface: Surface, corner: float = CORNER) -> Floats:
     ----------
     corner : angle in degrees. A vertex where two held edges turn by more is a corner. Where several held
         edges meet, the two that turn least go on into each other.
+    corners : vertices that are corners in any case.
 
     Examples
     --------
@@ -41,11 +42,43 @@ def smooth_midpoints(surface: Surface, corner: float = CORNER) -> Floats:
     >>> np.linalg.norm(smooth_midpoints(disc), axis=1).round(12).tolist() == [1.0] * 12
     True
     """
-    edges = surface.topology.edges[held_midpoints(surface)[0]]
-    return _smooth_middles(surface.vertices, edges, corner)
+    return _smooth_middles(surface.vertices, _held_edges(surface), corner, corners)
 
 
-def onto_held_curves(surface: Surface, corner: float = CORNER) -> Projection:
+def curve_doubt(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> float:
+    """How far ``smooth_midpoints`` may be from the curve that was meant, over the rises of the arcs.
+
+    With r, s the rises of the two arcs over an edge, this is the mean of |r - s|² / |r + s|² over the held
+    edges, weighted by |r + s|. It is 0 on circles and straight lines; on others it falls as the square of
+    the edge length, as the error of ``smooth_midpoints`` does.
+
+    >>> from pcmc import Patch
+    >>> angle = 2 * np.pi * np.arange(24) / 24
+    >>> rim = np.stack([2 * np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> plate = Surface([[0, 0, 0], *rim], [[0, k + 1, (k + 1) % 24 + 1] for k in range(24)], [0] * 24,
+    ...                 [Patch("plate", 1.0)], fixed=range(1, 25))
+    >>> round(curve_doubt(plate), 3)
+    0.037
+    """
+    rises, arcs = _arcs(surface.vertices, _held_edges(surface), corner, corners)
+    both = rises[arcs.all(axis=1)]
+    total, apart = (np.linalg.norm(both[:, 0] + sign * both[:, 1], axis=1) for sign in (1.0, -1.0))
+    share = np.divide(apart, total, out=np.ones_like(apart), where=total > apart)
+    share[apart == 0.0] = 0.0
+    return float(np.average(share**2, weights=total)) if total.any() else 0.0
+
+
+def held_corners(surface: Surface, corner: float = CORNER) -> Ints:
+    """Vertices (k,) of held edges at which none of these goes on into another one.
+
+    On a finer mesh curves turn less at them. So that they stay corners there, keep their numbers.
+    """
+    edges = _held_edges(surface)
+    edge, end, _ = _continuations(surface.vertices, edges, corner)
+    return np.setdiff1d(edges, edges[edge, end])
+
+
+def onto_held_curves(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> Projection:
     """A function (k,3) → (k,3) that puts points near a surface's held edges on the smooth curves there.
 
     The curves of ``smooth_midpoints``, each edge cut into 256. All meshes made with one such function,
@@ -61,12 +94,13 @@ def onto_held_curves(surface: Surface, corner: float = CORNER) -> Projection:
     >>> float(np.linalg.norm(onto_held_curves(disc)(np.array([[0.95, 0.1, 0.0]]))).round(5))
     1.0
     """
-    X, edges = surface.vertices, surface.topology.edges[held_midpoints(surface)[0]]
+    X, edges = surface.vertices, _held_edges(surface)
     if not len(edges):
         return lambda points: points
+    corners = np.union1d(held_corners(surface, corner), np.empty(0, int) if corners is None else corners)
     for _ in range(HALVINGS):
         number = len(X) + np.arange(len(edges))
-        X = np.concatenate([X, _smooth_middles(X, edges, corner)])
+        X = np.concatenate([X, _smooth_middles(X, edges, corner, corners)])
         edges = np.concatenate([np.stack([edges[:, 0], number], 1), np.stack([number, edges[:, 1]], 1)])
     start, side = X[edges[:, 0]], X[edges[:, 1]] - X[edges[:, 0]]
     tree = cKDTree(start + 0.5 * side)
@@ -82,41 +116,25 @@ def onto_held_curves(surface: Surface, corner: float = CORNER) -> Projection:
     return project
 
 
-def curve_doubt(surface: Surface, corner: float = CORNER) -> float:
-    """How far ``smooth_midpoints`` may be from the curve that was meant, over the rises of the arcs.
-
-    With r, s the rises of the two arcs over an edge, this is the mean of |r - s|² / |r + s|² over the held
-    edges, weighted by |r + s|. It is 0 on circles and straight lines; on others it falls as the square of
-    the edge length, as the error of ``smooth_midpoints`` does.
-
-    >>> from pcmc import Patch
-    >>> angle = 2 * np.pi * np.arange(24) / 24
-    >>> rim = np.stack([2 * np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    >>> plate = Surface([[0, 0, 0], *rim], [[0, k + 1, (k + 1) % 24 + 1] for k in range(24)], [0] * 24,
-    ...                 [Patch("plate", 1.0)], fixed=range(1, 25))
-    >>> round(curve_doubt(plate), 3)
-    0.037
-    """
-    edges = surface.topology.edges[held_midpoints(surface)[0]]
-    rises, arcs = _arc_rises(surface.vertices, edges, corner)
-    both = rises[arcs.all(axis=1)]
-    total, apart = (np.linalg.norm(both[:, 0] + sign * both[:, 1], axis=1) for sign in (1.0, -1.0))
-    share = np.divide(apart, total, out=np.ones_like(apart), where=total > apart)
-    share[apart == 0.0] = 0.0
-    return float(np.average(share**2, weights=total)) if total.any() else 0.0
+def _held_edges(surface: Surface) -> Ints:
+    """(e,2) edges whose middle is fixed on a finer mesh."""
+    return np.asarray(surface.topology.edges[held_midpoints(surface)[0]])
 
 
-def _smooth_middles(X: Floats, edges: Ints, corner: float) -> Floats:
+def _smooth_middles(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> Floats:
     """(k,3) the middles of edges (k,2), moved onto the arcs over them."""
-    rises, arcs = _arc_rises(X, edges, corner)
+    rises, arcs = _arcs(X, edges, corner, corners)
     middle = 0.5 * (X[edges[:, 0]] + X[edges[:, 1]])
-    return middle + rises.sum(axis=1) / np.maximum(arcs.sum(axis=1), 1.0)[:, None]
+    return middle + rises.sum(axis=1) / np.maximum(arcs.sum(axis=1), 1)[:, None]
 
 
-def _arc_rises(X: Floats, edges: Ints, corner: float) -> tuple[Floats, Bools]:
-    """The rises (k,2,3) of the arcs over edges (k,2), and which of the two there are (k,2)."""
+def _arcs(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> tuple[Floats, Bools]:
+    """The rises (e,2,3) of the arcs over edges that go on beyond either end, and where there is one (e,2)."""
     rises, arcs = np.zeros((len(edges), 2, 3)), np.zeros((len(edges), 2), dtype=bool)
     edge, end, beyond = _continuations(X, edges, corner)
+    if corners is not None:
+        smooth = ~np.isin(edges[edge, end], corners)
+        edge, end, beyond = edge[smooth], end[smooth], beyond[smooth]
     rises[edge, end] = _rises(X, edges[edge], beyond)
     arcs[edge, end] = True
     return rises, arcs
