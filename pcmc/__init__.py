@@ -9,7 +9,7 @@ from .base import errors
 
 if TYPE_CHECKING:
     from . import explore
-    from .accuracy import MeshCheck, MeshVerdict, check_mesh
+    from .accuracy import MeshCheck, MeshVerdict, check_mesh, solve_to_accuracy
     from .certificate import Certificate, Verdict, certify
     from .continuation import Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
@@ -45,6 +45,7 @@ __all__ = [
     "read",
     "sensitivities",
     "solve",
+    "solve_to_accuracy",
     "target_curvature",
     "write",
 ]
@@ -52,7 +53,7 @@ __all__ = [
 # Each name is imported at its first use. So ``import pcmc`` takes milliseconds, and the command can
 # handle Ctrl-C before numpy and scipy are imported.
 _NAMES = {
-    "accuracy": ("MeshCheck", "MeshVerdict", "check_mesh"),
+    "accuracy": ("MeshCheck", "MeshVerdict", "check_mesh", "solve_to_accuracy"),
     "certificate": ("Certificate", "Verdict", "certify"),
     "continuation": ("Direction", "follow"),
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
