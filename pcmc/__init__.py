@@ -10,7 +10,7 @@ from .base import errors
 if TYPE_CHECKING:
     from . import explore
     from .certificate import Certificate, Verdict, certify
-    from .continuation import Direction, follow
+    from .continuation import BoundaryMotion, Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
     from .energy.curvature import curvature_error, mean_curvature, target_curvature
     from .energy.functional import energy, gradient, hessian
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .surface import Patch, Plane, Surface
 
 __all__ = [
+    "BoundaryMotion",
     "Certificate",
     "Design",
     "Direction",
@@ -49,7 +50,7 @@ __all__ = [
 # handle Ctrl-C before numpy and scipy are imported.
 _NAMES = {
     "certificate": ("Certificate", "Verdict", "certify"),
-    "continuation": ("Direction", "follow"),
+    "continuation": ("BoundaryMotion", "Direction", "follow"),
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
     "energy.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
     "energy.functional": ("energy", "gradient", "hessian"),
