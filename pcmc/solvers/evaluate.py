@@ -12,6 +12,7 @@ from ..base.compiled import blocks, compiled, threads
 from ..energy import kernels
 from ..energy.functional import total
 from ..surface import Surface
+from ..surface.checks import reachable
 from ..surface.geometry import accumulate, dot, point, scaled, vector
 
 
@@ -25,8 +26,8 @@ class Point(NamedTuple):
 
     @property
     def finite(self) -> bool:
-        """Whether energy and gradient are numbers; then the positions are, too."""
-        return isfinite(self.energy) and isfinite(self.squared)
+        """Whether energy and gradient are numbers, and the positions are not too far out for a Surface."""
+        return isfinite(self.energy) and isfinite(self.squared) and reachable(self.X)
 
 
 class Evaluator:

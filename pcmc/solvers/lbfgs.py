@@ -42,7 +42,7 @@ class LbfgsOptions:
         if self.tolerance is not None:
             validate.number("tolerance", self.tolerance, least=0.0)
         validate.integer("evaluations", self.evaluations, least=1)
-        validate.integer("memory", self.memory)
+        validate.integer("memory", self.memory, most=1000)
         validate.number("inflation", self.inflation, above=1.0)
 
 
