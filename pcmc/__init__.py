@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from . import explore
     from .accuracy import MeshCheck, MeshVerdict, check_mesh, solve_to_accuracy
     from .certificate import Certificate, Verdict, certify
-    from .continuation import Direction, follow
+    from .continuation import BoundaryMotion, Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
     from .energy.curvature import curvature_error, mean_curvature, target_curvature
     from .energy.functional import energy, gradient, hessian
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .surface import Patch, Plane, Surface
 
 __all__ = [
+    "BoundaryMotion",
     "Certificate",
     "Design",
     "Direction",
@@ -55,7 +56,7 @@ __all__ = [
 _NAMES = {
     "accuracy": ("MeshCheck", "MeshVerdict", "check_mesh", "solve_to_accuracy"),
     "certificate": ("Certificate", "Verdict", "certify"),
-    "continuation": ("Direction", "follow"),
+    "continuation": ("BoundaryMotion", "Direction", "follow"),
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
     "energy.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
     "energy.functional": ("energy", "gradient", "hessian"),
