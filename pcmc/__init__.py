@@ -9,6 +9,7 @@ from .base import errors
 
 if TYPE_CHECKING:
     from . import explore
+    from .accuracy import MeshCheck, MeshVerdict, check_mesh
     from .certificate import Certificate, Verdict, certify
     from .continuation import Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
@@ -22,6 +23,8 @@ __all__ = [
     "Certificate",
     "Design",
     "Direction",
+    "MeshCheck",
+    "MeshVerdict",
     "Parameter",
     "Patch",
     "Plane",
@@ -29,6 +32,7 @@ __all__ = [
     "Target",
     "Verdict",
     "certify",
+    "check_mesh",
     "curvature_error",
     "energy",
     "errors",
@@ -48,6 +52,7 @@ __all__ = [
 # Each name is imported at its first use. So ``import pcmc`` takes milliseconds, and the command can
 # handle Ctrl-C before numpy and scipy are imported.
 _NAMES = {
+    "accuracy": ("MeshCheck", "MeshVerdict", "check_mesh"),
     "certificate": ("Certificate", "Verdict", "certify"),
     "continuation": ("Direction", "follow"),
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),

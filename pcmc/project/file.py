@@ -35,6 +35,7 @@ class Project:
     path : the file.
     plan : of the surface; None if ``path`` holds a surface itself.
     method, options : as in ``pcmc.solve``.
+    mesh_check : whether the result is solved on finer meshes, too; None if the file does not say.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
     files, picture : the output.
@@ -46,6 +47,7 @@ class Project:
     plan: Plan | None = None
     method: str = "newton"
     options: Mapping[str, Any] = field(default_factory=dict)
+    mesh_check: bool | None = None
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
     vary: Sequence[Parameter] = ()
@@ -134,7 +136,7 @@ def surface_of(project: Project) -> Surface:
 def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     """The project with the given data. Errors as in ``load``."""
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
-    method = options.pop("method", "newton")
+    method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
     files, picture = output.get("files", []), output.get("picture")
     view, colour = output.get("view", "diagonal"), output.get("colour", "patches")
     with in_file(path, FileError):
@@ -146,6 +148,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             plan=plan_from(data["plan"]),
             method=method,
             options=options,
+            mesh_check=mesh_check,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
             **(_search(data["targets"]) if "targets" in data else {}),
             files=files,

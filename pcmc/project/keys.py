@@ -16,6 +16,7 @@ from ..surface import Plane
 from .output import COLOURS
 from .remeshing import WHEN, Remeshing
 
+CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
 REQUIRED = MISSING  # the default of a key that must be given
 
 
@@ -169,12 +170,15 @@ def main_sections() -> tuple[Section, ...]:
 @cache
 def solve_section(method: str) -> Section:
     """The keys of [solve] for a method; for one that does not exist ``method`` alone."""
-    known = Key("method", "a text", "newton", "the solver", tuple(METHODS))
+    known = (
+        Key("method", "a text", "newton", "the solver", tuple(METHODS)),
+        Key("mesh_check", "true or false", None, CHECKED),
+    )
     if method not in METHODS:
-        return Section("solve", "The solver and its options.", (known,))
+        return Section("solve", "The solver and its options.", known)
     choices = {"target": ("minimum", "stationary"), "armijo": ("printed", "sufficient")}
     options = _of_class(find_method(method).options, choices=choices)
-    return Section("solve", "The solver and its options.", (known, *options), f'method = "{method}"')
+    return Section("solve", "The solver and its options.", (*known, *options), f'method = "{method}"')
 
 
 @cache

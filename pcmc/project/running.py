@@ -10,6 +10,9 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from scipy.spatial import cKDTree
+
 from .. import io
 from ..base.errors import BalanceWarning, OptionError
 from ..base.files import folder as made
@@ -24,16 +27,24 @@ from .file import Project, in_file, load, surface_of
 from .output import OnStep, PathLike, check_names, check_outputs, fields, ignore, paint, write_all
 
 if TYPE_CHECKING:
+    from ..accuracy import MeshCheck
     from ..design import Design
+
+
+SAME = 1e-9  # of the size: a vertex this near to a corner of the plan is that corner
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """The result of a project, the files written, and the search for its targets if it has any."""
+    """The result of a project, the files written, the search for its targets, and its mesh check.
+
+    ``design`` and ``mesh_check`` are None where the project asks for none.
+    """
 
     result: Result
     files: Sequence[Path]
     design: Design | None = None
+    mesh_check: MeshCheck | None = None
 
     @property
     def surface(self) -> Surface:
@@ -90,8 +101,37 @@ def run_project(
     changed: Callable[[Surface], Surface] | None = None,
     anyway: bool = False,
 ) -> Outcome:
-    """As ``run``, for a loaded project; ``changed`` is applied to its initial surface."""
-    report, outputs = progress or ignore, project.outputs
+    """As ``run``, for a loaded project; ``changed`` is applied to its initial surface.
+
+    The mesh check comes after the files are written: Ctrl-C during it leaves them.
+    """
+    outcome = _solve_and_write(project, progress or ignore, changed, anyway)
+    if project.mesh_check and outcome.certificate.index is not None:
+        outcome = replace(outcome, mesh_check=check_project_mesh(project, outcome.result, progress))
+    return outcome
+
+
+def check_project_mesh(project: Project, result: Result, progress: OnStep | None = None) -> MeshCheck:
+    """``pcmc.check_mesh`` of a project's result; the corners of its plan stay corners."""
+    from ..accuracy import check_mesh  # takes long to import
+
+    report, surface = progress or ignore, result.surface
+    corners = np.empty(0, dtype=np.int64)
+    if project.plan is not None and len(project.plan.corners):
+        away, nearest = cKDTree(surface.vertices).query(project.plan.corners)
+        corners = np.asarray(nearest)[np.asarray(away) <= SAME * surface.size]
+
+    def callback(state: Progress) -> None:
+        report(f"mesh check: {state.surface().m} triangles, step {state.iteration}")
+
+    return check_mesh(result, corners=corners, callback=callback)
+
+
+def _solve_and_write(
+    project: Project, report: OnStep, changed: Callable[[Surface], Surface] | None, anyway: bool
+) -> Outcome:
+    """The outcome of a project, its output written."""
+    outputs = project.outputs
     check_names(project.files, project.picture)
     check_outputs(outputs, project.folder)
     report("reading" if project.plan is None else "meshing the plan")

@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.errors import SurfaceError
-from ..meshing.refinement import refine
+from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import morse_index
 from ..surface import Surface
@@ -36,6 +36,7 @@ def newton(
     """Solve with the geometric solver; see ``pcmc.solve``."""
     options = options or NewtonOptions()
     _refuse_loose_parts(surface)
+    refinable("levels", options.levels, surface.m)
     history = History(callback)
     for level in range(options.levels + 1):
         end = _solve_level(surface, options, history, level)

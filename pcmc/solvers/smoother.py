@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import Bools, Floats
+from ..energy.functional import apply_supports
 from ..energy.motion_space import MotionSpace, VertexClasses, perpendicular
 from ..energy.projected_hessian import assemble, hessian_pattern
 from ..stability.factorisation import factoriser
@@ -92,7 +93,8 @@ class HarmonicExtension:
     """Lets the inside of the sheets follow the motion of their curves.
 
     The motion of curves and points is extended harmonically into the sheets: L_α w = 0 inside, w given on
-    the curves. Each sheet vertex takes the part of w along its sheet, which does not change the shape.
+    the curves. Each sheet vertex takes the part of w along its sheet, which does not change the shape, as
+    far as its support lets it.
     """
 
     def __init__(
@@ -105,12 +107,12 @@ class HarmonicExtension:
         data = assemble(equal, classes, space, pattern, X, hessian=0.0, stiffness=1.0)
         diagonal = pattern.indptr[:-1]
         data[diagonal] *= 1.0 + SHIFT
-        self._used = used
+        self._surface, self._used = surface, used
         self._prescribed = (classes.kind != SHEET) | surface.fixed
         self._weight = np.where(self._prescribed[used], PIN * data[diagonal], 0.0)
         data[diagonal] += self._weight
         # scaled to a diagonal of ones, so that no pivot beside a prescribed vertex looks like zero
-        self._scale = 1.0 / np.sqrt(data[diagonal])
+        self._scale = 1.0 / np.sqrt(np.where(data[diagonal] > 0.0, data[diagonal], 1.0))
         data *= np.repeat(self._scale, np.diff(pattern.indptr)) * self._scale[pattern.indices]
         self._factor = factoriser(pattern, backend).factor(data)
 
@@ -121,4 +123,5 @@ class HarmonicExtension:
         right = (self._scale * self._weight)[:, None] * given
         w[self._used] = self._scale[:, None] * self._factor.solve(right)
         w[self._prescribed] = 0.0
+        apply_supports(self._surface, w)
         return motion + w - space.project(w)

@@ -23,6 +23,7 @@ from ..energy.functional import energy_and_gradient, energy_at
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..meshing.quality import compare, redistribute, worst_quality
 from ..surface import Surface
+from ..surface.checks import reachable
 
 LOW = 5e-3  # height, in spacings along the junction, at which a sinking vertex is set to rest
 LIFT = 5e-2  # height, in the same, to which a resting vertex is lifted the first time
@@ -134,10 +135,12 @@ class State:
         return X, down
 
     def spoils_triangles(self, X: Floats) -> bool:
-        """Whether the move to X turns a triangle over or makes the worst one much worse.
+        """Whether the move to X turns a triangle over, makes the worst one much worse or leads too far out.
 
         Triangles of walls that can pinch do not count: their height may vanish.
         """
+        if not reachable(X):
+            return True
         turned, before, after = compare(self.X, X, self.quality_faces)
         return turned or after < 0.7 * min(before, self.min_quality)
 

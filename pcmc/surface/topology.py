@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.arrays import Bools, Ints
+from ..base.arrays import Bools, Ints, cached_array, read_only
 from ..base.compiled import compiled
 
 if TYPE_CHECKING:
@@ -57,19 +57,23 @@ class Topology:
     edge_of_face: Ints
     valence: Ints
 
-    @cached_property
+    def __post_init__(self) -> None:
+        for array in (self.edges, self.edge_of_face, self.valence):
+            read_only(array)
+
+    @cached_array
     def sense(self) -> Ints:
         """(m,3) int: +1 where a face runs along the edge of ``edge_of_face`` as its row does, else -1."""
         ascends = self.faces[:, [1, 2, 0]] < self.faces[:, [2, 0, 1]]
         return np.where(ascends, np.int8(1), np.int8(-1))
 
-    @cached_property
+    @cached_array
     def one_way_edge(self) -> Bools:
         """(e,) bool: edges between two triangles that run along it the same way: the side changes."""
         one_way: Bools = _one_way(self.faces, self.edge_of_face, self.valence)
         return one_way
 
-    @cached_property
+    @cached_array
     def fans(self) -> Ints:
         """(n,) int: the number of fans of triangles around each vertex that share no edge there.
 
@@ -78,17 +82,17 @@ class Topology:
         count: Ints = fans(self.faces, self.edge_of_face, self.edges, self.vertex_count)
         return count
 
-    @cached_property
+    @cached_array
     def boundary_edge(self) -> Bools:
         """(e,) bool: edges of a single triangle."""
         return self.valence == 1
 
-    @cached_property
+    @cached_array
     def junction_edge(self) -> Bools:
         """(e,) bool: edges where three or more triangles meet."""
         return self.valence >= 3
 
-    @cached_property
+    @cached_array
     def seam_edge(self) -> Bools:
         """(e,) bool: edges between two triangles of different patches, with no wall between them."""
         patches = np.repeat(self.patch_of_face, 3)
@@ -98,27 +102,27 @@ class Topology:
         np.maximum.at(high, self.edge_of_face.ravel(), patches)
         return (self.valence == 2) & (low != high)
 
-    @cached_property
+    @cached_array
     def curve_edge(self) -> Bools:
         """(e,) bool: boundary, junction and seam edges."""
         return self.boundary_edge | self.junction_edge | self.seam_edge
 
-    @cached_property
+    @cached_array
     def vertex_kind(self) -> Ints:
         """(n,) int: SHEET, CURVE or POINT."""
         return vertex_kind(self.edges[self.curve_edge], self.vertex_count)
 
-    @cached_property
+    @cached_array
     def on_boundary(self) -> Bools:
         """(n,) bool: vertices of a boundary edge."""
         return _touched(self.edges[self.boundary_edge], self.vertex_count)
 
-    @cached_property
+    @cached_array
     def on_junction(self) -> Bools:
         """(n,) bool: vertices of a junction or seam edge."""
         return _touched(self.edges[self.junction_edge | self.seam_edge], self.vertex_count)
 
-    @cached_property
+    @cached_array
     def interior(self) -> Bools:
         """(n,) bool: vertices inside a single sheet, where a mean curvature is defined."""
         return ~(self.on_boundary | self.on_junction)
@@ -134,7 +138,7 @@ class Topology:
         boundary = self.edges[self.boundary_edge]
         return self._curves(self.boundary_edge, vertex_kind(boundary, self.vertex_count) == POINT)
 
-    @cached_property
+    @cached_array
     def components(self) -> Ints:
         """(n,) int: label of the connected part that each vertex belongs to."""
         return components(self.edges, self.vertex_count)
