@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from .design import Design, Parameter, Target, meet, sensitivities
     from .energy.curvature import curvature_error, mean_curvature, target_curvature
     from .energy.functional import energy, gradient, hessian
+    from .existence import solve
     from .io import read, write
-    from .solvers import solve
     from .surface import Patch, Plane, Surface
 
 __all__ = [
@@ -60,8 +60,8 @@ _NAMES = {
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
     "energy.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
     "energy.functional": ("energy", "gradient", "hessian"),
+    "existence": ("solve",),
     "io": ("read", "write"),
-    "solvers": ("solve",),
     "surface": ("Patch", "Plane", "Surface"),
 }
 
