@@ -11,15 +11,16 @@ if TYPE_CHECKING:
     from . import explore
     from .accuracy import MeshCheck, MeshVerdict, check_mesh, solve_to_accuracy
     from .certificate import Certificate, Verdict, certify
-    from .continuation import Direction, follow
+    from .continuation import BoundaryMotion, Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
     from .energy.curvature import curvature_error, mean_curvature, target_curvature
     from .energy.functional import energy, gradient, hessian
+    from .existence import solve
     from .io import read, write
-    from .solvers import solve
     from .surface import Patch, Plane, Surface
 
 __all__ = [
+    "BoundaryMotion",
     "Certificate",
     "Design",
     "Direction",
@@ -55,12 +56,12 @@ __all__ = [
 _NAMES = {
     "accuracy": ("MeshCheck", "MeshVerdict", "check_mesh", "solve_to_accuracy"),
     "certificate": ("Certificate", "Verdict", "certify"),
-    "continuation": ("Direction", "follow"),
+    "continuation": ("BoundaryMotion", "Direction", "follow"),
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
     "energy.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
     "energy.functional": ("energy", "gradient", "hessian"),
+    "existence": ("solve",),
     "io": ("read", "write"),
-    "solvers": ("solve",),
     "surface": ("Patch", "Plane", "Surface"),
 }
 

@@ -23,7 +23,7 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, SurfaceError
-from ..meshing.held_curves import onto_held_curves
+from ..meshing.curve_projection import onto_held_curves
 from ..meshing.refinement import Projection
 from ..meshing.remeshing import remesh
 from ..meshing.sizes import limit_growth, triangles_for

@@ -270,15 +270,16 @@ def with_bar(value: float, bar: float) -> str:
     """A value and its bar, with two digits of the bar.
 
     >>> with_bar(2.71828, 0.0123), with_bar(1234.5, 45.0), with_bar(2.0, math.inf), with_bar(2.0, 1e-12)
-    ('2.718 ± 0.012', '1234 ± 45', '2 ± no limit', '2 ± 1e-12')
+    ('2.718 ± 0.012', '1234 ± 45', '2 ± unknown', '2 ± 1e-12')
     """
     if math.isnan(value):
         return "none in sight"
     if not math.isfinite(bar):
-        return f"{value:.4g} ± no limit"
+        return f"{value:.4g} ± unknown"
     if bar <= 1e-9 * abs(value) or bar == 0.0:
         return f"{value:.8g} ± {bar:.0e}"
     digits = 1 - math.floor(math.log10(bar))
-    if 0 <= digits <= 9:
-        return f"{value:.{digits}f} ± {bar:.{digits}f}"
+    if -6 <= digits <= 9:
+        shown = max(digits, 0)
+        return f"{round(value, digits):.{shown}f} ± {round(bar, digits):.{shown}f}"
     return f"{value:.4g} ± {bar:.2g}"
