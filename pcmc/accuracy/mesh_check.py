@@ -159,7 +159,7 @@ def check_mesh(
     if not isinstance(first, Surface):
         validate.refuse("surface", type(first).__name__, "a Surface or a Result", error=SurfaceError)
     validate.integer("most_triangles", most_triangles)
-    sharp = np.union1d(_vertices(corners, first.n), held_corners(first))
+    sharp = np.union1d(vertex_numbers(corners, first.n), held_corners(first))
     finest = first.m * 4 ** (meshes - 1)
     if finest > most_triangles:
         raise OptionError(
@@ -198,7 +198,7 @@ def _refuse_unsolved(certificate: Certificate) -> None:
         raise SurfaceError(message, what="surface", found=certificate.residual)
 
 
-def _vertices(corners: npt.ArrayLike, n: int) -> Ints:
+def vertex_numbers(corners: npt.ArrayLike, n: int) -> Ints:
     """The numbers (k,) of the corners, checked."""
     numbers = np.asarray(corners)
     whole = numbers.size == 0 or (numbers.ndim == 1 and np.issubdtype(numbers.dtype, np.integer))
@@ -258,27 +258,28 @@ def _text_table(table: pd.DataFrame) -> str:
         {
             "quantity": table.quantity,
             "of": table.of,
-            "on this mesh": [_with_bar(*pair) for pair in zip(table.value, table.error, strict=True)],
-            "limit": [_with_bar(*pair) for pair in zip(table.limit, table.limit_error, strict=True)],
+            "on this mesh": [with_bar(*pair) for pair in zip(table.value, table.error, strict=True)],
+            "limit": [with_bar(*pair) for pair in zip(table.limit, table.limit_error, strict=True)],
             "order": ["-" if math.isnan(p) else f"{p:.1f}" for p in table.order],
         }
     )
     return lines.to_string(index=False)
 
 
-def _with_bar(value: float, bar: float) -> str:
+def with_bar(value: float, bar: float) -> str:
     """A value and its bar, with two digits of the bar.
 
-    >>> _with_bar(2.71828, 0.0123), _with_bar(1234.5, 45.0), _with_bar(2.0, math.inf), _with_bar(2.0, 1e-12)
-    ('2.718 ± 0.012', '1234 ± 45', '2 ± no limit', '2 ± 1e-12')
+    >>> with_bar(2.71828, 0.0123), with_bar(1234.5, 45.0), with_bar(2.0, math.inf), with_bar(2.0, 1e-12)
+    ('2.718 ± 0.012', '1234 ± 45', '2 ± unknown', '2 ± 1e-12')
     """
     if math.isnan(value):
         return "none in sight"
     if not math.isfinite(bar):
-        return f"{value:.4g} ± no limit"
+        return f"{value:.4g} ± unknown"
     if bar <= 1e-9 * abs(value) or bar == 0.0:
         return f"{value:.8g} ± {bar:.0e}"
     digits = 1 - math.floor(math.log10(bar))
-    if 0 <= digits <= 9:
-        return f"{value:.{digits}f} ± {bar:.{digits}f}"
+    if -6 <= digits <= 9:
+        shown = max(digits, 0)
+        return f"{round(value, digits):.{shown}f} ± {round(bar, digits):.{shown}f}"
     return f"{value:.4g} ± {bar:.2g}"
