@@ -7,7 +7,6 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from ..accuracy import MeshCheck, check_mesh
 from ..base import validate
 from ..base.errors import OptionError, unknown
 from ..energy.functional import gradient
@@ -18,6 +17,8 @@ from .grid import checked
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from ..accuracy import MeshCheck
 
 Parts = tuple[Callable[..., Any], dict[str, Any], dict[str, Any]]
 
@@ -89,7 +90,11 @@ def solve_case(
     build, shape, solver = _split(generator, method, arguments)
     result = solve(build(**shape), method, **solver)
     answer = row(result, arguments)
-    return answer | mesh_columns(result, check_mesh) if mesh_check else answer
+    if mesh_check:
+        from ..accuracy import check_mesh  # needs pandas, which takes long to import
+
+        answer |= mesh_columns(result, check_mesh)
+    return answer
 
 
 def row(result: Result, names: Container[str]) -> dict[str, Any]:
