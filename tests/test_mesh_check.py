@@ -236,10 +236,10 @@ def test_large_surfaces_are_checked_on_request_only(hall, capsys, monkeypatch):
 
 
 def test_ctrl_c_during_the_check_keeps_the_files(hall, capsys, monkeypatch):
-    def pressed(*_):
+    def pressed(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("pcmc.project.check_project_mesh", pressed)
+    monkeypatch.setattr("pcmc.accuracy.mesh_check.solve", pressed)
     assert cli.main(["solve", "hall.toml"]) == 130
     assert "written: hall.pcmc" in capsys.readouterr().out
     assert certify(read("hall.pcmc")).certified
