@@ -23,6 +23,9 @@ from pcmc.project import run
 from pcmc.sweep import run as run_sweep
 from pcmc.sweep import solve_case
 from pcmc.sweep.projects import project_sweep
+from studies.folder import Folder
+from studies.mesh_check import STUDY
+from studies.study import perform
 
 
 @pytest.mark.parametrize("alpha", [0.51, 0.6, 1.0, 5.0])
@@ -192,6 +195,22 @@ def test_sliding_vertices_stay_on_the_plane():
     surface = solve(two_caps(1.2)).surface
     fine = refine(surface, 1, lambda _: smooth_midpoints(surface))
     assert np.abs(fine.vertices[fine.on_plane, 2]).max() < 1e-12
+
+
+@pytest.mark.slow
+def test_the_study_s_bars_hold_the_true_errors(tmp_path):
+    """On the coarsest mesh of each closed form; the study has all meshes."""
+    perform(STUDY, tmp_path, short=True)
+    folder = Folder(tmp_path / "mesh_check")
+    coverage = folder.read_table("coverage").set_index("family").loc["all"]
+    assert coverage.quantities > 30
+    assert coverage.inside >= 0.9
+    assert coverage.width_over_5 == 0.0
+    assert coverage.width_median < 1.2
+    verdicts = folder.read_table("verdicts").set_index("example").verdict
+    assert verdicts["L-shaped roof"] == "persists"
+    assert verdicts["Example 1, wall 1"] == "held by mesh"
+    assert folder.figure("coverage").stat().st_size > 10_000
 
 
 # ---- the command, projects and sweeps ------------------------------------------------------------
