@@ -15,6 +15,7 @@ from ..contact.pinching import (
     lift,
     place_pinched_walls,
     place_wall_rows,
+    remove_pinched_walls,
     standing_part,
     top_spacing,
 )
@@ -105,9 +106,9 @@ class State:
         """Quality of the worst triangle outside walls that can pinch."""
         return worst_quality(self.X, self.quality_faces)
 
-    def result_surface(self) -> Surface:
+    def result_surface(self, X: Floats | None = None) -> Surface:
         """The whole surface at X, with pinched walls placed on their resting junctions."""
-        X = self.X
+        X = self.X if X is None else X
         if self.resting.any():
             X = place_pinched_walls(self.full, self.walls, self.resting, X)
         return self.full.moved(X)
@@ -176,12 +177,12 @@ class State:
         """
         full = self.result_surface()
         walls = replace(find_walls(full), side=self.walls.side)
-        part = StandingPart.of(full, walls, self.resting)
-        if np.array_equal(part.surface.faces, self.surface.faces) or self._releases_left <= 0:
+        standing = remove_pinched_walls(full, walls, self.resting).faces
+        if np.array_equal(standing, self.surface.faces) or self._releases_left <= 0:
             return False
         self._releases_left -= 1
         self.full = full
-        self._take(part)
+        self._take(StandingPart.of(full, walls, self.resting))
         return True
 
     def lift_overpulled(self) -> bool:

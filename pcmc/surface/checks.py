@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from typing import Any, NoReturn
@@ -11,10 +12,11 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..base.errors import SurfaceError
-from .geometry import bounding_size, edge_vectors, face_areas
+from .geometry import bounding_size, cross, dot, norm, point, sub
 from .topology import Topology
 
 ZERO_AREA = 1e-14  # of the squared longest edge: below this a triangle has no direction in floats
+MANY = 16  # faces at one edge
 LARGEST = 1e50  # of a coordinate, tension or pressure: the squares of forces stay finite
 SMALLEST = 1e-50  # of a size or tension: the squares of forces and areas stay above zero
 NUMBERS = "iuf"  # kinds of arrays of numbers
@@ -72,7 +74,7 @@ def face_array(faces: Any, n: int) -> Ints:
 def patch_array(patch_of_face: Any, m: int, patches: Sequence[Any]) -> Ints:
     """(m,) int32 indices into ``patches``, every patch used, names unique."""
     names = [p.name for p in patches]
-    double = [name for place, name in enumerate(names) if name in names[:place]]
+    double = [name for name, times in Counter(names).items() if times > 1]
     if double:
         message = f"patches: the name {double[0]!r} is used twice; names must be unique"
         raise SurfaceError(message, what="patches", found=double[0])
@@ -114,14 +116,15 @@ def mesh(
     unused = np.flatnonzero(np.bincount(F.ravel(), minlength=len(X)) == 0)
     if len(unused):
         _refuse_rows("vertices", X, unused, "belongs to no face", hint="remove it and renumber the faces")
-    longest = (edge_vectors(X[F]) ** 2).sum(axis=2).max(axis=1)
-    flat = 2.0 * face_areas(X[F]) <= ZERO_AREA * longest
+    flat = _flat(X, F)
     if flat.any():
         flat &= ~_vanished(F, patch, patches, held, lying(height, X))
     bad = np.flatnonzero(flat)
     if len(bad):
         fault = f"of patch {names[patch[bad[0]]]!r} has zero area"
         _refuse_rows("faces", F, bad, fault, hint="merge its vertices or remesh")
+    if not _perhaps_at_fault(F, patch, topo.edge_of_face, len(topo.edges)):
+        return
     pair = np.sort(topo.edge_of_face, axis=1).astype(np.int64)  # two edges make a triangle
     same = _first_double(pair[:, 0] * len(topo.edges) + pair[:, 1])
     if same is not None:
@@ -129,6 +132,42 @@ def mesh(
         message = f"faces[{second}] is the same triangle as faces[{first}] = {F[first].tolist()}; remove one"
         raise SurfaceError(message, what="faces", where=second, found=F[second].tolist())
     _oriented(F, patch, topo, names)
+
+
+@compiled
+def _flat(X: Floats, F: Ints) -> Bools:
+    """(m,) triangles without an area that floats could tell from zero."""
+    out = np.zeros(len(F), dtype=np.bool_)
+    for f in range(len(F)):
+        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+        u, v, w = sub(b, a), sub(c, b), sub(a, c)
+        out[f] = norm(cross(u, w)) <= ZERO_AREA * max(dot(u, u), dot(v, v), dot(w, w))
+    return out
+
+
+@compiled
+def _perhaps_at_fault(F: Ints, patch: Ints, edge_of_face: Ints, edge_count: int) -> bool:
+    """Whether two faces at an edge are the same, or of one patch and run along it the same way.
+
+    True also where an edge has so many faces that sorting them all shows it sooner.
+    """
+    last = np.full(edge_count, -1, dtype=np.int32)
+    before = np.empty((len(F), 3), dtype=np.int32)  # the face seen last at the same edge
+    for f in range(len(F)):
+        for k in range(3):
+            edge = edge_of_face[f, k]
+            other, seen = last[edge], 0
+            while other >= 0:
+                j = 0
+                while edge_of_face[other, j] != edge:
+                    j += 1
+                if F[other, j] == F[f, k] or seen == MANY:
+                    return True
+                if patch[other] == patch[f] and F[other, j - 2] == F[f, k - 2]:
+                    return True
+                other, seen = before[other, j], seen + 1
+            before[f, k], last[edge] = last[edge], f
+    return False
 
 
 def _vanished(F: Ints, patch: Ints, patches: Sequence[Any], held: Bools, low: Bools) -> Bools:
