@@ -115,6 +115,16 @@ def test_refined_a_pinched_wall_has_rows_again_where_it_stands(make):
     assert len(np.unique(standing_rows, axis=0)) == len(standing_rows)
 
 
+def test_a_wall_pinched_at_its_ends_is_refined_again_and_again():
+    """Below the last resting vertex two rows coincide; their new neighbours must not."""
+    surface = solve(two_squares(16, alpha_aux=2.0), target="stationary").surface
+    for _ in range(2):
+        assert standing_part(surface).resting.any()
+        result = solve(refine(surface), target="stationary")
+        assert result.converged
+        surface = result.surface
+
+
 CONVERGED = {
     "Ex. 1": partial(two_squares, 8, alpha_aux=1.0),
     "Ex. 1, partly flat": partial(two_squares, 16, alpha_aux=2.0),
