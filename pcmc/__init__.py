@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .energy.functional import energy, gradient, hessian
     from .io import read, write
     from .solvers import solve
-    from .surface import Patch, Plane, Surface
+    from .surface import Line, Patch, Plane, Surface
 
 __all__ = [
     "Certificate",
@@ -25,6 +25,7 @@ __all__ = [
     "Direction",
     "MeshCheck",
     "MeshVerdict",
+    "Line",
     "Parameter",
     "Patch",
     "Plane",
@@ -60,7 +61,7 @@ _NAMES = {
     "energy.functional": ("energy", "gradient", "hessian"),
     "io": ("read", "write"),
     "solvers": ("solve",),
-    "surface": ("Patch", "Plane", "Surface"),
+    "surface": ("Line", "Patch", "Plane", "Surface"),
 }
 
 
