@@ -14,6 +14,7 @@ A P-CMC surface is Bᵀ∇E = 0, with B the basis of this space.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -191,8 +192,12 @@ def curve_chords(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
 
 def force_scale(surface: Surface, classes: VertexClasses, X: Floats) -> float:
     """The norm of the single triangles' tension forces ½ α |e|, which cancel at rest, force."""
-    square = _square_of_forces(X, classes.faces, surface.tensions[classes.patch_of_face])
-    return float(np.sqrt(square)) or 1.0
+    return _norm_of_forces(X, classes.faces, surface.tensions[classes.patch_of_face]) or 1.0
+
+
+def tension_forces(surface: Surface) -> float:
+    """The same norm for all triangles of a surface, force; 0 without tension."""
+    return _norm_of_forces(surface.vertices, surface.faces, surface.tensions[surface.patch_of_face])
 
 
 def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
@@ -260,7 +265,7 @@ def _along_normals(area_vector: Floats, chosen: Bools, basis: Floats, dimension:
 
 
 @compiled
-def _square_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
+def _norm_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
     total = 0.0
     for f in range(len(F)):
         square = 0.0
@@ -268,7 +273,7 @@ def _square_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
             edge = sub(point(X, F[f, i]), point(X, F[f, i - 1]))
             square += dot(edge, edge)
         total += 0.25 * tension[f] ** 2 * square
-    return total
+    return sqrt(total)
 
 
 @compiled
