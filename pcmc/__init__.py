@@ -17,18 +17,16 @@ if TYPE_CHECKING:
     from .energy.functional import energy, gradient, hessian
     from .existence import solve
     from .io import read, write
-    from .solvers import solve
     from .surface import Line, Patch, Plane, Surface
-    from .surface import Patch, Plane, Surface
 
 __all__ = [
     "BoundaryMotion",
     "Certificate",
     "Design",
     "Direction",
+    "Line",
     "MeshCheck",
     "MeshVerdict",
-    "Line",
     "Parameter",
     "Patch",
     "Plane",
@@ -65,9 +63,7 @@ _NAMES = {
     "energy.functional": ("energy", "gradient", "hessian"),
     "existence": ("solve",),
     "io": ("read", "write"),
-    "solvers": ("solve",),
     "surface": ("Line", "Patch", "Plane", "Surface"),
-    "surface": ("Patch", "Plane", "Surface"),
 }
 
 

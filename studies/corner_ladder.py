@@ -25,11 +25,12 @@ import numpy as np
 from scipy.optimize import curve_fit
 from scipy.stats import linregress, t
 
-from pcmc import Certificate, Surface, solve
+from pcmc import Certificate, Surface
 from pcmc.base.arrays import Floats, Ints
 from pcmc.base.errors import SurfaceError
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.quality import edge_lengths
+from pcmc.solvers import solve
 from pcmc.solvers.result import Result
 from pcmc.surface.geometry import angles
 
