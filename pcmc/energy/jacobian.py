@@ -90,6 +90,8 @@ def _sheet_factor(
     surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
 ) -> Floats:
     single = (classes.kind == SHEET) & (space.dimension == 1)
+    for _, along_line in surface.on_line:
+        single &= ~along_line
     out = np.zeros_like(X)
     area_vector = vertex_area_vectors(X, classes.faces)[0]
     _across_normals(area_vector, single, space.basis, gradient, out)
