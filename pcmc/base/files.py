@@ -1,15 +1,51 @@
-"""Write files atomically: one or several together are complete, or unchanged."""
+"""Write files atomically: one or several together are complete, or unchanged. Check what is to be read."""
 
 from __future__ import annotations
 
 import os
 import secrets
 import shutil
+import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from .errors import FileError
 from .interrupts import defer_interrupts
+
+
+def check_regular(path: Path) -> None:
+    """Refuse a folder, a pipe and a device before they are opened: reading them may never end.
+
+    Raises
+    ------
+    FileError : also for a name with the character NUL, and a path that the system refuses. A file that is
+        missing passes.
+
+    >>> check_regular(Path("/"))
+    Traceback (most recent call last):
+    ...
+    pcmc.base.errors.FileError: /: is no regular file but a folder; name a file on a disk
+    """
+    check_name(path)
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise FileError(f"{path}: cannot be opened ({error.strerror or error})", what=str(path)) from None
+    if stat.S_ISREG(mode):
+        return
+    kind = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
+    text = f"{path}: is no regular file but {kind}; name a file on a disk"
+    raise FileError(text, what=str(path), found=kind, expected="a regular file")
+
+
+def check_name(path: Path) -> None:
+    """Refuse a name that no file can have."""
+    if "\0" in str(path):
+        text = f"{str(path)!r}: a file name cannot have the character NUL"
+        raise FileError(text, what=str(path), found="\0")
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..contact.pinching import excess_pull, standing_part
 from ..energy.curvature import METHODS, curvature_error, mean_curvature
@@ -21,7 +22,7 @@ from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest, stiffness
-from ..surface import Surface
+from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
 from .balance import boundary_table, junction_table, load, load_ratio, pressures_left_over, reactions
@@ -144,7 +145,7 @@ def certify(
     ----------
     surface : the surface; it is not changed.
     modes : how many of the lowest modes to compute; the index is counted in any case.
-    tolerance : relative residual up to which it counts as at rest.
+    tolerance : relative residual, > 0, up to which it counts as at rest.
     evidence, proofs : what happened to it while it was solved, and what that proves.
         ``Result.certify`` passes them on.
 
@@ -158,6 +159,11 @@ def certify(
     >>> certificate.verdict.name, certificate.index, certificate.curvature_error < 1e-12
     ('STABLE', 0, True)
     """
+    expect_surface(surface)
+    validate.integer("modes", modes, most=surface.n)
+    validate.number("tolerance", tolerance, above=0.0)
+    if not isinstance(evidence, Evidence | None):
+        validate.refuse("evidence", evidence, "an Evidence or None")
     part = standing_part(surface)
     standing, classes, X = part.surface, part.classes, part.surface.vertices
     unheld = excess_pull(standing, part.walls, part.resting)

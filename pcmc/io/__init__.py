@@ -17,13 +17,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.arrays import Floats
-from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknown
-from ..base.files import atomic_write
+from ..base.errors import FileError, FileWarning, LostWarning, MissingExtra, PcmcError, unknown
+from ..base.files import atomic_write, check_name, check_regular
 from ..contact.pinching import standing_part
 from ..surface import Plane, Surface
 from .flat_walls import encode_walls, restore_walls
 from .import_warnings import import_warnings
-from .mesh_data import MeshData, merged, to_surface, without_unused
+from .libraries import unreadable
+from .mesh_data import MeshData, checked, merged, to_surface, without_unused
 
 
 @dataclass(frozen=True)
@@ -128,10 +129,11 @@ def _read(path: str | os.PathLike[str], given: tuple[Any, ...]) -> Surface:
 def load(path: str | os.PathLike[str]) -> MeshData:
     """Everything in a file, scalars and certificate too. Errors as in ``read``."""
     path = Path(path)
+    check_regular(path)
     form = _format(path)
     try:
         path.open("rb").close()  # the libraries' errors for a missing file differ
-        data = without_unused(import_module(f".{form.module}", __name__).read(path))
+        data = without_unused(checked(import_module(f".{form.module}", __name__).read(path)))
         if form.shared:
             return data
         return restore_walls(merged(data))
@@ -142,6 +144,10 @@ def load(path: str | os.PathLike[str]) -> MeshData:
         raise FileError(text, what=str(path), where=error.start) from None
     except PcmcError as error:
         raise _in_file(path, error, FileError) from None
+    except MissingExtra:
+        raise
+    except Exception as error:  # the net under the readers: a file may be wrong in a way that none checks
+        raise _in_file(path, unreadable(path.suffix, error), FileError) from error
 
 
 def write(
@@ -169,6 +175,7 @@ def write(
     FileWarning : if the coordinates are written relative to another origin (.stl).
     """
     path = Path(path)
+    check_name(path)
     form = _format(path)
     for patch in surface.patches:
         if "\n" in patch.name or "\r" in patch.name:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -151,8 +151,8 @@ class _Sections(dict[str, _Section]):
 
 def _open(path: Path) -> tuple[str, _Sections]:
     """The text before the vertices with its comments, and the sections without theirs."""
-    text = path.read_text(encoding="utf-8")
-    bare = re.sub(r"/\*.*?\*/", lambda m: "\f" * m[0].count("\n") + " ", text, flags=re.S)
+    text = path.read_text(encoding="utf-8-sig")
+    bare = re.sub(r"/\*.*?(?:\*/|\Z)", lambda m: "\f" * m[0].count("\n") + " ", text, flags=re.S)
     bare = re.sub(r"//[^\n]*", "", bare)
     bare = re.sub(r"\\[^\S\n]*\n", "\f", bare)
     heads = list(re.finditer(r"^[^\S\n]*(vertices|edges|faces|facets|bodies|read)\b", bare, re.I | re.M))
@@ -193,31 +193,33 @@ def _vertices(section: _Section, known: Mapping[str, float]) -> tuple[Ints, Floa
     columns = list(zip(*listed, strict=True)) or [()] * 5
     X = np.stack([_numbers(column, known, section) for column in columns[1:4]], axis=1)
     code, kinds = pd.factorize(np.array(columns[4], dtype=object))
+    first = np.unique(code, return_index=True)[1]
     support, constraint = np.zeros(len(kinds), dtype=np.int8), np.zeros(len(kinds), dtype=int)
     for k, rest in enumerate(kinds):
-        row, words = int(np.argmax(code == k)), rest.lower()
+        row, words = int(first[k]), rest.lower()
         if re.search(r"\bboundary\b", words):
             raise section.error("a vertex on a parametric boundary is not supported", row)
         named = re.search(r"\bconstraints?((?:\s+\d+)+)", words)
-        numbers = [int(w) for w in named[1].split()] if named else []
+        numbers = _whole(named[1].split(), section, row).tolist() if named else []
         support[k] = FIXED if re.search(r"\bfixed\b", words) else SLIDING if numbers else FREE
         if support[k] == SLIDING:
             if len(numbers) > 1:
                 raise section.error("a free vertex on two constraints is not supported", row)
             constraint[k] = numbers[0]
-    return np.array(columns[0], dtype=np.int64), X, support[code], constraint[code]
+    return _whole(columns[0], section), X, support[code], constraint[code]
 
 
 def _faces(edges: _Section, faces: _Section, vertex_ids: Ints) -> tuple[Ints, Ints, Ints, list[str]]:
     """Ids, vertices of face after face, corners of each face, and what follows the edges on its line."""
     what = "an edge number and two vertices"
     edge_rows = edges.elements(r"(\d+)[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)[^\n]*", what)
-    numbers = np.array(edge_rows, dtype=np.int64).reshape(-1, 3)
+    columns = list(zip(*edge_rows, strict=True)) or [()] * 3
+    numbers = np.stack([_whole(column, edges) for column in columns], axis=1)
     ends = np.stack([_places(vertex_ids, numbers[:, k], edges, "vertex") for k in (1, 2)], axis=1)
     listed = faces.elements(r"(\d+)((?:[^\S\n]+-?\d+)+)([^\n]*)", "a face number and its edges")
     counts = np.array([len(f[1].split()) for f in listed], dtype=np.int64)
-    signed = np.array(" ".join(f[1] for f in listed).split(), dtype=np.int64)
     row = np.repeat(np.arange(len(listed)), counts)
+    signed = _whole(" ".join(f[1] for f in listed).split(), faces, row)
     place = _places(numbers[:, 0], np.abs(signed), faces, "edge", row)
     tail = np.where(signed > 0, ends[place, 0], ends[place, 1])
     head = np.where(signed > 0, ends[place, 1], ends[place, 0])
@@ -227,7 +229,7 @@ def _faces(edges: _Section, faces: _Section, vertex_ids: Ints) -> tuple[Ints, In
     open_at = np.flatnonzero(head != tail[following])
     if len(open_at):
         raise faces.error("the edges of the face do not follow each other head to tail", row[open_at[0]])
-    ids = np.array([f[0] for f in listed], dtype=np.int64)
+    ids = _whole([f[0] for f in listed], faces)
     return ids, tail, counts, [f[2] for f in listed]
 
 
@@ -249,14 +251,17 @@ def _pressures(file: _Sections, face_ids: Ints, known: Mapping[str, float]) -> t
         return pressure, ("the file has no bodies, so no patch is under pressure",)
     section, without = file["bodies"], []
     listed = section.elements(r"(\d+)((?:[^\S\n]+-?\d+)*)([^\n]*)", "a body number and its faces")
-    for row, (number, members, rest) in enumerate(listed):
-        signed = np.array(members.split(), dtype=np.int64)
-        place = _places(face_ids, np.abs(signed), section, "face", np.full(len(signed), row))
+    inside = np.ones(len(listed))
+    for row, (number, _, rest) in enumerate(listed):
         given = re.search(r"\b(?:pressure|lagrange_multiplier)\s+(\S+)", rest, re.I)
         if given is None:
             without.append(number)
-        p = 1.0 if given is None else float(_numbers((given[1],), known, section, row)[0])
-        np.add.at(pressure, place, np.sign(signed) * p)
+        else:
+            inside[row] = _numbers((given[1],), known, section, row)[0]
+    of_body = np.repeat(np.arange(len(listed)), [len(members.split()) for _, members, _ in listed])
+    signed = _whole(" ".join(members for _, members, _ in listed).split(), section, of_body)
+    place = _places(face_ids, np.abs(signed), section, "face", of_body)
+    np.add.at(pressure, place, np.sign(signed) * inside[of_body])
     note = f"body {', '.join(without)} has no pressure in the file; 1 is used"
     return pressure, (note,) if without else ()
 
@@ -266,9 +271,10 @@ def _patches(
 ) -> tuple[Ints, tuple[Patch, ...]]:
     """Faces of the same patch number, tension and pressure are a patch."""
     code, kinds = pd.factorize(np.array(rest, dtype=object))
+    first = np.unique(code, return_index=True)[1]
     number, tension = np.zeros(len(kinds)), np.ones(len(kinds))
     for k, words in enumerate(kinds):
-        row = int(np.argmax(code == k))
+        row = int(first[k])
         for target, key in ((number, "patch"), (tension, "tension|density")):
             given = re.search(rf"\b(?:{key})\s+(\S+)", words, re.I)
             if given:
@@ -309,6 +315,17 @@ def _plane(top: _Section, constraint: Ints, origin: Floats, known: Mapping[str, 
         raise fail(f"{hit[1].strip()!r} names no coordinate")
     point = origin - formula[0] * normal / (normal @ normal)
     return Plane(tuple(point), tuple(normal))
+
+
+def _whole(words: Sequence[str], section: _Section, row: int | Ints | None = None) -> Ints:
+    """Whole numbers from words of the given rows, by default one of each row."""
+    try:
+        return np.array(words, dtype=np.int64)
+    except (OverflowError, ValueError):
+        bad = next((k for k, word in enumerate(words) if len(word.lstrip("-0")) > 18), 0)
+        at = bad if row is None else int(np.broadcast_to(row, len(words))[bad])
+        text = f"expected whole numbers below 2^63, found {words[bad][:40]!r}"
+        raise section.error(text, at) from None
 
 
 def _numbers(

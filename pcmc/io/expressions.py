@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import FileError
 
+LONGEST = 500  # characters: Python's parser cannot bear any depth of brackets and signs
 Fail = Callable[[str], FileError]
 
 
@@ -35,11 +37,16 @@ def linear(expression: str, known: Mapping[str, float], fail: Fail) -> Floats:
     [-0.5, -0.5, 0.0, 1.0]
     """
     source = expression.strip().replace("^", "**")
+    if len(source) > LONGEST:
+        raise fail(f"{source[:40]!r}... has {len(source)} characters, more than {LONGEST}")
     try:
-        with np.errstate(all="raise"):
+        with np.errstate(all="raise"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Python's own, about what it would not write so
             return _term(ast.parse(source, mode="eval").body, known)
-    except (SyntaxError, ValueError, ArithmeticError, RecursionError) as error:
-        raise fail(f"{expression.strip()[:60]!r} ({error.args[0]})") from None
+    except (SyntaxError, ValueError, ArithmeticError, RecursionError, MemoryError) as error:
+        raise fail(
+            f"{expression.strip()[:60]!r} ({error.args[0] if error.args else type(error).__name__})"
+        ) from None
 
 
 SUM: Mapping[type, Callable[[Any, Any], Any]] = {ast.Add: operator.add, ast.Sub: operator.sub}

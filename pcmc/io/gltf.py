@@ -9,6 +9,7 @@ and walls without height are metadata of the scene.
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,16 +20,18 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import FileError
+from ..base.files import check_regular
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.surface import FAR
 from .flat_walls import KEY
 from .libraries import load_library, translated_errors
-from .mesh_data import MeshData, support_of
+from .mesh_data import MeshData, support_kinds, support_of
 from .metadata import metadata_text, parse_metadata
 from .trimesh_scene import from_meshes
 
 SUPPORT = "_SUPPORT"
+ITEMS = 4  # of arrays, for each byte of a file; arrays may share their bytes
 
 
 def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], walls: str | None, **_: Any) -> None:
@@ -70,10 +73,9 @@ def read(path: Path) -> MeshData:
     """Meshes as patches, by the names of their nodes."""
     trimesh = load_library("trimesh")
     with translated_errors("glTF"):
-        if path.suffix.lower() == ".gltf":
-            json.loads(path.read_bytes())  # in a file that is cut off, trimesh would look for another file
+        _check_header(path)
         try:
-            scene = trimesh.load_scene(path, process=False)
+            scene = trimesh.load_scene(path, process=False, skip_materials=True)
         except FileNotFoundError as error:
             text = f"its part {error} is missing; keep the files of a .gltf in one folder"
             raise FileError(text, where=str(error)) from None
@@ -81,5 +83,26 @@ def read(path: Path) -> MeshData:
     X = mesh.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
     scalars = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_") and k != SUPPORT}
     support = mesh.scalars.get(SUPPORT)
-    held = None if support is None else np.round(support).astype(np.int8)
+    held = None if support is None else support_kinds(support)
     return replace(mesh, vertices=X, scalars=scalars, support=held, walls=scene.metadata.get(KEY))
+
+
+def _check_header(path: Path) -> None:
+    """Check what trimesh believes: parts are files, and arrays are not larger than the bytes there are."""
+    data = path.read_bytes()
+    size, items = len(data), 0
+    if path.suffix.lower() == ".glb":
+        data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
+    header = json.loads(data)  # in a file that is cut off, trimesh would look for another file
+    for buffer in header.get("buffers", ()):
+        name = buffer.get("uri", "base64,")
+        if "base64," not in name:
+            for place in {name.strip(), name.strip().lstrip("/"), os.path.split(name)[-1]}:  # it tries each
+                part = path.parent / place
+                check_regular(part)
+                size += part.stat().st_size if part.exists() else 0
+    for number, accessor in enumerate(header.get("accessors", ())):
+        items += accessor["count"]
+        if not isinstance(items, int) or accessor["count"] < 0 or items > ITEMS * size:
+            text = f"accessor {number} has {accessor['count']!r:.30} items, and the file only {size} bytes"
+            raise FileError(text, where=number, found=accessor["count"], expected=size)

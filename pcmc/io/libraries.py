@@ -23,9 +23,16 @@ def translated_errors(kind: str) -> Iterator[None]:
     """Turn whatever a library raises on a bad file into a FileError of one line."""
     try:
         yield
-    except (PcmcError, OSError, MissingExtra, MemoryError):
+    except (PcmcError, OSError, MissingExtra):
         raise
     except Exception as error:  # libraries raise anything, from KeyError to struct.error
-        text = " ".join(str(error).split())[:120]
-        reason = f"{type(error).__name__}: {text}" if text else type(error).__name__
-        raise FileError(f"not a readable {kind} file, or cut off ({reason})") from None
+        raise unreadable(kind, error) from None
+
+
+def unreadable(kind: str, error: Exception) -> FileError:
+    """The error in one line, for a file that is not of its kind."""
+    text = " ".join(str(error).split())[:120]
+    if isinstance(error, MemoryError):
+        text = "its numbers ask for more memory than there is"
+    reason = f"{type(error).__name__}: {text}" if text else type(error).__name__
+    return FileError(f"not a readable {kind} file, or cut off ({reason})")

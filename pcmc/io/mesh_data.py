@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
-from ..base.errors import OptionError, unknown
+from ..base.errors import FileError, OptionError, unknown
 from ..base.validate import choice
 from ..surface import Patch, Plane, Surface, checks
 from ..surface.geometry import bounding_size
@@ -57,9 +57,68 @@ class MeshData:
     walls: str | None = None
 
 
+def checked(data: MeshData) -> MeshData:
+    """The same with arrays of the right type, shape and range; FileError for others.
+
+    Files may have any numbers: readers and libraries do not all check them, and indices out of range would
+    reach numpy.
+    """
+    X = _numeric(data.vertices, "vertices", "fiu", (None, 3)).astype(np.float64)
+    checks.positions(X)
+    n, m = len(X), len(data.faces)
+    F = _within(_numeric(data.faces, "faces", "iu", (None, 3)), "faces", "vertices", n)
+    patch = _numeric(data.patch_of_face, "patch_of_face", "iu", (m,))
+    support = data.support
+    if support is not None:
+        support = support_kinds(_numeric(support, "support", "iu", (n,)))
+    for name, values in data.scalars.items():
+        if np.shape(values) != (m,):
+            _numeric(values, f"scalar {name}", "fiub", (n,))
+    patch = _within(patch, "patch_of_face", "patches", len(data.patches))
+    scalars = {name: np.asarray(values, dtype=np.float64) for name, values in data.scalars.items()}
+    return replace(data, vertices=X, faces=F, patch_of_face=patch, support=support, scalars=scalars)
+
+
+def _numeric(values: Any, name: str, kinds: str, shape: tuple[int | None, ...]) -> Any:
+    """The array if its dtype is one of these kinds and its shape this one; None stands for any length > 0."""
+    array = np.asarray(values)
+    fits = array.ndim == len(shape) and all(
+        size == wanted if wanted is not None else size > 0
+        for size, wanted in zip(array.shape, shape, strict=True)
+    )
+    if array.dtype.kind in kinds and fits:
+        return array
+    numbers = "numbers" if "f" in kinds else "whole numbers"
+    wanted = f"({', '.join('n > 0' if size is None else str(size) for size in shape)})"
+    text = f"{name}: expected {numbers} in the shape {wanted}, found {array.dtype} in {array.shape}"
+    raise FileError(text, what=name, where=name, found=array.shape, expected=shape)
+
+
+def _within(numbers: Any, name: str, what: str, size: int) -> Ints:
+    """The array as int64 if all its numbers are in 0..size-1."""
+    rows = numbers.reshape(len(numbers), -1)
+    bad = np.flatnonzero(((rows < 0) | (rows >= size)).any(axis=1))
+    if len(bad):
+        found = rows[bad[0]].tolist()
+        text = f"{name}: entry {bad[0]} is {found}, outside the {size} {what} 0..{size - 1}"
+        raise FileError(text, what=name, where=int(bad[0]), found=found, expected=(0, size - 1))
+    return np.asarray(numbers, dtype=np.int64)
+
+
 def support_of(surface: Surface) -> Ints:
     """(n,) int8 FREE, SLIDING or FIXED."""
     return np.where(surface.fixed, FIXED, np.where(surface.on_plane, SLIDING, FREE)).astype(np.int8)
+
+
+def support_kinds(values: npt.ArrayLike) -> Ints:
+    """(n,) int8 FREE, SLIDING or FIXED from the numbers of a file; FileError for others."""
+    numbers = np.asarray(values).ravel()
+    bad = np.flatnonzero(~np.isin(numbers, (FREE, SLIDING, FIXED)))
+    if len(bad):
+        found = numbers[bad[0]].item()
+        text = f"support: entry {bad[0]} is {found!r:.30}; expected 0 (free), 1 (sliding) or 2 (fixed)"
+        raise FileError(text, what="support", where=int(bad[0]), found=found, expected=(0, 1, 2))
+    return numbers.astype(np.int8)
 
 
 def without_unused(data: MeshData) -> MeshData:

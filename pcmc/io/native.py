@@ -9,6 +9,7 @@ rest of the certificate, its tables as lists of rows.
 from __future__ import annotations
 
 import json
+import zipfile
 from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
@@ -26,6 +27,8 @@ from .metadata import metadata_text, parse_metadata
 
 VERSION = 1
 FORMAT = "pcmc surface"
+INFLATED = 100  # most bytes for each byte of the file; a flat grid of a million triangles has 7
+ROOM = 64_000_000  # bytes that any file may become
 
 
 def write(
@@ -55,9 +58,13 @@ def write(
 
 def read(path: Path) -> MeshData:
     """All of it."""
+    with translated_errors("pcmc"):
+        _check_size(path)
     with translated_errors("pcmc"), path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
         arrays = {name: archive[name] for name in archive.files}
         meta = json.loads(str(arrays.pop("meta")))
+        if not isinstance(meta, dict) or not isinstance(meta["certificate"], dict):
+            raise FileError(f"its description is damaged: {str(meta)[:60]!r}", where="meta")
         if meta["format"] != FORMAT:
             text = f"expected the format {FORMAT!r}, found {meta['format']!r}"
             raise FileError(text, where="format", found=meta["format"], expected=FORMAT)
@@ -76,6 +83,16 @@ def read(path: Path) -> MeshData:
             scalars=_under("scalar ", arrays),
             certificate={**meta["certificate"], **_under("certificate ", arrays)},
         )
+
+
+def _check_size(path: Path) -> None:
+    """Refuse an archive that becomes far larger than any surface does: it was made to fill the memory."""
+    with zipfile.ZipFile(path) as archive:
+        size = sum(item.file_size for item in archive.infolist())
+    most = INFLATED * path.stat().st_size + ROOM
+    if size > most:
+        text = f"its {path.stat().st_size} bytes would become {size} in memory, and {most} at most are read"
+        raise FileError(text, where="size", found=size, expected=most)
 
 
 def _under(prefix: str, arrays: Mapping[str, Any]) -> dict[str, Any]:

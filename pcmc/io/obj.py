@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,8 @@ from .text import format_rows
 MARK = "# pcmc "
 VERTEX = re.compile(r"^[^\S\n]*v[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\n]*$", re.M)
 FACE = re.compile(r"^[^\S\n]*f[^\S\n]+([^\n]+)$", re.M)
-POINT = re.compile(r"^[^\S\n]*p[^\S\n]+([\d \t]+)$", re.M)
+POINT = re.compile(r"^[^\S\n]*p[^\S\n]+(\d[\d \t]*)$", re.M)
+CORNER = re.compile(r"[-+]?\d{1,18}(/\S*)?")
 
 
 def write(path: Path, surface: Surface, **_: Any) -> None:
@@ -41,32 +43,32 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
 
 def read(path: Path) -> MeshData:
     """Groups (``g``, else ``o``, else ``usemtl``) as patches."""
-    text = re.sub(r"\\[^\S\n]*\n", " \f", path.read_text(encoding="utf-8"))
+    text = re.sub(r"\\[^\S\n]*\n", " \f", path.read_text(encoding="utf-8-sig"))
     comment = re.search(rf"^{MARK}(.*)$", text, re.M)
     metadata = parse_metadata(comment[1] if comment else None)
     X = _vertices(text)
     key = next((k for k in ("g", "o", "usemtl") if re.search(rf"^[^\S\n]*{k}\s", text, re.M)), "g")
-    names: list[str] = []
+    starts = cache(lambda: np.array([m.start() for m in VERTEX.finditer(text)], dtype=np.int64))
+    names: dict[str, int] = {}
     corners, counts, groups = [], [], []
     support = np.full(len(X), FREE, dtype=np.int8)
     for name, part, offset in _parts(text, key, path.stem):
-        count, corner = _faces(text, part, offset, len(X))
+        count, corner = _faces(text, part, offset, len(X), starts)
         if len(count):
-            names += [] if name in names else [name]
             counts.append(count)
             corners.append(corner)
-            groups.append(np.full(len(count), names.index(name)))
+            groups.append(np.full(len(count), names.setdefault(name, len(names))))
         if name in HELD:
-            points = np.array(" ".join(POINT.findall(part)).split(), dtype=np.int64)
+            points = np.array(" ".join(POINT.findall(part)).split(), dtype=np.float64)
             if len(points) and not (points.min() >= 1 and points.max() <= len(X)):
                 raise _error(text, offset + 1, f"a point here is outside 1..{len(X)}", "p")
-            support[points - 1] = HELD[name]
+            support[points.astype(np.int64) - 1] = HELD[name]
     if not names:
         raise FileError("the file has no faces", where="faces", found=0)
     F, source, notes = triangulate(X, np.concatenate(corners), np.concatenate(counts))
     metadata.check_counts(len(X), len(F))
     known = support if comment or support.any() else None
-    patch, patches = np.concatenate(groups)[source], metadata.named(names)
+    patch, patches = np.concatenate(groups)[source], metadata.named(list(names))
     joined = metadata.counts is not None
     return MeshData(X, F, patch, patches, known, metadata.plane, notes=notes, joined=joined)
 
@@ -97,20 +99,20 @@ def _parts(text: str, key: str, default: str) -> Iterator[tuple[str, str, int]]:
         yield name, text[start:end], start
 
 
-def _faces(text: str, part: str, offset: int, n: int) -> tuple[Ints, Ints]:
-    """Corners per face, and the vertex index at each."""
+def _faces(text: str, part: str, offset: int, n: int, starts: Callable[[], Ints]) -> tuple[Ints, Ints]:
+    """Corners per face, and the vertex index at each. ``starts`` gives the vertices' places in the text."""
     faces = FACE.findall(part)
     bare = re.sub(r"/[^\s]*", "", "\n".join(faces)).split("\n") if faces else []
     counts = np.array([len(face.split()) for face in bare], dtype=np.int64)
     try:
         corner = np.array(" ".join(bare).split(), dtype=np.int64)
-    except ValueError:
-        at = next(m for m in FACE.finditer(part) if not re.fullmatch(r"[-\d/\s]+", m[1]))
+    except (ValueError, OverflowError):
+        lines = list(FACE.finditer(part))
+        at = next((m for m in lines if not all(map(CORNER.fullmatch, m[1].split()))), lines[0])
         raise _error(text, offset + at.start(), "expected vertex numbers", at[0]) from None
     if (corner < 0).any():  # counted back from the vertices seen so far
-        seen = np.array([m.start() for m in VERTEX.finditer(text)])
         at_face = np.array([offset + m.start() for m in FACE.finditer(part)])
-        before = np.repeat(np.searchsorted(seen, at_face), counts)
+        before = np.repeat(np.searchsorted(starts(), at_face), counts)
         corner = np.where(corner < 0, before + corner + 1, corner)
     bad = np.flatnonzero((corner < 1) | (corner > n))
     short = np.flatnonzero(counts < 3)

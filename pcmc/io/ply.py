@@ -119,9 +119,9 @@ def read(path: Path) -> MeshData:
             break
     vertex, face = tables["vertex"], tables["face"]
     X = np.stack([np.asarray(vertex.pop(c, None), dtype=np.float64) for c in "xyz"], axis=1)
-    key = next((k for k in ("vertex_indices", "vertex_index") if k in face), None)
+    key = next((k for k in ("vertex_indices", "vertex_index") if f"{k} count" in face), None)
     if key is None:
-        raise FileError("its faces have no property vertex_indices", where="face")
+        raise FileError("its faces have no list vertex_indices", where="face")
     corners, counts = face.pop(key), face.pop(f"{key} count")
     metadata = parse_metadata(comment[1] if comment else None)
     return from_polygons(X, corners, counts, vertex, face, metadata, path.stem)
@@ -145,6 +145,8 @@ def _elements(header: str, kinds: Mapping[str, str]) -> list[_Element]:
         try:
             match line.split():
                 case ["element", name, count]:
+                    if not count.isdecimal():
+                        raise ValueError
                     elements.append(_Element(name, int(count), []))
                 case ["property", "list", of_count, of_items, name]:
                     if elements[-1].lists:
@@ -162,6 +164,11 @@ def _elements(header: str, kinds: Mapping[str, str]) -> list[_Element]:
     if "vertex" not in names or "face" not in names[names.index("vertex") :]:
         text = f"its header must list vertices, then faces; found {', '.join(names) or 'none'}"
         raise FileError(text, where="header")
+    for element in elements:
+        columns = [p[0] for p in element.properties] + [f"{p[0]} count" for p in element.properties if p[2:]]
+        if len(set(columns)) < len(columns):
+            text = f"two properties of its element {element.name} have the same name"
+            raise FileError(text, where="header", found=element.name)
     missing = set("xyz") - {p[0] for p in elements[names.index("vertex")].properties if len(p) == 2}
     if missing:
         raise FileError(f"its vertices have no property {min(missing)}", where="vertex")
@@ -170,6 +177,7 @@ def _elements(header: str, kinds: Mapping[str, str]) -> list[_Element]:
 
 def _rows(element: _Element, data: bytes, start: int) -> tuple[dict[str, Any], int]:
     """Columns of an element that starts at a byte, a list's items one after the other; and its end."""
+    _enough(element, data, element.size)  # a row has at least a byte
     counts, offsets = _layout(element, data, start)
     _enough(element, data, int(offsets[-1]))
     kinds = np.unique(counts)
@@ -196,21 +204,23 @@ def _layout(element: _Element, data: bytes, start: int) -> tuple[Ints, Ints]:
         return np.zeros(element.size, np.int64), start + base.itemsize * rows
     name, item = element.lists[0], np.dtype(element.lists[2]).itemsize
 
-    def count_at(offset: int) -> int:
+    def count_at(row: int, offset: int) -> int:
         _enough(element, data, offset + base.itemsize)
-        return int(np.frombuffer(data, base, 1, offset)[f"{name} count"][0])
+        count = np.frombuffer(data, base, 1, offset)[f"{name} count"][0]
+        if not 0 <= count <= len(data) or count != int(count):
+            text = f"{element.name} {row} lists {count} items"
+            raise FileError(text, where=row, found=count.item())
+        return int(count)
 
-    first = count_at(start)
+    first = count_at(0, start)
     size = base.itemsize + first * item
-    if first >= 0 and start + element.size * size <= len(data):
+    if start + element.size * size <= len(data):
         table = np.frombuffer(data, element.row(first), element.size, start)
         if (table[f"{name} count"] == first).all():
             return np.full(element.size, first), start + size * rows
     counts, offsets = np.empty(element.size, np.int64), np.empty(element.size + 1, np.int64)
     for k in range(element.size):  # each row says only where the next one starts
-        offsets[k], counts[k] = start, count_at(start)
-        if counts[k] < 0:
-            raise FileError(f"{element.name} {k} lists {counts[k]} items", where=k, found=int(counts[k]))
+        offsets[k], counts[k] = start, count_at(k, start)
         start += base.itemsize + int(counts[k]) * item
     offsets[-1] = start
     return counts, offsets

@@ -10,10 +10,13 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..meshing.quality import triangle_quality
+from ..surface import checks
 from ..surface.geometry import area_vectors
-from .mesh_data import MeshData
+from .mesh_data import MeshData, support_kinds
 from .metadata import Metadata
 
+LARGEST = 200  # corners of a polygon: all fans of one are compared, which are their square
+AT_ONCE = 1 << 18  # triangles of fans compared at once: a hundred megabytes
 LABELS = ("patch", "PatchId", "RegionId", "GroupIds", "MaterialIds", "medit:ref", "gmsh:physical")
 """Cell data that may hold the patch of each face; the first of these in the file counts."""
 
@@ -33,15 +36,22 @@ def triangulate(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tup
     if len(few):
         text = f"face {few[0]} has {counts[few[0]]} corners; a face needs three or more"
         raise FileError(text, where=int(few[0]))
+    many = np.flatnonzero(counts > LARGEST)
+    if len(many):
+        text = f"face {many[0]} has {counts[many[0]]} corners, more than {LARGEST}; cut it into triangles"
+        text = f"{text} in the program that wrote it"
+        raise FileError(text, where=int(many[0]), found=int(counts[many[0]]), expected=LARGEST)
     if (counts == 3).all():
         return corners.reshape(-1, 3), np.arange(len(counts)), ()
+    checks.positions(X)
     start = np.cumsum(counts) - counts
     triangles, origin = [], []
     for k in np.unique(counts):
-        chosen = np.flatnonzero(counts == k)
-        polygon = corners[start[chosen][:, None] + np.arange(k)]
-        triangles.append(_best_fans(X, polygon, chosen).reshape(-1, 3))
-        origin.append(np.repeat(chosen, k - 2))
+        same = np.flatnonzero(counts == k)
+        for chosen in np.array_split(same, -(-len(same) * int(k) ** 2 // AT_ONCE)):
+            polygon = corners[start[chosen][:, None] + np.arange(k)]
+            triangles.append(_best_fans(X, polygon, chosen).reshape(-1, 3))
+            origin.append(np.repeat(chosen, k - 2))
     source = np.concatenate(origin)
     order = np.argsort(source, kind="stable")
     quads, more = np.count_nonzero(counts == 4), np.count_nonzero(counts > 4)
@@ -92,8 +102,9 @@ def from_polygons(
     """
     if not len(counts):
         raise FileError("the file has no faces", where="faces", found=0)
-    if corners.min() < 0 or corners.max() >= len(X):
-        bad = int(np.flatnonzero((corners < 0) | (corners >= len(X)))[0])
+    outside = (corners < 0) | (corners >= len(X)) | (corners != np.floor(corners))  # NaN differs from itself
+    if outside.any():
+        bad = int(np.flatnonzero(outside)[0])
         face = int(np.searchsorted(np.cumsum(counts), bad, side="right"))
         text = f"face {face} names vertex {corners[bad]}, which is outside 0..{len(X) - 1}"
         raise FileError(text, where=face)
@@ -108,7 +119,7 @@ def from_polygons(
         known = label == "patch" and values.min() >= 0 and values.max() < len(described)
         names = [described[int(v)] if known else f"patch {v}" for v in values.tolist()]
     support = point_data.get("support")
-    support = None if support is None else np.asarray(support).ravel().astype(np.int8)
+    support = None if support is None else support_kinds(support)
     scalars = _scalars(point_data, "support", len(X))
     scalars |= {k: v[source] for k, v in _scalars(cell_data, label, len(counts)).items()}
     patches, joined = metadata.named(names), metadata.counts is not None

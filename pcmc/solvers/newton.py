@@ -19,7 +19,7 @@ import numpy as np
 
 from ..base.errors import SurfaceError
 from ..certificate.slipping import describe_saddle, slipping_ends
-from ..meshing.refinement import refine
+from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import ways_down
 from ..surface import Surface
@@ -37,6 +37,7 @@ def newton(
     """Solve with the geometric solver; see ``pcmc.solve``."""
     options = options or NewtonOptions()
     _refuse_loose_parts(surface)
+    refinable("levels", options.levels, surface.m)
     history = History(callback)
     for level in range(options.levels + 1):
         end = _solve_level(surface, options, history, level)
