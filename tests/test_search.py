@@ -8,12 +8,14 @@ from shapes import pyramid, tube
 from starts import sphere, spherical_cap, two_squares
 
 from generators import spherical_cap_exact
-from pcmc import Patch, Verdict, certify, solve
+from pcmc import Patch, Verdict, certify, solve, write
 from pcmc.certificate.neck import narrowest_neck
 from pcmc.certificate.proof import Fold, Overload, UnbalancedJunction, Unheld
 from pcmc.existence.starts import low_start
+from pcmc.io import native
 from pcmc.solvers import solve as one_start
 from pcmc.solvers.result import Status
+from pcmc.sweep import solve_case
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
@@ -241,3 +243,18 @@ def test_a_surface_at_rest_needs_no_proof():
     result = solve(pyramid(0.4))
     assert result.proofs == ()
     assert result.certificate.verdict is Verdict.STABLE
+
+
+def test_a_file_keeps_the_proof(tmp_path):
+    result = solve(paraboloid(1.0, 0.45))
+    write(tmp_path / "cap.pcmc", result.surface, certificate=result.certificate)
+    overload, fold = native.read(tmp_path / "cap.pcmc").certificate["proofs"]
+    assert overload == {"kind": "Overload", "ratio": result.proofs[0].ratio}
+    assert fold["kind"] == "Fold"
+    assert fold["value"] == result.proofs[1].value
+
+
+def test_sweeps_search_only_if_asked():
+    case = {"generator": "generators:spherical_cap", "edge_length": 0.25, "alpha": 0.6, "height": 2.5}
+    assert solve_case(**case, inflation=2.0)["verdict"] == "ran away"
+    assert solve_case(**case, inflation=2.0, search=True)["verdict"] == "stable"

@@ -17,6 +17,7 @@ from .progress import sweeping
 
 TABLES = (".csv", ".parquet")
 WHAT = "A project (.toml), a surface, or package.module:function that returns a Surface."
+SEARCH = "Try further starts where the first leads to no equilibrium: slower, but with the proof."
 STORE = "File for finished cases. The same command again runs only the missing ones."
 
 
@@ -35,6 +36,7 @@ def sweep(
     time_limit: Annotated[
         float, option("SECONDS", "Time limit per case, in seconds.", parser=number)
     ] = 600.0,
+    search: Annotated[bool, typer.Option("--search", help=SEARCH)] = False,
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Run the stored cases that failed again.")
     ] = False,
@@ -68,7 +70,7 @@ def sweep(
     grid = {name: listed for name, listed in given.items() if len(listed) > 1}
     fixed = {name: listed[0] for name, listed in given.items() if len(listed) == 1}
     with sweeping() as draw:
-        cases = _cases(what, grid, fixed, method)
+        cases = _cases(what, grid, fixed, method, search)
         table = run(
             cases,
             store,
@@ -91,16 +93,17 @@ def sweep(
     return OK if good.all() else NOT_CERTIFIED
 
 
-def _cases(what: str, grid: dict[str, Any], fixed: dict[str, Any], method: str | None) -> Any:
+def _cases(what: str, grid: dict[str, Any], fixed: dict[str, Any], method: str | None, search: bool) -> Any:
     from ..sweep import Sweep, solve_case
     from ..sweep.projects import project_sweep
 
     if Path(what).suffix.lower() in (TOML, *FORMATS):
-        return project_sweep(what, grid, fixed, method=method)
+        return project_sweep(what, grid, fixed, method=method, search=search)
     if ":" not in what:
         kinds = f"a project (.toml), a surface ({' '.join(FORMATS)}), or a generator"
         raise OptionError(f"{what}: expected {kinds} such as generators:two_caps", what="WHAT", found=what)
-    return Sweep(solve_case, grid, {"generator": what, "method": method or "newton", **fixed})
+    about = {"generator": what, "method": method or "newton"} | ({"search": True} if search else {})
+    return Sweep(solve_case, grid, about | fixed)
 
 
 def _print_failures(failed: Any) -> None:

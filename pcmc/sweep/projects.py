@@ -21,6 +21,7 @@ def project_sweep(
     fixed: Mapping[str, Any] | None = None,
     *,
     method: str | None = None,
+    search: bool = False,
 ) -> Sweep:
     """The cases of a project at every combination of some of its numbers.
 
@@ -30,6 +31,8 @@ def project_sweep(
     grid, fixed : as of ``Sweep``, by the names of ``pcmc.project.varied``: ``NAME.tension`` and
         ``NAME.pressure`` of patches, and the numbers of the file, such as ``plan.edge_length``.
     method : replaces the project's method and its options.
+    search : whether a case whose start leads to no equilibrium tries further ones, as ``pcmc.solve`` does:
+        slower where there is none, with the proof as ``message``.
 
     Raises
     ------
@@ -45,16 +48,18 @@ def project_sweep(
     fixed = dict(fixed or {})
     if method is not None:
         find_method(method)
-    about = {"project": Path(path).as_posix(), "project_digest": projects.digest(path)}
+    about: dict[str, Any] = {"project": Path(path).as_posix(), "project_digest": projects.digest(path)}
     if method is not None:
         about["method"] = method
+    if search:
+        about["search"] = True
     sweep = Sweep(solve_project, grid, about | fixed)
     projects.check_varied(path, dict(sweep.grid) | {name: [value] for name, value in fixed.items()})
     return sweep
 
 
 def solve_project(
-    project: str, project_digest: str, method: str | None = None, **values: Any
+    project: str, project_digest: str, method: str | None = None, search: bool = False, **values: Any
 ) -> dict[str, Any]:
     """Build and solve a project, with its remeshing and targets and some of its numbers replaced.
 
@@ -62,7 +67,8 @@ def solve_project(
     ----------
     project : its file. project_digest : ``pcmc.project.digest`` of it when the sweep was declared: a case and
         its store belong to one state of the project.
-    method : replaces the project's. values : as of ``pcmc.project.varied``.
+    method : replaces the project's. search : as of ``project_sweep``.
+    values : as of ``pcmc.project.varied``.
 
     Returns
     -------
@@ -84,6 +90,6 @@ def solve_project(
     design, start = projects.varied(project, values)
     if method not in (None, design.method):
         design = replace(design, method=method, options={})
-    outcome = projects.solve_project(design, start)
-    answer = row(outcome.result, ("project", "project_digest", "method", *values))
+    outcome = projects.solve_project(replace(design, search=search), start)
+    answer = row(outcome.result, ("project", "project_digest", "method", "search", *values))
     return answer if outcome.design is None else answer | {"targets_met": outcome.design.met}

@@ -7,9 +7,10 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
+from .. import existence, solvers
 from ..base.errors import OptionError, unknown
 from ..energy.functional import gradient
-from ..solvers import find_method, solve
+from ..solvers import find_method
 from ..solvers.result import Result
 from .case_script import resolve
 from .grid import checked
@@ -44,14 +45,18 @@ def _split(generator: str, method: str, arguments: Mapping[str, Any]) -> Parts:
     return build, shape, solver
 
 
-@checked(lambda generator, method="newton", **arguments: _split(generator, method, arguments))
-def solve_case(generator: str, method: str = "newton", **arguments: Any) -> dict[str, Any]:
+@checked(lambda generator, method="newton", search=False, **arguments: _split(generator, method, arguments))
+def solve_case(
+    generator: str, method: str = "newton", search: bool = False, **arguments: Any
+) -> dict[str, Any]:
     """Build a surface with a generator, solve it, certify it; every number of the certificate.
 
     Parameters
     ----------
     generator : a function that returns a Surface: ``"generators:two_caps"``.
     method : as of ``pcmc.solve``.
+    search : whether further starts are tried where the first leads to no equilibrium, as ``pcmc.solve``
+        does: slower where there is none, with the proof as ``message``.
     arguments : parameters of the generator and options of the method. A name that both have is the
         generator's.
 
@@ -75,6 +80,7 @@ def solve_case(generator: str, method: str = "newton", **arguments: Any) -> dict
     ('converged', 58.5059, 17.583)
     """
     build, shape, solver = _split(generator, method, arguments)
+    solve = existence.solve if search else solvers.solve
     result = solve(build(**shape), method, **solver)
     return row(result, arguments)
 
