@@ -16,7 +16,6 @@ from ..surface import Surface
 from ..surface.checks import reachable
 from ..surface.geometry import accumulate, dot, point, scaled, vector
 
-
 ROUNDING = 1e-14  # of the triangles' forces: what is left of them to rounding where they cancel
 
 
