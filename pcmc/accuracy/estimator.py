@@ -103,7 +103,7 @@ class _FineMesh:
             system = None  # the duals are unknown; every quantity takes the shares of the energy
         tension = np.repeat(coarse.tensions[coarse.patch_of_face], 3)
         edge_of_face = coarse.topology.edge_of_face.ravel()
-        k = sqrt(3.0) * np.bincount(edge_of_face, tension, len(coarse.topology.edges))
+        k: Floats = np.bincount(edge_of_face, tension, len(coarse.topology.edges)).astype(float)
         missing = np.zeros_like(X)
         missing[coarse.n :] = _interpolation_error(coarse, X)
         held = np.where(fine.fixed[:, None], missing, 0.0)

@@ -159,7 +159,7 @@ def check_mesh(
     if not isinstance(first, Surface):
         validate.refuse("surface", type(first).__name__, "a Surface or a Result", error=SurfaceError)
     validate.integer("most_triangles", most_triangles)
-    sharp = np.union1d(_vertices(corners, first.n), held_corners(first))
+    sharp = np.union1d(vertex_numbers(corners, first.n), held_corners(first))
     finest = first.m * 4 ** (meshes - 1)
     if finest > most_triangles:
         raise OptionError(
@@ -198,7 +198,7 @@ def _refuse_unsolved(certificate: Certificate) -> None:
         raise SurfaceError(message, what="surface", found=certificate.residual)
 
 
-def _vertices(corners: npt.ArrayLike, n: int) -> Ints:
+def vertex_numbers(corners: npt.ArrayLike, n: int) -> Ints:
     """The numbers (k,) of the corners, checked."""
     numbers = np.asarray(corners)
     whole = numbers.size == 0 or (numbers.ndim == 1 and np.issubdtype(numbers.dtype, np.integer))

@@ -7,14 +7,12 @@ is a mesh of another boundary; here they are put on a smooth curve through the p
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface
-from .refinement import Projection, held_midpoints
+from .refinement import held_midpoints
 
 CORNER = 40.0  # degrees: where held edges turn by more, the curve has a corner
-HALVINGS = 8  # of each edge of a curve that points are projected onto
 STRAIGHT = 1e-9  # of the length of an edge: smaller rises of an arc over it count as none
 
 
@@ -42,7 +40,10 @@ def smooth_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | N
     >>> np.linalg.norm(smooth_midpoints(disc), axis=1).round(12).tolist() == [1.0] * 12
     True
     """
-    return _smooth_middles(surface.vertices, _held_edges(surface), corner, corners)
+    edges = held_edges(surface)
+    rises, arcs = arcs_over(surface.vertices, edges, corner, corners)
+    middle = surface.vertices[edges].mean(axis=1)
+    return middle + rises.sum(axis=1) / np.maximum(arcs.sum(axis=1), 1.0)[:, None]
 
 
 def curve_doubt(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> float:
@@ -60,7 +61,7 @@ def curve_doubt(surface: Surface, corner: float = CORNER, corners: Ints | None =
     >>> round(curve_doubt(plate), 3)
     0.037
     """
-    rises, arcs = _arcs(surface.vertices, _held_edges(surface), corner, corners)
+    rises, arcs = arcs_over(surface.vertices, held_edges(surface), corner, corners)
     both = rises[arcs.all(axis=1)]
     total, apart = (np.linalg.norm(both[:, 0] + sign * both[:, 1], axis=1) for sign in (1.0, -1.0))
     share = np.divide(apart, total, out=np.ones_like(apart), where=total > apart)
@@ -73,63 +74,18 @@ def held_corners(surface: Surface, corner: float = CORNER) -> Ints:
 
     On a finer mesh curves turn less at them. So that they stay corners there, keep their numbers.
     """
-    edges = _held_edges(surface)
+    edges = held_edges(surface)
     edge, end, _ = _continuations(surface.vertices, edges, corner)
     return np.setdiff1d(edges, edges[edge, end])
 
 
-def onto_held_curves(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> Projection:
-    """A function (k,3) → (k,3) that puts points near a surface's held edges on the smooth curves there.
-
-    The curves of ``smooth_midpoints``, each edge cut into 256. All meshes made with one such function,
-    by ``refine``, ``remesh`` or ``check_mesh``, have the same boundary.
-
-    Examples
-    --------
-    >>> angle = 2 * np.pi * np.arange(12) / 12
-    >>> rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    >>> from pcmc import Patch
-    >>> disc = Surface([[0, 0, 0], *rim], [[0, k + 1, (k + 1) % 12 + 1] for k in range(12)], [0] * 12,
-    ...                [Patch("disc", 1.0)], fixed=range(1, 13))
-    >>> float(np.linalg.norm(onto_held_curves(disc)(np.array([[0.95, 0.1, 0.0]]))).round(5))
-    1.0
-    """
-    X, edges = surface.vertices, _held_edges(surface)
-    if not len(edges):
-        return lambda points: points
-    corners = np.union1d(held_corners(surface, corner), np.empty(0, int) if corners is None else corners)
-    for _ in range(HALVINGS):
-        number = len(X) + np.arange(len(edges))
-        X = np.concatenate([X, _smooth_middles(X, edges, corner, corners)])
-        edges = np.concatenate([np.stack([edges[:, 0], number], 1), np.stack([number, edges[:, 1]], 1)])
-    start, side = X[edges[:, 0]], X[edges[:, 1]] - X[edges[:, 0]]
-    tree = cKDTree(start + 0.5 * side)
-
-    def project(points: Floats) -> Floats:
-        near = tree.query(points, k=min(3, len(start)))[1].reshape(len(points), -1)
-        away = points[:, None] - start[near]
-        share = np.einsum("pnd,pnd->pn", away, side[near]) / np.einsum("pnd,pnd->pn", side[near], side[near])
-        foot = start[near] + np.clip(share, 0.0, 1.0)[..., None] * side[near]
-        nearest = np.linalg.norm(points[:, None] - foot, axis=2).argmin(axis=1)
-        return np.asarray(foot[np.arange(len(points)), nearest])
-
-    return project
-
-
-def _held_edges(surface: Surface) -> Ints:
-    """(e,2) edges whose middle is fixed on a finer mesh."""
+def held_edges(surface: Surface) -> Ints:
+    """(e,2) the edges whose new vertices are held."""
     return np.asarray(surface.topology.edges[held_midpoints(surface)[0]])
 
 
-def _smooth_middles(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> Floats:
-    """(k,3) the middles of edges (k,2), moved onto the arcs over them."""
-    rises, arcs = _arcs(X, edges, corner, corners)
-    middle = 0.5 * (X[edges[:, 0]] + X[edges[:, 1]])
-    return middle + rises.sum(axis=1) / np.maximum(arcs.sum(axis=1), 1)[:, None]
-
-
-def _arcs(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> tuple[Floats, Bools]:
-    """The rises (e,2,3) of the arcs over edges that go on beyond either end, and where there is one (e,2)."""
+def arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> tuple[Floats, Bools]:
+    """The rises (e,2,3) of the arcs over held edges (e,2), and which of the two there are (e,2)."""
     rises, arcs = np.zeros((len(edges), 2, 3)), np.zeros((len(edges), 2), dtype=bool)
     edge, end, beyond = _continuations(X, edges, corner)
     if corners is not None:

@@ -16,6 +16,7 @@ from ..base.errors import FileError, OptionError, PcmcError
 from ..plan import Plan, plan_from
 from ..solvers import find_method
 from ..surface import Surface
+from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
@@ -35,6 +36,7 @@ class Project:
     path : the file.
     plan : of the surface; None if ``path`` holds a surface itself.
     method, options : as in ``pcmc.solve``.
+    wanted : the accuracy asked for.
     mesh_check : whether the result is solved on finer meshes, too; None if the file does not say.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
@@ -47,6 +49,7 @@ class Project:
     plan: Plan | None = None
     method: str = "newton"
     options: Mapping[str, Any] = field(default_factory=dict)
+    wanted: AccuracyWanted = field(default_factory=AccuracyWanted)
     mesh_check: bool | None = None
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
@@ -140,6 +143,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     files, picture = output.get("files", []), output.get("picture")
     view, colour = output.get("view", "diagonal"), output.get("colour", "patches")
     with in_file(path, FileError):
+        wanted = take_accuracy(options)
         find_method(method).options(**options)  # refuses bad values before the plan is meshed
         check_names(files, picture)
         check_picture(view, colour)
@@ -148,6 +152,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             plan=plan_from(data["plan"]),
             method=method,
             options=options,
+            wanted=wanted,
             mesh_check=mesh_check,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
             **(_search(data["targets"]) if "targets" in data else {}),

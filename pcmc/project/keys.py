@@ -9,10 +9,12 @@ from functools import cache
 from inspect import cleandoc
 from typing import Any
 
+from ..accuracy.adaptive import ACCURACY_OF
 from ..plan import Area, Divider, Hole, Plan
 from ..plan.parts import BOTTOMS, EDGES
 from ..solvers import METHODS, find_method
 from ..surface import Plane
+from .accuracy import AccuracyWanted
 from .output import COLOURS
 from .remeshing import WHEN, Remeshing
 
@@ -178,7 +180,10 @@ def solve_section(method: str) -> Section:
         return Section("solve", "The solver and its options.", known)
     choices = {"target": ("minimum", "stationary"), "armijo": ("printed", "sufficient")}
     options = _of_class(find_method(method).options, choices=choices)
-    return Section("solve", "The solver and its options.", (*known, *options), f'method = "{method}"')
+    keys = (*known, *options)
+    if method == "newton":
+        keys += _of_class(AccuracyWanted, {"accuracy": "a table"}, {"accuracy_of": ACCURACY_OF})
+    return Section("solve", "The solver and its options.", keys, f'method = "{method}"')
 
 
 @cache

@@ -94,11 +94,17 @@ class HarmonicExtension:
 
     The motion of curves and points is extended harmonically into the sheets: L_α w = 0 inside, w given on
     the curves. Each sheet vertex takes the part of w along its sheet, which does not change the shape, as
-    far as its support lets it.
+    far as its support lets it. ``prescribed`` (n,) are the vertices where w is given, in place of the curves
+    and the fixed ones.
     """
 
     def __init__(
-        self, surface: Surface, classes: VertexClasses, X: Floats, backend: str | None = None
+        self,
+        surface: Surface,
+        classes: VertexClasses,
+        X: Floats,
+        backend: str | None = None,
+        prescribed: Bools | None = None,
     ) -> None:
         used = ~classes.idle
         space = _one_unknown_each(used)
@@ -108,7 +114,8 @@ class HarmonicExtension:
         diagonal = pattern.indptr[:-1]
         data[diagonal] *= 1.0 + SHIFT
         self._surface, self._used = surface, used
-        self._prescribed = (classes.kind != SHEET) | surface.fixed
+        curves = (classes.kind != SHEET) | surface.fixed
+        self._prescribed = curves if prescribed is None else prescribed
         self._weight = np.where(self._prescribed[used], PIN * data[diagonal], 0.0)
         data[diagonal] += self._weight
         # scaled to a diagonal of ones, so that no pivot beside a prescribed vertex looks like zero
@@ -118,10 +125,16 @@ class HarmonicExtension:
 
     def extend(self, space: MotionSpace, motion: Floats) -> Floats:
         """The motion (n,3) with the sheets' vertices following the curves."""
-        given = np.where(self._prescribed[:, None], motion, 0.0)[self._used]
-        w = np.zeros_like(motion)
-        right = (self._scale * self._weight)[:, None] * given
-        w[self._used] = self._scale[:, None] * self._factor.solve(right)
+        w = self.harmonic(motion)
         w[self._prescribed] = 0.0
         apply_supports(self._surface, w)
         return motion + w - space.project(w)
+
+    def harmonic(self, motion: Floats) -> Floats:
+        """w (n,3), as ``motion`` where it is prescribed."""
+        given = np.where(self._prescribed[:, None], motion, 0.0)
+        w = np.zeros_like(motion)
+        right = (self._scale * self._weight)[:, None] * given[self._used]
+        w[self._used] = self._scale[:, None] * self._factor.solve(right)
+        w[self._prescribed] = given[self._prescribed]
+        return w

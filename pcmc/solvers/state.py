@@ -100,9 +100,9 @@ class State:
         """Quality of the worst triangle outside walls that can pinch."""
         return worst_quality(self.X, self.quality_faces)
 
-    def result_surface(self) -> Surface:
+    def result_surface(self, X: Floats | None = None) -> Surface:
         """The whole surface at X, with pinched walls placed on their resting junctions."""
-        X = self.X
+        X = self.X if X is None else X
         if self.resting.any():
             X = place_pinched_walls(self.full, self.walls, self.resting, X)
         return self.full.moved(X)
