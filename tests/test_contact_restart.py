@@ -9,7 +9,13 @@ from starts import bezier_hall, stationary, two_caps, two_squares
 
 from pcmc import Surface, certify, solve
 from pcmc.base.errors import SurfaceError
-from pcmc.contact.pinching import find_walls, place_wall_rows, remove_pinched_walls, resting_vertices
+from pcmc.contact.pinching import (
+    find_walls,
+    place_wall_rows,
+    remove_pinched_walls,
+    resting_vertices,
+    standing_part,
+)
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.solvers.state import State
