@@ -1,26 +1,59 @@
 """Starting surfaces: the paper's examples, and surfaces with a closed form."""
 
 from .bezier_hall import bezier_hall
+from .delaunay import delaunay, delaunay_exact, delaunay_force, delaunay_limit, unduloid_length
 from .double_bubble import double_bubble, double_bubble_exact
+from .enneper import enneper, enneper_exact, enneper_wire
 from .fans import four_fans, three_patches
 from .joined_caps import joined_caps, joined_caps_exact
+from .lens import hemisphere, hemisphere_exact, lens, lens_circle, lens_exact
 from .sphere import sphere, sphere_exact
 from .spherical_cap import spherical_cap, spherical_cap_exact
+from .tetrahedron import (
+    skew_quadrilateral,
+    skew_quadrilateral_exact,
+    tetrahedral_film,
+    tetrahedral_film_exact,
+)
+from .tubes import catenoid, catenoid_exact, catenoid_fold, catenoid_neck, cylinder, cylinder_exact
 from .two_caps import two_caps
 from .two_squares import two_squares
 
 __all__ = [
     "bezier_hall",
+    "catenoid",
+    "catenoid_exact",
+    "catenoid_fold",
+    "catenoid_neck",
+    "cylinder",
+    "cylinder_exact",
+    "delaunay",
+    "delaunay_exact",
+    "delaunay_force",
+    "delaunay_limit",
     "double_bubble",
     "double_bubble_exact",
+    "enneper",
+    "enneper_exact",
+    "enneper_wire",
     "four_fans",
+    "hemisphere",
+    "hemisphere_exact",
     "joined_caps",
     "joined_caps_exact",
+    "lens",
+    "lens_circle",
+    "lens_exact",
+    "skew_quadrilateral",
+    "skew_quadrilateral_exact",
     "sphere",
     "sphere_exact",
     "spherical_cap",
     "spherical_cap_exact",
+    "tetrahedral_film",
+    "tetrahedral_film_exact",
     "three_patches",
     "two_caps",
     "two_squares",
+    "unduloid_length",
 ]

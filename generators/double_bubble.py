@@ -10,7 +10,7 @@ from pcmc.base.arrays import Floats, Ints
 from pcmc.base.errors import OptionError
 
 from .builder import Builder
-from .exact import ExactSolution, Sphere, UprightPlane
+from .exact import ExactSolution, Shape, Sphere, UprightPlane
 from .ring_mesh import cap_directions, disc_points, even_segments, ring_mesh
 from .sphere import STRETCH
 from .sphere_pair import balanced_offsets
@@ -69,7 +69,9 @@ def double_bubble_exact(
     """Two spheres without the caps that the disc cuts off.
 
     A = 2π r (r + d) and V = π (r + d)² (2r - d)/3 for each, with r = 2α its radius and d the
-    distance of its centre from the disc, negative when it lies in the other bubble.
+    distance of its centre from the disc, negative when it lies in the other bubble. For equal
+    tensions the index is 2: at given volumes the double bubble is the minimum (Hutchings, Morgan,
+    Ritoré and Ros 2002), and its least area is a concave function of the two volumes (Hutchings 1997).
 
     >>> bubbles = double_bubble_exact()
     >>> round(bubbles.area / np.pi, 12), round(bubbles.volume / np.pi, 12), bubbles.height
@@ -82,13 +84,14 @@ def double_bubble_exact(
     volume = float((np.pi / 3.0 * (r + d) ** 2 * (2.0 * r - d)).sum())
     wall = np.pi * rim_radius**2
     energy = float(0.5 * r @ areas + alpha_aux * wall - volume)
-    shapes: dict[str, Sphere | UprightPlane] = {
+    shapes: dict[str, Shape] = {
         "left": Sphere((-offsets[LEFT], 0.0, 0.0), 2.0 * alpha_left),
         "right": Sphere((offsets[RIGHT], 0.0, 0.0), 2.0 * alpha_right),
         "wall": UprightPlane(),
     }
+    index = 2 if alpha_left == alpha_right == alpha_aux else None
     widest = max([rim_radius, *r[d > 0.0].tolist()])
-    return ExactSolution(energy, float(areas.sum() + wall), volume, 2.0 * widest, shapes)
+    return ExactSolution(energy, float(areas.sum() + wall), volume, 2.0 * widest, shapes, index)
 
 
 def _offsets(alpha_left: float, alpha_right: float, alpha_aux: float) -> tuple[tuple[float, float], float]:

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from pcmc import Surface
 from pcmc.base.arrays import Floats
+
+
+class Shape(Protocol):
+    """What a patch is a part of."""
+
+    def distance(self, points: Floats) -> Floats:
+        """(k,) distance of points (k,3) from the shape, length."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +71,17 @@ class UprightPlane:
 
 
 @dataclass(frozen=True)
+class FlatPlane:
+    """The plane through the origin with this unit normal."""
+
+    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+    def distance(self, points: Floats) -> Floats:
+        """(k,) distance of points (k,3) from the plane, length."""
+        return np.abs(points @ np.array(self.normal))
+
+
+@dataclass(frozen=True)
 class ExactSolution:
     """A surface in closed form.
 
@@ -72,14 +91,18 @@ class ExactSolution:
     area : A of all patches together, length².
     volume : V under pressure, length³.
     height : of the highest point over Π (or over the lowest point of a closed surface), length.
-    shapes : the sphere or plane that contains each patch, by the patch's name.
+    shapes : the sphere, plane, surface of revolution or minimal surface that contains each patch, by
+        the patch's name.
+    index : Morse index of E with the supports of the generator; rigid motions that no support resists
+        are not counted. None where no theorem gives it.
     """
 
     energy: float
     area: float
     volume: float
     height: float
-    shapes: Mapping[str, Sphere | UprightPlane]
+    shapes: Mapping[str, Shape]
+    index: int | None = None
 
     def distance(self, surface: Surface) -> Floats:
         """(n,) distance of each vertex from the shape of its patch, length; the largest of several."""

@@ -8,7 +8,7 @@ from pcmc import Patch, Surface
 from pcmc.base import validate
 from pcmc.base.errors import OptionError
 
-from .exact import ExactSolution, Sphere, UprightPlane
+from .exact import ExactSolution, Shape, Sphere, UprightPlane
 from .sphere_pair import balanced_offsets, build_pair
 
 RISE = 0.7  # of the exact height: a start that is clearly not the solution, yet near enough to reach it
@@ -66,7 +66,7 @@ def joined_caps_exact(
     )
     wall, volume = _segment(wall_radius, depth), left_volume + right_volume
     tops = [s.radius - depth for s, offset in zip(spheres, offsets, strict=True) if offset > 0.0]
-    shapes: dict[str, Sphere | UprightPlane] = {
+    shapes: dict[str, Shape] = {
         "left": spheres[0],
         "right": spheres[1],
         "wall": UprightPlane(),

@@ -42,7 +42,7 @@ def sphere(edge_length: float = 0.4, *, alpha: float = 1.0, exact: bool = False)
 
 
 def sphere_exact(*, alpha: float = 1.0) -> ExactSolution:
-    """Radius 2α: A = 16 π α², V = (32/3) π α³, E = (16/3) π α³.
+    """Radius 2α: A = 16 π α², V = (32/3) π α³, E = (16/3) π α³; index 1.
 
     >>> ball = sphere_exact()
     >>> round(ball.energy / np.pi, 12), ball.height
@@ -51,7 +51,7 @@ def sphere_exact(*, alpha: float = 1.0) -> ExactSolution:
     radius = 2.0 * validate.positive("alpha", alpha)
     area, volume = 4.0 * np.pi * radius**2, 4.0 / 3.0 * np.pi * radius**3
     shapes = {"bubble": Sphere((0.0, 0.0, 0.0), radius)}
-    return ExactSolution(alpha * area - volume, area, volume, 2.0 * radius, shapes)
+    return ExactSolution(alpha * area - volume, area, volume, 2.0 * radius, shapes, 1)
 
 
 def geodesic(frequency: int) -> tuple[Floats, Ints]:

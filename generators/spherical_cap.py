@@ -19,6 +19,7 @@ def spherical_cap(
     radius: float = 1.0,
     alpha: float = 0.6,
     height: float | None = None,
+    upper: bool = False,
     exact: bool = False,
 ) -> Surface:
     """A patch with a fixed circle on Π, as a dome whose height is not that of the equilibrium.
@@ -31,6 +32,7 @@ def spherical_cap(
     alpha : tension of "cap", force/length.
     height : of the initial dome, a part of a sphere; 0.3 radius unless given. It may exceed the
         radius: more than a hemisphere.
+    upper : with ``exact``, the higher of the two equilibria, more than a hemisphere.
     exact : put the vertices on the exact solution.
 
     Raises
@@ -45,7 +47,7 @@ def spherical_cap(
     edge_length = validate.positive("edge_length", edge_length)
     radius = validate.positive("radius", radius)
     if exact:
-        height = spherical_cap_exact(radius=radius, alpha=alpha).height
+        height = spherical_cap_exact(radius=radius, alpha=alpha, upper=upper).height
     dome = 0.3 * radius if height is None else validate.positive("height", height)
     ball = (radius**2 + dome**2) / (2.0 * dome)
     opening = 2.0 * np.arctan2(dome, radius)  # from the pole to the rim, seen from the centre
@@ -59,10 +61,11 @@ def spherical_cap(
     return mesh.surface([Patch("cap", alpha)], fixed=rim)
 
 
-def spherical_cap_exact(*, radius: float = 1.0, alpha: float = 0.6) -> ExactSolution:
-    """The sphere of radius 2α through the circle: height h = 2α - √(4α² - radius²).
+def spherical_cap_exact(*, radius: float = 1.0, alpha: float = 0.6, upper: bool = False) -> ExactSolution:
+    """The sphere of radius 2α through the circle: height h = 2α ∓ √(4α² - radius²).
 
-    A = 4π α h and V = π h² (6α - h) / 3. This is the lower of the two branches, the stable one.
+    A = 4π α h and V = π h² (6α - h) / 3. The lower cap (-) is stable; the upper one, with ``upper``,
+    has index 1. They meet at the hemisphere, α = radius/2.
 
     >>> cap = spherical_cap_exact()
     >>> round(cap.energy, 10), round(cap.height, 10)
@@ -78,8 +81,8 @@ def spherical_cap_exact(*, radius: float = 1.0, alpha: float = 0.6) -> ExactSolu
             found=alpha,
             expected=radius / 2,
         )
-    h = 2.0 * alpha - float(np.sqrt(4.0 * alpha**2 - radius**2))
+    h = 2.0 * alpha + (1.0 if upper else -1.0) * float(np.sqrt(4.0 * alpha**2 - radius**2))
     area = 4.0 * np.pi * alpha * h
     volume = np.pi * h**2 * (6.0 * alpha - h) / 3.0
     ball = Sphere((0.0, 0.0, h - 2.0 * alpha), 2.0 * alpha)
-    return ExactSolution(alpha * area - volume, area, volume, h, {"cap": ball})
+    return ExactSolution(alpha * area - volume, area, volume, h, {"cap": ball}, int(upper))

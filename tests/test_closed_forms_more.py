@@ -1,4 +1,4 @@
-"""Surfaces known in closed form that are no part of the package: Delaunay's, films, lenses, drums.
+"""Surfaces known in closed form: Delaunay's, films, lenses, minimal surfaces, drums.
 
 What is asserted is the order at which meshes come near them, and that the Morse index changes where
 theory says: at lengths π r k of a cylinder, at conjugate points of unduloids and catenoids.
@@ -6,18 +6,43 @@ theory says: at lengths π r k of a cylinder, at conjugate points of unduloids a
 
 import numpy as np
 import pytest
-from scipy.integrate import cumulative_simpson
+from refusals import refused
 from scipy.optimize import brentq
 from scipy.special import lpmv
-from shapes import disc, tube
+from shapes import disc
 
-from generators import spherical_cap
-from pcmc import Patch, Surface, Verdict, certify, solve
-from pcmc.energy.functional import volume
+import generators
+from generators import (
+    catenoid,
+    catenoid_exact,
+    catenoid_fold,
+    catenoid_neck,
+    cylinder,
+    cylinder_exact,
+    delaunay,
+    delaunay_exact,
+    delaunay_force,
+    delaunay_limit,
+    enneper,
+    enneper_exact,
+    hemisphere,
+    hemisphere_exact,
+    lens,
+    lens_circle,
+    lens_exact,
+    skew_quadrilateral,
+    skew_quadrilateral_exact,
+    spherical_cap,
+    spherical_cap_exact,
+    tetrahedral_film,
+    tetrahedral_film_exact,
+    unduloid_length,
+)
+from pcmc import Patch, Surface, Verdict, certify, energy, solve
+from pcmc.base.errors import OptionError
+from pcmc.energy.functional import patch_areas, volume
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
-
-AROUND = (12, 24, 48)
 
 
 def orders(errors):
@@ -25,45 +50,87 @@ def orders(errors):
     return np.log2(errors[:-1] / errors[1:])
 
 
-def rows(length, around, radius=1.0):
-    """An even number of rows that makes triangles of a tube about equilateral."""
-    return 2 * max(1, round(length / (2.0 * np.sqrt(3.0) * np.pi * radius / around)))
-
-
-def stationary(start, swell=1.01):
-    """The equilibrium found from a start whose free vertices are moved away from the axis."""
-    X = start.vertices.copy()
-    X[start.free, :2] *= swell
-    result = solve(start.moved(X), target="stationary")
+def stationary(start):
+    result = solve(start, target="stationary")
     assert result.converged
     return result
 
 
-def straight(radius, bottom, top):
-    """The profile of a cylinder."""
-    return lambda t: (radius + 0.0 * t, bottom + (top - bottom) * t)
+def edges(exact, around):
+    """Edge lengths, each half of the last, with these segments around a tube; its rows should double too."""
+    (meridian,) = exact.shapes.values()
+    edge = 2.0 * np.pi * meridian.r.max() / around
+    rows = meridian.length / (np.sqrt(3.0) * edge)
+    assert abs(rows - round(rows)) < 0.1
+    return edge, 0.5 * edge, 0.25 * edge
 
 
 def radii(surface):
     return np.hypot(*surface.vertices.T[:2])
 
 
+# ---- exact vertices: the closed form itself, without a solver -----------------------------------
+
+EXACT = {
+    "cylinder": ({"length": 3.6}, edges(cylinder_exact(length=3.6), 24)),
+    "catenoid": ({}, edges(catenoid_exact(), 41)),
+    "delaunay": ({"waviness": 1.5}, edges(delaunay_exact(waviness=1.5), 45)),
+    "hemisphere": ({}, (0.4, 0.2, 0.1)),
+    "lens": ({}, (0.4, 0.2, 0.1)),
+    "skew_quadrilateral": ({}, (0.1, 0.05, 0.025)),
+    "enneper": ({"radius": 1.2}, (0.2, 0.1, 0.05)),
+    "spherical_cap": ({"upper": True}, (0.1, 0.05, 0.025)),
+}
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_the_mesh_with_exact_vertices_has_the_area_volume_and_energy_of_the_closed_form(name):
+    arguments, lengths = EXACT[name]
+    exact = getattr(generators, f"{name}_exact")(**arguments)
+    meshes = [getattr(generators, name)(h, **arguments, exact=True) for h in lengths]
+    assert max(exact.distance(mesh).max() for mesh in meshes) < 1e-6
+    assert orders(np.array([patch_areas(mesh).sum() for mesh in meshes]) - exact.area)[-1] == (
+        pytest.approx(2.0, abs=0.2)
+    )
+    assert orders(np.array([energy(mesh) for mesh in meshes]) - exact.energy)[-1] == (
+        pytest.approx(2.0, abs=0.2)
+    )
+    if exact.volume:
+        assert orders(np.array([volume(mesh) for mesh in meshes]) - exact.volume)[-1] == (
+            pytest.approx(2.0, abs=0.2)
+        )
+
+
+def test_bad_input_is_refused():
+    with refused(OptionError, what="half_distance", found=0.7, expected=catenoid_fold()):
+        catenoid(half_distance=0.7)
+    with refused(OptionError, what="waviness", found=1.0):
+        delaunay(waviness=1.0)
+    with refused(OptionError, what="centre", found="top"):
+        delaunay(centre="top")
+    with refused(OptionError, what="alpha_film", found=2.5):
+        lens(alpha_film=2.5)
+    with refused(OptionError, what="radius", found=1.8):
+        enneper(radius=1.8)
+    with refused(OptionError, what="edge_length", found=0.0):
+        skew_quadrilateral(0.0)
+
+
 # ---- cylinder: the second variation is α ((kπ/L)² + (m² - 1)/r²) --------------------------------
-
-
-def cylinder(around, length, radius=1.0, tension=1.0):
-    """Radius r needs the pressure α / r."""
-    patch = Patch("tube", tension, tension / radius)
-    return tube(rows(length, around, radius), around, straight(radius, 0.0, length), patch)
 
 
 @pytest.mark.parametrize("radius", [1.0, 0.5])
 def test_the_softest_mode_of_a_cylinder(radius):
-    length, tension = 1.5 * np.pi * radius, 3.0
-    exact = tension * (np.pi**2 / length**2 - 1.0 / radius**2)
-    found = [stationary(cylinder(n, length, radius, tension), 1.0).certificate for n in AROUND]
-    assert [c.index for c in found] == [1, 1, 1]
-    error = np.array([c.eigenvalues[0] for c in found]) - exact
+    length, alpha = 1.5 * np.pi * radius, 3.0
+    exact = alpha * (np.pi**2 / length**2 - 1.0 / radius**2)
+    certificates = [
+        stationary(
+            cylinder(2.0 * np.pi * radius / n, radius=radius, length=length, alpha=alpha, exact=True)
+        ).certificate
+        for n in (12, 24, 48)
+    ]
+    assert [c.index for c in certificates] == [1, 1, 1]
+    error = np.array([c.eigenvalues[0] for c in certificates]) - exact
     assert orders(error) == pytest.approx(2.0, abs=0.25)
 
 
@@ -72,250 +139,179 @@ def test_a_cylinder_loses_a_way_of_being_stable_at_each_half_wave(turns, index):
     """Under given pressure at L = π r, 2 π r, …; at given volume the first of these does not count,
     and Plateau and Rayleigh's limit 2 π r is where the index goes from 1 to 2.
     """
-    found = stationary(cylinder(24, turns * np.pi), 1.0).certificate
-    assert found.index == index
-    assert found.verdict is (Verdict.SADDLE if index else Verdict.STABLE)
+    result = stationary(cylinder(np.pi / 12.0, length=turns * np.pi, exact=True))
+    assert result.certificate.index == cylinder_exact(length=turns * np.pi).index == index
+    assert result.certificate.verdict is (Verdict.SADDLE if index else Verdict.STABLE)
 
 
-# ---- Delaunay's surfaces, mean curvature ½: r = √(1 + B² + 2 B sin s), dz = (1 + B sin s)/r ds ----
+@pytest.mark.parametrize("length", [2.0, 4.0, 7.0])
+def test_the_index_of_a_meridian_is_the_cylinder_s(length):
+    (meridian,) = cylinder_exact(length=length).shapes.values()
+    assert meridian.index(1.0) == cylinder_exact(length=length).index
 
 
-def delaunay(B, middle, half):
-    """Profile over s in middle ± half, s the arc length: a neck at -π/2, a bulge at π/2."""
-    s = np.linspace(middle - half, middle + half, 4001)
-    r = np.sqrt(1.0 + B * B + 2.0 * B * np.sin(s))
-    z = cumulative_simpson((1.0 + B * np.sin(s)) / r, x=s, initial=0.0)
-    share = np.linspace(0.0, 1.0, len(s))
-    return (lambda t: (np.interp(t, share, r), np.interp(t, share, z))), r, z
-
-
-def conjugate(B):
-    """Arc length from the neck at which the change with B of the unduloid is tangential."""
-
-    def across(half):
-        s = np.linspace(-0.5 * np.pi, half - 0.5 * np.pi, 2001)
-        sine = np.sin(s)
-        r = np.sqrt(1.0 + B * B + 2.0 * B * sine)
-        r_B, r_s, z_s = (B + sine) / r, B * np.cos(s) / r, (1.0 + B * sine) / r
-        z_B = cumulative_simpson(sine / r - (1.0 + B * sine) * (B + sine) / r**3, x=s, initial=0.0)
-        return (r_B * z_s - z_B * r_s)[-1]
-
-    return brentq(across, 0.05, 2.5)
+# ---- Delaunay's surfaces ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("B", "middle", "half"),
-    [(0.4, 0.5 * np.pi, 1.2), (0.4, -0.5 * np.pi, 0.6), (1.5, 0.5 * np.pi, 1.2)],
+    ("waviness", "centre", "reach", "around"),
+    [(0.4, "bulge", 1.2, 13), (0.4, "neck", 0.6, 13), (1.5, "bulge", 1.2, 23)],
     ids=["bulge", "neck", "nodoid"],
 )
-def test_unduloids_and_nodoids(B, middle, half):
-    profile, r, z = delaunay(B, middle, half)
-    flux = np.pi * (1.0 - B * B)  # 2 π α r cos φ - π p r², the same at every height
+def test_unduloids_and_nodoids(waviness, centre, reach, around):
+    shape = {"waviness": waviness, "centre": centre, "reach": reach}
+    exact = delaunay_exact(**shape)
+    (meridian,) = exact.shapes.values()
     away, force = [], []
-    for around in AROUND:
-        mesh = tube(rows(2.0 * half, around, r.max()), around, profile, Patch("tube", 1.0))
-        result = stationary(mesh)
+    for length in edges(exact, around):
+        result = stationary(delaunay(length, **shape))
         assert result.certificate.verdict is Verdict.STABLE
-        surface = result.surface
-        away.append(np.abs(radii(surface) - np.interp(surface.vertices[:, 2], z, r)).max())
+        assert exact.index == 0
+        away.append(exact.distance(result.surface).max())
         ends = result.certificate.boundaries["reaction_z"].to_numpy()
         assert ends.sum() == pytest.approx(0.0, abs=1e-12)
-        force.append(ends.max() - np.pi * r[0] ** 2 - flux)
+        force.append(ends.max() - np.pi * meridian.r[0] ** 2 - delaunay_force(waviness=waviness))
     assert orders(away) == pytest.approx(2.0, abs=0.35)
     assert orders(force)[-1] == pytest.approx(2.0, abs=0.25)
 
 
-@pytest.mark.parametrize("B", [0.2, 0.4])
-def test_unduloids_turn_unstable_at_their_conjugate_point(B):
-    limit = conjugate(B)
-    index = []
-    for half in (limit - 0.15, limit + 0.15):
-        profile, *_ = delaunay(B, -0.5 * np.pi, half)
-        found = stationary(tube(rows(2.0 * half, 32), 32, profile, Patch("tube", 1.0)))
-        index.append(found.certificate.index)
-    assert index == [0, 1]
+@pytest.mark.parametrize("waviness", [0.2, 0.4])
+def test_unduloids_turn_unstable_at_their_conjugate_point(waviness):
+    limit = delaunay_limit(waviness=waviness)
+    for reach, index in ((limit - 0.15, 0), (limit + 0.15, 1)):
+        shape = {"waviness": waviness, "centre": "neck", "reach": reach}
+        assert delaunay_exact(**shape).index == index
+        assert stationary(delaunay(0.25, **shape)).certificate.index == index
 
 
 def test_the_conjugate_point_of_the_thinnest_waves_is_that_of_the_cylinder():
-    assert conjugate(1e-3) == pytest.approx(0.5 * np.pi, abs=2e-3)
+    assert delaunay_limit(waviness=1e-3) == pytest.approx(0.5 * np.pi, abs=2e-3)
+
+
+def test_unduloids_leave_the_cylinder_at_the_length_pi():
+    waves = np.array([0.02, 0.01])
+    bend = [unduloid_length(B) - np.pi - B for B in waves]
+    assert bend[0] / bend[1] == pytest.approx(4.0, abs=0.1)
 
 
 # ---- catenoids between rings of radius 1: c cosh(h/c) = 1 ---------------------------------------
 
-FILM = Patch("film", 1.0, pressure=0.0)
-FOLD = brentq(lambda u: u * np.tanh(u) - 1.0, 1.0, 1.5)  # h/c where the two necks meet
-WIDEST = 1.0 / np.sinh(FOLD)  # h there: 0.6627
-
-
-def neck(h, deep=False):
-    bounds = (0.05, h / FOLD) if deep else (h / FOLD, 1.0)
-    return brentq(lambda c: c * np.cosh(h / c) - 1.0, *bounds)
-
-
-def catenoid(around, h, c):
-    def profile(t):
-        z = h * (2.0 * t - 1.0)
-        return c * np.cosh(z / c), z
-
-    return tube(rows(2.0 * h, around, 0.8), around, profile, FILM)
-
 
 @pytest.mark.parametrize(("deep", "verdict"), [(False, Verdict.STABLE), (True, Verdict.SADDLE)])
 def test_catenoids(deep, verdict):
-    h = 0.5
-    c = neck(h, deep)
-    area = np.pi * c**2 * (2.0 * h / c + np.sinh(2.0 * h / c))
-    away, energy, pull = [], [], []
-    for around in AROUND[1:]:
-        result = stationary(catenoid(around, h, c))
-        found = result.certificate
-        assert found.verdict is verdict
-        assert found.index == int(deep)
-        z = result.surface.vertices[:, 2]
-        away.append(np.abs(radii(result.surface) - c * np.cosh(z / c)).max())
-        energy.append(result.energy - area)
-        pull.append(found.boundaries["reaction_z"].max() - 2.0 * np.pi * c)
-    for errors in (away, energy, pull):
-        assert orders(errors) == pytest.approx(2.0, abs=0.25)
+    shape = {"half_distance": 0.6, "deep": deep}
+    exact, c = catenoid_exact(**shape), catenoid_neck(**shape)
+    around = 29 if deep else 49
+    assert exact.area == pytest.approx(np.pi * c**2 * (1.2 / c + np.sinh(1.2 / c)), rel=1e-10)
+    away, area, pull = [], [], []
+    for length in edges(exact, around):
+        result = stationary(catenoid(length, **shape))
+        assert result.certificate.verdict is verdict
+        assert result.certificate.index == exact.index == int(deep)
+        away.append(exact.distance(result.surface).max())
+        area.append(result.energy - exact.energy)
+        pull.append(result.certificate.boundaries["reaction_z"].max() - 2.0 * np.pi * c)
+    for errors in (away, area, pull):
+        assert orders(errors) == pytest.approx(2.0, abs=0.35)
 
 
 def test_the_widest_catenoid():
-    assert abs(WIDEST - 0.6627) < 1e-4
-    for h in (0.98 * WIDEST, 1.03 * WIDEST):
-        result = solve(tube(rows(2.0 * h, 32), 32, straight(1.0, -h, h), FILM))
-        assert result.converged == (h < WIDEST)
-        assert (result.certificate.verdict is Verdict.STABLE) == (h < WIDEST)
+    assert catenoid_fold() == pytest.approx(0.6627434193491816, abs=1e-15)
+    near, far = 0.98 * catenoid_fold(), 1.03 * catenoid_fold()
+    assert solve(catenoid(0.2, half_distance=near)).certificate.verdict is Verdict.STABLE
+    apart = catenoid(0.2, half_distance=near)
+    assert not solve(apart.moved(apart.vertices * [1.0, 1.0, far / near])).converged
 
 
 def test_a_film_meets_the_plane_at_a_right_angle():
-    """Half a catenoid, its neck free on Π: the same neck as that of the whole one (8)."""
-    h = 0.5
-    c, error = neck(h), []
-    for around in AROUND:
-        count = rows(2.0 * h, around, 0.8) // 2
-        ends = {"on_plane": range(around), "fixed": range(count * around, (count + 1) * around)}
-        result = solve(tube(count, around, straight(1.0, 0.0, h), FILM, **ends))
+    """Half a catenoid, its neck free on Π: the same neck as that of the whole one."""
+    c, error = catenoid_neck(), []
+    for length in edges(catenoid_exact(), 41):
+        result = solve(catenoid(length, half=True))
         assert result.certificate.verdict is Verdict.STABLE
-        error.append(radii(result.surface)[:around].mean() - c)
+        error.append(radii(result.surface)[result.surface.on_plane].mean() - c)
     assert orders(error)[-1] == pytest.approx(2.0, abs=0.25)
 
 
 # ---- bubbles and lenses -------------------------------------------------------------------------
 
 
-def dome(rings, radius, opening):
-    """Points (n,3) of a sphere's part up to an angle from its top, faces, and which are its rim."""
-    flat, faces = disc(rings)
-    share = np.hypot(*flat.T)
-    out = flat / np.maximum(share, 1e-12)[:, None]
-    polar = opening * share
-    X = radius * np.column_stack([np.sin(polar)[:, None] * out, np.cos(polar)])
-    return X, faces, np.isclose(share, 1.0)
-
-
 def test_a_bubble_on_the_plane_is_a_hemisphere():
     """Free to slide: modes α (l (l + 1) - 2) / R² with l + m even, the two translations left out."""
     size, lowest, lift = [], [], []
     for rings in (4, 8, 16):
-        X, faces, rim = dome(rings, 2.0, 0.5 * np.pi)
-        X[rim, 2] = 0.0
-        start = Surface(X * [1.05, 0.97, 1.03], faces, [0] * len(faces), [Patch("bubble", 1.0)], on_plane=rim)
-        result = solve(start, target="stationary")
-        found = certify(result.surface, modes=4)
-        assert found.verdict is Verdict.SADDLE
-        assert found.index == 1
-        Y = result.surface.vertices
+        result = stationary(hemisphere(np.pi / rings))
+        certificate = certify(result.surface, modes=4)
+        assert certificate.verdict is Verdict.SADDLE
+        assert certificate.index == hemisphere_exact().index == 1
+        Y, rim = result.surface.vertices, result.surface.on_plane
         size.append(np.linalg.norm(Y - Y[rim].mean(axis=0), axis=1).max() - 2.0)
-        lowest.append(found.eigenvalues - [-0.5, 1.0, 1.0, 1.0])
-        lift.append(found.support + 4.0 * np.pi)  # the load on its circle
+        lowest.append(certificate.eigenvalues - [-0.5, 1.0, 1.0, 1.0])
+        lift.append(certificate.support + 4.0 * np.pi)  # the load on its circle
     assert orders(size) == pytest.approx(2.0, abs=0.2)
     assert orders(lift) == pytest.approx(2.0, abs=0.2)
     assert orders(np.array(lowest)) == pytest.approx(2.0, abs=0.3)
 
 
-def lens(rings, top, bottom, film):
-    """Two domes over a circle in the middle of a flat film whose outer edge is held, and its radius.
-
-    Radii 2 α balance the pressure 1. Over the circle of radius ρ their slopes have sines ρ / 2 α, so
-    the forces across the film always balance; those along it do if √(α_1² - ρ²/4) + √(α_2² - ρ²/4)
-    is the film's tension: ρ is twice the height of the triangle with the tensions as its sides.
-    """
-    s = 0.5 * (top + bottom + film)
-    circle = 4.0 * np.sqrt(s * (s - top) * (s - bottom) * (s - film)) / film
-    angles = [np.arcsin(0.5 * circle / tension) for tension in (top, bottom)]
-    upper, faces, rim = dome(rings, 2.0 * top, angles[0])
-    lower = dome(rings, 2.0 * bottom, angles[1])[0]
-    upper[:, 2] -= 2.0 * top * np.cos(angles[0])
-    lower[:, 2] -= 2.0 * bottom * np.cos(angles[1])
-    around = np.flatnonzero(rim)
-    around = around[np.argsort(np.arctan2(*upper[around].T[1::-1]))]
-    number = np.arange(len(rim))
-    number[~rim] = len(rim) + np.arange(np.count_nonzero(~rim))
-    X, F, patch = [upper, lower[~rim] * [1, 1, -1]], [faces, number[faces][:, ::-1]], [0, 1]
-    inner, count = around, len(rim) + np.count_nonzero(~rim)
-    for k in range(1, rings + 1):
-        outer = count + np.arange(len(around))
-        X.append(upper[around] * [2.0 ** (k / rings), 2.0 ** (k / rings), 0.0])
-        ahead, next_ahead = np.roll(inner, -1), np.roll(outer, -1)
-        F += [np.stack([inner, outer, next_ahead], 1), np.stack([inner, next_ahead, ahead], 1)]
-        patch += [2, 2]
-        inner, count = outer, count + len(around)
-    patches = [Patch("top", top), Patch("bottom", bottom), Patch("film", film, 0.0)]
-    surface = Surface(
-        np.concatenate(X), np.concatenate(F), np.repeat(patch, [len(f) for f in F]), patches, fixed=inner
-    )
-    return surface, around, circle
-
-
 @pytest.mark.parametrize("tensions", [(1.0, 1.3, 1.8), (1.0, 1.0, 1.0)], ids=["unequal", "120°"])
 def test_a_lens_in_a_film_keeps_young_s_law(tensions):
-    error = []
+    alphas = dict(zip(("alpha_top", "alpha_bottom", "alpha_film"), tensions, strict=True))
+    circle, error, away = lens_circle(**alphas), [], []
     for rings in (3, 6, 12):
-        start, around, circle = lens(rings, *tensions)
-        result = stationary(start, 1.03)
+        start = lens(np.pi * circle / (3.0 * rings), **alphas)
+        (junction,) = start.topology.junctions
+        result = stationary(start)
         assert result.certificate.index == 1  # it grows or shrinks
-        error.append(radii(result.surface)[around].mean() - circle)
+        error.append(radii(result.surface)[junction.vertices].mean() - circle)
+        away.append(lens_exact(**alphas).distance(result.surface).max())
     assert orders(error) == pytest.approx(2.0, abs=0.2)
+    assert orders(away)[-1] == pytest.approx(2.0, abs=0.35)
 
 
-# ---- flat films ---------------------------------------------------------------------------------
-
-CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
-
-
-def tetrahedron(n, centre):
-    """The six triangles from a tetrahedron's edges to a point inside: four triple lines meet there."""
-    number: dict[tuple[float, ...], int] = {}
-    F, patch, held = [], [], set()
-    pairs = [(a, b) for a in range(4) for b in range(a + 1, 4)]
-    for k, (a, b) in enumerate(pairs):
-
-        def at(i, j, a=a, b=b):
-            place = centre + (CORNERS[a] - centre) * i / n + (CORNERS[b] - centre) * j / n
-            return number.setdefault(tuple(place.round(9).tolist()), len(number))
-
-        for i in range(n):
-            for j in range(n - i):
-                F.append([at(i, j), at(i + 1, j), at(i, j + 1)])
-                F += [[at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]] if i + j < n - 1 else []
-        patch += [k] * n**2
-        held |= {at(i, n - i) for i in range(n + 1)}
-    films = [Patch(f"film {a}{b}", 1.0, pressure=0.0) for a, b in pairs]
-    return Surface(np.array(list(number)), F, patch, films, fixed=sorted(held))
+# ---- films without pressure ---------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("n", [1, 2, 4])
 def test_the_soap_film_of_a_tetrahedron_is_flat(n):
-    start = tetrahedron(n, np.array([0.1, 0.05, -0.08]))
+    start, exact = tetrahedral_film(1.0 / n), tetrahedral_film_exact()
     middle = int(np.linalg.norm(start.vertices, axis=1).argmin())
     assert sum(middle in curve.vertices for curve in start.topology.junctions) == 4
     result = solve(start)
     assert result.certificate.verdict is Verdict.STABLE
     assert result.surface.vertices[middle] == pytest.approx(0.0, abs=1e-12)
-    assert result.energy == pytest.approx(6.0 * np.sqrt(2.0), rel=1e-13)
+    assert exact.distance(result.surface).max() < 1e-12
+    assert result.energy == pytest.approx(exact.energy, rel=1e-13)
 
 
-# ---- caps: the limit of great tension, and how they vibrate -------------------------------------
+def test_schwarz_s_surface_in_four_edges_of_a_tetrahedron():
+    exact = skew_quadrilateral_exact()
+    assert exact.area == pytest.approx(0.6396307855855, abs=5e-14)
+    results = [stationary(skew_quadrilateral(h)) for h in (0.1, 0.05, 0.025)]
+    assert [r.certificate.verdict for r in results] == [Verdict.STABLE] * 3
+    assert orders(np.array([r.energy for r in results]) - exact.energy) == pytest.approx(2.0, abs=0.1)
+    assert orders([exact.distance(r.surface).max() for r in results]) == pytest.approx(2.0, abs=0.2)
+
+
+@pytest.mark.parametrize("radius", [0.8, 1.3])
+def test_enneper_s_surface_is_found_and_unstable_beyond_its_hemisphere(radius):
+    exact = enneper_exact(radius=radius)
+    assert exact.area == pytest.approx(np.pi * (radius**2 + radius**4 + radius**6 / 3.0))
+    results = [stationary(enneper(h, radius=radius)) for h in (0.2, 0.1, 0.05)]
+    assert [r.certificate.index for r in results] == [exact.index] * 3
+    assert exact.index == int(radius > 1.0)
+    assert orders(np.array([r.energy for r in results]) - exact.energy)[-1] == pytest.approx(2.0, abs=0.3)
+    assert orders([exact.distance(r.surface).max() for r in results])[-1] == pytest.approx(2.0, abs=0.35)
+
+
+# ---- caps: the upper one, the limit of great tension, and how they vibrate ----------------------
+
+
+def test_the_upper_cap_is_a_saddle():
+    exact = spherical_cap_exact(upper=True)
+    assert exact.height == pytest.approx(1.2 + np.sqrt(0.44))
+    results = [stationary(spherical_cap(h, upper=True, exact=True)) for h in (0.2, 0.1, 0.05)]
+    assert [r.certificate.index for r in results] == [exact.index] * 3 == [1, 1, 1]
+    assert orders(np.array([r.energy for r in results]) - exact.energy) == pytest.approx(2.0, abs=0.2)
 
 
 def test_a_tense_roof_over_an_ellipse_solves_poisson_s_equation():

@@ -166,6 +166,29 @@ def test_the_least_recently_used_session_expires(client, monkeypatch):
     client.ask(f"/api/{names[0]}/state")
 
 
+def test_the_mesh_check_comes_as_a_table_in_words(client):
+    header, arrays = client.ask(f"/api/{client.ask('/api/open')[0]['session']}/check")
+    check = header["check"]
+    assert (check["name"], check["word"], arrays) == ("persists", "persists", {})
+    names = [row["name"] for row in check["rows"]]
+    assert {"height of left", "volume", "energy", "lowest eigenvalue"} <= set(names)
+    height = check["rows"][names.index("height of left")]
+    value, bar = map(float, height["value"].split(" ± "))
+    limit, narrower = map(float, height["limit"].split(" ± "))
+    assert abs(value - limit) <= bar
+    assert narrower < bar
+
+
+def test_a_surface_that_is_not_at_rest_has_no_mesh_check():
+    running = explore.start(CAP.retensioned({"cap": 0.2}))
+    try:
+        client = Client(running)
+        name = client.ask("/api/open")[0]["session"]
+        assert "needs a surface at rest" in client.ask(f"/api/{name}/check", status=400)
+    finally:
+        running.close()
+
+
 @pytest.mark.parametrize(
     ("path", "body", "status", "line"),
     [

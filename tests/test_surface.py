@@ -45,7 +45,7 @@ BAD = {
     "flat vertices": ({"vertices": np.zeros((5, 2))}, "vertices", None, r"\(n, 3\).*\(5, 2\)"),
     "no vertices": ({"vertices": np.zeros((0, 3))}, "vertices", None, "n > 0"),
     "ragged vertices": ({"vertices": [[0, 0, 0], [1, 0]]}, "vertices", None, "a regular array"),
-    "words": ({"vertices": [["a", "b", "c"]]}, "vertices", None, "a regular array of numbers"),
+    "words": ({"vertices": [["a", "b", "c"]]}, "vertices", None, "an array of real numbers"),
     "index too high": (faces(1, 1, 2, 5), "faces", 1, r"outside the range 0\.\.4"),
     "index below 0": (faces(2, 2, 3, -1), "faces", 2, r"outside the range 0\.\.4"),
     "repeated vertex": (faces(3, 3, 3, 4), "faces", 3, r"= \[3, 3, 4\] has a vertex twice"),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from functools import cached_property, wraps
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -10,3 +12,25 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.integer[Any]]
 Bools = npt.NDArray[np.bool_]
+
+Array = TypeVar("Array", bound=npt.NDArray[Any])
+
+
+def read_only(array: Array) -> Array:
+    """The same array, which can no longer be written to.
+
+    >>> read_only(np.ones(2)).flags.writeable
+    False
+    """
+    array.setflags(write=False)
+    return array
+
+
+def cached_array(method: Callable[[Any], Array]) -> cached_property[Array]:
+    """``cached_property`` for an array, which can then no longer be written to."""
+
+    @wraps(method)
+    def computed(owner: Any) -> Array:
+        return read_only(method(owner))
+
+    return cached_property(computed)

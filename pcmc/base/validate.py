@@ -10,12 +10,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import fields
 from numbers import Integral, Real
+from reprlib import Repr
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from .errors import OptionError, PcmcError, unknown
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+
+MOST = 2**31 - 1  # of a count: more steps, levels or vertices than that no run can have
 
 Options = TypeVar("Options", bound="DataclassInstance")
 
@@ -39,9 +42,7 @@ def number(
     ...
     pcmc.base.errors.OptionError: gamma: expected a finite number ≥ 0 and < 1, found 1.5
     """
-    given = math.nan
-    if isinstance(value, Real) and not isinstance(value, bool):
-        given = float(value)
+    given = real(value)
     if not (
         math.isfinite(given)
         and (above is None or given > above)
@@ -53,6 +54,20 @@ def number(
         bounds = " and ".join(f"{sign} {limit:g}" for limit, sign in limits if limit is not None)
         refuse(name, value, f"a finite number {bounds}".rstrip(), where, hint, error)
     return given
+
+
+def real(value: object) -> float:
+    """A real number as a float; NaN for anything else, and where a float cannot hold it.
+
+    >>> real(2), real("2"), real(10**400)
+    (2.0, nan, nan)
+    """
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.nan
 
 
 def positive(name: str, value: object) -> float:
@@ -69,19 +84,22 @@ def integer(
     value: object,
     least: int = 0,
     *,
+    most: int = MOST,
     where: str | None = None,
     hint: str = "",
     error: type[PcmcError] = OptionError,
 ) -> int:
-    """An int ≥ least.
+    """An int ≥ least and ≤ most.
 
     >>> integer("iterations", 2.5)
     Traceback (most recent call last):
     ...
     pcmc.base.errors.OptionError: iterations: expected a whole number ≥ 0, found 2.5
     """
-    if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
-        refuse(name, value, f"a whole number ≥ {least}", where, hint, error)
+    if not isinstance(value, Integral) or isinstance(value, bool) or not least <= int(value) <= most:
+        above = isinstance(value, Integral) and int(value) > most
+        bounds = f"≥ {least} and ≤ {most}" if above else f"≥ {least}"
+        refuse(name, value, f"a whole number {bounds}", where, hint, error)
     return int(value)
 
 
@@ -99,7 +117,7 @@ def vector(name: str, value: Any, *, error: type[PcmcError] = OptionError) -> tu
     (0.0, 0.0, 1.0)
     """
     try:
-        x, y, z = (float(c) for c in value)
+        x, y, z = (real(c) for c in value)
     except (TypeError, ValueError):
         x = y = z = math.nan
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
@@ -115,8 +133,9 @@ def choice(name: str, value: object, known: Sequence[str]) -> str:
     ...
     pcmc.base.errors.OptionError: unknown armijo 'suficient'; did you mean 'sufficient'? Known: ...
     """
-    if value not in known:
-        raise OptionError(unknown(name, value, known), what=name, found=value, expected=tuple(known))
+    if not isinstance(value, str) or value not in known:
+        found = value if isinstance(value, str) else shown(value)
+        raise OptionError(unknown(name, found, known), what=name, found=value, expected=tuple(known))
     return str(value)
 
 
@@ -138,5 +157,20 @@ def refuse(
 ) -> NoReturn:
     """Raise the error for a parameter with a wrong value."""
     owner = "" if where is None else f" of {where!r}"
-    message = f"{name}{owner}: expected {expected}, found {value!r}{hint and f'; {hint}'}"
+    message = f"{name}{owner}: expected {expected}, found {shown(value)}{hint and f'; {hint}'}"
     raise error(message, what=name, where=where, found=value, expected=expected)
+
+
+def shown(value: object) -> str:
+    """The value as an error shows it: what is long is cut.
+
+    >>> shown("roof"), shown([0] * 1000), shown(10**5000)
+    ("'roof'", '[0, 0, 0, 0, 0, 0, 0, 0, 0, 0, ...]', 'a number of 16610 bits')
+    """
+    short = Repr()
+    short.maxlist = short.maxtuple = short.maxdict = short.maxset = 10
+    short.maxstring, short.maxother, short.maxlong = 200, 200, 40
+    try:
+        return short.repr(value)
+    except ValueError:  # Python writes no number of more than some thousand digits
+        return f"a number of {value.bit_length()} bits" if isinstance(value, int) else type(value).__name__

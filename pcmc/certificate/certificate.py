@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..contact.pinching import excess_pull, standing_part
 from ..energy.curvature import METHODS, curvature_error, mean_curvature
@@ -21,10 +22,11 @@ from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest, stiffness
-from ..surface import Surface
+from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
 from .balance import boundary_table, junction_table, load, load_ratio, pressures_left_over, reactions
+from .proof import Proof
 from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
@@ -57,6 +59,8 @@ class Certificate:
     pinched : (k,) vertices where a junction rests on Π and its wall has no height.
     load_ratio : pressure along Π's normal over the most that the boundary's tension could carry; see
         the function ``load_ratio``.
+    proofs : why there is no equilibrium, if that is the verdict: ``Overload``, ``UnbalancedJunction``,
+        ``Fold`` or ``Unheld``.
     """
 
     verdict: Verdict
@@ -79,6 +83,7 @@ class Certificate:
     reactions: Floats
     pinched: Ints
     load_ratio: float
+    proofs: tuple[Proof, ...] = ()
 
     @property
     def certified(self) -> bool:
@@ -127,7 +132,12 @@ class Certificate:
 
 
 def certify(
-    surface: Surface, *, modes: int = 1, tolerance: float = TOLERANCE, evidence: Evidence | None = None
+    surface: Surface,
+    *,
+    modes: int = 1,
+    tolerance: float = TOLERANCE,
+    evidence: Evidence | None = None,
+    proofs: tuple[Proof, ...] = (),
 ) -> Certificate:
     """Examine a surface.
 
@@ -135,8 +145,9 @@ def certify(
     ----------
     surface : the surface; it is not changed.
     modes : how many of the lowest modes to compute; the index is counted in any case.
-    tolerance : relative residual up to which it counts as at rest.
-    evidence : what happened to it while it was solved. ``Result.certify`` passes it on.
+    tolerance : relative residual, > 0, up to which it counts as at rest.
+    evidence, proofs : what happened to it while it was solved, and what that proves.
+        ``Result.certify`` passes them on.
 
     Examples
     --------
@@ -148,6 +159,11 @@ def certify(
     >>> certificate.verdict.name, certificate.index, certificate.curvature_error < 1e-12
     ('STABLE', 0, True)
     """
+    expect_surface(surface)
+    validate.integer("modes", modes, most=surface.n)
+    validate.number("tolerance", tolerance, above=0.0)
+    if not isinstance(evidence, Evidence | None):
+        validate.refuse("evidence", evidence, "an Evidence or None")
     part = standing_part(surface)
     standing, classes, X = part.surface, part.classes, part.surface.vertices
     unheld = excess_pull(standing, part.walls, part.resting)
@@ -174,20 +190,21 @@ def certify(
     patches = _patch_table(surface, standing, areas, qualities)
     ratio, support_forces = load_ratio(standing), reactions(standing)
     notes = _pulled_off(unheld), pressures_left_over(standing)
-    verdict, reason = judge(
-        Findings(
-            surface=surface,
-            pinchable=part.walls.pinchable,
-            residual=residual,
-            tolerance=tolerance,
-            quality=quality,
-            index=index,
-            own_residuals=_own_residuals(standing, classes, left),
-            softest=_softest(standing, classes, eigenvalues, fields),
-            load_ratio=ratio,
-            evidence=evidence,
-        )
+    findings = Findings(
+        surface=surface,
+        pinchable=part.walls.pinchable,
+        residual=residual,
+        tolerance=tolerance,
+        quality=quality,
+        index=index,
+        own_residuals=_own_residuals(standing, classes, left),
+        softest=_softest(standing, classes, eigenvalues, fields),
+        load_ratio=ratio,
+        evidence=evidence,
+        given=proofs,
+        mode=fields[0] if len(fields) else np.empty((0, 3)),
     )
+    verdict, reason = judge(findings)
     return Certificate(
         verdict=verdict,
         detail="; ".join(filter(None, (reason, *notes))),
@@ -209,6 +226,7 @@ def certify(
         reactions=support_forces,
         pinched=np.flatnonzero(part.resting),
         load_ratio=ratio,
+        proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),
     )
 
 

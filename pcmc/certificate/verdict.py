@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 
+import numpy as np
+
 from ..base.arrays import Bools, Floats
 from ..surface import Surface
-from .balance import coarseness, hardly_balanced, unbalanced
+from .balance import coarseness, hardly_balanced, unbalanced, unheld
 from .collapse import where_collapsed
+from .neck import Neck, pinched_neck
+from .proof import Overload, Proof
+from .slipping import describe_saddle
 
 NEUTRAL = 1e-2  # |λ| size²/α below which a mode counts as neutral
 SMALL = 1e3  # tolerances of its own forces that a patch may lack where stronger ones hide it
@@ -24,7 +29,8 @@ class Verdict(Enum):
     NEUTRAL = "neutral: at rest, and some change of shape costs almost no energy"
     SADDLE = "saddle: at rest, but some change of shape lowers the energy"
     NOT_CONVERGED = "not converged: the forces do not balance yet; solve further"
-    NO_EQUILIBRIUM = "no equilibrium: tension and pressure cannot balance; change the tensions"
+    NO_EQUILIBRIUM = "no equilibrium: tension and pressure cannot balance, as the detail proves"
+    RAN_AWAY = "ran away from this start: another start may come to rest; nothing proves that none does"
     DEGENERATE = "degenerate mesh: triangles have collapsed; remesh, or start from another shape"
 
 
@@ -51,6 +57,8 @@ class Findings:
     softest : lowest eigenvalue in units of α/size²; infinite where none is known.
     load_ratio : pressure over the most that the boundary's tension could carry.
     evidence : what happened on the way, if a solver was there to see it.
+    given : proofs that there is no equilibrium, which a solver brought.
+    mode : (n,3) displacements of the lowest mode; empty where none is known.
     """
 
     surface: Surface
@@ -63,6 +71,8 @@ class Findings:
     softest: float
     load_ratio: float
     evidence: Evidence | None = None
+    given: tuple[Proof, ...] = ()
+    mode: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
     @property
     def moving(self) -> bool:
@@ -70,9 +80,16 @@ class Findings:
         return self.residual > self.tolerance
 
     @cached_property
-    def unbalanced(self) -> str:
-        """Names a junction whose tensions cannot balance, while forces are left; else empty."""
-        return unbalanced(self.surface, self.pinchable) if self.moving else ""
+    def proofs(self) -> tuple[Proof, ...]:
+        """Why there is no equilibrium, while forces are left; those of the shape first."""
+        if not self.moving:
+            return ()
+        of_shape = (
+            unbalanced(self.surface, self.pinchable),
+            Overload(self.load_ratio) if self.overloaded else None,
+            unheld(self.surface, stable=False),
+        )
+        return tuple(dict.fromkeys(proof for proof in (*of_shape, *self.given) if proof is not None))
 
     @cached_property
     def hardly_balanced(self) -> str:
@@ -85,10 +102,13 @@ class Findings:
 
         Where a solver saw the surface inflate or collapse, the mesh leaves nothing open.
         """
-        if not self.moving:
-            return False
         settled = self.evidence in (Evidence.INFLATED, Evidence.COLLAPSED)
         return self.load_ratio > 1.0 + (0.0 if settled else coarseness(self.surface))
+
+    @cached_property
+    def neck(self) -> Neck | None:
+        """The neck that pinches off, if triangles have collapsed there."""
+        return pinched_neck(self.surface) if self.moving and self.collapsed else None
 
     @property
     def collapsed(self) -> bool:
@@ -111,9 +131,15 @@ def judge(findings: Findings) -> tuple[Verdict, str]:
     return rule.verdict, rule.reason(findings)
 
 
-def _overload(f: Findings) -> str:
-    digits = ".3f" if f.load_ratio < 1.1 else ".2f" if f.load_ratio < 1e4 else ".3g"
-    return f"the pressure is {f.load_ratio:{digits}} times what the boundary's tension could carry"
+def _ran_away(f: Findings) -> str:
+    if f.neck is not None:
+        return f"{f.neck}; bring the held curves nearer to each other, or raise the pressure"
+    if f.evidence is Evidence.INFLATED:
+        return (
+            "it grew without bound; start lower, raise the tensions or lower the pressures, or follow the"
+            " pressure from a lower one (pcmc.follow)"
+        )
+    return "it shrank to nothing; hold it with fixed= or on_plane=, raise the pressure, or start larger"
 
 
 def _collapse(f: Findings) -> str:
@@ -141,7 +167,7 @@ def _weak_patch(f: Findings) -> str:
 
 
 def _ways_down(f: Findings) -> str:
-    return f"index {f.index}: {'1 way' if f.index == 1 else f'{f.index} ways'} down"
+    return describe_saddle(f.surface, f.index or 0, f.mode)
 
 
 RULES = (
@@ -150,17 +176,15 @@ RULES = (
         lambda f: not f.surface.tensions.any(),
         lambda f: "no patch has a tension: every shape is at rest",
     ),
-    Rule(Verdict.NO_EQUILIBRIUM, lambda f: bool(f.unbalanced), lambda f: f.unbalanced),
-    Rule(Verdict.NO_EQUILIBRIUM, lambda f: f.overloaded, _overload),
     Rule(
         Verdict.NO_EQUILIBRIUM,
-        lambda f: f.moving and f.evidence is Evidence.INFLATED,
-        lambda f: "the surface inflates without bound (from this start; others may differ)",
+        lambda f: bool(f.proofs),
+        lambda f: "; ".join([*map(str, f.proofs), *([str(f.neck)] if f.neck else [])]),
     ),
     Rule(
-        Verdict.NO_EQUILIBRIUM,
-        lambda f: f.moving and f.evidence is Evidence.VANISHED,
-        lambda f: "nothing holds the surface, and it shrinks to nothing",
+        Verdict.RAN_AWAY,
+        lambda f: f.moving and (f.evidence in (Evidence.INFLATED, Evidence.VANISHED) or f.neck is not None),
+        _ran_away,
     ),
     Rule(Verdict.DEGENERATE, lambda f: f.collapsed, _collapse),
     Rule(Verdict.NOT_CONVERGED, lambda f: f.moving or f.index is None, _forces_left),

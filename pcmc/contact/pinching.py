@@ -80,7 +80,7 @@ def find_walls(surface: Surface) -> Walls:
         wall_below=np.concatenate(wall_below),
         top_free=on_top & ~surface.fixed & ~surface.on_plane,
         corner=on_top & surface.fixed & low,
-        side=np.where(np.where(low, _pressure_push(surface), height) < 0.0, -1.0, 1.0),
+        side=np.where(np.where(low, _pressure_push(surface, low), height) < 0.0, -1.0, 1.0),
         pinchable=pinchable,
     )
 
@@ -143,11 +143,10 @@ def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surf
     X = surface.vertices.copy()
     X[resting] -= surface.plane.height(X[resting])[:, None] * np.array(surface.plane.normal)
     owner = _owners(surface.n, walls, resting)
-    X, F = X[owner], owner[surface.faces]
-    apart = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
-    flat = _lie_on_plane(walls, resting)[F].all(axis=1)
-    left = apart & ~(flat & surface.walls[surface.patch_of_face])
-    F, patch = np.ascontiguousarray(F[left]), np.ascontiguousarray(surface.patch_of_face[left])
+    F, left = _standing_faces(surface, walls, resting, owner)
+    X, F, patch = X[owner], np.ascontiguousarray(F[left]), np.ascontiguousarray(surface.patch_of_face[left])
+    F.setflags(write=False)
+    patch.setflags(write=False)
     topo, on_plane = topology(F, patch, surface.n), surface.on_plane | resting
     return surface._with(vertices=X, faces=F, patch_of_face=patch, topology=topo, on_plane=on_plane)
 
@@ -266,13 +265,23 @@ def place_pinched_walls(surface: Surface, walls: Walls, resting: Bools, X: Float
 
     A foot that still carries a triangle slides on Π and stays where it is.
     """
-    stands = np.zeros(surface.n, dtype=bool)
-    stands[remove_pinched_walls(surface, walls, resting).faces] = True
+    owner, stands = _owners(surface.n, walls, resting), np.zeros(surface.n, dtype=bool)
+    F, left = _standing_faces(surface, walls, resting, owner)
+    stands[F[left]] = True
     rows = walls.rows
     gone = (resting | walls.corner)[rows.top_ends].all(axis=1) & ~stands[rows.vertices]
     X, places = X.copy(), rows.top_places(X)
     X[rows.vertices[gone]] = places[gone]
-    return X[_owners(surface.n, walls, resting)]
+    return X[owner]
+
+
+def _standing_faces(surface: Surface, walls: Walls, resting: Bools, owner: Ints) -> tuple[Ints, Bools]:
+    """(m,3) faces between the owners of their vertices, and which of them stand (m,)."""
+    F = owner[surface.faces]
+    apart = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
+    wall = surface.walls[surface.patch_of_face]
+    apart[wall] &= ~_lie_on_plane(walls, resting)[F[wall]].all(axis=1)
+    return F, apart
 
 
 def _owners(n: int, walls: Walls, resting: Bools) -> Ints:
@@ -295,9 +304,10 @@ def _lie_on_plane(walls: Walls, resting: Bools) -> Bools:
     return down
 
 
-def _pressure_push(surface: Surface) -> Floats:
-    """(n,) force along Π's normal with which the pressure of the sheets pushes each vertex."""
-    vector = area_vectors(surface.vertices[surface.faces])
-    force = (surface.pressures * ~surface.walls)[surface.patch_of_face] / 3.0
-    push = force * (vector @ np.array(surface.plane.normal))
-    return vertex_sums(push[:, None], surface.faces, surface.n)[:, 0]
+def _pressure_push(surface: Surface, at: Bools) -> Floats:
+    """(n,) force of the pressure of sheets along Π's normal on the vertices ``at``; elsewhere 0."""
+    near = at[surface.faces].any(axis=1)
+    F, patch = surface.faces[near], surface.patch_of_face[near]
+    force = (surface.pressures * ~surface.walls)[patch] / 3.0
+    push = force * (area_vectors(surface.vertices[F]) @ np.array(surface.plane.normal))
+    return np.where(at, vertex_sums(push[:, None], F, surface.n)[:, 0], 0.0)

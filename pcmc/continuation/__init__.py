@@ -1,10 +1,11 @@
-"""Following a branch of equilibria as tensions or pressures change, through folds.
+"""Following a branch of equilibria as tensions, pressures or the boundary change, and others that leave it.
 
-Gives ``follow`` and ``Direction``. May import ``design`` and the rooms below it.
+Gives ``follow``, ``Direction`` and ``BoundaryMotion``. May import ``design`` and the rooms below it.
 """
 
+from .boundary_motion import BoundaryMotion
 from .branch import Branch, follow
 from .direction import Direction
 from .options import Ending, FollowOptions
 
-__all__ = ["Branch", "Direction", "Ending", "FollowOptions", "follow"]
+__all__ = ["BoundaryMotion", "Branch", "Direction", "Ending", "FollowOptions", "follow"]

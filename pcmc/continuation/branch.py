@@ -15,9 +15,11 @@ from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..design import Parameter
 from ..solvers.result import Callback
 from ..surface import Surface
+from .boundary_motion import BoundaryMotion
 from .direction import Direction
 from .options import Ending, FollowOptions
-from .state import QUANTITIES
+from .state import QUANTITIES, BranchMesh, Line
+from .switching import ALONG, leaving
 from .tracing import Tracer
 
 
@@ -32,17 +34,23 @@ class Branch:
         over Π (length), index, lowest_eigenvalue (force/length³), residual (relative), quality of the
         worst triangle, slope dλ/ds, iterations of Newton's method.
     events : one row per event: kind ("fold", "index" or "contact"), parameter, energy, volume, height,
-        arclength, and the index before and after it.
+        arclength, the index before and after it, and, of a change of index, along_branch: the cosine
+        between the mode that turns and the branch. It is 1 at a fold; 0 where the branch goes on as it was
+        and others leave it.
     surfaces : by row of ``points``.
+    event_surfaces : by row of ``events``.
     ending, detail : why the branch ends, and the last difficulty.
     """
 
-    parameter: Direction
+    parameter: Direction | BoundaryMotion
     points: pd.DataFrame
     events: pd.DataFrame
     surfaces: Mapping[int, Surface] = field(repr=False)
     ending: Ending
     detail: str = ""
+    event_surfaces: Mapping[int, Surface] = field(default_factory=dict, repr=False)
+    _line: Line | None = field(default=None, repr=False)
+    _options: FollowOptions = field(default=FollowOptions(), repr=False)
 
     @property
     def message(self) -> str:
@@ -59,10 +67,124 @@ class Branch:
         """The events at which λ turns."""
         return self.events[self.events.kind == "fold"].reset_index(drop=True)
 
+    @property
+    def bifurcations(self) -> pd.DataFrame:
+        """The events at which the index changes and λ does not turn; rows are numbered as in ``events``."""
+        return self.events[(self.events.kind == "index") & (self.events.along_branch < ALONG)]
+
+    def switch(
+        self,
+        event: int | None = None,
+        *,
+        stop: float | None = None,
+        until: Mapping[str, float] | None = None,
+        callback: Callback | None = None,
+        **options: Any,
+    ) -> tuple[Branch, Branch]:
+        """Follow the two branches that leave this one at a bifurcation, along the mode that turns.
+
+        Parameters
+        ----------
+        event : row of ``events``; by default the first of ``bifurcations``.
+        stop, until, callback : as in ``follow``; here ``stop`` does not decide the direction.
+        options : fields of ``FollowOptions``; by default those of this branch. ``step`` is the distance
+            of the first point from the bifurcation.
+
+        Returns
+        -------
+        (Branch, Branch)
+            Along the mode and against it. Of a symmetric bifurcation (a pitchfork) they are images of each
+            other, and λ turns at its start; of others λ passes it. The first row of ``points`` is the
+            first point off the bifurcation.
+
+        Raises
+        ------
+        OptionError : the event is not a bifurcation: a fold, a change of contact, or without a mode of
+            eigenvalue 0; or several modes turn at once.
+
+        Notes
+        -----
+        The mesh must have the symmetry that makes the bifurcation. On another mesh the branches pass
+        each other at a small distance: the one followed bends away smoothly, without an event.
+
+        The event is where an eigenvalue of the Hessian passes 0. The equations of equilibrium on a mesh
+        are singular a little beside it, to second order in the edge length; there the branches leave.
+
+        Examples
+        --------
+        A roof of two tops, equally high until its tension is too small; then one of them sinks:
+
+        >>> from pcmc import Patch, Surface, solve
+        >>> X = [[-3, -1, 0], [0, -1, 0], [3, -1, 0], [3, 1, 0], [0, 1, 0], [-3, 1, 0], [-1, 0, 1], [1, 0, 1]]
+        >>> F = [[0, 1, 6], [1, 7, 6], [1, 2, 7], [2, 3, 7], [3, 4, 7], [4, 6, 7], [4, 5, 6], [5, 0, 6]]
+        >>> roof = Surface(X, F, [0] * 8, [Patch("roof", 0.6)], fixed=range(6))
+        >>> branch = follow(solve(roof).surface, "roof", 0.4, min_quality=0.1)
+        >>> [round(x, 2) for x in branch.bifurcations.parameter]
+        [0.41]
+        >>> left, right = branch.switch(steps=2)
+        >>> tops = [side.last.vertices[6:, 2].round(6).tolist() for side in (left, right)]
+        >>> tops[0] == tops[1][::-1], tops[0][0] != tops[0][1]
+        (True, True)
+        """
+        row = self._bifurcation(event)
+        goals = _goals(stop, until)
+        chosen = validate.build(FollowOptions, "switch", vars(self._options) | options)
+        line = replace(self._require_line(), value=float(self.events.parameter[row]))
+        surface = self.event_surfaces[row]
+        starts = leaving(BranchMesh(surface, line, chosen.backend), line.value, chosen, row)
+        one, other = (
+            _traced(self.parameter, Tracer(surface, line, goals, chosen, callback, start)) for start in starts
+        )
+        return one, other
+
+    def _require_line(self) -> Line:
+        if self._line is None:
+            message = "switch: this branch was put together from tables; only one that follow gave can switch"
+            raise OptionError(message, what="branch")
+        return self._line
+
+    def _bifurcation(self, event: int | None) -> int:
+        """The row of the event, which must be a bifurcation along one mode."""
+        if event is None:
+            if self.bifurcations.empty:
+                message = "switch: no bifurcation on this branch, no index changes beside its folds"
+                raise OptionError(message, what="event", expected="a bifurcation")
+            event = int(self.bifurcations.index[0])
+        if validate.integer("event", event) >= len(self.events):
+            validate.refuse("event", event, f"a row of events, below {len(self.events)}")
+        row: Any = self.events.loc[event]
+        if row.kind == "fold" or row.along_branch >= ALONG:
+            message = f"event {event} is a fold: the branch itself turns there, and no other leaves it"
+            raise OptionError(message, what="event", where=event, found="fold", expected="a bifurcation")
+        count = abs(int(row.index_after) - int(row.index_before))
+        if row.kind != "index" or count != 1:
+            found = row.kind if row.kind != "index" else f"{count} modes that turn at once"
+            message = f"event {event}: expected a change of index by 1, found {found}"
+            raise OptionError(message, what="event", where=event, found=found, expected="a bifurcation")
+        return event
+
+
+def _traced(parameter: Direction | BoundaryMotion, tracer: Tracer) -> Branch:
+    """The branch that a tracer follows to its end."""
+    ending, detail = tracer.run()
+    columns = list(tracer.event("", tracer.here.state, 0.0, 0, 0))
+    events = pd.DataFrame(tracer.events, columns=columns)
+    return Branch(
+        parameter,
+        pd.DataFrame(tracer.rows),
+        events.drop(columns="surface"),
+        tracer.surfaces,
+        ending,
+        detail,
+        dict(enumerate(events.surface)),
+        tracer.line,
+        tracer.options,
+    )
+
 
 def follow(
     surface: Surface,
-    parameter: str | Parameter | Direction,
+    parameter: str | Parameter | Direction | BoundaryMotion,
     stop: float | None = None,
     *,
     until: Mapping[str, float] | None = None,
@@ -75,7 +197,8 @@ def follow(
     ----------
     surface : where the branch starts: at rest (a minimum or a saddle) and held against rigid motions.
     parameter : a patch's name for its tension; a ``Parameter``, whose bounds are ignored; or a
-        ``Direction``, for several tensions and pressures that change together.
+        ``Direction``, for several tensions and pressures that change together; or a ``BoundaryMotion``,
+        which moves the fixed vertices.
     stop : end where the parameter has this value. The branch starts towards it.
     until : end where one of ``parameter``, ``energy``, ``volume`` or ``height`` has the value given.
     callback : called with a Progress after each point. Raise StopIteration in it to stop.
@@ -129,25 +252,26 @@ def follow(
     if chosen.remesh is not None and find_spec("mmgpy") is None:
         raise MissingExtra("mmgpy", "remesh")
     direction, goals = _direction(parameter), _goals(stop, until)
+    if chosen.remesh is not None and isinstance(direction, BoundaryMotion):
+        message = "remesh: a new mesh has other boundary vertices than BoundaryMotion moves; leave remesh out"
+        raise OptionError(message, what="remesh", found=chosen.remesh)
     line = direction.line(surface)
     if stop is not None and stop != line.value:
         chosen = replace(chosen, step=math.copysign(chosen.step, stop - line.value))
-    tracer = Tracer(surface, line, goals, chosen, callback)
-    ending, detail = tracer.run()
-    columns = list(tracer.event("", tracer.here.state, 0.0, 0, 0))
-    events = pd.DataFrame(tracer.events, columns=columns)
-    return Branch(direction, pd.DataFrame(tracer.rows), events, tracer.surfaces, ending, detail)
+    return _traced(direction, Tracer(surface, line, goals, chosen, callback))
 
 
-def _direction(parameter: object) -> Direction:
-    if isinstance(parameter, Direction):
+def _direction(parameter: object) -> Direction | BoundaryMotion:
+    if isinstance(parameter, Direction | BoundaryMotion):
         return parameter
     if isinstance(parameter, str):
         return Direction({parameter: 1.0})
     if isinstance(parameter, Parameter):
         weights = {parameter.patch: 1.0}
         return Direction(weights) if parameter.kind == "tension" else Direction(pressures=weights)
-    validate.refuse("parameter", parameter, "the name of a patch, a Parameter or a Direction")
+    validate.refuse(
+        "parameter", parameter, "the name of a patch, a Parameter, a Direction or a BoundaryMotion"
+    )
 
 
 def _goals(stop: float | None, until: Mapping[str, float] | None) -> dict[str, float]:

@@ -80,11 +80,32 @@ def branch_point(at: State, before: Tangent | float) -> BranchPoint:
     else:
         matrix, sense = BorderedMatrix(at, np.zeros_like(at.X), 1.0 / scale**2), before
     s, slope = matrix.solve(np.zeros(at.space.size), sense, TANGENT_ACCURACY)
-    direction, weights = at.motion(s), at.area_weights
+    direction, weights = at.motion(s, slope), at.area_weights
     length = Tangent(direction, slope, weights, scale).length(direction, slope)
     tangent = Tangent(direction / length, slope / length, weights, scale)
     stiffness = at.mesh.stiffness(at.space, at.X, matrix.values, matrix.factor)
     return BranchPoint(at, tangent, _eigenvalues(stiffness), stiffness.negative)
+
+
+def soft_modes(at: State, count: int) -> tuple[Floats, Floats]:
+    """The ``count`` eigenvalues (k,) nearest zero, nearest first, and their motions (k,n,3)."""
+    values, factor = at.mesh.hessian(at.surface, at.space, at.X)
+    stiffness = at.mesh.stiffness(at.space, at.X, values, factor)
+    if len(stiffness.mass) < DENSE:
+        every, vectors = eigh(stiffness.matrix.toarray(), np.diag(stiffness.mass))
+        fields = np.array([at.space.to_vectors(column) for column in vectors.T])
+    else:
+        every, fields = lowest(stiffness, stiffness.negative + count + 1)
+    nearest = np.argsort(np.abs(every))[:count]
+    return every[nearest], np.array([at.motion(at.space.to_coordinates(fields[i])) for i in nearest])
+
+
+def along_branch(at: BranchPoint, count: int) -> float:
+    """Cosine between the tangent and the ``count`` softest modes, in the metric of arclength."""
+    tangent = at.tangent
+    modes = soft_modes(at.state, count)[1]
+    squares = np.einsum("v,kvi,kvi->k", tangent.weights, modes, modes)
+    return float(np.linalg.norm(np.einsum("vi,kvi->k", tangent.row, modes) / np.sqrt(squares)))
 
 
 def _eigenvalues(stiffness: Stiffness) -> Floats:

@@ -4,7 +4,8 @@ The unknowns are the positions X and the parameter λ:
 
     r(X, λ) = B(X)ᵀ ∇E(X; λ) = 0,    g(X, λ) = 0
 
-with g a condition on arclength, volume, height or λ itself. A Newton step solves
+with g a condition on arclength, volume, height or λ itself. (Where λ moves the boundary, X moves along
+with it, and derivatives by λ are total ones.) A Newton step solves
 
     [ J   f ] [ s ]     [ -r ]        J s = dr along s,  f = Bᵀ ∂∇E/∂λ
     [ cᵀ  d ] [ δλ]  =  [ -g ]        c = Bᵀ ∂g/∂X,  d = ∂g/∂λ
@@ -91,11 +92,13 @@ def fixed_height(mesh: BranchMesh, vertex: int, height: float) -> Constraint:
 class BorderedMatrix:
     """The matrix [[J, f], [cᵀ, d]] at a state, with H factorised.
 
-    The last row is ⟨row, motion⟩ + rate δλ; ``unit`` brings it to the size of the others.
+    The last row is ⟨row, motion⟩ + rate δλ, where the motion takes in what follows the boundary as λ
+    changes; ``unit`` brings it to the size of the others.
     """
 
     def __init__(self, at: State, row: Floats, rate: float) -> None:
-        self.at, self.row, self.rate = at, row, rate
+        self.at, self.row = at, row
+        self.rate = rate if at.carried is None else rate + float((row * at.carried).sum())
         try:
             self.values, self.factor = at.mesh.hessian(at.surface, at.space, at.X)
         except SingularMatrix as error:
@@ -154,10 +157,10 @@ def correct(start: State, constraint: Constraint, tolerance: float) -> State:
         last = size
         matrix = BorderedMatrix(at, constraint.gradient(at), constraint.rate)
         s, change = matrix.solve(-at.forces, -g, 1e-3)
-        step = at.motion(s)
+        step = at.motion(s, change)
         if not np.abs(step).max() < mesh.full.size:
             break
-        at = State(mesh, at.moved(step), at.parameter + change, iteration + 1)
+        at = at.step(step, at.parameter + change, iteration + 1)
         _check_tensions(at)
         if at.quality < COLLAPSED:
             raise MeshCollapsed("triangles collapse")

@@ -132,7 +132,13 @@ class ParameterLine:
                 columns[f"pressure {patch.name}"] = self.pressures[i] + self.pressure_rates[i] * value
         return columns
 
-    def energy_derivative(self, surface: Surface, X: Floats) -> float:
+    def boundary(self, value: float) -> None:
+        """No fixed vertex moves."""
+
+    def velocity(self, value: float) -> None:
+        """No fixed vertex moves."""
+
+    def energy_derivative(self, surface: Surface, X: Floats, value: float) -> float:
         """∂E/∂λ = Σ w_i A_i - Σ u_i V_i at X (n,3)."""
         areas, volumes, _ = weighted(surface, X=X)
         return float(self.tension_rates @ areas - self.pressure_rates @ volumes)

@@ -72,7 +72,7 @@ class Segment:
         if name == "volume":
             return float((state.volume_gradient * tangent.direction).sum())
         by_position = float((state.gradient * tangent.direction).sum())
-        by_parameter = state.mesh.line.energy_derivative(state.surface, state.X)
+        by_parameter = state.mesh.line.energy_derivative(state.surface, state.X, state.parameter)
         return by_position + by_parameter * tangent.slope
 
     def turning_point(self, name: str) -> float | None:

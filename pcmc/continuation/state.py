@@ -20,8 +20,10 @@ from ..stability.modes import Stiffness, full_matrix, lumped_mass
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.topology import SHEET
+from .boundary_motion import BoundaryLine
 from .direction import ParameterLine
 
+Line = ParameterLine | BoundaryLine
 QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a goal may name
 
 
@@ -30,14 +32,14 @@ class BranchMesh:
 
     Attributes
     ----------
-    full, line : the surface with all its walls; its tensions and pressures as functions of λ.
+    full, line : the surface with all its walls; its tensions, pressures and boundary as functions of λ.
     part : the standing part of the surface, without the walls that vanish where a junction rests on Π.
     surface, classes, quality_faces : those of ``part``.
     walls, resting : the walls that can pinch, and (n,) which junction vertices rest on Π.
     loaded : (patches,) 1 for the patches under pressure, 0 for walls.
     """
 
-    def __init__(self, surface: Surface, line: ParameterLine, backend: str | None = None) -> None:
+    def __init__(self, surface: Surface, line: Line, backend: str | None = None) -> None:
         self.full, self.line, self._backend = surface, line, backend
         self.part = part = standing_part(surface)
         self.surface, self.walls, self.resting = part.surface, part.walls, part.resting
@@ -45,6 +47,7 @@ class BranchMesh:
         self.loaded: Floats = (~surface.walls).astype(float)
         self._curves_move = bool(((self.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None
+        self._inside: HarmonicExtension | None = None
         self._dimension: Ints | None = None
 
     def hessian(self, surface: Surface, space: MotionSpace, X: Floats) -> tuple[Floats, Factor]:
@@ -67,6 +70,17 @@ class BranchMesh:
             self._extension = HarmonicExtension(self.surface, self.classes, X, self._backend)
         d = space.to_vectors(s)
         return d if self._extension is None else self._extension.extend(space, d)
+
+    def carried(self, change: Floats, X: Floats) -> Floats:
+        """The motion w (n,3) in which the inside follows a change (k,3) of the boundary."""
+        surface = self.surface
+        if self._inside is None:
+            self._inside = HarmonicExtension(surface, self.classes, X, self._backend, surface.fixed)
+        motion = np.zeros_like(X)
+        motion[surface.fixed] = change
+        w = self._inside.harmonic(motion)
+        w[surface.on_plane] = surface.plane.along(w[surface.on_plane])
+        return w
 
     def full_surface(self, X: Floats) -> Surface:
         """The surface with all its walls; those that vanish lie on Π."""
@@ -124,8 +138,15 @@ class State:
 
     @cached_property
     def parameter_derivative(self) -> Floats:
-        """∂r/∂λ = Bᵀ ∂∇E/∂λ (N,)."""
-        return self.space.to_coordinates(self.mesh.line.gradient(self.surface, self.X))
+        """dr/dλ = Bᵀ ∂∇E/∂λ (N,), and Bᵀ Df[v] where λ moves the boundary."""
+        change = self.space.to_coordinates(self.mesh.line.gradient(self.surface, self.X))
+        return change if self.carried is None else change + self.jacobian.times(self.carried)
+
+    @cached_property
+    def carried(self) -> Floats | None:
+        """v (n,3), how the vertices follow the boundary as λ grows; None where it stays."""
+        velocity = self.mesh.line.velocity(self.parameter)
+        return None if velocity is None else self.mesh.carried(velocity, self.X)
 
     @cached_property
     def jacobian(self) -> Linearisation:
@@ -144,9 +165,10 @@ class State:
 
     @cached_property
     def volume_gradient(self) -> Floats:
-        """(n,3) gradient of the volume, supports applied, length²."""
+        """(n,3) gradient of the volume, supports applied unless the boundary moves, length²."""
         surface = self.mesh.surface
-        return apply_supports(surface, weighted(surface, 0.0, -self.mesh.loaded, self.X)[2])
+        gradient = weighted(surface, 0.0, -self.mesh.loaded, self.X)[2]
+        return gradient if self.carried is not None else apply_supports(surface, gradient)
 
     @cached_property
     def highest_vertex(self) -> int:
@@ -180,9 +202,24 @@ class State:
         """X (n,3) with the rows of walls below their crest; motions count from here."""
         return place_wall_rows(self.mesh.surface, self.mesh.walls, self.X, self.space)
 
-    def motion(self, s: Floats) -> Floats:
-        """The motion Bs (n,3), in which the insides of the sheets follow their curves."""
-        return self.mesh.motion(self.space, self.X, s)
+    def motion(self, s: Floats, change: float = 0.0) -> Floats:
+        """The motion Bs (n,3), in which the insides of the sheets follow their curves.
+
+        With a change of λ, and so of the boundary, what follows that is added to first order.
+        """
+        d = self.mesh.motion(self.space, self.X, s)
+        return d if self.carried is None or not change else d + change * self.carried
+
+    def step(self, d: Floats, parameter: float, iterations: int = 0) -> State:
+        """The state at X + d (n,3) and λ, its boundary where λ has it."""
+        X = self.moved(d)
+        boundary = self.mesh.line.boundary(parameter)
+        if boundary is not None:
+            fixed = self.mesh.surface.fixed
+            left = self.mesh.carried(boundary - X[fixed], self.X)
+            X = self.moved(d + left)
+            X[fixed] = boundary
+        return State(self.mesh, X, parameter, iterations)
 
     def moved(self, d: Floats) -> Floats:
         """X + d (n,3), with the rows of walls below their crest."""

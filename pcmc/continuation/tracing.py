@@ -19,7 +19,7 @@ from ..meshing.remeshing import remesh
 from ..solvers import solve
 from ..solvers.result import Callback, Progress, Status
 from ..surface import Surface
-from .branch_point import BranchPoint, Tangent, branch_point
+from .branch_point import BranchPoint, Tangent, along_branch, branch_point
 from .correction import (
     Constraint,
     ContactChanged,
@@ -31,10 +31,9 @@ from .correction import (
     fixed_parameter,
     fixed_volume,
 )
-from .direction import ParameterLine
 from .options import Ending, FollowOptions
 from .segment import EVENT_ACCURACY, Segment, crosses_goal
-from .state import BranchMesh, State
+from .state import BranchMesh, Line, State
 
 START_RESIDUAL = 1e-4  # relative residual up to which a surface is near enough to a branch to start
 QUALITY_LOSS = 0.7  # ratio of triangle qualities, new to old, below which a step is refused
@@ -56,22 +55,26 @@ class Step:
 
 
 class Tracer:
-    """A branch while it is followed; ``here`` is its last point."""
+    """A branch while it is followed; ``here`` is its last point.
+
+    It starts at ``first``, if that is given, and otherwise at the surface.
+    """
 
     def __init__(
         self,
         surface: Surface,
-        line: ParameterLine,
+        line: Line,
         goals: Mapping[str, float],
         options: FollowOptions,
         callback: Callback | None,
+        first: BranchPoint | None = None,
     ) -> None:
         self.line, self.goals, self.options, self.callback = line, goals, options, callback
         self.rows: list[dict[str, Any]] = []
         self.events: list[dict[str, Any]] = []
         self.surfaces: dict[int, Surface] = {}
         self.arclength = 0.0
-        self.here = self.first_point(self.mesh(surface))
+        self.here = first or self.first_point(self.mesh(surface))
 
     def mesh(self, surface: Surface) -> BranchMesh:
         """A mesh of the branch."""
@@ -177,8 +180,7 @@ class Tracer:
     def predict(self, t: float) -> State:
         """The state on the tangent at arclength t from here."""
         here, tangent = self.here.state, self.here.tangent
-        X = here.moved(t * tangent.direction)
-        return State(here.mesh, X, here.parameter + t * tangent.slope)
+        return here.step(t * tangent.direction, here.parameter + t * tangent.slope)
 
     def solve_at(self, t: float) -> State:
         """The state on the branch at arclength t from here."""
@@ -219,7 +221,7 @@ class Tracer:
         here, tangent = self.here.state, self.here.tangent
         if self.options.remesh is not None and here.quality < wanted:
             try:
-                mesh = self.mesh(remesh(self.surface(), self.options.remesh))
+                mesh = self.mesh(remesh(self.surface_at(here), self.options.remesh))
             except SurfaceError:
                 return
             start = State(mesh, mesh.surface.vertices, here.parameter)
@@ -262,7 +264,10 @@ class Tracer:
         index, sign = start.index, 1 if end.index > start.index else -1
         for t, count in segment.index_changes():
             after = index + sign * count
-            located.append((t, self.event("index", segment.point(t).state, t, index, after)))
+            point = segment.point(t)
+            event = self.event("index", point.state, t, index, after)
+            event["along_branch"] = along_branch(point, count)
+            located.append((t, event))
             index = after
         return [event for _, event in sorted(located, key=lambda pair: pair[0])]
 
@@ -280,6 +285,8 @@ class Tracer:
             "arclength": self.arclength + t,
             "index_before": before,
             "index_after": after,
+            "along_branch": math.nan,
+            "surface": self.surface_at(at),
         }
 
     def record(self) -> None:
@@ -299,9 +306,9 @@ class Tracer:
         )
         if (number - 1) % self.options.keep:
             self.surfaces.pop(number - 1, None)
-        self.surfaces[number] = self.surface()
+        self.surfaces[number] = self.surface_at(self.here.state)
         if self.callback is not None:
-            self.callback(Progress(number, self.surface, self.rows[-1]))
+            self.callback(Progress(number, lambda: self.surface_at(here.state), self.rows[-1]))
 
     def columns(self, at: State) -> dict[str, Any]:
         """The columns of both tables."""
@@ -313,7 +320,6 @@ class Tracer:
             "height": at.height,
         }
 
-    def surface(self) -> Surface:
-        """The surface at the last point."""
-        here = self.here.state
-        return self.line.surface_at(here.mesh.full_surface(here.X), here.parameter)
+    def surface_at(self, at: State) -> Surface:
+        """The whole surface at a state."""
+        return self.line.surface_at(at.mesh.full_surface(at.X), at.parameter)

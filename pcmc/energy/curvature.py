@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Bools, Floats
-from ..surface import Surface
+from ..surface import Surface, expect_surface
 from ..surface.geometry import vertex_area_vectors
 from .functional import weighted
 
@@ -39,6 +39,7 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     >>> mean_curvature(pyramid, "variational").round(6).tolist()
     [nan, nan, nan, nan, 1.06066]
     """
+    expect_surface(surface)
     validate.choice("method", method, METHODS)
     area_gradient = weighted(surface, np.ones(len(surface.patches)))[2]
     area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces)
@@ -54,6 +55,7 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
 
 def target_curvature(surface: Surface) -> Floats:
     """H̄ = p / (2 α) (n,) of the sheet each vertex lies in; NaN where ``mean_curvature`` is."""
+    expect_surface(surface)
     patch = np.zeros(surface.n, dtype=np.int64)
     patch[surface.faces] = surface.patch_of_face[:, None]
     target = np.array([p.target_curvature for p in surface.patches])[patch]

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.arrays import Floats
-from ..surface import Surface
+from ..surface import Surface, expect_surface
 from . import kernels
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def energy(surface: Surface) -> float:
     >>> round(energy(tent), 12) == round(2 * (3**0.5 / 2 + 1) - 1 / 6, 12)
     True
     """
+    expect_surface(surface)
     return energy_at(surface, surface.vertices)
 
 
@@ -84,6 +85,7 @@ def gradient(surface: Surface) -> Floats:
     >>> gradient(pyramid)[4].round(6).tolist()
     [0.0, 0.0, 1.495094]
     """
+    expect_surface(surface)
     return energy_and_gradient(surface)[1]
 
 
@@ -106,6 +108,7 @@ def hessian(surface: Surface) -> csr_array:
     """
     from scipy.sparse import coo_array, csr_array
 
+    expect_surface(surface)
     blocks = np.empty((surface.m, 3, 3, 3, 3))
     kernels.hessian_blocks(kernels.energy_mesh(surface), surface.vertices, blocks)
     unknowns = 3 * surface.faces[:, :, None] + np.arange(3)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, read_only
 from ..base.compiled import blocks, compiled, run_blocks, threads
 from ..surface import Surface
 from ..surface.geometry import Vector, accumulate, cross, dot, norm, point, scaled, sub, vector
@@ -43,8 +43,8 @@ class Mesh(NamedTuple):
 
 def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Floats | None = None) -> Mesh:
     """All triangles of a surface, with its own tensions and pressures (k,) or with others."""
-    tension = surface.tensions if tension is None else tension
-    pressure = surface.pressures if pressure is None else pressure
+    tension = surface.tensions if tension is None else read_only(tension)
+    pressure = surface.pressures if pressure is None else read_only(pressure)
     return Mesh(surface.faces, surface.patch_of_face, surface.origin, tension, pressure)
 
 

@@ -13,7 +13,8 @@ A P-CMC surface is Bᵀ∇E = 0, with B the basis of this space.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -119,15 +120,21 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     """
     pulls = (surface.tensions != 0.0) | (surface.pressures != 0.0)
     active = pulls[surface.patch_of_face]
-    faces = np.ascontiguousarray(surface.faces[active])
-    patch = np.ascontiguousarray(surface.patch_of_face[active])
+    faces, patch = surface.faces, surface.patch_of_face
+    if not active.all():
+        faces, patch = np.ascontiguousarray(faces[active]), np.ascontiguousarray(patch[active])
     kinds = np.unique(np.stack([surface.tensions, surface.pressures]), axis=1, return_inverse=True)
     alike = np.asarray(kinds[1]).ravel()[patch].astype(np.int32)
-    topo = topology(faces, alike, surface.n)
+    if active.all():
+        topo = replace(surface.topology, patch_of_face=alike)
+    else:
+        topo = topology(faces, alike, surface.n)
     if (topo.one_way_edge & ~topo.seam_edge).any():
         turned = _against_the_others(topo) & (surface.pressures[patch] == 0.0)
-        faces[turned] = faces[turned][:, ::-1]
+        faces = np.where(turned[:, None], faces[:, ::-1], faces)
         topo = topology(faces, alike, surface.n)
+    faces.setflags(write=False)  # compiled loops then see one type of array
+    patch.setflags(write=False)
     edges = topo.edges[topo.curve_edge | topo.one_way_edge]
     links = np.concatenate([edges, edges[:, ::-1]])
     if crest is not None and len(crest):
@@ -181,8 +188,12 @@ def curve_chords(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
 
 def force_scale(surface: Surface, classes: VertexClasses, X: Floats) -> float:
     """The norm of the single triangles' tension forces ½ α |e|, which cancel at rest, force."""
-    square = _square_of_forces(X, classes.faces, surface.tensions[classes.patch_of_face])
-    return float(np.sqrt(square)) or 1.0
+    return _norm_of_forces(X, classes.faces, surface.tensions[classes.patch_of_face]) or 1.0
+
+
+def tension_forces(surface: Surface) -> float:
+    """The same norm for all triangles of a surface, force; 0 without tension."""
+    return _norm_of_forces(surface.vertices, surface.faces, surface.tensions[surface.patch_of_face])
 
 
 def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
@@ -242,7 +253,7 @@ def _along_normals(area_vector: Floats, chosen: Bools, basis: Floats, dimension:
 
 
 @compiled
-def _square_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
+def _norm_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
     total = 0.0
     for f in range(len(F)):
         square = 0.0
@@ -250,7 +261,7 @@ def _square_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
             edge = sub(point(X, F[f, i]), point(X, F[f, i - 1]))
             square += dot(edge, edge)
         total += 0.25 * tension[f] ** 2 * square
-    return total
+    return sqrt(total)
 
 
 @compiled

@@ -17,7 +17,8 @@ def rigid_motions(surface: Surface) -> Floats:
     Entry (i,0) is the translation, (i,1) the rotation vector, scaled so that the six are orthonormal
     when lengths are measured in sizes of the surface.
     """
-    arm = (surface.vertices - surface.vertices.mean(axis=0)) / surface.size
+    size = surface.size or 1.0  # 0 where all vertices are at one point
+    arm = (surface.vertices - surface.vertices.mean(axis=0)) / size
     held, free = surface.fixed, np.eye(6)
     if not surface.free.all():
         rows = [_row(arm[held], axis) for axis in np.eye(3)]
@@ -25,7 +26,7 @@ def rigid_motions(surface: Surface) -> Floats:
         _, s, vt = np.linalg.svd(resisted.T @ resisted)
         free = vt[s <= 1e-10 * s[0]]
     motions = free.reshape(-1, 2, 3).copy()
-    motions[:, 1] /= surface.size
+    motions[:, 1] /= size
     return motions
 
 
@@ -38,7 +39,8 @@ def rigid_modes(space: MotionSpace, motions: Floats, X: Floats) -> Floats:
         return np.zeros((space.size, 0))
     arm = X - X.mean(axis=0)
     fields = [translation + np.cross(rotation, arm) for translation, rotation in motions]
-    parts = np.stack([space.to_coordinates(f) / np.linalg.norm(f) for f in fields], axis=1)
+    lengths = [float(np.linalg.norm(f)) or 1.0 for f in fields]  # 0 where all lies on the axis of rotation
+    parts = np.stack([space.to_coordinates(f) / k for f, k in zip(fields, lengths, strict=True)], axis=1)
     u, s, _ = np.linalg.svd(parts, full_matrices=False)
     return u[:, s > SEEN]
 

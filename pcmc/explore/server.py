@@ -26,7 +26,7 @@ from ..io import FORMATS, write
 from ..project.output import fields as written_fields
 from ..surface import Patch, Surface
 from .messages import pack, plain
-from .page_data import centre, fields, findings, outline
+from .page_data import centre, fields, findings, mesh_findings, outline
 from .session import Session, State, solved_start
 
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
@@ -230,6 +230,10 @@ class _Handler(BaseHTTPRequestHandler):
             header, arrays = outline(session.surface)
             first = {"session": name, "title": explorer.title, "formats": list(FORMATS), **header}
             self._send_state(session.state(), first, arrays)
+        elif len(steps) == 3 and steps[0] == "api" and steps[2] == "check":
+            check = explorer.session(steps[1]).check_mesh()
+            header = {"superseded": True} if check is None else {"check": mesh_findings(check)}
+            self._send(pack(header, {}), "application/octet-stream")
         elif len(steps) == 3 and steps[0] == "api" and steps[2] in ACTS:
             session = explorer.session(steps[1])
             given = (_values(asked),) if steps[2] in ("follow", "settle") else ()

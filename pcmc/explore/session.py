@@ -13,6 +13,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
+from ..accuracy import MeshCheck, check_mesh
 from ..certificate import Certificate, Verdict, certify
 from ..solvers import solve
 from ..solvers.result import Progress, Result
@@ -136,6 +137,20 @@ class Session:
                 self._failure = certificate
 
         return self._run(act)
+
+    def check_mesh(self) -> MeshCheck | None:
+        """The mesh check of the surface shown; None if the page shows another one before it ends."""
+        checked = self.surface
+
+        def check(_: Progress) -> None:
+            if self.surface is not checked:
+                raise StopIteration
+
+        with self._turn:
+            try:
+                return check_mesh(checked, callback=check)
+            except KeyboardInterrupt:
+                return None
 
     def undo(self) -> State:
         """One step back; if the values asked for were not reached, back to those of the surface shown."""

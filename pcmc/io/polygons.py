@@ -43,7 +43,7 @@ def triangulate(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tup
         raise FileError(text, where=int(many[0]), found=int(counts[many[0]]), expected=LARGEST)
     if (counts == 3).all():
         return corners.reshape(-1, 3), np.arange(len(counts)), ()
-    checks.within_reach(checks.positions(X))
+    checks.positions(X)
     start = np.cumsum(counts) - counts
     triangles, origin = [], []
     for k in np.unique(counts):

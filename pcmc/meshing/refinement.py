@@ -11,7 +11,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..contact.pinching import midpoints
-from ..surface import Surface
+from ..surface import Surface, expect_surface
 
 Projection = Callable[[Floats], Floats]
 
@@ -57,9 +57,21 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     >>> fine.n, fine.m, int(fine.fixed.sum())  # the diagonal's midpoint is free
     (9, 8, 8)
     """
-    for _ in range(validate.integer("levels", levels)):
+    expect_surface(surface)
+    for _ in range(refinable("levels", levels, surface.m)):
         surface = _refine_once(surface, project)
     return surface
+
+
+def refinable(name: str, levels: object, triangles: int) -> int:
+    """The number of refinements, if so many triangles can be counted in 32 bits afterwards.
+
+    >>> refinable("levels", 3, 1000)
+    3
+    """
+    most = int(np.log2(validate.MOST / triangles) / 2.0)
+    hint = f"each makes four times as many triangles of {triangles}"
+    return validate.integer(name, levels, most=most, hint=hint)
 
 
 def prolongation(surface: Surface) -> csr_array:
@@ -96,17 +108,29 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
     return both_fixed, slides
 
 
-def _refine_once(surface: Surface, project: Projection | None) -> Surface:
-    edges = surface.topology.edges
-    middle = midpoints(surface, edges)
-    held, slides = held_midpoints(surface)
+def projected(project: Projection, points: Floats) -> Floats:
+    """``project`` of points (k,3); OptionError if it returns another shape."""
+    moved = np.asarray(project(points.copy()), dtype=float)
+    if moved.shape != points.shape:
+        expected, found = points.shape, moved.shape
+        message = f"project: expected a function that returns shape {expected}, it returned {found}"
+        raise OptionError(message, what="project", found=found, expected=expected)
+    return moved
+
+
+def new_vertices(
+    surface: Surface, cut: Bools, project: Projection | None = None
+) -> tuple[Floats, Bools, Bools]:
+    """Positions (k,3) and supports of new vertices on the edges ``cut`` (e,): fixed, sliding (k,)."""
+    middle = midpoints(surface, surface.topology.edges[cut])
+    held, slides = (mask[cut] for mask in held_midpoints(surface))
     if project is not None:
-        projected = np.asarray(project(middle[held].copy()), dtype=float)
-        if projected.shape != middle[held].shape:
-            expected, found = middle[held].shape, projected.shape
-            message = f"project: expected a function that returns shape {expected}, it returned {found}"
-            raise OptionError(message, what="project", found=found, expected=expected)
-        middle[held] = projected
+        middle[held] = projected(project, middle[held])
+    return middle, held, slides
+
+
+def _refine_once(surface: Surface, project: Projection | None) -> Surface:
+    middle, held, slides = new_vertices(surface, np.ones(len(surface.topology.edges), dtype=bool), project)
     a, b, c = surface.faces.T
     bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
     X, patch = np.concatenate([surface.vertices, middle]), np.repeat(surface.patch_of_face, 4)

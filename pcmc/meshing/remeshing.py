@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from ..base import validate
@@ -18,7 +18,8 @@ from ..surface import Surface
 from ..surface.geometry import angles, area_vectors, face_areas, segment_lengths
 from .angles import improve_angles
 from .quality import edge_lengths
-from .refinement import held_midpoints, refine
+from .refinement import Projection, held_midpoints, projected, prolongation, refine
+from .sizes import check_sizes, edges_between, equilateral_area, limit_growth, place_between, triangles_for
 
 CHORD = 0.1  # of the edge length
 MOST = 20_000_000  # triangles; more mean a mistake in the edge length
@@ -27,18 +28,20 @@ GOOD_ANGLE = 25.0  # degrees; no further pass is made when all angles reach it
 LEAST_ANGLE = 20.0  # degrees; a patch that stays below it ...
 WORSE = 0.8  # ... and below this share of its old smallest angle keeps its old triangles, cut
 RAISED = 0.25  # of its spacing: height to which a resting junction is lifted, so that its wall has area
+LARGE = 2.0  # times the area wanted: a larger triangle is split, also between curves
 BLUNT, OBTUSE = 25.0, 100.0  # degrees; for the upper two angles of one that fills a corner well
 
 
 def remesh(
     surface: Surface,
-    edge_length: float,
+    edge_length: float | npt.ArrayLike,
     *,
     near_curves: float | None = None,
     growth: float = 1.2,
     chord: float | None = None,
+    project: Projection | None = None,
 ) -> Surface:
-    """The same surface with triangles near a wanted edge length.
+    """The same surface with triangles near a wanted edge length, the same everywhere or not.
 
     Patches, tensions, the plane and all names stay. Boundaries, junctions and seams do not move, to
     rounding: their vertices stay, and new ones are put on the straight edges between them, with the
@@ -49,19 +52,24 @@ def remesh(
 
     Parameters
     ----------
-    edge_length : of the triangles, length.
+    edge_length : of the triangles, length; or one per vertex (n,), which is lowered where it would grow
+        faster than ``growth``.
     near_curves : edge length at junctions and boundaries, if it is to be shorter there; it grows
         with the distance.
     growth : ratio of the lengths of neighbouring edges where they grow, > 1.
     chord : largest distance between the triangles and the smooth surface, length; where the surface
-        is strongly curved, edges get shorter to keep it. By default a tenth of ``edge_length``.
+        is strongly curved, edges get shorter to keep it. By default a tenth of ``edge_length``, of the
+        largest one if there are several.
+    project : (k,3) → (k,3), applied to the new fixed vertices: puts them on a curved boundary that the
+        edges only approximate.
 
     Raises
     ------
     MissingExtra
         Without the library mmgpy.
     OptionError
-        For lengths that are not positive, or that would make more than 20 million triangles.
+        For lengths that are not positive, or that would make more than 20 million triangles; if
+        ``project`` returns another shape.
     SurfaceError
         When MMG gives up, or does not keep a curve.
 
@@ -73,18 +81,17 @@ def remesh(
     >>> fine.m > 2 * dome.m, fine.patches == dome.patches
     (True, True)
     """
-    check_lengths(edge_length, near_curves, growth, chord)
-    count = face_areas(surface.vertices[surface.faces]).sum() / (math.sqrt(3.0) / 4.0 * edge_length**2)
-    if count > MOST:
-        hint = f"it makes about {count:.2g}; choose a larger one"
-        validate.refuse("edge_length", edge_length, f"at most {MOST} triangles", hint=hint)
+    check_lengths(edge_length if np.ndim(edge_length) == 0 else 1.0, near_curves, growth, chord)
+    size = _wanted_sizes(surface, edge_length, growth)
     part = standing_part(surface)
     surface = lift(surface, part.walls, part.resting, RAISED)
-    old = _cut_curves(surface, edge_length if near_curves is None else near_curves)
+    along_curves = size if near_curves is None else np.minimum(size, near_curves)
+    old, wanted = _cut_curves(surface, size, along_curves, project)
+    chord = CHORD * float(wanted.size.max()) if chord is None else chord
     candidates, mesh = [], old
     for _ in range(PASSES):
-        size = _sizes(mesh, edge_length, growth)
-        mesh = _remesh_with_mmg(mesh, size, growth, CHORD * edge_length if chord is None else chord)
+        size = _sizes(mesh, wanted, growth)
+        mesh = _remesh_with_mmg(mesh, size, growth, chord)
         mesh = replace(mesh, X=improve_angles(mesh.X, mesh.F, mesh.source < 0, GOOD_ANGLE))
         candidates.append(mesh)
         if angles(mesh.X[mesh.F]).min() >= GOOD_ANGLE:
@@ -124,27 +131,66 @@ def check_lengths(
     validate.number("growth", growth, above=1.0)
 
 
+@dataclass(frozen=True, eq=False)
+class _Background:
+    """Wanted edge lengths at points; elsewhere that of the nearest one holds."""
+
+    points: Floats
+    size: Floats
+
+    def at(self, X: Floats) -> Floats:
+        """(k,) the edge lengths wanted at positions (k,3)."""
+        if self.size.min() == self.size.max():
+            return np.full(len(X), self.size[0])
+        return self.size[cKDTree(self.points).query(X)[1]]
+
+
+def _wanted_sizes(surface: Surface, edge_length: npt.ArrayLike, growth: float) -> Floats:
+    """(n,) the edge length wanted at each vertex."""
+    if np.ndim(edge_length) == 0:
+        size = np.full(surface.n, edge_length, dtype=float)
+    else:
+        size = check_sizes(edge_length, surface.n)
+        size = limit_growth(surface.vertices, surface.topology.edges, size, growth)
+    count = triangles_for(face_areas(surface.vertices[surface.faces]), size[surface.faces].mean(axis=1))
+    if count > MOST:
+        hint = f"it makes about {count:.2g}; choose a larger one"
+        found = float(size.min())
+        validate.refuse("edge_length", found, f"at most {MOST} triangles", hint=hint)
+    return size
+
+
 def _curve_edges(surface: Surface) -> Bools:
     """(e,) the edges that must stay: curves, and edges held inside a patch."""
     fixed, sliding = held_midpoints(surface)
     return surface.topology.curve_edge | fixed | sliding
 
 
-def _cut_curves(surface: Surface, length: float) -> _Mesh:
-    """The mesh with new vertices on its curves, at most about ``length`` apart."""
-    counts = _pieces(surface, length)
+def _cut_curves(
+    surface: Surface, size: Floats, along_curves: Floats, project: Projection | None = None
+) -> tuple[_Mesh, _Background]:
+    """The mesh with new vertices on its curves, about ``along_curves`` (n,) apart, and its sizes."""
+    first = surface.n
+    background = _Background(surface.vertices, size)
+    counts = _pieces(surface, along_curves)
     # 1→4 keeps the triangles' shape, cutting single edges does not
     while len(counts) and np.median(counts) >= 2.0:
+        along_curves = prolongation(surface) @ along_curves
         surface = _refined_round(surface)
-        counts = _pieces(surface, length)
+        counts = _pieces(surface, along_curves)
     topo, stay = surface.topology, _curve_edges(surface)
     fixed_edge, sliding_edge = held_midpoints(surface)
     X, F, patch, number = surface.vertices, surface.faces, surface.patch_of_face, np.arange(surface.n)
     mesh = _Mesh(X, F, patch, topo.edges[stay], surface.fixed, surface.on_plane, number)
     support = np.stack([fixed_edge[stay], sliding_edge[stay]], axis=1)
     while (counts > 1).any():
-        mesh, counts, support = _cut_once(mesh, counts, support)
-    return mesh
+        mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
+    if project is not None:
+        new = mesh.fixed & (np.arange(len(mesh.X)) >= first)
+        X = mesh.X.copy()
+        X[new] = projected(project, X[new])
+        mesh = replace(mesh, X=X)
+    return mesh, background
 
 
 def _refined_round(surface: Surface) -> Surface:
@@ -180,33 +226,43 @@ def _edge_normals(surface: Surface, chosen: Ints) -> Floats:
     return total[np.searchsorted(key, patch_of_edge[chosen, None] * surface.n + topo.edges[chosen])]
 
 
-def _pieces(surface: Surface, length: float) -> Ints:
+def _pieces(surface: Surface, size: Floats) -> Ints:
     """(c,) into how many pieces each curve edge is to be cut."""
-    lengths = edge_lengths(surface)[_curve_edges(surface)]
-    return np.maximum(1, np.rint(lengths / length)).astype(np.int64)
+    chosen = _curve_edges(surface)
+    start, end = size[surface.topology.edges[chosen]].T
+    return np.maximum(1, np.rint(edges_between(edge_lengths(surface)[chosen], start, end))).astype(np.int64)
 
 
-def _cut_once(mesh: _Mesh, counts: Ints, support: Bools) -> tuple[_Mesh, Ints, Bools]:
+def _cut_once(mesh: _Mesh, size: Floats, counts: Ints, support: Bools) -> tuple[_Mesh, Floats, Ints, Bools]:
     """Every curve edge that is to be cut, cut in two, with its triangles."""
     cut = counts > 1
     ends, pieces = mesh.curves[cut], counts[cut]
     first = pieces // 2
-    share = (first / pieces)[:, None]
+    size_start, size_end = size[ends].T
+    share = place_between(first / pieces, size_start, size_end)
     start, end = mesh.X[ends[:, 0]], mesh.X[ends[:, 1]]
     number = len(mesh.X) + np.arange(len(ends))
-    F, patch = _cut_triangles(mesh.F, mesh.patch, ends, number, len(mesh.X))
+    F, patch = cut_triangles(mesh.F, mesh.patch, ends, number, len(mesh.X))
     halves = np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)
-    X = np.concatenate([mesh.X, start + share * (end - start)])
+    X = np.concatenate([mesh.X, start + share[:, None] * (end - start)])
+    size = np.concatenate([size, size_start + share * (size_end - size_start)])
     curves = np.concatenate([mesh.curves[~cut], *halves])
     fixed = np.concatenate([mesh.fixed, support[cut, 0]])
     sliding = np.concatenate([mesh.sliding, support[cut, 1]])
     new = _Mesh(X, F, patch, curves, fixed, sliding, np.arange(len(X)))
     counts = np.concatenate([counts[~cut], first, pieces - first])
-    return new, counts, np.concatenate([support[~cut], support[cut], support[cut]])
+    return new, size, counts, np.concatenate([support[~cut], support[cut], support[cut]])
 
 
-def _cut_triangles(F: Ints, patch: Ints, ends: Ints, number: Ints, n: int) -> tuple[Ints, Ints]:
-    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four."""
+def cut_triangles(
+    F: Ints, patch: Ints, ends: Ints, number: Ints, n: int, first: Ints | None = None
+) -> tuple[Ints, Ints]:
+    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four.
+
+    The edges ``ends`` (k,2) get the vertices ``number`` (k,); old vertices are below n. With two cut sides
+    a line leads to the middle of one of them from the corner opposite: of the side opposite corner
+    ``first`` (m,), where that is given.
+    """
     key = ends.min(axis=1).astype(np.int64) * n + ends.max(axis=1)
     order = np.argsort(key)
     side = F[:, [[1, 2], [2, 0], [0, 1]]].astype(np.int64)
@@ -220,10 +276,13 @@ def _cut_triangles(F: Ints, patch: Ints, ends: Ints, number: Ints, n: int) -> tu
     roll = (np.arange(3) + turn[:, None]) % 3
     a, b, c = np.take_along_axis(F.astype(np.int64), roll, axis=1).T
     p, q, r = np.take_along_axis(middle, roll, axis=1).T  # on the sides opposite a, b, c
+    if first is not None:
+        count[(count == 2) & (first == (turn + 1) % 3)] = -2
     templates = {
         0: [(a, b, c)],
         1: [(a, b, p), (a, p, c)],
         2: [(c, q, p), (q, a, p), (a, b, p)],
+        -2: [(c, q, p), (q, b, p), (a, b, q)],
         3: [(a, r, q), (b, p, r), (c, q, p), (p, q, r)],
     }
     faces, owner = [], []
@@ -234,9 +293,9 @@ def _cut_triangles(F: Ints, patch: Ints, ends: Ints, number: Ints, n: int) -> tu
     return np.concatenate(faces), np.concatenate(owner)
 
 
-def _sizes(mesh: _Mesh, edge_length: float, growth: float) -> Floats:
+def _sizes(mesh: _Mesh, wanted: _Background, growth: float) -> Floats:
     """(n,) the edge length wanted at each vertex: a curve's own next to it, growing away from it."""
-    size = np.full(len(mesh.X), float(edge_length))
+    size = wanted.at(mesh.X)
     if len(mesh.curves):
         length = segment_lengths(mesh.X, mesh.curves)
         spacing = np.zeros(len(mesh.X))
@@ -264,7 +323,7 @@ def _remesh_with_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> 
     tool.set_edges(mesh.curves.astype(np.int32), np.ones(len(mesh.curves), dtype=np.int64))
     tool.set_required_edges(np.arange(len(mesh.curves), dtype=np.int32))
     tool.set_required_vertices(fixed.astype(np.int32))
-    tool.set_required_triangles(_corners_to_keep(mesh).astype(np.int32))
+    tool.set_required_triangles(_corners_to_keep(mesh, size).astype(np.int32))
     tool["metric"] = size[:, None]
     least, most = 0.3 * float(size.min()), 1.3 * float(size.max())
     try:
@@ -285,13 +344,15 @@ def _remesh_with_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> 
     return _Mesh(X, F.astype(np.int64), patch - 1, curves, fixed, sliding, source)
 
 
-def _corners_to_keep(mesh: _Mesh) -> Ints:
-    """Triangles between curves that are as good as their corner allows: MMG would split them."""
+def _corners_to_keep(mesh: _Mesh, size: Floats) -> Ints:
+    """Triangles between curves that are as good as their corner allows, and small: MMG would split them."""
     on_curve = np.zeros(len(mesh.X), dtype=bool)
     on_curve[mesh.curves] = True
     between = np.flatnonzero(on_curve[mesh.F].all(axis=1))
-    _, second, largest = np.sort(angles(mesh.X[mesh.F[between]]), axis=1).T
-    return between[(second >= BLUNT) & (largest <= OBTUSE)]
+    corners = mesh.X[mesh.F[between]]
+    _, second, largest = np.sort(angles(corners), axis=1).T
+    small = face_areas(corners) <= LARGE * equilateral_area(size[mesh.F[between]].mean(axis=1))
+    return between[(second >= BLUNT) & (largest <= OBTUSE) & small]
 
 
 def _check_curves(before: _Mesh, curves: Ints, F: Ints, n: int) -> None:

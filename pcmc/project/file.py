@@ -17,6 +17,7 @@ from ..base.files import check_name, check_regular
 from ..plan import Plan, plan_from
 from ..solvers import find_method
 from ..surface import Surface
+from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
@@ -41,6 +42,8 @@ class Project:
     path : the file.
     plan : of the surface; None if ``path`` holds a surface itself.
     method, options : as in ``pcmc.solve``.
+    wanted : the accuracy asked for.
+    mesh_check : whether the result is solved on finer meshes, too; None if the file does not say.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
     files, picture : the output.
@@ -52,6 +55,8 @@ class Project:
     plan: Plan | None = None
     method: str = "newton"
     options: Mapping[str, Any] = field(default_factory=dict)
+    wanted: AccuracyWanted = field(default_factory=AccuracyWanted)
+    mesh_check: bool | None = None
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
     vary: Sequence[Parameter] = ()
@@ -168,10 +173,11 @@ def surface_of(project: Project) -> Surface:
 def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     """The project with the given data. Errors as in ``load``."""
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
-    method = options.pop("method", "newton")
+    method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
     files, picture = output.get("files", []), output.get("picture")
     view, colour = output.get("view", "diagonal"), output.get("colour", "patches")
     with in_file(path, FileError):
+        wanted = take_accuracy(options)
         find_method(method).options(**options)  # refuses bad values before the plan is meshed
         _check_inside([*files, *([] if picture is None else [picture])])
         check_names(files, picture)
@@ -181,6 +187,8 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             plan=plan_from(data["plan"]),
             method=method,
             options=options,
+            wanted=wanted,
+            mesh_check=mesh_check,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
             **(_search(data["targets"]) if "targets" in data else {}),
             files=files,

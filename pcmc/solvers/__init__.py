@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..base import validate
 from ..base.errors import SurfaceError
-from ..surface import Surface
+from ..surface import Surface, expect_surface
 
 if TYPE_CHECKING:
     from .result import Callback, Result
@@ -93,8 +93,7 @@ def solve(
     ...
     pcmc.base.errors.OptionError: unknown method 'nestrov'; did you mean 'nesterov'? Known: newton, ...
     """
-    if not isinstance(surface, Surface):
-        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
+    expect_surface(surface)
     solver = find_method(method)
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a Progress")

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import Bools, Floats
+from ..energy.functional import apply_supports
 from ..energy.motion_space import MotionSpace, VertexClasses, perpendicular
 from ..energy.projected_hessian import assemble, hessian_pattern
 from ..stability.factorisation import factoriser
@@ -92,11 +93,18 @@ class HarmonicExtension:
     """Lets the inside of the sheets follow the motion of their curves.
 
     The motion of curves and points is extended harmonically into the sheets: L_α w = 0 inside, w given on
-    the curves. Each sheet vertex takes the part of w along its sheet, which does not change the shape.
+    the curves. Each sheet vertex takes the part of w along its sheet, which does not change the shape, as
+    far as its support lets it. ``prescribed`` (n,) are the vertices where w is given, in place of the curves
+    and the fixed ones.
     """
 
     def __init__(
-        self, surface: Surface, classes: VertexClasses, X: Floats, backend: str | None = None
+        self,
+        surface: Surface,
+        classes: VertexClasses,
+        X: Floats,
+        backend: str | None = None,
+        prescribed: Bools | None = None,
     ) -> None:
         used = ~classes.idle
         space = _one_unknown_each(used)
@@ -105,20 +113,28 @@ class HarmonicExtension:
         data = assemble(equal, classes, space, pattern, X, hessian=0.0, stiffness=1.0)
         diagonal = pattern.indptr[:-1]
         data[diagonal] *= 1.0 + SHIFT
-        self._used = used
-        self._prescribed = (classes.kind != SHEET) | surface.fixed
+        self._surface, self._used = surface, used
+        curves = (classes.kind != SHEET) | surface.fixed
+        self._prescribed = curves if prescribed is None else prescribed
         self._weight = np.where(self._prescribed[used], PIN * data[diagonal], 0.0)
         data[diagonal] += self._weight
         # scaled to a diagonal of ones, so that no pivot beside a prescribed vertex looks like zero
-        self._scale = 1.0 / np.sqrt(data[diagonal])
+        self._scale = 1.0 / np.sqrt(np.where(data[diagonal] > 0.0, data[diagonal], 1.0))
         data *= np.repeat(self._scale, np.diff(pattern.indptr)) * self._scale[pattern.indices]
         self._factor = factoriser(pattern, backend).factor(data)
 
     def extend(self, space: MotionSpace, motion: Floats) -> Floats:
         """The motion (n,3) with the sheets' vertices following the curves."""
-        given = np.where(self._prescribed[:, None], motion, 0.0)[self._used]
-        w = np.zeros_like(motion)
-        right = (self._scale * self._weight)[:, None] * given
-        w[self._used] = self._scale[:, None] * self._factor.solve(right)
+        w = self.harmonic(motion)
         w[self._prescribed] = 0.0
+        apply_supports(self._surface, w)
         return motion + w - space.project(w)
+
+    def harmonic(self, motion: Floats) -> Floats:
+        """w (n,3), as ``motion`` where it is prescribed."""
+        given = np.where(self._prescribed[:, None], motion, 0.0)
+        w = np.zeros_like(motion)
+        right = (self._scale * self._weight)[:, None] * given[self._used]
+        w[self._used] = self._scale[:, None] * self._factor.solve(right)
+        w[self._prescribed] = given[self._prescribed]
+        return w

@@ -15,6 +15,7 @@ from ..contact.pinching import (
     lift,
     place_pinched_walls,
     place_wall_rows,
+    remove_pinched_walls,
     standing_part,
     top_spacing,
 )
@@ -22,6 +23,7 @@ from ..energy.functional import energy_and_gradient, energy_at
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..meshing.quality import compare, redistribute, worst_quality
 from ..surface import Surface
+from ..surface.checks import reachable
 
 LOW = 5e-3  # height, in spacings along the junction, at which a sinking vertex is set to rest
 LIFT = 5e-2  # height, in the same, to which a resting vertex is lifted the first time
@@ -98,9 +100,9 @@ class State:
         """Quality of the worst triangle outside walls that can pinch."""
         return worst_quality(self.X, self.quality_faces)
 
-    def result_surface(self) -> Surface:
+    def result_surface(self, X: Floats | None = None) -> Surface:
         """The whole surface at X, with pinched walls placed on their resting junctions."""
-        X = self.X
+        X = self.X if X is None else X
         if self.resting.any():
             X = place_pinched_walls(self.full, self.walls, self.resting, X)
         return self.full.moved(X)
@@ -133,10 +135,12 @@ class State:
         return X, down
 
     def spoils_triangles(self, X: Floats) -> bool:
-        """Whether the move to X turns a triangle over or makes the worst one much worse.
+        """Whether the move to X turns a triangle over, makes the worst one much worse or leads too far out.
 
         Triangles of walls that can pinch do not count: their height may vanish.
         """
+        if not reachable(X):
+            return True
         turned, before, after = compare(self.X, X, self.quality_faces)
         return turned or after < 0.7 * min(before, self.min_quality)
 
@@ -167,12 +171,12 @@ class State:
         """
         full = self.result_surface()
         walls = replace(find_walls(full), side=self.walls.side)
-        part = StandingPart.of(full, walls, self.resting)
-        if np.array_equal(part.surface.faces, self.surface.faces) or self._releases_left <= 0:
+        standing = remove_pinched_walls(full, walls, self.resting).faces
+        if np.array_equal(standing, self.surface.faces) or self._releases_left <= 0:
             return False
         self._releases_left -= 1
         self.full = full
-        self._take(part)
+        self._take(StandingPart.of(full, walls, self.resting))
         return True
 
     def lift_overpulled(self) -> bool:

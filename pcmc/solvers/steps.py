@@ -16,6 +16,7 @@ from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import edge_lengths
 from ..stability.factorisation import Factor, Factoriser, SingularMatrix, factoriser
 from ..stability.modes import SOFT, full_matrix, lowest, negatives_without, stiffness
+from ..surface.checks import reachable
 from ..surface.geometry import vertex_area_vectors
 from .smoother import HarmonicExtension, Smoother
 from .state import State
@@ -115,7 +116,7 @@ class Stepper:
         for t in 0.5 ** np.arange(12):
             X, down = state.displaced(t * d)
             value = state.energy_at(X)
-            if np.isfinite(value) and value < state.energy + 1e-3 * t * slope:
+            if reachable(X) and value < state.energy + 1e-3 * t * slope:
                 state.move(X, down)
                 self._factor = None
                 self.kind = "descent"

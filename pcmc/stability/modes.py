@@ -116,11 +116,29 @@ def morse_index(surface: Surface) -> int:
     >>> morse_index(roof)
     0
     """
+    return _of_standing_part(surface).negative
+
+
+def ways_down(surface: Surface) -> tuple[int, Floats]:
+    """The Morse index of a surface at rest and its lowest mode (n,3); empty if there is no way down.
+
+    Raises
+    ------
+    SingularMatrix : the second variation has no inertia that can be counted.
+    """
+    system = _of_standing_part(surface)
+    if system.negative == 0 or system.space.size <= 2:
+        return system.negative, np.empty((0, 3))
+    return system.negative, lowest(system, 1)[1][0]
+
+
+def _of_standing_part(surface: Surface) -> Stiffness:
+    """The second variation of the part of a surface that stands."""
     part = standing_part(surface)
     X = part.surface.vertices
     space = motion_space(part.surface, part.classes, X)
     rigid = rigid_modes(space, rigid_motions(part.surface), X)
-    return stiffness(part.surface, part.classes, space, rigid).negative
+    return stiffness(part.surface, part.classes, space, rigid)
 
 
 def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:

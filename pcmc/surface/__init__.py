@@ -3,6 +3,6 @@
 Gives ``Patch``, ``Plane`` and ``Surface`` to all other rooms. Imports only ``base``.
 """
 
-from .surface import Patch, Plane, Surface
+from .surface import Patch, Plane, Surface, expect_surface
 
-__all__ = ["Patch", "Plane", "Surface"]
+__all__ = ["Patch", "Plane", "Surface", "expect_surface"]

@@ -3,45 +3,61 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from numbers import Real
 from typing import Any, NoReturn
 
 import numpy as np
-import numpy.typing as npt
 
-from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
+from ..base.compiled import compiled
 from ..base.errors import SurfaceError
-from .geometry import bounding_size, edge_vectors, face_areas
+from .geometry import bounding_size, cross, dot, norm, point, sub
 from .topology import Topology
 
 ZERO_AREA = 1e-14  # of the squared longest edge: below this a triangle has no direction in floats
+MANY = 16  # faces at one edge
 LARGEST = 1e50  # of a coordinate, tension or pressure: the squares of forces stay finite
+SMALLEST = 1e-50  # of a size or tension: the squares of forces and areas stay above zero
+NUMBERS = "iuf"  # kinds of arrays of numbers
 RESTING = 1e-12  # height, relative to the size, at which a vertex counts as lying on Π
 ROUNDED = 8.0 * float(np.finfo(float).eps)  # the same, relative to the coordinates
 
 
-def positions(vertices: npt.ArrayLike) -> Floats:
-    """(n,3) finite floats, a copy of its own."""
-    X = _array(vertices, "vertices", np.float64)
+def positions(vertices: Any) -> Floats:
+    """(n,3) floats up to LARGEST, beyond which they cannot hold the forces; a copy of its own."""
+    X = np.array(_plain(vertices, "vertices"), dtype=np.float64, order="C")
     if X.ndim != 2 or X.shape[1] != 3 or not len(X):
         refuse_shape("vertices", X, "(n, 3) with n > 0")
-    bad = np.flatnonzero(~np.isfinite(X).all(axis=1))
-    if len(bad):
-        _refuse_rows("vertices", X, bad, "is not finite", hint="replace or remove it")
+    if not reachable(X):
+        bad = np.flatnonzero(~np.isfinite(X).all(axis=1))
+        if len(bad):
+            _refuse_rows("vertices", X, bad, "is not finite", hint="replace or remove it")
+        bad = np.flatnonzero((np.abs(X) > LARGEST).any(axis=1))
+        hint = "use a larger unit of length"
+        _refuse_rows("vertices", X, bad, f"is farther out than {LARGEST:g}", hint=hint)
     return X
 
 
-def within_reach(X: Floats) -> None:
-    """Coordinates up to LARGEST: a solver may run beyond, but not start there."""
-    bad = np.flatnonzero((np.abs(X) > LARGEST).any(axis=1))
-    if len(bad):
-        _refuse_rows(
-            "vertices", X, bad, f"is farther out than {LARGEST:g}", hint="use a larger unit of length"
-        )
+@compiled
+def reachable(X: Floats) -> bool:
+    """Whether all coordinates are numbers up to LARGEST."""
+    for v in range(len(X)):
+        for d in range(X.shape[1]):
+            if not abs(X[v, d]) <= LARGEST:
+                return False
+    return True
 
 
-def face_array(faces: npt.ArrayLike, n: int) -> Ints:
+def large_enough(X: Floats) -> None:
+    """At least SMALLEST across: floats cannot hold the squares of areas of a smaller surface."""
+    size = bounding_size(X)
+    if 0.0 < size < SMALLEST:
+        message = f"vertices: the surface is only {size:g} across; use a smaller unit of length"
+        raise SurfaceError(message, what="vertices", found=size, expected=f"≥ {SMALLEST:g}")
+
+
+def face_array(faces: Any, n: int) -> Ints:
     """(m,3) int32 vertex indices within 0..n-1, no vertex twice in a face."""
     F = _integers(faces, "faces")
     if F.ndim != 2 or F.shape[1] != 3 or not len(F):
@@ -55,12 +71,10 @@ def face_array(faces: npt.ArrayLike, n: int) -> Ints:
     return F.astype(np.int32)
 
 
-def patch_array(patch_of_face: npt.ArrayLike, m: int, patches: Sequence[Any]) -> Ints:
+def patch_array(patch_of_face: Any, m: int, patches: Sequence[Any]) -> Ints:
     """(m,) int32 indices into ``patches``, every patch used, names unique."""
-    names = [getattr(p, "name", None) for p in patches] if isinstance(patches, Iterable) else []
-    if not names or None in names:
-        validate.refuse("patches", patches, "a sequence of Patch", error=SurfaceError)
-    double = [name for name, times in Counter(map(str, names)).items() if times > 1]
+    names = [p.name for p in patches]
+    double = [name for name, times in Counter(names).items() if times > 1]
     if double:
         message = f"patches: the name {double[0]!r} is used twice; names must be unique"
         raise SurfaceError(message, what="patches", found=double[0])
@@ -79,7 +93,7 @@ def patch_array(patch_of_face: npt.ArrayLike, m: int, patches: Sequence[Any]) ->
 
 def mask(chosen: Any, n: int, what: str) -> Bools:
     """(n,) bool from such a mask or from an array of indices."""
-    given = np.asarray(list(chosen) if isinstance(chosen, range | set | frozenset) else chosen)
+    given = _plain(chosen, what)
     if given.dtype == bool:
         if given.shape != (n,):
             refuse_shape(what, given, f"({n},) for a mask")
@@ -102,14 +116,15 @@ def mesh(
     unused = np.flatnonzero(np.bincount(F.ravel(), minlength=len(X)) == 0)
     if len(unused):
         _refuse_rows("vertices", X, unused, "belongs to no face", hint="remove it and renumber the faces")
-    longest = (edge_vectors(X[F]) ** 2).sum(axis=2).max(axis=1)
-    flat = 2.0 * face_areas(X[F]) <= ZERO_AREA * longest
+    flat = _flat(X, F)
     if flat.any():
         flat &= ~_vanished(F, patch, patches, held, lying(height, X))
     bad = np.flatnonzero(flat)
     if len(bad):
         fault = f"of patch {names[patch[bad[0]]]!r} has zero area"
         _refuse_rows("faces", F, bad, fault, hint="merge its vertices or remesh")
+    if not _perhaps_at_fault(F, patch, topo.edge_of_face, len(topo.edges)):
+        return
     pair = np.sort(topo.edge_of_face, axis=1).astype(np.int64)  # two edges make a triangle
     same = _first_double(pair[:, 0] * len(topo.edges) + pair[:, 1])
     if same is not None:
@@ -117,6 +132,42 @@ def mesh(
         message = f"faces[{second}] is the same triangle as faces[{first}] = {F[first].tolist()}; remove one"
         raise SurfaceError(message, what="faces", where=second, found=F[second].tolist())
     _oriented(F, patch, topo, names)
+
+
+@compiled
+def _flat(X: Floats, F: Ints) -> Bools:
+    """(m,) triangles without an area that floats could tell from zero."""
+    out = np.zeros(len(F), dtype=np.bool_)
+    for f in range(len(F)):
+        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+        u, v, w = sub(b, a), sub(c, b), sub(a, c)
+        out[f] = norm(cross(u, w)) <= ZERO_AREA * max(dot(u, u), dot(v, v), dot(w, w))
+    return out
+
+
+@compiled
+def _perhaps_at_fault(F: Ints, patch: Ints, edge_of_face: Ints, edge_count: int) -> bool:
+    """Whether two faces at an edge are the same, or of one patch and run along it the same way.
+
+    True also where an edge has so many faces that sorting them all shows it sooner.
+    """
+    last = np.full(edge_count, -1, dtype=np.int32)
+    before = np.empty((len(F), 3), dtype=np.int32)  # the face seen last at the same edge
+    for f in range(len(F)):
+        for k in range(3):
+            edge = edge_of_face[f, k]
+            other, seen = last[edge], 0
+            while other >= 0:
+                j = 0
+                while edge_of_face[other, j] != edge:
+                    j += 1
+                if F[other, j] == F[f, k] or seen == MANY:
+                    return True
+                if patch[other] == patch[f] and F[other, j - 2] == F[f, k - 2]:
+                    return True
+                other, seen = before[other, j], seen + 1
+            before[f, k], last[edge] = last[edge], f
+    return False
 
 
 def _vanished(F: Ints, patch: Ints, patches: Sequence[Any], held: Bools, low: Bools) -> Bools:
@@ -182,17 +233,29 @@ def _first_double(key: Ints) -> tuple[int, int] | None:
     return int(order[nearest]), int(order[nearest + 1])
 
 
-def _array(values: npt.ArrayLike, what: str, dtype: Any) -> Any:
+def _plain(values: Any, what: str) -> Any:
+    """Any array, sequence or other collection as an array of numbers or of truth values."""
+    if isinstance(values, Iterable) and not isinstance(values, Sequence | Mapping | str | bytes):
+        values = values if hasattr(values, "__array__") else list(values)
+    masked = values if isinstance(values, list | tuple) else [values]
+    if any(np.ma.is_masked(part) for part in masked):
+        raise SurfaceError(f"{what}: some entries are masked; fill or remove them", what=what)
     try:
-        return np.array(values, dtype=dtype, order="C")
-    except (TypeError, ValueError) as error:
+        array = np.asarray(values)
+        if array.dtype.kind == "O" and all(isinstance(value, Real) for value in array.flat):
+            array = array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
         raise SurfaceError(f"{what}: expected a regular array of numbers ({error})", what=what) from None
+    if array.dtype.kind not in NUMBERS + "b" and array.size:
+        message = f"{what}: expected an array of real numbers, found one of {array.dtype}"
+        raise SurfaceError(message, what=what, found=str(array.dtype), expected="real numbers")
+    return array
 
 
-def _integers(values: npt.ArrayLike, what: str) -> Ints:
-    given = _array(values, what, None)
-    if not np.issubdtype(given.dtype, np.integer):
-        given = _array(given, what, np.float64)
+def _integers(values: Any, what: str) -> Ints:
+    given = _plain(values, what)
+    if given.dtype.kind not in "iu" or (given.dtype.kind == "u" and (given > 2**53).any()):
+        given = given.astype(np.float64)
         bad = np.argwhere((given != np.floor(given)) | (np.abs(given) > 2**53))
         if len(bad):
             place = tuple(bad[0].tolist())

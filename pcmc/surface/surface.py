@@ -13,12 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
 from . import checks
 from .geometry import Vector, bounding_size
 from .topology import Topology, topology
 
+FIELDS = ("vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane")
 FAR = 30.0  # sizes from the point of Π: farther, volumes seen from it lose over three digits
 
 
@@ -46,13 +47,20 @@ class Patch:
     wall: bool = field(default=False, repr=False)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            validate.refuse("Patch.name", self.name, "a text", error=SurfaceError)
         object.__setattr__(self, "name", str(self.name))
+        if not isinstance(self.wall, bool | np.bool_):
+            validate.refuse("wall", self.wall, "True or False", self.name, error=SurfaceError)
         object.__setattr__(self, "wall", bool(self.wall))
         tension = self._number("tension", least=0.0, hint="0 makes a wall that does not pull")
         pressure = self._number("pressure")
         if tension == 0.0 and pressure != 0.0:
             hint = f"a patch under pressure {pressure:g} must pull; a wall (pressure=0) may have tension 0"
             validate.refuse("tension", 0.0, "> 0", self.name, hint, SurfaceError)
+        if 0.0 < tension < checks.SMALLEST:
+            hint = "use a smaller unit of force"
+            validate.refuse("tension", tension, f"0 or ≥ {checks.SMALLEST:g}", self.name, hint, SurfaceError)
 
     def _number(self, key: str, least: float | None = None, hint: str = "") -> float:
         value, where, most = getattr(self, key), self.name, checks.LARGEST
@@ -91,12 +99,17 @@ class Plane:
         for key in ("point", "normal"):
             vector = validate.vector(f"Plane.{key}", getattr(self, key), error=SurfaceError)
             object.__setattr__(self, key, vector)
-        length = math.sqrt(sum(c * c for c in self.normal))
+        if max(map(abs, self.point)) > checks.LARGEST:
+            limit = f"coordinates up to {checks.LARGEST:g}"
+            validate.refuse("Plane.point", self.point, limit, error=SurfaceError)
+        _, exponent = math.frexp(max(map(abs, self.normal)))
+        scaled = [math.ldexp(c, -exponent) for c in self.normal]  # so that no square is too large or small
+        length = math.sqrt(sum(c * c for c in scaled))
         if length == 0.0:
             validate.refuse("Plane.normal", self.normal, "a vector of positive length", error=SurfaceError)
-        object.__setattr__(self, "normal", tuple(c / length for c in self.normal))
+        object.__setattr__(self, "normal", tuple(c / length for c in scaled))
 
-    @cached_property
+    @cached_array
     def axes(self) -> Floats:
         """(3,3) rows: two unit vectors along the plane and its normal; the identity for z = 0."""
         normal = np.array(self.normal)
@@ -104,6 +117,9 @@ class Plane:
         first = axis - (axis @ normal) * normal
         first /= np.linalg.norm(first)
         return np.stack([first, np.cross(normal, first), normal])
+
+    def __getstate__(self) -> dict[str, object]:
+        return {"point": self.point, "normal": self.normal}
 
     def to_local(self, points: npt.ArrayLike) -> Floats:
         """(…,3) two coordinates on the plane and the height above it, of points (…,3).
@@ -121,6 +137,18 @@ class Plane:
         """(…,3) the components of vectors (…,3) parallel to the plane: v - ⟨v, n⟩ n, Eq. (19)."""
         normal = np.array(self.normal)
         return vectors - (vectors @ normal)[..., None] * normal
+
+
+def expect_surface(value: object) -> None:
+    """Refuse anything but a Surface.
+
+    >>> expect_surface(None)
+    Traceback (most recent call last):
+    ...
+    pcmc.base.errors.SurfaceError: surface: expected a Surface, found 'NoneType'
+    """
+    if not isinstance(value, Surface):
+        validate.refuse("surface", type(value).__name__, "a Surface", error=SurfaceError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,16 +190,18 @@ class Surface:
         if not isinstance(self.plane, Plane):
             validate.refuse("plane", self.plane, "a Plane", error=SurfaceError)
         X = checks.positions(self.vertices)
-        checks.within_reach(X)
+        checks.large_enough(X)
         F = checks.face_array(self.faces, len(X))
-        patch = checks.patch_array(self.patch_of_face, len(F), self.patches)
+        patches = tuple(self.patches) if isinstance(self.patches, Iterable) else ()
+        if not patches or not all(isinstance(patch, Patch) for patch in patches):
+            validate.refuse("patches", self.patches, "a sequence of Patch", error=SurfaceError)
+        patch = checks.patch_array(self.patch_of_face, len(F), patches)
         fixed = checks.mask(self.fixed, len(X), "fixed")
         sliding = checks.mask(self.on_plane, len(X), "on_plane") & ~fixed
         arrays = {"vertices": X, "faces": F, "patch_of_face": patch, "fixed": fixed}
         for key, value in (arrays | {"on_plane": sliding}).items():
-            value.setflags(write=False)
-            object.__setattr__(self, key, value)
-        object.__setattr__(self, "patches", tuple(self.patches))
+            object.__setattr__(self, key, read_only(value))
+        object.__setattr__(self, "patches", patches)
         height = self.plane.height(X)
         checks.mesh(X, F, patch, self.topology, self.patches, fixed | sliding, height)
         checks.on_plane(height, sliding, X, self.size)
@@ -200,7 +230,7 @@ class Surface:
         """Edges, curves and points, from the faces alone; shared by all moved copies."""
         return topology(self.faces, self.patch_of_face, len(self.vertices))
 
-    @cached_property
+    @cached_array
     def uncancelled(self) -> Floats:
         """(e,) the sum of the pressures at each edge that is not held, force/area.
 
@@ -214,7 +244,7 @@ class Surface:
         rounding = 1e-12 * np.abs(self.pressures).max(initial=0.0)
         return np.where(held | (np.abs(left) <= rounding), 0.0, left)
 
-    @cached_property
+    @cached_array
     def origin(self) -> Floats:
         """(3,) the point that volumes are seen from: that of Π.
 
@@ -233,17 +263,17 @@ class Surface:
             middle = middle - height * np.array(self.plane.normal)
         return np.asarray(middle)
 
-    @cached_property
+    @cached_array
     def walls(self) -> Bools:
         """(k,) bool: which patches are walls."""
         return np.array([p.auxiliary for p in self.patches])
 
-    @cached_property
+    @cached_array
     def tensions(self) -> Floats:
         """(k,) tension α of each patch."""
         return np.array([p.tension for p in self.patches])
 
-    @cached_property
+    @cached_array
     def pressures(self) -> Floats:
         """(k,) pressure p of each patch."""
         return np.array([p.pressure for p in self.patches])
@@ -267,8 +297,7 @@ class Surface:
         if X.shape != self.vertices.shape:
             checks.refuse_shape("vertices", X, self.vertices.shape)
         checks.on_plane(self.plane.height(X), self.on_plane, X, self.size)
-        X.setflags(write=False)
-        return self._with(vertices=X)
+        return self._with(vertices=read_only(X))
 
     def retensioned(
         self,
@@ -280,6 +309,11 @@ class Surface:
 
         ``walls`` names patches that are walls whatever their pressure.
         """
+        for key, given in (("tensions", tensions), ("pressures", pressures)):
+            if not isinstance(given or {}, Mapping):
+                validate.refuse(key, given, "a mapping from patch names to numbers", error=SurfaceError)
+        if isinstance(walls, str) or not isinstance(walls, Iterable):
+            validate.refuse("walls", walls, "a sequence of patch names", error=SurfaceError)
         patches = list(self.patches)
         changes: dict[int, dict[str, Any]] = {self.patch_index(name): {"wall": True} for name in walls}
         for key, given in (("tension", tensions), ("pressure", pressures)):
@@ -289,6 +323,22 @@ class Surface:
             patches[index] = replace(patches[index], **both)
         return self._with(patches=tuple(patches))
 
+    def __copy__(self) -> Surface:
+        """The surface itself: it never changes."""
+        return self
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Surface:
+        """The surface itself: it never changes."""
+        return self
+
+    def __getstate__(self) -> dict[str, object]:
+        """What describes the surface, and the point it is seen from; the rest is computed anew."""
+        return {name: vars(self)[name] for name in (*FIELDS, "origin") if name in vars(self)}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        for name, value in state.items():
+            vars(self)[name] = read_only(value) if isinstance(value, np.ndarray) else value
+
     def patch_faces(self, patches: Sequence[int]) -> Bools:
         """(m,) mask of the triangles of the given patches."""
         return np.isin(self.patch_of_face, patches)
@@ -296,8 +346,7 @@ class Surface:
     def _with(self, **changes: object) -> Surface:
         """A copy that skips the checks already made; the topology travels along."""
         other = object.__new__(type(self))
-        names = ("vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane")
-        for name in (*names, "topology"):
+        for name in (*FIELDS, "topology"):
             other.__dict__[name] = changes.get(name, getattr(self, name))
         if "patches" not in changes:  # seen from one point all along a solver's way
             other.__dict__["origin"] = self.origin

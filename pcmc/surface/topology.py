@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.arrays import Bools, Ints
+from ..base.arrays import Bools, Ints, cached_array, read_only
 from ..base.compiled import compiled
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array  # at run time where it is needed: many surfaces never ask
 
 SHEET, CURVE, POINT = 0, 1, 2
+FEW = 32  # sides in a bucket up to which sorting by insertion is fastest
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +57,23 @@ class Topology:
     edge_of_face: Ints
     valence: Ints
 
-    @cached_property
+    def __post_init__(self) -> None:
+        for array in (self.edges, self.edge_of_face, self.valence):
+            read_only(array)
+
+    @cached_array
     def sense(self) -> Ints:
         """(m,3) int: +1 where a face runs along the edge of ``edge_of_face`` as its row does, else -1."""
         ascends = self.faces[:, [1, 2, 0]] < self.faces[:, [2, 0, 1]]
         return np.where(ascends, np.int8(1), np.int8(-1))
 
-    @cached_property
+    @cached_array
     def one_way_edge(self) -> Bools:
         """(e,) bool: edges between two triangles that run along it the same way: the side changes."""
-        total = np.bincount(self.edge_of_face.ravel(), self.sense.ravel(), len(self.edges))
-        return (self.valence == 2) & (total != 0.0)
+        one_way: Bools = _one_way(self.faces, self.edge_of_face, self.valence)
+        return one_way
 
-    @cached_property
+    @cached_array
     def fans(self) -> Ints:
         """(n,) int: the number of fans of triangles around each vertex that share no edge there.
 
@@ -77,17 +82,17 @@ class Topology:
         count: Ints = fans(self.faces, self.edge_of_face, self.edges, self.vertex_count)
         return count
 
-    @cached_property
+    @cached_array
     def boundary_edge(self) -> Bools:
         """(e,) bool: edges of a single triangle."""
         return self.valence == 1
 
-    @cached_property
+    @cached_array
     def junction_edge(self) -> Bools:
         """(e,) bool: edges where three or more triangles meet."""
         return self.valence >= 3
 
-    @cached_property
+    @cached_array
     def seam_edge(self) -> Bools:
         """(e,) bool: edges between two triangles of different patches, with no wall between them."""
         patches = np.repeat(self.patch_of_face, 3)
@@ -97,27 +102,27 @@ class Topology:
         np.maximum.at(high, self.edge_of_face.ravel(), patches)
         return (self.valence == 2) & (low != high)
 
-    @cached_property
+    @cached_array
     def curve_edge(self) -> Bools:
         """(e,) bool: boundary, junction and seam edges."""
         return self.boundary_edge | self.junction_edge | self.seam_edge
 
-    @cached_property
+    @cached_array
     def vertex_kind(self) -> Ints:
         """(n,) int: SHEET, CURVE or POINT."""
         return vertex_kind(self.edges[self.curve_edge], self.vertex_count)
 
-    @cached_property
+    @cached_array
     def on_boundary(self) -> Bools:
         """(n,) bool: vertices of a boundary edge."""
         return _touched(self.edges[self.boundary_edge], self.vertex_count)
 
-    @cached_property
+    @cached_array
     def on_junction(self) -> Bools:
         """(n,) bool: vertices of a junction or seam edge."""
         return _touched(self.edges[self.junction_edge | self.seam_edge], self.vertex_count)
 
-    @cached_property
+    @cached_array
     def interior(self) -> Bools:
         """(n,) bool: vertices inside a single sheet, where a mean curvature is defined."""
         return ~(self.on_boundary | self.on_junction)
@@ -133,7 +138,7 @@ class Topology:
         boundary = self.edges[self.boundary_edge]
         return self._curves(self.boundary_edge, vertex_kind(boundary, self.vertex_count) == POINT)
 
-    @cached_property
+    @cached_array
     def components(self) -> Ints:
         """(n,) int: label of the connected part that each vertex belongs to."""
         return components(self.edges, self.vertex_count)
@@ -174,12 +179,9 @@ def topology(faces: Ints, patch_of_face: Ints, vertex_count: int) -> Topology:
     >>> t.edges[~t.boundary_edge].tolist(), t.valence.tolist()
     ([[0, 2]], [1, 2, 1, 1, 1])
     """
-    corners = np.concatenate([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]]).astype(np.int64)
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    key, inverse, count = np.unique(low * vertex_count + high, return_inverse=True, return_counts=True)
-    edges = np.stack([key // vertex_count, key % vertex_count], axis=1).astype(np.int32)
-    edge_of_face = inverse.reshape(3, -1).T.astype(np.int32)
-    return Topology(faces, patch_of_face, vertex_count, edges, np.ascontiguousarray(edge_of_face), count)
+    corners = np.ascontiguousarray(faces, dtype=np.int32)
+    edges, edge_of_face, valence = _number_edges(corners, vertex_count)
+    return Topology(faces, patch_of_face, vertex_count, edges, edge_of_face, valence)
 
 
 def vertex_kind(ends: Ints, vertex_count: int) -> Ints:
@@ -189,10 +191,14 @@ def vertex_kind(ends: Ints, vertex_count: int) -> Ints:
 
 
 def components(edges: Ints, vertex_count: int) -> Ints:
-    """(n,) int: label of each vertex's connected part."""
-    from scipy.sparse.csgraph import connected_components
+    """(n,) int: label of each vertex's connected part, in the order of their first vertices.
 
-    return connected_components(_adjacency(edges, vertex_count), directed=False)[1]
+    >>> import numpy as np
+    >>> components(np.array([[3, 1], [2, 4]]), 5).tolist()
+    [0, 1, 2, 1, 2]
+    """
+    label: Ints = _components(np.ascontiguousarray(edges, dtype=np.int32), vertex_count)
+    return label
 
 
 def curve_neighbours(links: Ints, vertex_count: int) -> tuple[Ints, Ints]:
@@ -237,23 +243,95 @@ def _split_at(pairs: Ints, stop: Bools, vertex_count: int) -> tuple[Ints, Ints]:
 
 
 @compiled
+def _join(parent: Ints, a: int, b: int) -> None:
+    """Join the trees of a and b; the root of a tree is its smallest node."""
+    while parent[a] != a:
+        parent[a] = parent[parent[a]]
+        a = parent[a]
+    while parent[b] != b:
+        parent[b] = parent[parent[b]]
+        b = parent[b]
+    parent[max(a, b)] = min(a, b)
+
+
+@compiled
+def _components(edges: Ints, n: int) -> Ints:
+    parent = np.arange(n).astype(np.int32)
+    for e in range(len(edges)):
+        _join(parent, edges[e, 0], edges[e, 1])
+    parts = 0
+    for v in range(n):
+        if parent[v] == v:
+            parent[v] = parts
+            parts += 1
+        else:  # the label of an earlier vertex
+            parent[v] = parent[parent[v]]
+    return parent
+
+
+@compiled
+def _one_way(F: Ints, edge_of_face: Ints, valence: Ints) -> Bools:
+    total = np.zeros(len(valence), dtype=np.int32)
+    for f in range(len(F)):
+        for k in range(3):
+            total[edge_of_face[f, k]] += 1 if F[f, k - 2] < F[f, k - 1] else -1
+    return (valence == 2) & (total != 0)
+
+
+@compiled
 def fans(F: Ints, edge_of_face: Ints, edges: Ints, n: int) -> Ints:
     """(n,) the number of fans of triangles around each vertex that share no edge there."""
-    parent = np.arange(2 * len(edges))  # node 2 e + s is the end edges[e, s] of edge e
+    parent = np.arange(2 * len(edges)).astype(np.int32)  # node 2 e + s is the end edges[e, s] of edge e
     for f in range(len(F)):
         for c in range(3):
             one, two = edge_of_face[f, c - 1], edge_of_face[f, c - 2]
             a = 2 * one + (edges[one, 1] == F[f, c])
             b = 2 * two + (edges[two, 1] == F[f, c])
-            while parent[a] != a:
-                parent[a] = parent[parent[a]]
-                a = parent[a]
-            while parent[b] != b:
-                parent[b] = parent[parent[b]]
-                b = parent[b]
-            parent[max(a, b)] = min(a, b)
+            _join(parent, a, b)
     count = np.zeros(n, dtype=np.int64)
     for k in range(len(parent)):
         if parent[k] == k:
             count[edges[k // 2, k % 2]] += 1
     return count
+
+
+@compiled
+def _number_edges(F: Ints, n: int) -> tuple[Ints, Ints, Ints]:
+    """``edges``, ``edge_of_face`` and ``valence`` of a Topology, in time proportional to the faces.
+
+    The sides of the faces are put into the bucket of their lower vertex and sorted there by the higher one.
+    """
+    first = np.zeros(n + 2, dtype=np.int32)
+    for f in range(len(F)):
+        for k in range(3):
+            first[min(F[f, k - 1], F[f, k - 2]) + 2] += 1
+    for v in range(n):
+        first[v + 2] += first[v + 1]
+    higher, place = np.empty((2, 3 * len(F)), dtype=np.int32)
+    for f in range(len(F)):
+        for k in range(3):
+            low, high = min(F[f, k - 1], F[f, k - 2]), max(F[f, k - 1], F[f, k - 2])
+            at = first[low + 1]
+            higher[at], place[at] = high, 3 * f + k
+            first[low + 1] = at + 1  # in the end the buckets of vertex v start at first[v]
+    edges, valence = np.empty((3 * len(F), 2), dtype=np.int32), np.zeros(3 * len(F), dtype=np.int32)
+    edge_of_face = np.empty(3 * len(F), dtype=np.int32)
+    count = 0
+    for v in range(n):
+        start, end = first[v], first[v + 1]
+        if end - start > FEW:
+            order = np.argsort(higher[start:end])
+            higher[start:end], place[start:end] = higher[start:end][order], place[start:end][order]
+        for i in range(start + 1, end):
+            high, where, j = higher[i], place[i], i
+            while j > start and higher[j - 1] > high:
+                higher[j], place[j] = higher[j - 1], place[j - 1]
+                j -= 1
+            higher[j], place[j] = high, where
+        for i in range(start, end):
+            if i == start or higher[i] != higher[i - 1]:
+                edges[count, 0], edges[count, 1] = v, higher[i]
+                count += 1
+            valence[count - 1] += 1
+            edge_of_face[place[i]] = count - 1
+    return edges[:count].copy(), edge_of_face.reshape(-1, 3), valence[:count].copy()

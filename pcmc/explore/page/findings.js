@@ -72,6 +72,27 @@ export function showFindings(body, findings) {
   }));
 }
 
+/** The answer of the mesh check. */
+export function showCheck(root, check) {
+  root.hidden = false;
+  root.dataset.verdict = check.name;
+  root.querySelector(".word").textContent = capital(`${check.word}: ${check.sentence}`);
+  root.querySelector(".detail").textContent = capital(check.detail);
+  root.querySelector("tbody").replaceChildren(...check.rows.flatMap(({ name, value, limit, order }) => {
+    const [title, values] = [document.createElement("tr"), document.createElement("tr")];
+    values.title = order === null ? "No settled order" : `The error falls with order ${digits(order, 2)} of the edge length`;
+    const head = document.createElement("th");
+    Object.assign(head, { scope: "rowgroup", colSpan: 2, textContent: capital(name) });
+    title.append(head);
+    values.append(...[value, limit].map((text) => {
+      const cell = document.createElement("td");
+      cell.textContent = text;
+      return cell;
+    }));
+    return [title, values];
+  }));
+}
+
 const percentOf = (x) => (x === null ? "–" : `${digits(100 * x, 3)} %`);
 
 /** Values, limits and colour map of the chosen field; null for the patches' own colours. */

@@ -1,0 +1,328 @@
+"""Meshes that are fine where the error comes from, until the quantities wanted are accurate.
+
+A round solves the surface, checks its mesh, and shares out the error among the triangles (``estimator``).
+A triangle of edge length h has a share η ∝ h⁴ where the surface is smooth, and the sum of all shares is
+least, for N triangles, where all are equal: h_new = h (η̄ / η)^(1/4) with √η̄ = Σ √η / N. MMG makes the
+mesh, and the next round begins. At a corner where the surface is like r^λ, equal shares lead to edges
+h ∝ r^(1 - λ/2), and to an error ∝ 1 / N, as for a smooth surface: order 2 in 1/√N.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from ..base import validate
+from ..base.arrays import Floats
+from ..base.errors import MissingExtra, SurfaceError
+from ..meshing.curve_projection import onto_held_curves
+from ..meshing.refinement import Projection
+from ..meshing.remeshing import remesh
+from ..meshing.sizes import limit_growth, triangles_for
+from ..solvers import solve
+from ..solvers.result import Result, Status
+from ..surface import Surface
+from ..surface.geometry import face_areas
+from .estimator import Goal, error_shares
+from .goals import Accuracy, accuracies, check_places, goals_in
+from .mesh_check import BOUNDARIES, MeshCheck, check_mesh, vertex_numbers, with_bar
+
+TRIANGLES = 50_000  # of the mesh returned, by default at most
+ROUNDS = 12
+PATIENCE = 3  # rounds in turn without a limit in sight
+GROWTH = 1.5  # of neighbouring edges
+FINER, COARSER = 0.25, 3.0  # times the edge length, in one round
+LEAST, MOST = 1.5, 3.0  # times as many triangles from round to round
+SPARE = 1.3  # times the triangles foreseen, so that fewer rounds are needed
+FLOOR = 1e-12  # of the largest share: a share below counts as that much
+WORTHWHILE = 0.8  # of the limit of triangles: from here on a further round gains little
+ACCURACY_OF = ("mesh", "limit")
+
+
+class AccuracyStatus(Enum):
+    """How a search for an accuracy ended. The value is a sentence."""
+
+    REACHED = "accuracy reached"
+    NO_LIMIT = "accuracy out of reach: there is no limit as the mesh gets finer"
+    TRIANGLES = "accuracy not reached within the limit of triangles"
+    ROUNDS = "accuracy not reached: further rounds do not help"
+    NOT_AT_REST = "accuracy not reached: the solver finds no equilibrium"
+    STOPPED = "accuracy not reached: stopped on request"
+
+
+End = tuple[AccuracyStatus, str]
+"""How a search ends, and why."""
+
+
+@dataclass(frozen=True, eq=False)
+class AccurateResult:
+    """The end of a search for an accuracy. Every value describes exactly ``surface``.
+
+    Attributes
+    ----------
+    status : how the search ended.
+    result : of the solve that gave ``surface``.
+    check : the mesh check of ``surface``; None if no equilibrium was found.
+    values : a row per quantity wanted: ``quantity``, ``of``, ``value``, ``error``, ``limit``,
+        ``limit_error`` and ``order`` as in a mesh check, and the ``accuracy`` wanted.
+    history : a row per round and quantity: the columns of ``values``, ``round``, ``triangles``, ``verdict``.
+    surfaces : at rest, of each round.
+    detail : why the accuracy is not reached; empty if it is.
+    """
+
+    status: AccuracyStatus
+    result: Result
+    check: MeshCheck | None
+    values: pd.DataFrame
+    history: pd.DataFrame
+    surfaces: tuple[Surface, ...]
+    detail: str = ""
+
+    @property
+    def reached(self) -> bool:
+        """Whether every quantity is as accurate as wanted."""
+        return self.status is AccuracyStatus.REACHED
+
+    @property
+    def surface(self) -> Surface:
+        """The surface with the accurate quantities, or the best one so far."""
+        return self.result.surface
+
+    @property
+    def message(self) -> str:
+        """A sentence, and each quantity with its bar on this mesh and in the limit."""
+        head = "; ".join(filter(None, (self.status.value, self.detail)))
+        parts = [
+            f"{_name(row)} {with_bar(row['value'], row['error'])} on this mesh,"
+            f" {with_bar(row['limit'], row['limit_error'])} in the limit, wanted ± {row['accuracy']:g}"
+            for row in self.values.to_dict("records")
+        ]
+        return "; ".join([f"{head} ({self.surface.m} triangles)", *parts])
+
+
+def solve_to_accuracy(
+    surface: Surface,
+    accuracy: Accuracy,
+    *,
+    accuracy_of: str = "mesh",
+    boundary: str | Projection = "smooth",
+    corners: npt.ArrayLike = (),
+    most_triangles: int = TRIANGLES,
+    callback: Callable[[Mapping[str, Any]], None] | None = None,
+    **options: Any,
+) -> AccurateResult:
+    """Solve on meshes that get finer where the error comes from, until the error bars are small enough.
+
+    Start from a coarse mesh: remeshing keeps the vertices of boundaries and junctions. The error bars
+    are those of ``check_mesh``.
+
+    Parameters
+    ----------
+    surface : the surface to start from.
+    accuracy : the error bar wanted, by quantity, in its unit: ``{"height": 1e-3}`` or ``"height=1e-3"``.
+        Quantities are those of the mesh check: height, area, volume, energy, reaction, thrust, reaction
+        per length, lowest eigenvalue; with a patch, as in ``"height of north"``, that patch's alone.
+    accuracy_of : ``"mesh"``, the value on the mesh returned is to be so accurate; ``"limit"``, the
+        extrapolated value is, which needs far fewer triangles.
+    boundary, corners : as in ``check_mesh``: where new vertices of a held boundary or held line go. The
+        smooth curves are those through the vertices of the first mesh.
+    most_triangles : the most that the mesh returned may have; the check solves on 16 times as many.
+    callback : called after each round with a row of numbers. StopIteration in it, or Ctrl-C, ends the
+        search with the best surface so far.
+    options : of ``pcmc.solve``.
+
+    Raises
+    ------
+    OptionError
+        For an unknown quantity, with the nearest known one, or an accuracy that is not positive.
+    MissingExtra
+        Without the library mmgpy.
+
+    Examples
+    --------
+    >>> from pcmc.plan import Plan
+    >>> roof = Plan([[0, 0], [4, 0], [4, 3], [0, 3]], tension=4.0, edge_length=1.0).surface()
+    >>> fine = solve_to_accuracy(roof, "height=0.02")
+    >>> fine.status.name, bool(fine.values.error[0] <= 0.02), fine.surface.m < 500
+    ('REACHED', True, True)
+    """
+    wanted = accuracies(accuracy)
+    validate.choice("accuracy_of", accuracy_of, ACCURACY_OF)
+    validate.integer("most_triangles", most_triangles, least=1)
+    if not isinstance(surface, Surface):
+        validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
+    check_places(wanted, surface)
+    _require_mmg()
+    project: Projection | None
+    if callable(boundary):
+        project = boundary
+    else:
+        validate.choice("boundary", boundary, BOUNDARIES)
+        sharp = vertex_numbers(corners, surface.n)
+        project = onto_held_curves(surface, corners=sharp) if boundary == "smooth" else None
+    return _Search(wanted, accuracy_of, project, most_triangles, callback, options).run(surface)
+
+
+def size_field(surface: Surface, shares: Floats, triangles: float, growth: float = GROWTH) -> Floats:
+    """(n,) edge lengths for a mesh of so many triangles whose shares in the error are all equal.
+
+    Parameters
+    ----------
+    shares : (m,) ≥ 0, of the triangles in the error.
+    triangles : how many the new mesh has, about.
+
+    Examples
+    --------
+    >>> from pcmc import Patch
+    >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
+    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+    >>> size_field(square, np.array([1.0, 1.0]), 20).round(3).tolist()
+    [0.34, 0.34, 0.34, 0.34]
+    """
+    F, areas = surface.faces, face_areas(surface.vertices[surface.faces])
+    root = np.sqrt(np.maximum(shares, FLOOR * shares.max(initial=0.0)))
+    mean = root.sum() / triangles
+    factor = np.clip(np.sqrt(mean / np.where(root > 0.0, root, mean or 1.0)), FINER, COARSER)
+    length = np.sqrt(areas * 4.0 / math.sqrt(3.0)) * factor
+    count = np.maximum(np.bincount(F.ravel(), minlength=surface.n), 1)
+    wanted = np.exp(np.bincount(F.ravel(), np.repeat(np.log(length), 3), surface.n) / count)
+    for _ in range(6):  # limits to growth make edges shorter and triangles more
+        size = limit_growth(surface.vertices, surface.topology.edges, wanted, growth)
+        wanted *= math.sqrt(triangles_for(areas, size[F].mean(axis=1)) / triangles)
+    return limit_growth(surface.vertices, surface.topology.edges, wanted, growth)
+
+
+@dataclass(frozen=True, eq=False)
+class _Round:
+    """A surface at rest, its check, the quantities wanted, and the largest error bar over its accuracy."""
+
+    result: Result
+    check: MeshCheck
+    goals: Mapping[Goal, float]
+    values: pd.DataFrame
+    excess: float
+
+    @classmethod
+    def of(cls, result: Result, check: MeshCheck, wanted: Mapping[str, float], accuracy_of: str) -> _Round:
+        goals = goals_in(check.table, wanted)
+        names = list(zip(check.table["quantity"], check.table["of"], strict=True))
+        rows = check.table.iloc[[names.index(goal) for goal in goals]].reset_index(drop=True)
+        values = rows.assign(accuracy=list(goals.values()))
+        bar = values["error" if accuracy_of == "mesh" else "limit_error"]
+        return cls(result, check, goals, values, float((bar / values["accuracy"]).max()))
+
+    @property
+    def settled(self) -> bool:
+        """Whether finer meshes have this surface, and all of its quantities a limit."""
+        return self.check.persists and math.isfinite(self.excess)
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The numbers for the history."""
+        return {"triangles": self.result.surface.m, "verdict": self.check.verdict.name.lower()}
+
+
+@dataclass(eq=False)
+class _Search:
+    """The rounds of a search for an accuracy, and the first solve."""
+
+    wanted: Mapping[str, float]
+    accuracy_of: str
+    project: Projection | None
+    most_triangles: int
+    callback: Callable[[Mapping[str, Any]], None] | None
+    options: Mapping[str, Any]
+    rounds: list[_Round] = field(default_factory=list)
+
+    def run(self, surface: Surface) -> AccurateResult:
+        """Rounds until one of the ends."""
+        first = result = solve(surface, **self.options)
+        status, detail = AccuracyStatus.ROUNDS, f"after {ROUNDS} rounds"
+        try:
+            for _ in range(ROUNDS):
+                if ended := self._unsolved(result) or self._round(result):
+                    status, detail = ended
+                    break
+                surface = self._remeshed(self.rounds[-1])
+                result = solve(surface, **self.options)
+        except (StopIteration, KeyboardInterrupt):
+            status, detail = AccuracyStatus.STOPPED, ""
+        return self._end(status, detail, first)
+
+    def _unsolved(self, result: Result) -> End | None:
+        if result.converged:
+            return None
+        if result.status is Status.STOPPED:
+            return AccuracyStatus.STOPPED, ""
+        return AccuracyStatus.NOT_AT_REST, f"on {result.surface.m} triangles: {result.message}"
+
+    def _round(self, result: Result) -> End | None:
+        """Check the mesh of a surface at rest; the end of the search if this is the last round."""
+        check = check_mesh(result, boundary=self.project or "polygon")
+        here = _Round.of(result, check, self.wanted, self.accuracy_of)
+        self.rounds.append(here)
+        if self.callback is not None:
+            self.callback({"round": len(self.rounds), **here.record, "excess": here.excess})
+        if here.excess <= 1.0 and check.persists:
+            return AccuracyStatus.REACHED, ""
+        if len(self.rounds) >= PATIENCE and not any(r.settled for r in self.rounds[-PATIENCE:]):
+            return AccuracyStatus.NO_LIMIT, _why_no_limit(here)
+        m = result.surface.m
+        if m < WORTHWHILE * self.most_triangles:
+            return None
+        known = math.isfinite(here.excess)
+        needed = f"about {m * here.excess:.2g} are needed" if known else "the error is not known"
+        hint = f"raise most_triangles= (now {self.most_triangles}), or ask for less accuracy"
+        if self.accuracy_of == "mesh":
+            hint += ", or for that of the limit alone (accuracy_of='limit')"
+        return AccuracyStatus.TRIANGLES, f"{needed}; {hint}"
+
+    def _remeshed(self, here: _Round) -> Surface:
+        """The surface on a mesh with equal shares of the error.
+
+        With equal shares N triangles have the error (Σ √η)² / N; the m triangles here have Σ η.
+        """
+        surface, fine = here.result.surface, here.check.surfaces[1:2]
+        if fine:
+            shares = error_shares(surface, fine[0], here.goals)
+        else:  # no finer mesh has this surface: finer everywhere
+            shares = face_areas(surface.vertices[surface.faces]) ** 2
+        evenness = float(np.sqrt(shares).sum() ** 2 / shares.sum()) / surface.m if shares.any() else 1.0
+        factor = SPARE * evenness * here.excess if math.isfinite(here.excess) else MOST
+        triangles = min(float(np.clip(factor, LEAST, MOST)) * surface.m, self.most_triangles)
+        return remesh(surface, size_field(surface, shares, triangles), growth=GROWTH, project=self.project)
+
+    def _end(self, status: AccuracyStatus, detail: str, first: Result) -> AccurateResult:
+        history = [r.values.assign(round=k + 1, **r.record) for k, r in enumerate(self.rounds)]
+        rows = pd.concat(history, ignore_index=True) if history else pd.DataFrame()
+        surfaces = tuple(r.result.surface for r in self.rounds)
+        if not self.rounds:
+            return AccurateResult(status, first, None, pd.DataFrame(), rows, surfaces, detail)
+        last = self.rounds[-1]
+        return AccurateResult(status, last.result, last.check, last.values, rows, surfaces, detail)
+
+
+def _why_no_limit(here: _Round) -> str:
+    """The mesh check's reason, or the quantities whose values do not settle."""
+    if not here.check.persists:
+        return "; ".join(filter(None, (here.check.detail, here.check.advice)))
+    rows = here.values[~np.isfinite(here.values["error"])]
+    names = ", ".join(map(_name, rows.to_dict("records")))
+    return f"the values of {names} do not settle from mesh to mesh"
+
+
+def _name(row: Mapping[Any, Any]) -> str:
+    return f"{row['quantity']} of {row['of']}" if row["of"] else str(row["quantity"])
+
+
+def _require_mmg() -> None:
+    if importlib.util.find_spec("mmgpy") is None:
+        raise MissingExtra("mmgpy", "remesh")

@@ -1,0 +1,201 @@
+"""Where the error of a quantity comes from: a share for each triangle, from two nested meshes.
+
+A surface at rest on a mesh is compared with the surface at rest on the mesh's 1→4 refinement. The
+interpolation error along edge e = (a, b) is what the finer mesh adds to it,
+
+    d_e = x_e - (x_a + x_b) / 2,
+
+with x_e the vertex on e. A quantity q responds to forces by its dual field z, H z = ∂q/∂X with H the second
+variation of E in the motion space, and has an interpolation error d_e(z) of its own. Then the mesh changes
+q by about the energy product of the two errors, plus what the held vertices contribute that move
+to a curved boundary:
+
+    η_e = k_e |d_e| |d_e(z)| + |(∂q/∂X - H z) · d_e| at held vertices,   k_e = √3 Σ α over the triangles at e
+
+k_e is the stiffness of a vertex in the middle of two equilateral triangles. The energy is its own dual:
+η_e = ½ k_e |d_e|² + |∇E · d_e|. Becker and Rannacher 2001 weight a residual by the dual in this way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from ..base.arrays import Floats, Ints
+from ..certificate.balance import held_lengths, reactions
+from ..contact.pinching import standing_part
+from ..design.targets import Target, measure
+from ..energy.functional import energy_and_gradient
+from ..energy.motion_space import motion_space
+from ..energy.rigid_motions import rigid_modes, rigid_motions
+from ..stability.factorisation import SingularMatrix
+from ..stability.modes import Stiffness, lowest, stiffness
+from ..surface import Surface
+
+STEP = 1e-5  # of the size: length of the steps that differences of ∇E are taken over
+
+QUANTITIES = (
+    "height",
+    "area",
+    "volume",
+    "energy",
+    "reaction",
+    "thrust",
+    "reaction per length",
+    "lowest eigenvalue",
+)
+Goal = tuple[str, str]
+"""A quantity and the patch or boundary it belongs to, as in a mesh check; "" for the whole."""
+
+
+def error_shares(coarse: Surface, fine: Surface, goals: Mapping[Goal, float]) -> Floats:
+    """(m,) the share of each coarse triangle in the errors of quantities, each in units of its accuracy.
+
+    Parameters
+    ----------
+    coarse : a surface at rest.
+    fine : its 1→4 refinement, at rest as well.
+    goals : the accuracy wanted of each quantity. Several are added up.
+
+    Examples
+    --------
+    On the cap all triangles are alike, and so are their shares in the energy's error:
+
+    >>> from generators import spherical_cap
+    >>> from pcmc import solve
+    >>> from pcmc.meshing.refinement import refine
+    >>> cap = solve(spherical_cap(0.5)).surface
+    >>> shares = error_shares(cap, solve(refine(cap)).surface, {("energy", ""): 1e-3})
+    >>> len(shares) == cap.m, bool(shares.min() > 0.02 * shares.max())
+    (True, True)
+    """
+    here = _FineMesh.of(coarse, fine)
+    total = np.zeros(len(coarse.topology.edges))
+    for goal, accuracy in goals.items():
+        total += here.shares(goal) / accuracy
+    edge_of_face = coarse.topology.edge_of_face
+    faces = np.bincount(edge_of_face.ravel(), minlength=len(total))
+    return np.asarray((total / np.maximum(faces, 1))[edge_of_face].sum(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class _FineMesh:
+    """The fine surface at rest, its second variation, and the interpolation errors of the coarse one."""
+
+    coarse: Surface
+    fine: Surface
+    system: Stiffness | None
+    stiffness: Floats
+    free: Floats
+    held: Floats
+
+    @classmethod
+    def of(cls, coarse: Surface, fine: Surface) -> _FineMesh:
+        part = standing_part(fine)
+        shown, X = part.surface, part.surface.vertices
+        space = motion_space(shown, part.classes, X)
+        try:
+            system = stiffness(shown, part.classes, space, rigid_modes(space, rigid_motions(shown), X))
+        except SingularMatrix:
+            system = None  # the duals are unknown; every quantity takes the shares of the energy
+        tension = np.repeat(coarse.tensions[coarse.patch_of_face], 3)
+        edge_of_face = coarse.topology.edge_of_face.ravel()
+        k: Floats = np.bincount(edge_of_face, tension, len(coarse.topology.edges)).astype(float)
+        missing = np.zeros_like(X)
+        missing[coarse.n :] = _interpolation_error(coarse, X)
+        held = np.where(fine.fixed[:, None], missing, 0.0)
+        return cls(coarse, shown, system, k, space.project(missing), held)
+
+    def shares(self, goal: Goal) -> Floats:
+        """(e,) the share of each coarse edge in the error of a quantity."""
+        quantity, of = goal
+        n, force = self.coarse.n, energy_and_gradient(self.fine, supports=False)[1]
+        missing = np.linalg.norm(self.free[n:], axis=1)
+        if quantity == "energy" or self.system is None:
+            at_held = np.abs(np.einsum("nd,nd->n", force, self.held))[n:]
+            return np.asarray(0.5 * self.stiffness * missing**2 + at_held)
+        own = np.zeros(len(missing))
+        if quantity == "lowest eigenvalue":
+            mode = lowest(self.system, 1)[1][0]
+            slope = _along(self.fine, mode, second=True)
+            own = self.stiffness * self._missing(mode) ** 2
+        else:
+            slope = _slope(self.fine, quantity, of)
+        dual = self.system.space.to_vectors(self.system.factor.solve(self.system.space.to_coordinates(slope)))
+        reaction = slope - _along(self.fine, dual)
+        at_held = np.abs(np.einsum("nd,nd->n", reaction, self.held))[n:]
+        return np.asarray(self.stiffness * missing * self._missing(dual) + at_held + own)
+
+    def _missing(self, field: Floats) -> Floats:
+        """(e,) size of the interpolation error of a field of motions, in the motion space."""
+        error = np.zeros_like(field)
+        error[self.coarse.n :] = _interpolation_error(self.coarse, field)
+        space = self.system.space if self.system is not None else None
+        error = error if space is None else space.project(error)
+        return np.asarray(np.linalg.norm(error[self.coarse.n :], axis=1))
+
+
+def _interpolation_error(coarse: Surface, field: Floats) -> Floats:
+    """(e,3) the field at each new vertex less the mean of the ends of its edge."""
+    start, end = coarse.topology.edges.T
+    return np.asarray(field[coarse.n :] - 0.5 * (field[start] + field[end]))
+
+
+def _slope(surface: Surface, quantity: str, of: str) -> Floats:
+    """(n,3) the derivative of a quantity by the positions."""
+    if quantity in ("height", "area", "volume"):
+        return measure(surface, Target({"height": "apex"}.get(quantity, quantity), of or None)).by_position
+    forces, share = reactions(surface), held_lengths(surface)
+    vertices = _held_vertices(surface, of)
+    pull = np.zeros_like(forces)
+    if quantity == "reaction per length":
+        size = np.linalg.norm(forces[vertices], axis=1) / share[vertices]
+        top = vertices[size.argmax()]
+        pull[top] = forces[top] / (np.linalg.norm(forces[top]) or 1.0) / share[top]
+    elif quantity == "thrust":
+        total = surface.plane.along(forces[vertices].sum(axis=0))
+        pull[vertices] = total / (np.linalg.norm(total) or 1.0)
+    else:
+        pull[vertices] = surface.plane.normal
+    return _reaction_slope(surface, pull)
+
+
+def _held_vertices(surface: Surface, of: str) -> Ints:
+    """The vertices of the held boundary, or of its curves with the name of a patch."""
+    held = held_lengths(surface) > 0.0
+    patch = of.split(" near (")[0]
+    names = [" | ".join(surface.patches[i].name for i in c.sheets) for c in surface.topology.boundary_loops]
+    curves = zip(names, surface.topology.boundary_loops, strict=True)
+    chosen = [c.vertices[held[c.vertices]] for name, c in curves if name == patch]
+    return np.unique(np.concatenate(chosen)) if chosen else np.flatnonzero(held)
+
+
+def _reaction_slope(surface: Surface, pull: Floats) -> Floats:
+    """(n,3) the derivative of Σ ⟨pull, f⟩ over the vertices, f = Σ α ∂A - ⅓ Σ p A_T ν_T the forces there.
+
+    A_T ν_T changes along u by (q - r) × u / 2 as the corner opposite the side q, r moves.
+    """
+    X, F = surface.vertices, surface.faces
+    weights = surface.retensioned(pressures=dict.fromkeys((p.name for p in surface.patches), 0.0))
+    slope = _along(weights, pull)
+    sixth = surface.pressures[surface.patch_of_face][:, None] / 6.0 * pull[F].sum(axis=1)
+    for c in range(3):
+        np.add.at(slope, F[:, c], -np.cross(X[F[:, c - 2]] - X[F[:, c - 1]], sixth))
+    return slope
+
+
+def _along(surface: Surface, field: Floats, second: bool = False) -> Floats:
+    """(n,3) the derivative of ∇E along a field, or the second one, by differences."""
+    most = float(np.linalg.norm(field, axis=1).max())
+    if most == 0.0:
+        return np.zeros_like(field)
+    step = (sqrt(STEP) if second else STEP) * surface.size / most
+    X = surface.vertices
+    ahead, back = (energy_and_gradient(surface, X + s * field, supports=False)[1] for s in (step, -step))
+    if not second:
+        return np.asarray((ahead - back) / (2.0 * step))
+    here = energy_and_gradient(surface, supports=False)[1]
+    return np.asarray((ahead + back - 2.0 * here) / step**2)

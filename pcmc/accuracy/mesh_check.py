@@ -1,0 +1,285 @@
+"""The mesh check: the same surface on finer meshes, with an error bar for everything read from it."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from ..base import validate
+from ..base.arrays import Ints
+from ..base.errors import FreeSurfaceWarning, OptionError, SurfaceError
+from ..certificate import Certificate, certify
+from ..meshing.held_curves import curve_doubt, held_corners, smooth_midpoints
+from ..meshing.refinement import Projection, refine
+from ..solvers import solve
+from ..solvers.result import Callback, Result, Status
+from ..surface import Surface
+from .extrapolation import extrapolate
+from .persistence import MeshVerdict, compared, lost, shape_order
+from .quantities import Key, Reading, readings
+
+MOST = 4_000_000  # triangles of the finest mesh, by default
+STEPS = 60  # of the solver on each finer mesh: it starts near
+BOUNDARIES = ("smooth", "polygon")
+
+
+@dataclass(frozen=True, eq=False)
+class MeshCheck:
+    """How far a surface at rest depends on its mesh. ``print`` shows the table.
+
+    Attributes
+    ----------
+    verdict, detail : the verdict, and its reason.
+    place : (x, y, z) of the place that the reason names; None where it names none.
+    advice : what to type to get a surface that does not depend on its mesh; empty where nothing is known.
+    table : a row per quantity, with the columns
+
+        - ``quantity``, ``of``: its name; the patch or boundary it belongs to, empty for the whole;
+        - ``value``: on this mesh; ``error``: its bar, how far the limit may be from it;
+        - ``limit``: the value as edges go to zero; ``limit_error``: its bar;
+        - ``order``: observed p of error ∝ h^p, h the edge length.
+
+        Without a limit in sight ``limit`` is NaN and the bars are infinite. ``order`` is NaN for what is
+        the same on all meshes, to rounding, and for what swings.
+    surfaces : on each mesh at rest, the one given first; a solve that failed is left out.
+    """
+
+    verdict: MeshVerdict
+    detail: str
+    place: tuple[float, float, float] | None
+    advice: str
+    table: pd.DataFrame
+    surfaces: tuple[Surface, ...]
+
+    @property
+    def persists(self) -> bool:
+        """Whether finer meshes have the same surface."""
+        return self.verdict is MeshVerdict.PERSISTS
+
+    def row(self, quantity: str, of: str = "") -> pd.Series[Any]:
+        """The row of one quantity.
+
+        Raises
+        ------
+        OptionError : the table has no such row.
+        """
+        pairs = zip(self.table["quantity"].tolist(), self.table["of"].tolist(), strict=True)
+        known = [_name(*pair) for pair in pairs]
+        return self.table.iloc[known.index(validate.choice("quantity", _name(quantity, of), known))]
+
+    def numbers(self) -> dict[str, Any]:
+        """The verdict, and bar, limit, its bar and order of the quantities of the whole surface, for tables.
+
+        The height is that of the highest patch. Keys are such as ``height_error`` and ``volume_limit``.
+        """
+        verdict = self.verdict.name.lower().replace("_", " ")
+        found: dict[str, Any] = {"mesh_verdict": verdict, "mesh_detail": self.detail}
+        heights = self.table[self.table["quantity"] == "height"].nlargest(1, "value")
+        for row in pd.concat([heights, self.table[self.table["of"] == ""]]).to_dict("records"):
+            for column in ("error", "limit", "limit_error", "order"):
+                found[f"{row['quantity']}_{column}".replace(" ", "_")] = float(row[column])
+        return found
+
+    def brief(self) -> str:
+        """The verdict, its reason, and the bars of the heights and of what belongs to the whole surface."""
+        main = self.table[(self.table.of == "") | (self.table.quantity == "height")]
+        return "\n".join([*self._head(), _text_table(main)])
+
+    def __str__(self) -> str:
+        return "\n".join([*self._head(), "", _text_table(self.table)])
+
+    def _head(self) -> list[str]:
+        return [part for part in (self.verdict.value, self.detail, self.advice) if part]
+
+
+def check_mesh(
+    surface: Surface | Result,
+    meshes: int = 3,
+    *,
+    boundary: str | Projection = "smooth",
+    corners: npt.ArrayLike = (),
+    callback: Callback | None = None,
+    most_triangles: int = MOST,
+) -> MeshCheck:
+    """Solve a surface at rest again on finer meshes, and compare.
+
+    Each finer mesh has every triangle of the last one cut into four. The solver starts on it from the last
+    surface and looks for the stationary point near it: a saddle is followed as a saddle. What a designer
+    reads gets an error bar; see ``MeshCheck``. The index, the shape and the contact of walls with Π decide
+    the verdict.
+
+    Parameters
+    ----------
+    surface : at rest, or the result of a solver that converged.
+    meshes : how many in all, this one included, ≥ 2. With 2 there is no observed order, and order 2 is
+        taken with a wide bar; more than 3 make the limit sharper. The finest has 4^(meshes - 1) times as
+        many triangles.
+    boundary : where new vertices of a held boundary or held line go: ``"smooth"``, on smooth curves
+        through the old ones, which turn by up to 40° at a vertex (straight lines stay straight);
+        ``"polygon"``, on the straight edges; or a function (k,3) → (k,3) that puts points of the edges
+        on the exact curve. Vertices that slide on Π stay on it.
+    corners : vertices (k,) at which held curves have corners though they turn by less.
+    callback : called with a ``Progress`` after each step of the solver. Where it raises StopIteration,
+        the check ends with KeyboardInterrupt, as with Ctrl-C.
+    most_triangles : the most that the finest mesh may have.
+
+    Raises
+    ------
+    OptionError
+        For ``meshes`` below 2, another ``boundary``, ``corners`` that are no vertices, or more than
+        ``most_triangles``.
+    SurfaceError
+        If the surface is not at rest.
+
+    Examples
+    --------
+    >>> from pcmc import Patch, solve
+    >>> angle = 2 * np.pi * np.arange(12) / 12
+    >>> rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> disc = Surface([[0, 0, 0.5], *rim], [[0, k + 1, (k + 1) % 12 + 1] for k in range(12)], [0] * 12,
+    ...                [Patch("cap", 0.6)], fixed=range(1, 13))
+    >>> check = check_mesh(solve(disc))
+    >>> check.verdict.name, [s.m for s in check.surfaces]
+    ('PERSISTS', [12, 48, 192])
+    >>> row, exact = check.row("volume"), 0.9239415226
+    >>> bool(abs(row.value - exact) <= row.error), bool(abs(row.limit - exact) <= row.limit_error)
+    (True, True)
+    """
+    validate.integer("meshes", meshes, least=2)
+    if not callable(boundary):
+        validate.choice("boundary", boundary, BOUNDARIES)
+    first = surface.surface if isinstance(surface, Result) else surface
+    if not isinstance(first, Surface):
+        validate.refuse("surface", type(first).__name__, "a Surface or a Result", error=SurfaceError)
+    validate.integer("most_triangles", most_triangles)
+    sharp = np.union1d(vertex_numbers(corners, first.n), held_corners(first))
+    finest = first.m * 4 ** (meshes - 1)
+    if finest > most_triangles:
+        raise OptionError(
+            f"the finest of {meshes} meshes would have {finest} triangles, more than most_triangles ="
+            f" {most_triangles}; ask for fewer meshes, or raise most_triangles=",
+            what="meshes",
+            found=finest,
+            expected=most_triangles,
+        )
+    certificate = surface.certificate if isinstance(surface, Result) else certify(surface)
+    _refuse_unsolved(certificate)
+    surfaces, certificates = [first], [certificate]
+    finding, order = None, None
+    for _ in range(meshes - 1):
+        result = _solved(_refined(surfaces[-1], boundary, sharp), callback)
+        if not result.converged or result.certificate.index is None:
+            finding, order = lost(result), -np.inf
+            break
+        surfaces.append(result.surface)
+        certificates.append(result.certificate)
+    if finding is None or len(surfaces) > 1:
+        found = compared(surfaces, certificates)
+        finding = found if finding is None or found.verdict is MeshVerdict.CHANGES else finding
+    table = _table(
+        [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)],
+        shape_order=shape_order(surfaces) if order is None else order,
+        curve_doubt=curve_doubt(first, corners=sharp) if boundary == "smooth" else 0.0,
+    )
+    return MeshCheck(finding.verdict, finding.reason, finding.place, finding.advice, table, tuple(surfaces))
+
+
+def _refuse_unsolved(certificate: Certificate) -> None:
+    if certificate.index is None:
+        message = f"check_mesh needs a surface at rest; solve it first ({certificate.verdict.value}"
+        message += f"; {certificate.detail})" if certificate.detail else ")"
+        raise SurfaceError(message, what="surface", found=certificate.residual)
+
+
+def vertex_numbers(corners: npt.ArrayLike, n: int) -> Ints:
+    """The numbers (k,) of the corners, checked."""
+    numbers = np.asarray(corners)
+    whole = numbers.size == 0 or (numbers.ndim == 1 and np.issubdtype(numbers.dtype, np.integer))
+    if not whole or (numbers.size and not (numbers.min() >= 0 and numbers.max() < n)):
+        validate.refuse("corners", corners, f"whole numbers of vertices, 0..{n - 1}")
+    return numbers.astype(np.int64)
+
+
+def _refined(surface: Surface, boundary: str | Projection, corners: Ints) -> Surface:
+    """The surface on a mesh with four times as many triangles."""
+    project = boundary if callable(boundary) else None
+    if boundary == "smooth":
+        project = lambda _: smooth_midpoints(surface, corners=corners)  # noqa: E731
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FreeSurfaceWarning)  # given with the first surface
+        return refine(surface, 1, project)
+
+
+def _solved(start: Surface, callback: Callback | None) -> Result:
+    result = solve(start, "newton", callback, target="stationary", iterations=STEPS)
+    if result.status is Status.STOPPED:
+        raise KeyboardInterrupt
+    return result
+
+
+def _table(found: Sequence[dict[Key, Reading]], **doubts: float) -> pd.DataFrame:
+    """Values, limits, bars and orders; NaN for a quantity that a finer mesh does not have."""
+    first = list(found[0].values())
+    estimates = np.array([[_of(one, key, "estimate") for key in found[0]] for one in found])
+    rounding = np.array([[_of(one, key, "rounding") for key in found[0]] for one in found])
+    value = np.array([reading.value for reading in first])
+    result = extrapolate(estimates, np.nanmax(rounding, axis=0), value, **doubts)
+    return pd.DataFrame(
+        {
+            "quantity": [reading.quantity for reading in first],
+            "of": [reading.of for reading in first],
+            "value": value,
+            "error": result.error,
+            "limit": result.limit,
+            "limit_error": result.limit_error,
+            "order": result.order,
+        }
+    )
+
+
+def _name(quantity: str, of: str) -> str:
+    return f"{quantity} of {of}" if of else quantity
+
+
+def _of(one: dict[Key, Reading], key: Key, name: str) -> float:
+    return float(getattr(one[key], name)) if key in one else math.nan
+
+
+def _text_table(table: pd.DataFrame) -> str:
+    """Lines with as many digits as the bars let stand."""
+    lines = pd.DataFrame(
+        {
+            "quantity": table.quantity,
+            "of": table.of,
+            "on this mesh": [with_bar(*pair) for pair in zip(table.value, table.error, strict=True)],
+            "limit": [with_bar(*pair) for pair in zip(table.limit, table.limit_error, strict=True)],
+            "order": ["-" if math.isnan(p) else f"{p:.1f}" for p in table.order],
+        }
+    )
+    return lines.to_string(index=False)
+
+
+def with_bar(value: float, bar: float) -> str:
+    """A value and its bar, with two digits of the bar.
+
+    >>> with_bar(2.71828, 0.0123), with_bar(1234.5, 45.0), with_bar(2.0, math.inf), with_bar(2.0, 1e-12)
+    ('2.718 ± 0.012', '1234 ± 45', '2 ± unknown', '2 ± 1e-12')
+    """
+    if math.isnan(value):
+        return "none in sight"
+    if not math.isfinite(bar):
+        return f"{value:.4g} ± unknown"
+    if bar <= 1e-9 * abs(value) or bar == 0.0:
+        return f"{value:.8g} ± {bar:.0e}"
+    digits = 1 - math.floor(math.log10(bar))
+    if -6 <= digits <= 9:
+        shown = max(digits, 0)
+        return f"{round(value, digits):.{shown}f} ± {round(bar, digits):.{shown}f}"
+    return f"{value:.4g} ± {bar:.2g}"

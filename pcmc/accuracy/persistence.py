@@ -1,0 +1,217 @@
+"""Whether a surface is found again on finer meshes, and if not what it becomes, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from itertools import pairwise
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..certificate import Certificate
+from ..contact.pinching import standing_part
+from ..energy.functional import energy_and_gradient
+from ..energy.motion_space import motion_space
+from ..meshing.quality import triangle_quality
+from ..solvers.result import Result
+from ..surface import Surface
+from ..surface.geometry import segment_lengths
+
+FAR = 0.25  # of the surface's extent: a finer surface this far away is another shape
+FLAT = 0.1  # of its size: the least extent that counts
+STILL = 1e-8  # of its size: moves up to here are none
+RESTED = 0.1  # of a junction's length: a smaller change of contact is none
+REACH = 0.3  # of a junction's length: this near to it a place belongs to it
+FURTHER = 3  # meshes ahead at which an eigenvalue that only falls is foreseen
+POOR = 0.05  # triangle quality that shows where a solve failed
+
+
+class MeshVerdict(Enum):
+    """Whether a surface depends on its mesh. The value is a sentence."""
+
+    PERSISTS = "persists: finer meshes have the same surface"
+    CHANGES = "changes: finer meshes have another surface"
+    HELD_BY_MESH = "held by the mesh: finer meshes do not hold this surface"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A verdict, its reason, the place it speaks of (or None), and what to type (or nothing)."""
+
+    verdict: MeshVerdict
+    reason: str
+    place: tuple[float, float, float] | None = None
+    advice: str = ""
+
+
+def lost(result: Result) -> Finding:
+    """The finding where the solver reaches no equilibrium on a finer mesh."""
+    surface = result.surface
+    quality = triangle_quality(surface.vertices, surface.faces)
+    quality[standing_part(surface).walls.pinchable[surface.patch_of_face]] = np.inf
+    worst = int(quality.argmin())
+    if quality[worst] < POOR:
+        place = surface.vertices[surface.faces[worst]].mean(axis=0)
+        what = f"its triangles collapse near {_text(place)}"
+    else:
+        part = standing_part(surface)
+        space = motion_space(part.surface, part.classes, surface.vertices)
+        left = np.linalg.norm(space.project(energy_and_gradient(part.surface, surface.vertices)[1]), axis=1)
+        place = surface.vertices[left.argmax()]
+        what = f"its forces do not come to rest near {_text(place)}"
+    reason = f"on {surface.m} triangles the solver finds no equilibrium near this one: {what}"
+    return _at(MeshVerdict.HELD_BY_MESH, surface, reason, place)
+
+
+def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -> Finding:
+    """The finding about surfaces at rest on meshes each of which refines the one before."""
+    for surface, certificate in zip(surfaces[1:], certificates[1:], strict=True):
+        if certificate.index != certificates[0].index:
+            return _other_index(surface, certificate, certificates[0])
+    first = surfaces[0]
+    size = max(float(np.ptp(first.plane.height(first.vertices))), FLAT * first.size)
+    moves = [_moves(a, b) for a, b in pairwise(surfaces)]
+    for (surface, fine), move in zip(pairwise(surfaces), moves, strict=True):
+        farthest = int(move.argmax())
+        if move[farthest] > FAR * size:
+            place = surface.vertices[farthest]
+            reason = (
+                f"on {fine.m} triangles it is another shape, {move[farthest]:.3g} away near {_text(place)}"
+            )
+            return _at(MeshVerdict.CHANGES, surface, reason, place)
+        if contact := _other_contact(surface, fine):
+            return contact
+    mean = [_mean(move) for move in moves]
+    if shape_order(surfaces) < 0.0:
+        place = surfaces[-2].vertices[int(moves[-1].argmax())]
+        reason = (
+            f"each finer surface is farther from the last one (by {mean[-2]:.2g}, then {mean[-1]:.2g} in the"
+            f" mean), most near {_text(place)}"
+        )
+        return _at(MeshVerdict.HELD_BY_MESH, surfaces[-1], reason, place)
+    return _stability(surfaces, certificates)
+
+
+def shape_order(surfaces: Sequence[Surface]) -> float:
+    """Observed order of the surface itself: log2 of the last two mean moves from mesh to mesh.
+
+    Infinite with fewer than three meshes, or where the last move is none.
+    """
+    if len(surfaces) < 3:
+        return np.inf
+    before, last = (_mean(_moves(a, b)) for a, b in pairwise(surfaces[-3:]))
+    return float(np.log2(before / last)) if last > STILL * surfaces[0].size else np.inf
+
+
+def _mean(moves: Floats) -> float:
+    """Root mean square."""
+    return float(np.sqrt((moves**2).mean()))
+
+
+def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -> Finding:
+    """The finding from the trend of the lowest eigenvalue, where all else persists."""
+    index, finest = certificates[0].index, surfaces[-1]
+    kind = "stable" if index == 0 else f"a saddle of index {index}"
+    meshes = " and ".join(str(surface.m) for surface in surfaces[1:])
+    reason = f"{kind} on {meshes} triangles too"
+    lowest = [float(c.eigenvalues[0]) for c in certificates if len(c.eigenvalues)]
+    if index != 0 or len(lowest) < max(3, len(surfaces)):
+        return Finding(MeshVerdict.PERSISTS, reason)
+    step, before = lowest[-1] - lowest[-2], lowest[-2] - lowest[-3]
+    falls = step < 0.0 and step < 0.84 * before  # no limit in sight, as for the error bars
+    if not falls:
+        return Finding(MeshVerdict.PERSISTS, reason)
+    values = ", ".join(f"{value:.3g}" for value in lowest)
+    reason += f", but the lowest eigenvalue falls from mesh to mesh ({values}) with no limit in sight"
+    place = _where_softest(finest, certificates[-1])
+    if lowest[-1] + FURTHER * step < 0.0:
+        reason += f": it would be a saddle within {FURTHER} more refinements, by a motion near {_text(place)}"
+        return _at(MeshVerdict.HELD_BY_MESH, finest, reason, place)
+    return Finding(MeshVerdict.PERSISTS, reason)
+
+
+def _other_index(surface: Surface, here: Certificate, first: Certificate) -> Finding:
+    """The finding where the Morse index is another one on a finer mesh."""
+    place = _where_softest(surface, here)
+    becomes = "stable" if here.index == 0 else f"a saddle of index {here.index}"
+    was = "stable" if first.index == 0 else f"of index {first.index}"
+    reason = (
+        f"on {surface.m} triangles it is {becomes}, here {was}; the motion that turns is largest near"
+        f" {_text(place)}"
+    )
+    return _at(MeshVerdict.CHANGES, surface, reason, place)
+
+
+def _where_softest(surface: Surface, certificate: Certificate) -> Floats:
+    """(3,) where the lowest mode moves the surface most."""
+    moved = np.linalg.norm(certificate.modes, axis=2).sum(axis=0)  # zero where no mode was computed
+    return np.asarray(surface.vertices[moved.argmax()])
+
+
+def _moves(coarse: Surface, fine: Surface) -> Floats:
+    """(n,) how far the coarse vertices have moved in ways that change the shape, length."""
+    part = standing_part(coarse)
+    space = motion_space(part.surface, part.classes, coarse.vertices)
+    return np.linalg.norm(space.project(fine.vertices[: coarse.n] - coarse.vertices), axis=1)
+
+
+def _other_contact(coarse: Surface, fine: Surface) -> Finding | None:
+    """The finding where a junction rests on Π along another length, beyond what the mesh resolves."""
+    walls = standing_part(coarse).walls
+    before, after = _resting_lengths(coarse), _resting_lengths(fine)
+    for k in np.flatnonzero(walls.pinchable):
+        tops = walls.top_edges[walls.wall_below == k]
+        lengths = segment_lengths(coarse.vertices, tops)
+        if abs(after[k] - before[k]) > 2.0 * lengths.max() + RESTED * lengths.sum():
+            name = coarse.patches[k].name
+            reason = (
+                f"on {fine.m} triangles the junction over {name!r} rests on the plane along {after[k]:.3g}"
+                f" of its length {lengths.sum():.3g}, here along {before[k]:.3g}"
+            )
+            return Finding(MeshVerdict.CHANGES, reason, _tuple(coarse.vertices[tops].mean(axis=(0, 1))))
+    return None
+
+
+def _resting_lengths(surface: Surface) -> Floats:
+    """(patches,) the length of the junctions over each wall that rests on Π."""
+    part = standing_part(surface)
+    walls, down = part.walls, part.resting | part.walls.corner
+    rests = down[walls.top_edges].all(axis=1) & part.resting[walls.top_edges].any(axis=1)
+    lengths = segment_lengths(surface.vertices, walls.top_edges) * rests
+    return np.asarray(np.bincount(walls.wall_below, lengths, len(surface.patches)), dtype=float)
+
+
+def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats) -> Finding:
+    """A finding about a place, with advice where it is near a junction that ends over a wall that slides."""
+    X, pinchable = surface.vertices, standing_part(surface).walls.pinchable
+    nearest, found = np.inf, None
+    for curve in surface.topology.junctions:
+        ends = [v for v in curve.vertices[[0, -1]] if surface.fixed[v] and not curve.closed]
+        if not ends or not pinchable[list(curve.sheets)].any():
+            continue
+        length = segment_lengths(X, np.stack([curve.vertices[:-1], curve.vertices[1:]], axis=1)).sum()
+        distance = np.linalg.norm(X[curve.vertices] - place, axis=1).min() / length
+        if distance <= min(nearest, REACH):
+            nearest, found = distance, (curve, X[min(ends, key=lambda v: np.linalg.norm(X[v] - place))])
+    if found is None:
+        return Finding(verdict, reason, _tuple(place))
+    curve, end = found
+    names = " | ".join(surface.patches[k].name for k in curve.sheets)
+    wall = next(surface.patches[k].name for k in curve.sheets if pinchable[k])
+    reason += f"; the junction {names} there ends at {_text(end)}, where only the mesh holds it"
+    advice = (
+        f'hold the bottom of {wall!r}: bottom = "held" under its divider in a plan, or add its lowest'
+        " vertices to fixed="
+    )
+    return Finding(verdict, reason, _tuple(place), advice)
+
+
+def _tuple(place: Floats) -> tuple[float, float, float]:
+    x, y, z = (float(c) for c in place)
+    return x, y, z
+
+
+def _text(place: Floats) -> str:
+    return "(" + ", ".join(f"{c:.3g}" for c in np.round(place, 6) + 0.0) + ")"

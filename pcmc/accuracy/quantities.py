@@ -1,0 +1,138 @@
+"""What a designer reads from a surface at rest: heights, areas, volume, energy, reactions, softest mode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..certificate import Certificate
+from ..certificate.balance import boundary_table
+from ..surface import Surface
+
+ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open
+RESIDUALS = 10.0  # that a quantity may change with the forces left, relative
+EIGENVALUES = 1e-12  # of the largest eigenvalue: rounding of the lowest one
+
+STIFFEST = 10.0  # the largest eigenvalue in units of α over the area of a triangle
+
+Curve = tuple[tuple[int, ...], bytes]  # a boundary curve: its sheets, and its vertices in the coarsest mesh
+Key = tuple[str, str, tuple[int, ...], bytes]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A quantity of one surface.
+
+    Attributes
+    ----------
+    quantity, of : its name, and the patch or boundary it belongs to; empty for the whole.
+    value : as read from the mesh.
+    estimate : of the same limit, but smoother from mesh to mesh; the same as ``value`` for most.
+    rounding : differences up to this size are none.
+    """
+
+    quantity: str
+    of: str
+    value: float
+    estimate: float
+    rounding: float
+
+
+def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[Key, Reading]:
+    """The quantities of a surface. Keys are the same for all refinements of one surface.
+
+    ``vertices`` is the number of vertices of the coarsest mesh, which come first in all finer ones.
+    """
+    share = ROUNDING + RESIDUALS * certificate.residual
+    size, tension = surface.size, float(surface.tensions.max())
+    areas = certificate.patches["area"].to_numpy()
+    found: dict[Key, Reading] = {}
+
+    def add(quantity: str, of: str, value: float, scale: float, curve: Curve = ((), b"")) -> None:
+        found[quantity, "" if curve[1] else of, *curve] = Reading(quantity, of, value, value, share * scale)
+
+    for k, patch in enumerate(surface.patches):
+        if not patch.auxiliary:
+            height, estimate = _height(surface, k)
+            reading = Reading("height", patch.name, height, estimate, share * size)
+            found["height", patch.name, (), b""] = reading
+    for patch, area in zip(surface.patches, areas.tolist(), strict=True):
+        add("area", patch.name, area, size**2)
+    add("volume", "", certificate.volume, size**3)
+    add("energy", "", certificate.energy, tension * float(areas.sum()))
+    add("reaction", "", certificate.support, tension * size)
+    for curve, name, pull, most in _boundaries(surface, certificate, vertices):
+        add("reaction", name, float(pull @ np.array(surface.plane.normal)), tension * size, curve)
+        add("thrust", name, float(np.linalg.norm(surface.plane.along(pull))), tension * size, curve)
+        add("reaction per length", name, most, tension, curve)
+    if len(certificate.eigenvalues):
+        stiffest = STIFFEST * tension * surface.m / float(areas.sum())
+        rounding = share * tension / size**2 + EIGENVALUES * stiffest
+        lowest = float(certificate.eigenvalues[0])
+        key = "lowest eigenvalue"
+        found[key, "", (), b""] = Reading(key, "", lowest, lowest, rounding)
+    return found
+
+
+def _boundaries(
+    surface: Surface, certificate: Certificate, vertices: int
+) -> Iterator[tuple[Curve, str, Floats, float]]:
+    """Each held boundary curve, its name, its reaction (3,) and the largest one per length.
+
+    Of several curves of one name, each is named with its place.
+    """
+    table = boundary_table(surface, certificate.reactions)
+    if not len(table):
+        return
+    held = surface.fixed | surface.on_plane
+    curves = [c for c in surface.topology.boundary_loops if held[c.vertices].any()]
+    names = table["boundary"].astype(str).tolist()
+    middles = table[["middle_x", "middle_y", "middle_z"]].to_numpy()
+    pulls = table[["reaction_x", "reaction_y", "reaction_z"]].to_numpy()
+    most = table["per_length_max"].to_numpy().tolist()
+    for i, curve in enumerate(curves):
+        place = ", ".join(f"{c:.3g}" for c in middles[i])
+        name = names[i] if names.count(names[i]) == 1 else f"{names[i]} near ({place})"
+        old = np.sort(curve.vertices[curve.vertices < vertices])
+        yield (curve.sheets, old.tobytes()), name, pulls[i], most[i]
+
+
+def _height(surface: Surface, patch: int) -> tuple[float, float]:
+    """Greatest height of a patch's vertices over Π, and that of the smooth surface through them there.
+
+    The highest vertex is up to half an edge beside the top, at random from mesh to mesh. The paraboloid
+    through it and its neighbours, or on a junction the parabola, has its top at the surface's own.
+    """
+    local = surface.plane.to_local(surface.vertices)
+    vertices = np.unique(surface.faces[surface.patch_of_face == patch])
+    top = int(vertices[local[vertices, 2].argmax()])
+    value = float(local[top, 2])
+    if surface.fixed[top] or surface.on_plane[top]:
+        return value, value
+    topo = surface.topology
+    around = (topo.edges == top).any(axis=1)
+    if topo.on_junction[top]:
+        around &= topo.junction_edge | topo.seam_edge
+    beside = topo.edges[around].sum(axis=1) - top
+    step = local[beside] - local[top]
+    if topo.on_junction[top]:
+        if len(beside) != 2:
+            return value, value
+        along = step[0, :2] - step[1, :2]
+        along /= np.linalg.norm(along) or 1.0
+        step = np.column_stack([step[:, :2] @ along, np.zeros(2), step[:, 2]])
+    return value, value + _rise(step)
+
+
+def _rise(step: Floats) -> float:
+    """How far the top of a paraboloid through 0 and the points ``step`` (k,3) is above 0; 0 without one."""
+    x, y, z = step.T
+    a, b, xx, xy, yy = np.linalg.lstsq(np.column_stack([x, y, 0.5 * x * x, x * y, 0.5 * y * y]), z)[0]
+    slope, bend = np.array([a, b]), np.array([[xx, xy], [xy, yy]])
+    place = -np.linalg.pinv(bend) @ slope
+    rise = 0.5 * float(slope @ place)
+    near = np.linalg.norm(place) <= np.linalg.norm(step[:, :2], axis=1).max()
+    return rise if near and rise > 0.0 else 0.0

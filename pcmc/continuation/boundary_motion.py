@@ -1,0 +1,127 @@
+"""A parameter λ of a surface that moves its boundary: the fixed vertices are at P(λ).
+
+The inside follows harmonically, so that triangles keep their shape: a change of P by d moves the vertices
+by w with L w = 0 inside and w = d at the fixed vertices, L the cotangent Laplacian. With v the w of dP/dλ,
+
+    dr/dλ = Bᵀ Df[v],    dE/dλ = Σ ⟨∇E, dP/dλ⟩ over the fixed vertices,
+
+f the forces that ``jacobian`` linearises.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base import validate
+from ..base.arrays import Floats
+from ..base.errors import OptionError
+from ..energy.functional import weighted
+from ..surface import Surface
+
+DIFFERENCE = 1e-5  # of the size of λ: step of the central difference for dP/dλ
+SAME_PLACE = 1e-9  # of the surface's size: how far P(start) may be from the fixed vertices
+
+
+@dataclass(frozen=True)
+class BoundaryMotion:
+    """λ moves the fixed vertices.
+
+    Parameters
+    ----------
+    positions : P, a smooth function of λ; the positions (k,3) of the fixed vertices in the order of their
+        numbers, ``surface.vertices[surface.fixed]``.
+    start : λ of the surface that ``follow`` starts from.
+
+    Examples
+    --------
+    Two rings move apart; λ is half their distance:
+
+    >>> def rings(half_distance):
+    ...     x, y, z = film.vertices[film.fixed].T
+    ...     return np.stack([x, y, np.sign(z) * half_distance], axis=1)
+    >>> distance = BoundaryMotion(rings, start=0.5)
+    """
+
+    positions: Callable[[float], npt.ArrayLike]
+    start: float
+
+    def __post_init__(self) -> None:
+        if not callable(self.positions):
+            validate.refuse("BoundaryMotion.positions", self.positions, "a function of the parameter")
+        object.__setattr__(self, "start", validate.number("BoundaryMotion.start", self.start))
+
+    def line(self, surface: Surface) -> BoundaryLine:
+        """The boundary along this motion, which at its start must be that of the surface."""
+        if not surface.fixed.any():
+            message = "BoundaryMotion: the surface has no fixed vertex that could move"
+            raise OptionError(message, what="parameter", found=0)
+        line = BoundaryLine(self.start, self.positions, int(surface.fixed.sum()))
+        off = np.linalg.norm(line.boundary(self.start) - surface.vertices[surface.fixed], axis=1)
+        if off.max() > SAME_PLACE * surface.size:
+            worst = int(np.flatnonzero(surface.fixed)[off.argmax()])
+            message = f"BoundaryMotion: positions({self.start:g}) is not the surface's boundary: fixed vertex"
+            raise OptionError(
+                f"{message} {worst} is {off.max():.3g} away; check start= and the order of the vertices",
+                what="positions", where=worst, found=float(off.max()), expected=0.0,
+            )  # fmt: skip
+        return line
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryLine:
+    """The fixed vertices as functions of λ; tensions and pressures stay.
+
+    Attributes
+    ----------
+    value : λ at the start.
+    positions : P.
+    count : number of fixed vertices.
+    """
+
+    value: float
+    positions: Callable[[float], npt.ArrayLike]
+    count: int
+
+    @property
+    def scale(self) -> float:
+        """The size of λ in the metric of arclength: its value at the start, or 1."""
+        return abs(self.value) or 1.0
+
+    def allows(self, value: float) -> bool:
+        """Every λ is as good as P makes it."""
+        return True
+
+    def surface_at(self, surface: Surface, value: float) -> Surface:
+        """The surface; its tensions and pressures do not depend on λ."""
+        return surface
+
+    def columns(self, surface: Surface, value: float) -> dict[str, float]:
+        """No tension or pressure varies."""
+        return {}
+
+    def boundary(self, value: float) -> Floats:
+        """P(λ) (count,3)."""
+        P = np.asarray(self.positions(value), dtype=float)
+        if P.shape != (self.count, 3) or not np.isfinite(P).all():
+            found = f"shape {P.shape}" if P.shape != (self.count, 3) else "numbers that are not finite"
+            expected = f"({self.count}, 3) finite numbers, one row per fixed vertex"
+            validate.refuse(f"BoundaryMotion.positions({value:g})", found, expected)
+        return P
+
+    def velocity(self, value: float) -> Floats:
+        """dP/dλ (count,3)."""
+        h = DIFFERENCE * self.scale
+        return (self.boundary(value + h) - self.boundary(value - h)) / (2.0 * h)
+
+    def energy_derivative(self, surface: Surface, X: Floats, value: float) -> float:
+        """Σ ⟨∇E, dP/dλ⟩ over the fixed vertices at X (n,3), force·length per unit of λ."""
+        forces = weighted(surface, surface.tensions, surface.pressures, X)[2]
+        return float((forces[surface.fixed] * self.velocity(value)).sum())
+
+    def gradient(self, surface: Surface, X: Floats) -> Floats:
+        """∂∇E/∂λ where no vertex moves: zero (n,3)."""
+        return np.zeros_like(X)

@@ -1,0 +1,214 @@
+"""One surface on meshes that are finer and finer at the ends of its junctions: does it have a limit?
+
+Level k halves the edges within r 2^-k of the ends; the solver goes on from the level before, and where it
+fails, once more from the initial shape on a mesh of that level. The bottoms of the walls slide on Π, or
+they are held where they are drawn.
+
+Near an end on a straight boundary the crest's height over Π is, along its length s from the end,
+
+    u = A s - c s log(1/s),    c = α_w / (π α),
+
+the wall's pull on a quarter plane of tension α on each side. The crest moves sideways like a
+string of tension α_w u: from its end, which the mesh holds, its compliance is
+∫ ds / (α_w u) = log(A / (A - c log(1/h))) / (α_w c). So with the edge length h the end's hold, the inverse
+of this, falls like 1/log(1/h), and it is gone at h = exp(-A/c), where the junction comes to rest on Π.
+``rise`` measures A and c, ``loss`` the eigenvalue that the hold keeps up.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.optimize import curve_fit
+from scipy.stats import linregress, t
+
+from pcmc import Certificate, Surface, solve
+from pcmc.base.arrays import Floats, Ints
+from pcmc.base.errors import SurfaceError
+from pcmc.meshing.local_refinement import refine_near
+from pcmc.meshing.quality import edge_lengths
+from pcmc.solvers.result import Result
+from pcmc.surface.geometry import angles
+
+Projection = Callable[[Floats], Floats]
+PERSISTS, SADDLE, TURNS, LOST, SINKS, NONE = CATEGORIES = (
+    "has a limit: a minimum",
+    "has a limit: a saddle",
+    "held by the mesh: a saddle in the limit",
+    "held by the mesh: no limit found",
+    "comes down on its held bottom",
+    "not found on the first mesh",
+)
+SUNK = 1e-3  # quality of a wall's triangles at which its junction has come down on its bottom
+LEAST_FIT = 4  # levels
+ITERATIONS = 60  # of the solver on a mesh; from the level before it takes 5
+CONFIDENCE = 0.95
+
+
+def ends(surface: Surface) -> Ints:
+    """The fixed vertices of roofs where junctions end."""
+    roof = np.zeros(surface.n, dtype=bool)
+    roof[surface.faces[~surface.walls[surface.patch_of_face]]] = True
+    curves = [curve.vertices[[0, -1]] for curve in surface.topology.junctions if not curve.closed]
+    last = np.unique(np.concatenate(curves))
+    return last[(surface.fixed & surface.topology.on_boundary & roof)[last]]
+
+
+def hold_bottoms(surface: Surface) -> Surface:
+    """The same surface with every sliding vertex fixed."""
+    fixed = surface.fixed | surface.on_plane
+    args = surface.vertices, surface.faces, surface.patch_of_face, surface.patches
+    return Surface(*args, fixed=fixed, plane=surface.plane)
+
+
+def climb(
+    surface: Surface, levels: int, radius: float, held: bool, project: Projection | None = None
+) -> tuple[list[dict[str, Any]], Surface]:
+    """A row per level as long as there is an equilibrium, and the surface at the last one.
+
+    ``radius`` is what the first refinement reaches; ``project`` puts new boundary vertices in place.
+    """
+    vertices = ends(surface)
+    places = surface.vertices[vertices]
+    shape, rows, reached = surface, [], surface
+    for level in range(levels + 1):
+        result = _solved(shape, held)
+        if not result.converged and level:
+            anew = refine_near(surface, places, level, radius, project)
+            again = _solved(anew, held)
+            shape, result = (anew, again) if again.converged else (shape, result)
+        certificate = result.certify(modes=1) if result.converged else result.certificate
+        at_end = np.isin(result.surface.topology.edges, vertices).any(axis=1)
+        rows.append(
+            {
+                "level": level,
+                "edge_length": float(np.median(edge_lengths(shape)[at_end])),
+                "triangles": shape.m,
+                "status": result.status.name.lower(),
+                **_findings(certificate, result.surface),
+            }
+        )
+        if not result.converged:
+            break
+        reached = result.surface
+        if level < levels:
+            try:
+                shape = refine_near(shape.moved(reached.vertices), places, 1, radius * 0.5**level, project)
+            except SurfaceError:  # a wall without height cannot be cut
+                shape = refine_near(surface, places, level + 1, radius, project)
+    return rows, reached
+
+
+def _solved(shape: Surface, held: bool) -> Result:
+    start = hold_bottoms(shape) if held else shape
+    return solve(start, "newton", target="stationary", iterations=ITERATIONS)
+
+
+def _findings(certificate: Certificate, surface: Surface) -> dict[str, Any]:
+    walls = [patch.auxiliary for patch in surface.patches]
+    return {
+        "index": -1 if certificate.index is None else certificate.index,
+        "eigenvalue": float(certificate.eigenvalues[0]) if len(certificate.eigenvalues) else math.nan,
+        "height": float(surface.plane.height(surface.vertices).max()),
+        "energy": certificate.energy,
+        "pinched": len(certificate.pinched),
+        "quality": certificate.quality,
+        "walls_quality": float(certificate.patches.quality[walls].min()),
+    }
+
+
+def label(rows: Sequence[dict[str, Any]], levels: int, held: bool) -> str:
+    """Which of ``CATEGORIES`` the rows of ``climb`` are.
+
+    >>> row = {"status": "converged", "index": 0, "walls_quality": 0.5}
+    >>> label([row, row | {"index": 1}], 1, False)
+    'held by the mesh: a saddle in the limit'
+    """
+    last = rows[-1]
+    if last["status"] != "converged":
+        if held and last["walls_quality"] < SUNK:
+            return SINKS
+        return LOST if len(rows) > 1 else NONE
+    assert len(rows) == levels + 1
+    if last["index"] == 0:
+        return PERSISTS
+    return TURNS if rows[0]["index"] == 0 else SADDLE
+
+
+def opening(surface: Surface, vertex: int) -> float:
+    """The angle of the outline at a vertex in plan, through the inside, degrees.
+
+    >>> from generators import two_squares
+    >>> square = two_squares(4)
+    >>> [round(opening(square, v), 6) for v in ends(square)]
+    [180.0, 180.0]
+    """
+    roof = ~surface.walls[surface.patch_of_face]
+    faces = surface.faces[roof]
+    flat = surface.plane.to_local(surface.vertices)[:, :2]
+    return float(angles(flat[faces])[faces == vertex].sum())
+
+
+def loss(rows: Sequence[dict[str, Any]]) -> dict[str, float]:
+    """The law λ = λ∞ + B / (log(1/h) + ℓ) of the lowest eigenvalue against the edge length h at the end.
+
+    ``limit`` λ∞ ± ``limit_margin``, ``loss`` B ± ``loss_margin`` (95 %) and ``shift`` ℓ, from the levels on
+    which nothing rests on Π but the first two, ``fitted`` many; NaN where these are fewer than five.
+    """
+    free = [row for row in rows if row["status"] == "converged" and row["pinched"] == 0][2:]
+    none = dict.fromkeys(("limit", "limit_margin", "loss", "loss_margin", "shift"), math.nan)
+    if len(free) < 5:
+        return {"fitted": len(free), **none}
+    depth = -np.log([row["edge_length"] for row in free])
+    values = np.array([row["eigenvalue"] for row in free])
+    span = np.ptp(values) or 1.0
+    start = (0.0, 1.0, 1.0 - depth.min())
+    bounds = ((-np.inf, -np.inf, 1e-3 - depth.min()), np.inf)
+    scaled, covariance = curve_fit(law, depth, (values - values[-1]) / span, start, bounds=bounds)
+    margins = t.ppf(0.5 + 0.5 * CONFIDENCE, len(free) - 3) * np.sqrt(np.diag(covariance)) * span
+    limit, amount = values[-1] + span * scaled[0], span * scaled[1]
+    found = (limit, margins[0], amount, margins[1], scaled[2])
+    return {"fitted": len(free), **dict(zip(none, map(float, found), strict=True))}
+
+
+def law(depth: Floats, limit: float, amount: float, shift: float) -> Floats:
+    """λ∞ + B / (log(1/h) + ℓ) at depths log(1/h)."""
+    return np.asarray(limit + amount / (depth + shift))
+
+
+def fit(x: Floats, y: Floats) -> tuple[float, float]:
+    """Least-squares slope of y over x and half the width of its 95 % confidence interval.
+
+    >>> fit(np.arange(4.0), 2.0 * np.arange(4.0))
+    (2.0, 0.0)
+    """
+    line = linregress(x, y)
+    return float(line.slope), float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(x) - 2) * line.stderr)
+
+
+def crest(surface: Surface, vertex: int) -> tuple[Floats, Floats]:
+    """Along the junction from its end: (k,) distances of the edges' middles, (k,) their rises dz/ds."""
+    for curve in surface.topology.junctions:
+        if not curve.closed and vertex in curve.vertices[[0, -1]]:
+            line = curve.vertices if curve.vertices[0] == vertex else curve.vertices[::-1]
+            local = surface.plane.to_local(surface.vertices[line])
+            along = np.linalg.norm(local[:, :2] - local[0, :2], axis=1)
+            return 0.5 * (along[1:] + along[:-1]), np.diff(local[:, 2]) / np.diff(along)
+    raise ValueError(f"no junction ends at vertex {vertex}")
+
+
+def rise(surface: Surface, vertex: int, least: float, most: float) -> dict[str, float]:
+    """c and A of dz/ds = A + c - c log(1/s), from edges at distances least ≤ s ≤ most from the end.
+
+    ``c`` ± ``c_margin`` (95 %); ``rest``: the distance exp(-A/c) from which on the junction lies on Π.
+    """
+    s, slope = crest(surface, vertex)
+    used = (s >= least) & (s <= most)
+    if used.sum() < LEAST_FIT:
+        return dict.fromkeys(("c", "c_margin", "rest"), math.nan)
+    c, margin = fit(np.log(s[used]), slope[used])
+    A = float((slope[used] - c * np.log(s[used])).mean()) - c
+    return {"c": c, "c_margin": margin, "rest": math.exp(-A / c) if c > 0.0 else 0.0}

@@ -1,0 +1,353 @@
+"""Where junctions end: does the surface have a limit there as the mesh is refined, or does the mesh hold it?
+
+Each example is solved on meshes that are graded towards the ends of its junctions, each with half the edge
+length there of the one before: ten times with the bottoms of its walls sliding on Π, eight times with
+them held; each equilibrium of Fig. 16's grid eight and five times. ``corner_ladder`` has the theory of the
+hold and how it is fitted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from generators import bezier_hall, four_fans, joined_caps, three_patches, two_caps, two_squares
+from pcmc import Surface
+from pcmc.base.arrays import Floats
+from pcmc.sweep import Sweep
+
+from .alpha_grid import AXES, EDGE_LENGTH, TENSIONS
+from .cases import run_sweep
+from .corner_ladder import (
+    CATEGORIES,
+    LOST,
+    NONE,
+    PERSISTS,
+    SADDLE,
+    SINKS,
+    TURNS,
+    climb,
+    ends,
+    label,
+    law,
+    loss,
+    opening,
+    rise,
+)
+from .folder import Folder
+from .panels import category_panels
+from .refinement import FAMILIES
+from .study import Study
+
+LEVELS = {"sliding": 10, "held": 8}  # of refinement at the ends
+GRID_LEVELS = {"sliding": 8, "held": 5}
+REACH = 0.15  # of the size: what the first refinement reaches around an end
+GRID_REACH = 1.5
+SAMPLE = [[1.5, 6.0, 6.0], [4.0, 4.0, 3.0]]  # of the grid, where its equilibria are not at hand
+COLORS = dict(
+    zip(CATEGORIES, ("#08519C", "#CC79A7", "#F4A582", "#D6604D", "#FFF2AE", "#E6E6E6"), strict=True)
+)
+NO_CASE = "no equilibrium on the first mesh"
+BOTTOMS = {"sliding": False, "held": True}
+DRAWN = "fig4"
+
+
+@dataclass(frozen=True)
+class Case:
+    """An example whose junctions end on the outline.
+
+    Attributes
+    ----------
+    build : its initial shape.
+    project : puts new boundary vertices on a curved outline.
+    """
+
+    name: str
+    title: str
+    build: Callable[[], Surface]
+    project: Callable[[Floats], Floats] | None = None
+
+
+def _on_rim(radius: float) -> Callable[[Floats], Floats]:
+    def project(points: Floats) -> Floats:
+        return points * [1.0, 1.0, 0.0] * radius / np.linalg.norm(points[:, :2], axis=1)[:, None]
+
+    return project
+
+
+ROUND = {family.name: family.rounded for family in FAMILIES}
+CASES = (
+    Case("example1-0.5", "Example 1, wall 0.5", lambda: two_squares(8, alpha_aux=0.5)),
+    Case("example1-1", "Example 1, wall 1", lambda: two_squares(8, alpha_aux=1.0)),
+    Case("example1-2", "Example 1, wall 2", lambda: two_squares(8)),
+    Case("example2", "Example 2", lambda: two_caps(0.6), ROUND["example2_near"]),
+    Case("joined", "two spheres in balance", lambda: joined_caps(0.6), ROUND["joined_caps"]),
+    Case("example3", "Example 3", lambda: four_fans(7), _on_rim(20.0)),
+    Case("example4", "Example 4", bezier_hall),
+    Case("fig4", "Fig. 4", lambda: three_patches(7), _on_rim(10.0)),
+)
+
+
+def data(folder: Folder, short: bool) -> None:
+    """``ladder``: a row per example, bottom and level; ``ends``: a row per end; ``grid``: Fig. 16."""
+    rows, at_ends = [], []
+    for case in CASES[1::5] if short else CASES:
+        initial = case.build()
+        for bottom, held in BOTTOMS.items():
+            if not (held or initial.on_plane.any()):
+                continue
+            levels = 4 if short else LEVELS[bottom]
+            found, reached = climb(initial, levels, REACH * initial.size, held, case.project)
+            whose = {"case": case.name, "bottom": bottom}
+            rows += [whose | row for row in found]
+            at_ends += [whose | row for row in _ends(initial, reached, found, levels, held)]
+            if case.name == DRAWN and held:
+                folder.write_mesh(DRAWN, {"at rest": reached})
+    folder.write_table("ladder", pd.DataFrame(rows))
+    folder.write_table("ends", pd.DataFrame(at_ends))
+    sweep = Sweep(grid_case, {"tensions": _equilibria(folder, short), "bottom": list(BOTTOMS)})
+    found_grid = run_sweep(folder, "grid", sweep)
+    triples = pd.DataFrame(
+        [v[0] if isinstance(v[0], list) else v for v in found_grid.pop("tensions")], columns=list(AXES)
+    )
+    columns = ["bottom", "label", "levels", "index", "eigenvalue", "last_eigenvalue", "height", "last_height"]
+    folder.write_table("grid", pd.concat([triples, found_grid[columns].reset_index(drop=True)], axis=1))
+
+
+def _ends(
+    initial: Surface, reached: Surface, rows: list[dict[str, Any]], levels: int, held: bool
+) -> list[dict[str, Any]]:
+    """A row for each end: where it is, what meets there, its label and the fits."""
+    last = [row for row in rows if row["status"] == "converged"]
+    shared = {"label": label(rows, levels, held), "levels": len(last), **loss(rows)}
+    edge = last[-1]["edge_length"] if last else math.nan
+    return [
+        {
+            "end": int(vertex),
+            **{axis: float(initial.vertices[vertex, k]) for k, axis in enumerate("xyz")},
+            "opening": opening(initial, int(vertex)),
+            "tensions": " ".join(f"{a:g}" for a in _tensions(initial, int(vertex))),
+            **shared,
+            "theory_c": _theory(initial, int(vertex)),
+            **rise(reached, int(vertex), 3.0 * edge, 0.02 * initial.size),
+        }
+        for vertex in ends(initial)
+    ]
+
+
+def _tensions(surface: Surface, vertex: int) -> list[float]:
+    """Of the roofs at an end, then of its wall."""
+    patches = np.unique(surface.patch_of_face[(surface.faces == vertex).any(axis=1)])
+    return [float(surface.tensions[k]) for k in sorted(patches, key=lambda k: (surface.walls[k], k))]
+
+
+def _theory(surface: Surface, vertex: int) -> float:
+    """c = α_w / (π α) for two roofs of one tension on a straight boundary; NaN elsewhere."""
+    one, *others, wall = _tensions(surface, vertex)
+    straight = abs(opening(surface, vertex) - 180.0) < 30.0  # the rim of a coarse disc is a polygon
+    return wall / (math.pi * one) if straight and others == [one] else math.nan
+
+
+def _equilibria(folder: Folder, short: bool) -> list[list[float]]:
+    """The tensions (wall, large, small) at which ``alpha_grid_geometric`` finds an equilibrium."""
+    beside = Folder(folder.path.parent / "alpha_grid_geometric")
+    if short or not (beside.path / "finer.csv").is_file():
+        return SAMPLE
+    return [[float(v) for v in row] for row in beside.read_table("finer")[list(AXES)].to_numpy()]
+
+
+def grid_case(tensions: list[float], bottom: str) -> dict[str, Any]:
+    """Whether the equilibrium at tensions (wall, large, small) of the grid has a limit."""
+    named = dict(zip(("wall", "large", "small"), tensions, strict=True))
+    initial, held = two_caps(EDGE_LENGTH).retensioned(named), BOTTOMS[bottom]
+    rows, _ = climb(initial, GRID_LEVELS[bottom], GRID_REACH, held, ROUND["example2_near"])
+    known = [row for row in rows if row["status"] == "converged"] or rows
+    return {
+        "label": label(rows, GRID_LEVELS[bottom], held),
+        "levels": len(known) if known is not rows or rows[-1]["status"] == "converged" else 0,
+        "index": known[0]["index"],
+        "eigenvalue": known[0]["eigenvalue"],
+        "last_eigenvalue": known[-1]["eigenvalue"],
+        "height": known[0]["height"],
+        "last_height": known[-1]["height"],
+    }
+
+
+def table(folder: Folder) -> dict[str, float]:
+    """``labels``: each example with its bottoms sliding and held, the loss of hold, and the limit."""
+    ladder, at_ends, grid = (folder.read_table(name) for name in ("ladder", "ends", "grid"))
+    rows = []
+    for (name, bottom), mine in ladder.groupby(["case", "bottom"], sort=False):
+        here = at_ends[(at_ends.case == name) & (at_ends.bottom == bottom)]
+        known = mine[mine.status == "converged"]
+        rows.append(
+            {
+                "case": name,
+                "bottom": bottom,
+                "opening": here.opening.mean(),
+                "tensions": here.tensions.iloc[0],
+                "label": here.label.iloc[0],
+                "levels": len(known),
+                "index": known["index"].iloc[0],
+                "last_index": known["index"].iloc[-1],
+                "eigenvalue": known.eigenvalue.iloc[0],
+                "last_eigenvalue": known.eigenvalue.iloc[-1],
+                **{key: here[key].iloc[0] for key in ("limit", "limit_margin", "loss", "loss_margin")},
+                "c": here.c.mean(),
+                "c_margin": here.c_margin.max(),
+                "theory_c": here.theory_c.mean(),
+                "rest": here.rest.mean(),
+                "edge_at_rest": known.edge_length[known.pinched > 0].max(),
+            }
+        )
+    labels = pd.DataFrame(rows)
+    folder.write_table("labels", labels)
+    counts = grid.groupby(["bottom", "label"]).size()
+    folder.write_table("grid_counts", counts.rename("cases").reset_index())
+    found = {f"grid_{bottom}_{_short(name)}": float(n) for (bottom, name), n in counts.items()}
+    for row in labels.to_dict("records"):
+        found[f"{row['case']}_{row['bottom']}_levels"] = float(row["levels"])
+        found[f"{row['case']}_{row['bottom']}_limit"] = float(row["limit"])
+    return {key: value for key, value in found.items() if math.isfinite(value)}
+
+
+def _short(name: str) -> str:
+    short = {PERSISTS: "limit", SADDLE: "saddle", TURNS: "turns", LOST: "lost", SINKS: "sinks", NONE: "none"}
+    return short[name]
+
+
+def figure(folder: Folder) -> None:
+    """The loss of hold with its fits, the crest's rise beside the theory, the grid, a graded mesh."""
+    from pcmc.plot import lines
+
+    ladder, at_ends = folder.read_table("ladder"), folder.read_table("ends")
+    sizes = {case.name: case.build() for case in CASES if (ladder.case == case.name).any()}
+    curves = {}
+    for case in CASES:
+        for bottom in BOTTOMS:
+            mine = ladder[(ladder.case == case.name) & (ladder.bottom == bottom)]
+            mine = mine[mine.status == "converged"]
+            if len(mine) > 1:
+                initial = sizes[case.name]
+                unit = initial.size**2 / initial.tensions.max()
+                curves[f"{case.title}, {bottom}"] = (mine.edge_length / initial.size, mine.eigenvalue * unit)
+    lines(
+        {name: curve for name, curve in curves.items() if "sliding" in name},
+        folder.figure("loss"),
+        x="edge length at the end / size",
+        y="lowest eigenvalue, α/size²",
+        xscale="log",
+        markers=True,
+        levels={"saddle below": 0.0},
+        title="Bottoms slide: the ends lose their hold on finer meshes",
+    )
+    lines(
+        {name: curve for name, curve in curves.items() if "held" in name},
+        folder.figure("held"),
+        x="edge length at the end / size",
+        y="lowest eigenvalue, α/size²",
+        xscale="log",
+        markers=True,
+        title="Bottoms are held: the lowest eigenvalue has a limit",
+    )
+    _draw_fits(folder, ladder, at_ends)
+    _draw_grid(folder)
+    _draw_mesh(folder)
+
+
+def _draw_fits(folder: Folder, ladder: pd.DataFrame, at_ends: pd.DataFrame) -> None:
+    """The eigenvalues of sliding bottoms as long as nothing rests, in units of the first; and the law."""
+    from pcmc.plot import lines
+
+    free = ladder[(ladder.bottom == "sliding") & (ladder.pinched == 0) & (ladder.status == "converged")]
+    curves: dict[str, Any] = {}
+    for case in CASES:
+        mine = free[free.case == case.name]
+        fits = at_ends[(at_ends.case == case.name) & (at_ends.bottom == "sliding")]
+        if not len(fits) or not math.isfinite(fits.limit.iloc[0]):
+            continue
+        found, unit = fits.iloc[0], abs(mine.eigenvalue.iloc[0])
+        depth = np.linspace(*-np.log(mine.edge_length.iloc[[2, -1]]), 50)
+        fitted = law(depth, found.limit, found.loss, found["shift"])
+        curves[case.title] = (mine.edge_length, mine.eigenvalue / unit)
+        curves[f"limit {found.limit:.2g} ± {found.limit_margin:.1g}"] = (np.exp(-depth), fitted / unit)
+    lines(
+        curves,
+        folder.figure("fits"),
+        x="edge length at the end",
+        y="lowest eigenvalue, first mesh: ±1",
+        xscale="log",
+        markers=True,
+        title="The logarithmic loss of hold, with 95 % intervals",
+    )
+
+
+def _draw_grid(folder: Folder) -> None:
+    grid = folder.read_table("grid")
+    marks = folder.read_table("grid").assign(found=True)
+    for bottom in BOTTOMS:
+        mine = marks[marks.bottom == bottom]
+        tables = {}
+        for wall in sorted(grid.alpha_wall.unique()):
+            square = np.full((len(TENSIONS), len(TENSIONS)), NO_CASE, dtype=object)
+            for row in mine[mine.alpha_wall == wall].itertuples():
+                square[TENSIONS.index(row.alpha_small), TENSIONS.index(row.alpha_large)] = row.label
+            tables[f"α of the wall = {wall:g}"] = square
+        shown = {name: color for name, color in COLORS.items() if (mine.label == name).any()}
+        category_panels(
+            TENSIONS,
+            TENSIONS,
+            tables,
+            shown | {NO_CASE: "#F7F7F7"},
+            folder.figure(f"grid-{bottom}"),
+            marks={},
+            xlabel="α of the larger patch",
+            ylabel="α of the smaller patch",
+            columns=5,
+        )
+
+
+def _draw_mesh(folder: Folder) -> None:
+    """A graded mesh, whole and near one end, eight times and sixty-four times as large."""
+    from pcmc.plot import panel
+
+    surface = folder.read_mesh(DRAWN)["at rest"]
+    place = surface.vertices[ends(surface)[0]]
+    parts = [_near(surface, place, surface.size / share) for share in (1, 8, 64)]
+    panel(
+        parts,
+        folder.figure("graded"),
+        views="plan",
+        one_scale=False,
+        edges=True,
+        supports=False,
+        columns=3,
+        titles=("Fig. 4, held bottoms", "an end, 8 times as large", "64 times as large"),
+    )
+
+
+def _near(surface: Surface, place: Floats, reach: float) -> Surface:
+    """The roofs' triangles within a distance of a place."""
+    roof = ~surface.walls[surface.patch_of_face]
+    near = roof & (np.linalg.norm(surface.vertices[surface.faces] - place, axis=2).max(axis=1) <= reach)
+    used, faces = np.unique(surface.faces[near], return_inverse=True)
+    patches, patch = np.unique(surface.patch_of_face[near], return_inverse=True)
+    kept = [surface.patches[k] for k in patches]
+    return Surface(surface.vertices[used], faces.reshape(-1, 3), patch, kept, fixed=surface.fixed[used])
+
+
+STUDY = Study(
+    "corners",
+    "ends of junctions: which have a limit as the mesh gets finer, and which the mesh holds",
+    data,
+    table,
+    figure,
+    parameters={"levels": LEVELS, "grid_levels": GRID_LEVELS, "edge_length": EDGE_LENGTH},
+    seconds=150,
+    paper=False,
+)

@@ -1,0 +1,190 @@
+"""The mesh check: error bars that hold the true error, all verdicts, bad input refused."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from refusals import refused
+from shapes import cap, disc, pyramid
+
+from generators import (
+    joined_caps,
+    joined_caps_exact,
+    spherical_cap,
+    spherical_cap_exact,
+    two_caps,
+    two_squares,
+)
+from pcmc import MeshVerdict, Patch, Surface, check_mesh, solve
+from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.meshing.held_curves import smooth_midpoints
+from pcmc.meshing.refinement import held_midpoints, refine
+
+
+@pytest.mark.parametrize("alpha", [0.51, 0.6, 1.0, 5.0])
+def test_the_bars_of_a_cap_hold_its_true_errors(alpha):
+    exact = spherical_cap_exact(alpha=alpha)
+    found = check_mesh(solve(spherical_cap(0.2, alpha=alpha)))
+    assert found.verdict is MeshVerdict.PERSISTS
+    truth = {"height": exact.height, "area": exact.area, "volume": exact.volume, "energy": exact.energy}
+    truth["reaction"] = -np.pi
+    for quantity, value in truth.items():
+        row = found.row(quantity, "cap" if quantity in ("height", "area") else "")
+        assert abs(row.value - value) <= row.error <= 5.0 * abs(row.value - value), quantity
+        assert abs(row.limit - value) <= row.limit_error < 0.2 * row.error, quantity
+        assert row.order == pytest.approx(2.0, abs=0.4), quantity
+
+
+def test_joined_caps_persist_and_their_limits_are_the_exact_values():
+    exact = joined_caps_exact()
+    found = check_mesh(solve(joined_caps(1.0)))
+    assert found.verdict is MeshVerdict.PERSISTS
+    for row, value in (
+        (found.row("energy"), exact.energy),
+        (found.row("volume"), exact.volume),
+        (found.row("height", "left"), exact.height),
+    ):
+        assert abs(row.value - value) <= row.error <= 2.0 * abs(row.value - value)
+        assert abs(row.limit - value) <= row.limit_error < 0.2 * row.error
+
+
+def test_exact_quantities_have_bars_at_rounding_and_no_order():
+    """A flat film has its area on every mesh; the volume below it is 0."""
+    t = np.linspace(0.0, 1.0, 4)
+    X = np.array([[x, y, 0.0] for x in t for y in t])
+    k = np.arange(16).reshape(4, 4)
+    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
+    F = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    rim = np.isin(X[:, :2], (0.0, 1.0)).any(axis=1)
+    film = Surface(X, F, [0] * len(F), [Patch("film", 2.0, 0.0)], fixed=rim)
+    found = check_mesh(film)
+    for quantity in ("area", "energy"):
+        row = found.row(quantity, "film" if quantity == "area" else "")
+        assert row.value == pytest.approx(1.0 if quantity == "area" else 2.0, abs=1e-12)
+        assert row.error < 1e-8
+        assert np.isnan(row.order)
+
+
+def test_a_saddle_is_followed_as_a_saddle():
+    found = check_mesh(solve(two_squares(12, alpha_aux=2.0), target="stationary"))
+    assert found.verdict is MeshVerdict.PERSISTS
+    assert "saddle of index 1" in found.detail
+
+
+def test_a_stable_surface_that_turns_into_a_saddle_changes():
+    found = check_mesh(solve(two_squares(6, alpha_aux=2.0)))
+    assert found.verdict is MeshVerdict.CHANGES
+    assert "saddle of index 1" in found.detail
+    assert "hold the bottom of 'wall'" in found.advice
+
+
+@pytest.mark.parametrize("edge", [1.2, 0.6], ids=["drifts", "collapses"])
+def test_a_junction_that_slips_at_its_end_is_held_by_the_mesh(edge):
+    found = check_mesh(solve(two_caps(edge)))
+    assert found.verdict is MeshVerdict.HELD_BY_MESH
+    assert abs(found.place[0]) < 0.5  # near a corner (0.25, ±2.905, 0)
+    assert abs(abs(found.place[1]) - 2.905) < 0.6
+    assert "hold the bottom of 'wall'" in found.advice
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(-3, 3), st.integers(-3, 3))
+def test_scales_of_length_and_force_scale_the_table(length, force):
+    """q → s q for heights, s² for areas, …; orders stay."""
+    size, strength = 10.0**length, 10.0**force
+    one = check_mesh(solve(cap(4)))
+    start = cap(4)
+    patch = Patch("cap", 0.6 * strength * size, strength)
+    scaled = Surface(start.vertices * size, start.faces, start.patch_of_face, [patch], start.fixed)
+    two = check_mesh(solve(scaled))
+    scale = {"height": size, "area": size**2, "volume": size**3, "energy": strength * size**3}
+    scale |= {"reaction": strength * size**2, "reaction per length": strength * size}
+    scale["lowest eigenvalue"] = strength / size
+    for (_, a), (_, b) in zip(one.table.iterrows(), two.table.iterrows(), strict=True):
+        if a.quantity == "thrust":  # zero by symmetry
+            continue
+        for column in ("value", "error", "limit", "limit_error"):
+            assert b[column] == pytest.approx(scale[a.quantity] * a[column], rel=1e-4), (a.quantity, column)
+        assert b.order == pytest.approx(a.order, abs=1e-4)
+
+
+def test_other_numbers_of_meshes():
+    result = solve(spherical_cap(0.25))
+    exact = spherical_cap_exact()
+    bars = []
+    for meshes in (2, 3, 4):
+        found = check_mesh(result, meshes)
+        assert [s.m for s in found.surfaces] == [result.surface.m * 4**k for k in range(meshes)]
+        row = found.row("energy")
+        assert abs(row.value - exact.energy) <= row.error
+        assert abs(row.limit - exact.energy) <= row.limit_error
+        bars.append(row.limit_error)
+    assert bars[0] > 3.0 * bars[1] > 9.0 * bars[2]
+
+
+def test_bad_input_is_refused():
+    surface = solve(pyramid()).surface
+    with refused(OptionError, what="meshes", found=1, expected="a whole number ≥ 2"):
+        check_mesh(surface, 1)
+    with refused(OptionError, what="meshes", found=64, expected=50):
+        check_mesh(surface, most_triangles=50)
+    with refused(OptionError, what="boundary", found="smoth"):
+        check_mesh(surface, boundary="smoth")
+    with refused(SurfaceError, what="surface", found="str"):
+        check_mesh("surface")
+    with pytest.raises(SurfaceError, match="needs a surface at rest; solve it first"):
+        check_mesh(pyramid())
+    with refused(OptionError, what="quantity", found="hight of roof"):
+        check_mesh(surface).row("hight", "roof")
+
+
+def test_ctrl_c_ends_the_check():
+    def stop(progress):
+        raise StopIteration
+
+    with pytest.raises(KeyboardInterrupt):
+        check_mesh(solve(pyramid()), callback=stop)
+
+
+# ---- new vertices of held curves -----------------------------------------------------------------
+
+
+def test_new_vertices_lie_on_circles_of_uneven_edges_and_on_straight_lines():
+    rng = np.random.default_rng(5)
+    angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, 40))
+    rim = np.stack([3.0 + 2.0 * np.cos(angle), 2.0 * np.sin(angle), 1.0 + 0 * angle], axis=1)
+    F = [[0, k + 1, (k + 1) % 40 + 1] for k in range(40)]
+    dome = Surface([[3, 0, 2], *rim], F, [0] * 40, [Patch("dome", 1.0)], fixed=range(1, 41))
+    away = np.linalg.norm(smooth_midpoints(dome) - [3.0, 0.0, 1.0], axis=1)
+    assert away == pytest.approx(2.0, abs=1e-12)
+    square = two_squares(4)
+    edges = square.topology.edges[held_midpoints(square)[0]]
+    assert np.array_equal(smooth_midpoints(square), square.vertices[edges].mean(axis=1))
+
+
+def test_corners_stay_corners():
+    flat, F = disc(1)  # a hexagon turns by 60°
+    rim = np.isclose(np.hypot(*flat.T), 1.0)
+    hexagon = Surface(np.column_stack([flat, 0.0 * rim]), F, [0] * len(F), [Patch("a", 1.0)], fixed=rim)
+    for corner, radius in ((40.0, np.sqrt(0.75)), (70.0, 1.0)):
+        away = np.linalg.norm(smooth_midpoints(hexagon, corner), axis=1)
+        assert away == pytest.approx(radius, abs=1e-12)
+
+
+def test_smooth_curves_are_met_with_order_four():
+    """An ellipse, its vertices at even angles."""
+    error = []
+    for count in (16, 32, 64):
+        angle = 2.0 * np.pi * np.arange(count) / count
+        rim = np.stack([2.0 * np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+        F = [[0, k + 1, (k + 1) % count + 1] for k in range(count)]
+        plate = Surface([[0, 0, 0], *rim], F, [0] * count, [Patch("plate", 1.0)], fixed=range(1, count + 1))
+        new = smooth_midpoints(plate, 60.0)
+        error.append(np.abs(np.hypot(new[:, 0] / 2.0, new[:, 1]) - 1.0).max())
+    assert np.log2(np.array(error[:-1]) / error[1:]).min() > 3.0
+
+
+def test_sliding_vertices_stay_on_the_plane():
+    surface = solve(two_caps(1.2)).surface
+    fine = refine(surface, 1, lambda _: smooth_midpoints(surface))
+    assert np.abs(fine.vertices[fine.on_plane, 2]).max() < 1e-12
