@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pcmc.base.errors import OptionError, unknown
 
 from . import (
+    accuracy,
     alpha_grid,
     alpha_grid_geometric,
     calibration,
@@ -41,6 +42,7 @@ MODULES = (
     solvers,
     existence,
     mesh_check,
+    accuracy,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out

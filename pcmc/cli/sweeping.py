@@ -17,6 +17,7 @@ from .progress import sweeping
 
 TABLES = (".csv", ".parquet")
 WHAT = "A project (.toml), a surface, or package.module:function that returns a Surface."
+SEARCH = "Try further starts where the first leads to no equilibrium: slower, but with the proof."
 STORE = "File for finished cases. The same command again runs only the missing ones."
 
 
@@ -38,6 +39,7 @@ def sweep(
     mesh_check: Annotated[
         bool, typer.Option("--mesh-check", help="Solve each case on two finer meshes, too, for error bars.")
     ] = False,
+    search: Annotated[bool, typer.Option("--search", help=SEARCH)] = False,
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Run the stored cases that failed again.")
     ] = False,
@@ -71,7 +73,7 @@ def sweep(
     grid = {name: listed for name, listed in given.items() if len(listed) > 1}
     fixed = {name: listed[0] for name, listed in given.items() if len(listed) == 1}
     with sweeping() as draw:
-        cases = _cases(what, grid, fixed, method, mesh_check)
+        cases = _cases(what, grid, fixed, method, {"mesh_check": mesh_check, "search": search})
         table = run(
             cases,
             store,
@@ -95,18 +97,18 @@ def sweep(
 
 
 def _cases(
-    what: str, grid: dict[str, Any], fixed: dict[str, Any], method: str | None, mesh_check: bool
+    what: str, grid: dict[str, Any], fixed: dict[str, Any], method: str | None, wanted: dict[str, bool]
 ) -> Any:
     from ..sweep import Sweep, solve_case
     from ..sweep.projects import project_sweep
 
     if Path(what).suffix.lower() in (TOML, *FORMATS):
-        return project_sweep(what, grid, fixed, method=method, mesh_check=mesh_check)
+        return project_sweep(what, grid, fixed, method=method, **wanted)
     if ":" not in what:
         kinds = f"a project (.toml), a surface ({' '.join(FORMATS)}), or a generator"
         raise OptionError(f"{what}: expected {kinds} such as generators:two_caps", what="WHAT", found=what)
-    checked = {"mesh_check": True} if mesh_check else {}
-    return Sweep(solve_case, grid, {"generator": what, "method": method or "newton", **checked, **fixed})
+    about = {"generator": what, "method": method or "newton"}
+    return Sweep(solve_case, grid, about | {name: True for name, on in wanted.items() if on} | fixed)
 
 
 def _print_failures(failed: Any) -> None:

@@ -24,6 +24,7 @@ def project_sweep(
     *,
     method: str | None = None,
     mesh_check: bool = False,
+    search: bool = False,
 ) -> Sweep:
     """The cases of a project at every combination of some of its numbers.
 
@@ -35,6 +36,8 @@ def project_sweep(
     method : replaces the project's method and its options.
     mesh_check : whether to check the mesh of each case, as ``solve_case`` does; the project's own key
         ``solve.mesh_check`` asks for it, too.
+    search : whether a case whose start leads to no equilibrium tries further ones, as ``pcmc.solve`` does:
+        slower where there is none, with the proof as ``message``.
 
     Raises
     ------
@@ -53,15 +56,21 @@ def project_sweep(
     about: dict[str, Any] = {"project": Path(path).as_posix(), "project_digest": projects.digest(path)}
     if method is not None:
         about["method"] = method
-    if validate.flag("mesh_check", mesh_check):
-        about["mesh_check"] = True
+    for name, value in {"mesh_check": mesh_check, "search": search}.items():
+        if validate.flag(name, value):
+            about[name] = True
     sweep = Sweep(solve_project, grid, about | fixed)
     projects.check_varied(path, dict(sweep.grid) | {name: [value] for name, value in fixed.items()})
     return sweep
 
 
 def solve_project(
-    project: str, project_digest: str, method: str | None = None, mesh_check: bool = False, **values: Any
+    project: str,
+    project_digest: str,
+    method: str | None = None,
+    mesh_check: bool = False,
+    search: bool = False,
+    **values: Any,
 ) -> dict[str, Any]:
     """Build and solve a project, with its remeshing and targets and some of its numbers replaced.
 
@@ -69,7 +78,8 @@ def solve_project(
     ----------
     project : its file. project_digest : ``pcmc.project.digest`` of it when the sweep was declared: a case and
         its store belong to one state of the project.
-    method, mesh_check : as of ``project_sweep``. values : as of ``pcmc.project.varied``.
+    method, mesh_check, search : as of ``project_sweep``.
+    values : as of ``pcmc.project.varied``.
 
     Returns
     -------
@@ -91,8 +101,8 @@ def solve_project(
     design, start = projects.varied(project, values)
     if method not in (None, design.method):
         design = replace(design, method=method, options={})
-    outcome = projects.solve_project(design, start)
-    answer = row(outcome.result, ("project", "project_digest", "method", "mesh_check", *values))
+    outcome = projects.solve_project(replace(design, search=search), start)
+    answer = row(outcome.result, ("project", "project_digest", "method", "mesh_check", "search", *values))
     if mesh_check or design.mesh_check:
         answer |= mesh_columns(outcome.result, partial(projects.check_project_mesh, design))
     return answer if outcome.design is None else answer | {"targets_met": outcome.design.met}

@@ -7,10 +7,11 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
+from .. import existence, solvers
 from ..base import validate
 from ..base.errors import OptionError, unknown
 from ..energy.functional import gradient
-from ..solvers import find_method, solve
+from ..solvers import find_method
 from ..solvers.result import Result
 from .case_script import resolve
 from .grid import checked
@@ -47,14 +48,17 @@ def _split(generator: str, method: str, arguments: Mapping[str, Any]) -> Parts:
     return build, shape, solver
 
 
-def _check(generator: str, method: str = "newton", mesh_check: bool = False, **arguments: Any) -> None:
+def _check(
+    generator: str, method: str = "newton", mesh_check: bool = False, search: bool = False, **arguments: Any
+) -> None:
     validate.flag("mesh_check", mesh_check)
+    validate.flag("search", search)
     _split(generator, method, arguments)
 
 
 @checked(_check)
 def solve_case(
-    generator: str, method: str = "newton", mesh_check: bool = False, **arguments: Any
+    generator: str, method: str = "newton", mesh_check: bool = False, search: bool = False, **arguments: Any
 ) -> dict[str, Any]:
     """Build a surface with a generator, solve it, certify it; every number of the certificate.
 
@@ -63,6 +67,8 @@ def solve_case(
     generator : a function that returns a Surface: ``"generators:two_caps"``.
     method : as of ``pcmc.solve``.
     mesh_check : whether to solve each surface at rest on two finer meshes, too (``pcmc.check_mesh``).
+    search : whether further starts are tried where the first leads to no equilibrium, as ``pcmc.solve``
+        does: slower where there is none, with the proof as ``message``.
     arguments : parameters of the generator and options of the method. A name that both have is the
         generator's.
 
@@ -88,6 +94,7 @@ def solve_case(
     ('converged', 58.5059, 17.583)
     """
     build, shape, solver = _split(generator, method, arguments)
+    solve = existence.solve if search else solvers.solve
     result = solve(build(**shape), method, **solver)
     answer = row(result, arguments)
     if mesh_check:
