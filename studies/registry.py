@@ -17,6 +17,7 @@ from . import (
     example3,
     example4,
     existence,
+    gallery,
     mesh_search,
     refinement,
     solvers,
@@ -39,6 +40,7 @@ MODULES = (
     refinement,
     solvers,
     existence,
+    gallery,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out
