@@ -8,20 +8,19 @@ from itertools import product
 import numpy as np
 
 from ..base.arrays import Bools, Floats
+from ..base.errors import OptionError, SurfaceError
 from ..certificate.neck import held_groups
 from ..certificate.proof import Fold
-from ..stability.factorisation import SingularMatrix
-from ..stability.modes import lowest, second_variation
+from ..continuation import BoundaryMotion
 from ..surface import Surface
 from .attempts import Attempts
+from .folding import Arrival, way
 from .starts import low_start
 
 SHARES = (0.5, 0.25, 0.1, 0.03)  # of the distance, at which to begin
-CLOSE = 6e-3  # relative distance between the last equilibrium and the first failure that ends the search
-STEPS = 40
-SOFTENED = 0.25  # of its eigenvalue at the start: the last equilibrium's, if a fold follows
 FLAT = 1e-6  # of the size: curves whose middles are nearer to each other are not moved
-AGREE = 0.02  # relative difference of the fold extrapolated from the eigenvalues, and of the last equilibrium
+STEPS = 80
+SMALLEST = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,65 +73,44 @@ class Spread:
             return None
         return cls(surface, line, middle, np.where(held, apart[groups], 0.0), held)
 
-    def at(self, share: float, shape: Floats, of: float) -> Surface:
-        """The surface at a share of the distance, its free vertices from a shape (n,3) at another share."""
-        X = shape.copy()
-        free = ~self.held
-        X[free] += ((share / of - 1.0) * ((X[free] - self.middle) @ self.line))[:, None] * self.line
-        given = self.surface.vertices[self.held]
-        X[self.held] = given + ((share - 1.0) * self.along[self.held])[:, None] * self.line
+    def boundary(self, share: float) -> Floats:
+        """(k,3) the fixed vertices with their curves at a share of the distance."""
+        X = self.surface.vertices + ((share - 1.0) * self.along)[:, None] * self.line
+        return X[self.held]
+
+    def at(self, share: float, shape: Floats) -> Surface:
+        """The surface at a share of the distance; its free vertices are those of a shape (n,3), nearer."""
+        X = shape + ((share - 1.0) * ((shape - self.middle) @ self.line))[:, None] * self.line
+        X[self.held] = self.boundary(share)
         return self.surface.moved(X)
 
 
 def move_apart(surface: Surface, attempts: Attempts) -> Apart:
-    """Follow the film's minimum as the distance between the held curves grows to that of the surface.
+    """Follow the film as the distance between the held curves grows to that of the surface.
 
-    The lowest eigenvalue λ of a film falls to zero at a fold, as the square root of the distance that is
-    left: λ² is linear there. Where films end, a fold is claimed if λ has fallen and if the line through
-    its last squares meets zero near the end.
+    The branch begins at the largest of a few distances at which a minimum is found, from the given shape or
+    a low start, both pressed together.
     """
     spread = Spread.of(surface)
     if spread is None:
         return Apart()
     shapes = [start.vertices for start in (surface, low_start(surface)) if start is not None]
     for begin, shape in product(SHARES, shapes):
-        result = attempts.solve(spread.at(begin, shape, 1.0), levels=0, target="minimum")
+        result = attempts.solve(spread.at(begin, shape), levels=0, target="minimum")
         if result.converged:
             break
     else:
         return Apart()
-    here, film, failed, step = begin, result.surface, np.inf, 0.5 * begin
-    known = [(here, _softest(film))]
-    for _ in range(STEPS):
-        ahead = min(1.0, here + step) if failed == np.inf else 0.5 * (here + failed)
-        result = attempts.solve(spread.at(ahead, film.vertices, here), levels=0, target="minimum")
-        if result.converged:
-            here, film = ahead, result.surface
-            known.append((here, _softest(film)))
-            if here == 1.0:
-                return Apart(surface=film)
-        else:
-            failed = ahead
-        if failed - here <= CLOSE * here:
-            return Apart(fold=_fold(known, failed, begin))
-    return Apart()
-
-
-def _softest(surface: Surface) -> float:
-    """The lowest eigenvalue of a film, force/length³; NaN if it cannot be computed."""
+    motion = BoundaryMotion(spread.boundary, start=begin)
     try:
-        return float(lowest(second_variation(surface), 1)[0][0])
-    except SingularMatrix:
-        return np.nan
-
-
-def _fold(known: list[tuple[float, float]], failed: float, begin: float) -> Fold | None:
-    """The fold between the last equilibrium and the first failure, if the eigenvalues lead there."""
-    shares, values = np.array(known).T
-    if len(shares) < 3 or not 0.0 <= values[-1] < SOFTENED * values[0]:
-        return None
-    (x0, x1), (y0, y1) = shares[-2:], values[-2:] ** 2
-    at = x1 + y1 * (x1 - x0) / (y0 - y1) if y0 > y1 else np.inf
-    if abs(at - shares[-1]) > AGREE * shares[-1]:
-        return None
-    return Fold("distance", float(np.clip(at, shares[-1], failed)), begin)
+        branch = attempts.follow(result.surface, motion, 1.0, steps=STEPS, smallest=SMALLEST, min_quality=0.3)
+    except (OptionError, SurfaceError):  # no branch: rigid motions are free
+        return Apart()
+    end = way(branch)
+    if end.arrival is Arrival.REACHED:
+        X = branch.last.vertices.copy()
+        X[spread.held] = surface.vertices[spread.held]
+        return Apart(surface=surface.moved(X))
+    if end.arrival is Arrival.FOLD:
+        return Apart(fold=Fold("distance", end.farthest, begin))
+    return Apart()
