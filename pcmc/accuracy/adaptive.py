@@ -31,7 +31,7 @@ from ..solvers import solve
 from ..solvers.result import Result, Status
 from ..surface import Surface
 from ..surface.geometry import face_areas
-from .estimator import Goal, error_shares
+from .estimator import Goal, error_shares, evenness
 from .goals import Accuracy, accuracies, check_places, goals_in
 from .mesh_check import BOUNDARIES, MeshCheck, check_mesh, vertex_numbers, with_bar
 
@@ -288,15 +288,14 @@ class _Search:
     def _remeshed(self, here: _Round) -> Surface:
         """The surface on a mesh with equal shares of the error.
 
-        With equal shares N triangles have the error (Σ √η)² / N; the m triangles here have Σ η.
+        With equal shares N triangles have the error (Σ √η)² / N, the m triangles here have Σ η.
         """
         surface, fine = here.result.surface, here.check.surfaces[1:2]
         if fine:
             shares = error_shares(surface, fine[0], here.goals)
         else:  # no finer mesh has this surface: finer everywhere
             shares = face_areas(surface.vertices[surface.faces]) ** 2
-        evenness = float(np.sqrt(shares).sum() ** 2 / shares.sum()) / surface.m if shares.any() else 1.0
-        factor = SPARE * evenness * here.excess if math.isfinite(here.excess) else MOST
+        factor = SPARE * evenness(shares) * here.excess if math.isfinite(here.excess) else MOST
         triangles = min(float(np.clip(factor, LEAST, MOST)) * surface.m, self.most_triangles)
         return remesh(surface, size_field(surface, shares, triangles), growth=GROWTH, project=self.project)
 

@@ -78,6 +78,8 @@ def linearise(
 ) -> Linearisation:
     """The derivative of the forces of ``surface`` at X, where ∇E is ``gradient`` (n,3)."""
     single = (classes.kind == SHEET) & (space.dimension == 1)
+    for _, along_line in surface.on_line:
+        single &= ~along_line
     sheet_factor = _sheet_factor(surface, classes, single, space.basis, X, gradient)
     slides = surface.on_plane[classes.curve]
     rows = np.flatnonzero(space.dimension[classes.curve] == np.where(slides, 1, 2))

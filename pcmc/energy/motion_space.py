@@ -4,7 +4,7 @@
 - on a curve where sheets meet or end: the plane perpendicular to the curve;
 - at a point where such curves meet, or which sheets share that have no edge in common there: all
   three directions;
-- always within what the support allows: nothing where fixed, along Π where sliding.
+- always within what the support allows: nothing where fixed, along Π where sliding, or along a line.
 
 The remaining directions only slide vertices along the shape and belong to mesh quality. Faces without
 tension and pressure exert no force: they are left out, and a vertex of such faces alone has no motion.
@@ -171,6 +171,8 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     n = surface.n
     basis, dimension = np.zeros((n, 3, 3)), np.zeros(n, dtype=np.int64)
     moving = ~(surface.fixed | classes.idle)
+    for _, along_line in surface.on_line:
+        moving |= along_line & ~classes.idle
 
     sheet = moving & (classes.kind == SHEET)
     _along_normals(vertex_area_vectors(X, classes.faces)[0], sheet, basis, dimension)
@@ -190,6 +192,8 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     sliding = np.flatnonzero(moving & surface.on_plane)
     if len(sliding):
         _within_plane(np.array(surface.plane.normal), tangent, sliding, basis, dimension)
+    for line, along_line in surface.on_line:
+        _within_line(np.array(line.direction), np.flatnonzero(along_line & moving), basis, dimension)
     return MotionSpace.of(basis, dimension)
 
 
@@ -255,6 +259,14 @@ def _within_plane(normal: Floats, tangent: Floats, sliding: Ints, basis: Floats,
         basis[chosen[single], 0] = across[single] / length[single, None]
         basis[chosen[~single], 0], basis[chosen[~single], 1] = first[0], second[0]
         dimension[chosen] = np.where(single, 1, 2)
+
+
+def _within_line(direction: Floats, sliding: Ints, basis: Floats, dimension: Ints) -> None:
+    """Leave the line's direction where moving along it changes the shape, and nothing elsewhere; in place."""
+    across = np.linalg.norm(basis[sliding] @ direction, axis=1) > PARALLEL
+    basis[sliding] = 0.0
+    basis[sliding[across], 0] = direction
+    dimension[sliding] = across
 
 
 @compiled

@@ -19,6 +19,7 @@ TARGETS = ("minimum", "stationary")
 DESCENTS = 5  # smooth steps after a Newton step that did not help
 PATIENCE = 8  # steps without halving the residual, once it is that small
 ROUNDED = 1e-10  # relative residual that counts as zero where rounding lets no step lower it
+NOISE = 10.0  # times what rounding of the coordinates leaves, which counts as zero in the same way
 COLLAPSED = 1e-3  # triangle quality below which the attempt ends
 POOR = 0.15  # triangle quality that explains why no step helps
 DOWN = ("shifted", "saddle")  # kinds of steps where the second variation is indefinite
@@ -192,7 +193,8 @@ class Attempt:
         """Whether the residual is below the tolerance, or as low as rounding lets it become."""
         residual = self.state.relative
         no_progress = self.stuck or self.steps_since_best > PATIENCE
-        return residual <= self.options.tolerance or (residual <= ROUNDED and no_progress)
+        rounded = max(ROUNDED, NOISE * self.state.rounding)
+        return residual <= self.options.tolerance or (residual <= rounded and no_progress)
 
     def _leave_rest(self) -> bool:
         """Leave a saddle if a minimum is sought, or lift a resting junction; False if neither is due."""

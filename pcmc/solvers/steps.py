@@ -15,7 +15,7 @@ from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import edge_lengths
 from ..stability.factorisation import Factor, Factoriser, SingularMatrix, factoriser
-from ..stability.modes import SOFT, full_matrix, lowest, negatives_without, stiffness
+from ..stability.modes import SOFT, full_matrix, lowest, negatives_without, stiffness, strength_units
 from ..surface.checks import reachable
 from ..surface.geometry import vertex_area_vectors
 from .smoother import HarmonicExtension, Smoother
@@ -188,7 +188,8 @@ class Stepper:
         state = self.state
         if self._pattern is None or self._factoriser is None:
             self._pattern = hessian_pattern(state.classes, state.space)
-            self._factoriser = factoriser(self._pattern, self.backend)
+            units = strength_units(state.surface, state.classes, state.space)
+            self._factoriser = factoriser(self._pattern, self.backend, units)
         rigid = rigid_modes(state.space, self._motions, state.X)
         for weight in (shift, shift + SOFT):
             data = assemble(state.surface, state.classes, state.space, self._pattern, state.X, 1.0, weight)

@@ -5,6 +5,7 @@ import { digits } from "./panel.js";
 
 const SIGNS = {
   stable: "✓", neutral: "≈", saddle: "⤢", not_converged: "…", no_equilibrium: "✕", degenerate: "△",
+  undecided: "?",
   opening: "…",
 };
 
