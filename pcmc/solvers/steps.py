@@ -43,7 +43,7 @@ class Stepper:
         self.factorisations = 0
         self._shifted_steps = 0  # in a row
         self._residual_raised = False  # by the last step, which was allowed to
-        self.free()
+        self._version = -1
         self._factor_space: MotionSpace = state.space
         self._drop_outdated()
 
