@@ -18,6 +18,8 @@ from . import (
     example3,
     example4,
     existence,
+    gallery,
+    mesh_check,
     mesh_search,
     refinement,
     solvers,
@@ -40,7 +42,9 @@ MODULES = (
     refinement,
     solvers,
     existence,
+    mesh_check,
     accuracy,
+    gallery,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out
