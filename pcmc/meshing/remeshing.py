@@ -89,7 +89,8 @@ def remesh(
     >>> fine.m > 2 * dome.m, fine.patches == dome.patches
     (True, True)
     """
-    check_lengths(edge_length if np.ndim(edge_length) == 0 else 1.0, near_curves, growth, chord)
+    one: Any = edge_length if np.ndim(edge_length) == 0 else 1.0
+    check_lengths(one, near_curves, growth, chord)
     size = _wanted_sizes(surface, edge_length, growth)
     part = standing_part(surface)
     surface = lift(surface, part.walls, part.resting, RAISED)

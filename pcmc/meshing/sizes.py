@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -69,8 +70,8 @@ def limit_growth(X: Floats, edges: Ints, size: Floats, growth: float) -> Floats:
     start = np.concatenate([edges[:, 0], np.full(n, n)])
     end = np.concatenate([edges[:, 1], np.arange(n)])
     weight = np.concatenate([rise, size])
-    graph = coo_array((weight, (start, end)), shape=(n + 1, n + 1)).tocsr()
-    return np.asarray(dijkstra(graph, directed=False, indices=n))[:n]
+    graph: Any = coo_array((weight, (start, end)), shape=(n + 1, n + 1)).tocsr()
+    return np.asarray(dijkstra(graph, directed=False, indices=[n])[0, :n])
 
 
 def edges_between(length: Floats, start: Floats, end: Floats) -> Floats:
