@@ -12,10 +12,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
 from ..base.validate import choice
-from ..surface import Patch, Plane, Surface, checks
+from ..surface import Line, Patch, Plane, Surface, checks
 from ..surface.geometry import bounding_size
 from ..surface.topology import topology
 
@@ -42,6 +42,7 @@ class MeshData:
         vertices at one place stay two: those of a wall without height below a junction on Π.
     walls : the text of ``flat_walls.encode_walls``, where patches are separate meshes and a wall has
         no height.
+    lines : as ``on_line`` in Surface.
     """
 
     vertices: Floats
@@ -55,6 +56,7 @@ class MeshData:
     notes: tuple[str, ...] = ()
     joined: bool = False
     walls: str | None = None
+    lines: tuple[tuple[Line, Bools], ...] = ()
 
 
 def checked(data: MeshData) -> MeshData:
@@ -168,6 +170,7 @@ def _selected(data: MeshData, keep: Ints, place: Ints) -> MeshData:
         faces=place[data.faces],
         support=None if data.support is None else data.support[keep],
         scalars={k: v[keep] if len(v) == n else v for k, v in data.scalars.items()},
+        lines=tuple((line, along[keep]) for line, along in data.lines),
     )
 
 
@@ -198,7 +201,8 @@ def to_surface(
     rounded = sliding & ~held & (np.abs(height) < ROUNDING * size) & (np.abs(height) > 1e-12 * size)
     if rounded.any():  # back onto the plane
         X = X - np.where(rounded, height, 0.0)[:, None] * np.array(plane.normal)
-    return Surface(X, data.faces, data.patch_of_face, patches, held, sliding, plane)
+    lines = data.lines if fixed is None else ()
+    return Surface(X, data.faces, data.patch_of_face, patches, held, sliding, plane, lines)
 
 
 def _changed(

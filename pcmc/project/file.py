@@ -44,6 +44,7 @@ class Project:
     method, options : as in ``pcmc.solve``.
     wanted : the accuracy asked for.
     mesh_check : whether the result is solved on finer meshes, too; None if the file does not say.
+    search : whether further starts are tried where the first leads to no equilibrium.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
     files, picture : the output.
@@ -57,6 +58,7 @@ class Project:
     options: Mapping[str, Any] = field(default_factory=dict)
     wanted: AccuracyWanted = field(default_factory=AccuracyWanted)
     mesh_check: bool | None = None
+    search: bool = True
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
     vary: Sequence[Parameter] = ()
