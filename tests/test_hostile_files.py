@@ -16,7 +16,7 @@ from refusals import refused
 import pcmc
 from pcmc import cli
 from pcmc.base.errors import FileError, FileWarning
-from pcmc.io import FORMATS, reading_process
+from pcmc.io import reading_process
 from tests.test_io_foreign import X, expected
 
 pytest.importorskip("pyvista")
@@ -52,7 +52,9 @@ WRONG = {  # the suffix, the content, and where the error is
     "obj, far out": (".obj", "v 1e300 0 0\nv 0 1e300 0\nv 0 0 1\nv 1 1 1\nf 1 2 3 4\n", 0),
     "ply, very many vertices": (".ply", ply(b"0 0 0\n", 10**12), "vertex"),
     "ply, very many rows of nothing": (
-        ".ply", ply(TRIANGLE).replace(b"element", b"element none 1000000000000\nelement", 1), "none",
+        ".ply",
+        ply(TRIANGLE).replace(b"element", b"element none 1000000000000\nelement", 1),
+        "none",
     ),
     "ply, a number of 400 digits": (".ply", ply(b"0 0 0\n", int("9" * 400)), 3),
     "ply, fewer than none": (".ply", ply(b"0 0 0\n", -3), 3),
@@ -67,7 +69,7 @@ WRONG = {  # the suffix, the content, and where the error is
     "ply, corners without a list": (".ply", ply(TRIANGLE).replace(b"list uchar int", b"int"), "face"),
     "vtu, very many cells": (".vtu", '<VTKFile><Piece NumberOfCells="400000000">\n</VTKFile>', 1),
     "vtu, a count of 400 digits": (".vtu", f'<VTKFile><Piece NumberOfCells="{"9" * 400}">\n</VTKFile>', 1),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -185,7 +187,6 @@ def test_arrays_without_bytes_are_refused(tmp_path, count):
         pcmc.read(path)
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no pipes with names")
 @pytest.mark.parametrize("part", ["pipe", "/pipe", "missing/pipe", "/dev/zero"])
 def test_parts_that_are_pipes_or_devices_are_refused(tmp_path, part):
     os.mkfifo(tmp_path / "pipe")
@@ -338,7 +339,6 @@ def test_a_reader_that_takes_too_long_is_stopped(tmp_path, monkeypatch):
         pcmc.read(tmp_path / "a.3dm")
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can limit the memory of a process")
 def test_a_reader_may_not_fill_the_memory(tmp_path):
     code = (
         "import numpy as np\n"
@@ -347,10 +347,10 @@ def test_a_reader_may_not_fill_the_memory(tmp_path):
         "np.ones(2**31)\n"
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert "MemoryError" in told.stderr
+    assert "MemoryError" in told.stderr or sys.platform != "linux"  # others cannot limit it
 
 
-# ---- many groups, and paths
+# ---- many groups
 
 
 @pytest.mark.parametrize("negative", [False, True])
@@ -384,87 +384,3 @@ class Counted:
             return getattr(self.pattern, name)(*arguments)
 
         return search
-
-
-SUFFIXES = [*FORMATS, ".toml"]
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no pipes with names")
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_pipes_and_devices_are_not_opened(tmp_path, suffix, capsys):
-    os.mkfifo(tmp_path / f"pipe{suffix}")
-    (tmp_path / f"device{suffix}").symlink_to("/dev/zero")
-    for name in ("pipe", "device"):
-        path = tmp_path / f"{name}{suffix}"
-        assert cli.main(["certify", str(path)]) == 2
-        assert capsys.readouterr().err.count("is no regular file but a pipe or a device") == 1
-
-
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_paths_that_no_file_can_have(tmp_path, suffix):
-    read = pcmc.project.load if suffix == ".toml" else pcmc.read
-    (tmp_path / f"folder{suffix}").mkdir()
-    (tmp_path / f"loop{suffix}").symlink_to(tmp_path / f"loop{suffix}")
-    for name in ("a\0b", "a" * 300, "folder", "loop", "missing", "missing/a"):
-        path = tmp_path / f"{name}{suffix}"
-        with refused(FileError, what=str(path)) as caught:
-            read(path)
-        assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_places_that_cannot_be_written(tmp_path, suffix):
-    (tmp_path / f"folder{suffix}").mkdir()
-    for name in ("a\0b", "a" * 300, "folder", "missing/a"):
-        path = tmp_path / f"{name}{suffix}"
-        with refused(FileError, what=str(path)):
-            pcmc.write(path, expected())
-    assert [p.name for p in tmp_path.iterdir()] == [f"folder{suffix}"]
-
-
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_a_file_that_the_disk_has_no_room_for_is_not_there(tmp_path, suffix):
-    resource = pytest.importorskip("resource")
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    surface = expected()
-    resource.setrlimit(resource.RLIMIT_FSIZE, (200, hard))
-    try:
-        with pytest.raises(FileError) as caught:
-            pcmc.write(tmp_path / f"a{suffix}", surface)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert "\n" not in str(caught.value)
-    assert list(tmp_path.iterdir()) == []
-
-
-# ---- encodings
-
-
-@pytest.mark.parametrize("suffix", [".obj", ".fe", ".ply"])
-@pytest.mark.parametrize("change", ["mark", "lines"])
-def test_marks_and_line_ends_of_windows_change_nothing(tmp_path, suffix, change):
-    """A byte-order mark before the first vertex must not lose it."""
-    path = tmp_path / f"a{suffix}"
-    if suffix == ".ply":
-        if change == "mark":
-            pytest.skip("a PLY file begins with its magic number")
-        data = ply(TRIANGLE + b"3 0 1 2\n")
-    else:
-        pcmc.write(path, expected())
-        data = path.read_bytes() if suffix == ".fe" else (V + "f 1 2 5\nf 2 3 5\n").encode()
-    path.write_bytes(data)
-    before = pcmc.io.load(path)
-    path.write_bytes(b"\xef\xbb\xbf" + data if change == "mark" else data.replace(b"\n", b"\r\n"))
-    after = pcmc.io.load(path)
-    np.testing.assert_array_equal(after.vertices, before.vertices)
-    np.testing.assert_array_equal(after.faces, before.faces)
-
-
-@pytest.mark.parametrize("suffix", [".obj", ".fe"])
-def test_other_encodings_are_named(tmp_path, suffix):
-    path = tmp_path / f"a{suffix}"
-    pcmc.write(path, expected())
-    path.write_bytes(path.read_text(encoding="utf-8").encode("utf-16"))
-    with refused(FileError, what=str(path)) as caught:
-        pcmc.read(path)
-    assert "\n" not in str(caught.value)
