@@ -50,8 +50,9 @@ def test_absurd_projects_are_refused(tmp_path, text, capsys):
 
 
 def test_a_number_out_of_range_is_named_with_its_line(tmp_path):
-    path = project(tmp_path, SMALL + f"\n[solve]\niterations = {'9' * 400}\n")
-    with refused(FileError, what="solve.iterations", where=path.read_text().count("\n")):
+    path = project(tmp_path, SMALL.replace("[solve]", f"[solve]\niterations = {'9' * 400}"))
+    line = 1 + path.read_text(encoding="utf-8").split("\n").index("[solve]")
+    with refused(FileError, what="solve.iterations", where=line + 1):
         load(path)
 
 
