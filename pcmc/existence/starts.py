@@ -19,7 +19,7 @@ SOUND = 0.05  # quality of the plan's triangles above which the plan is kept
 
 
 def low_start(surface: Surface) -> Surface | None:
-    """The same mesh, low over the surface that its boundary spans; None where nothing is fixed.
+    """The same mesh, low over the surface that its boundary spans; None where it spans none.
 
     The lowest surface has each vertex at the mean height of its neighbours. Over a plan whose triangles
     are sound the vertices keep their places, and their heights over the lowest surface are scaled down
@@ -33,7 +33,7 @@ def low_start(surface: Surface) -> Surface | None:
     >>> low_start(spire).vertices[4].round(3).tolist()
     [0.0, 0.0, 0.283]
     """
-    if not surface.fixed.any():
+    if not _spans(surface.vertices[surface.fixed]):
         return None
     walls = surface.walls[surface.patch_of_face]
     faces = surface.faces[~walls] if not walls.all() else surface.faces
@@ -63,6 +63,14 @@ def low_start(surface: Surface) -> Surface | None:
         moved = _at(surface, low)
         return moved.moved(place_wall_rows(moved, find_walls(moved), moved.vertices))
     return _at(surface, low)
+
+
+def _spans(points: Floats) -> bool:
+    """Whether points (k,3) do not all lie on one line."""
+    if len(points) < 3:
+        return False
+    lengths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(lengths[1] > 1e-9 * lengths[0])
 
 
 def _diagonal(place: Floats) -> float:

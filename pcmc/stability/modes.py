@@ -23,6 +23,7 @@ from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from .factorisation import Factor, SingularMatrix, factoriser
 
+STRONG = 1e-6  # of the largest tension: where all are at least this, factors need no units
 SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
 
 
@@ -46,6 +47,20 @@ class Stiffness:
     factor: Factor
     rigid: Floats
     negative: int
+
+
+def strength_units(surface: Surface, classes: VertexClasses, space: MotionSpace) -> Floats | None:
+    """(N,) 1/√α of the tension around each unknown, as powers of two; None if all are of one order.
+
+    Factorised in these units, a patch that pulls far less than another still counts.
+    """
+    tension = surface.tensions[np.unique(classes.patch_of_face)]
+    if not len(tension) or tension.min() >= STRONG * tension.max():
+        return None
+    strongest = np.zeros(surface.n)
+    np.maximum.at(strongest, classes.faces, surface.tensions[classes.patch_of_face, None])
+    unknown = np.repeat(strongest, space.dimension)
+    return np.asarray(2.0 ** -np.round(0.5 * np.log2(unknown)))
 
 
 def full_matrix(pattern: Pattern, data: Floats) -> csr_array:
@@ -87,7 +102,7 @@ def stiffness(
     """
     X = surface.vertices
     pattern = hessian_pattern(classes, space)
-    solver = factoriser(pattern, backend)
+    solver = factoriser(pattern, backend, strength_units(surface, classes, space))
     for added in (0.0, SOFT):
         data = assemble(surface, classes, space, pattern, X, 1.0, added)
         with suppress(SingularMatrix):
