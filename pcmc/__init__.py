@@ -17,13 +17,14 @@ if TYPE_CHECKING:
     from .energy.functional import energy, gradient, hessian
     from .existence import solve
     from .io import read, write
-    from .surface import Patch, Plane, Surface
+    from .surface import Line, Patch, Plane, Surface
 
 __all__ = [
     "BoundaryMotion",
     "Certificate",
     "Design",
     "Direction",
+    "Line",
     "MeshCheck",
     "MeshVerdict",
     "Parameter",
@@ -62,7 +63,7 @@ _NAMES = {
     "energy.functional": ("energy", "gradient", "hessian"),
     "existence": ("solve",),
     "io": ("read", "write"),
-    "surface": ("Patch", "Plane", "Surface"),
+    "surface": ("Line", "Patch", "Plane", "Surface"),
 }
 
 

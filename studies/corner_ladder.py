@@ -1,8 +1,9 @@
 """One surface on meshes that are finer and finer at the ends of its junctions: does it have a limit?
 
 Level k halves the edges within r 2^-k of the ends; the solver goes on from the level before, and where it
-fails, once more from the initial shape on a mesh of that level. The bottoms of the walls slide on Π, or
-they are held where they are drawn.
+fails, once more from the initial shape on a mesh of that level. The bottoms of the walls slide on Π
+("sliding"); they are held where they are drawn ("held"); or they slide, and the ends slide along a straight
+outline, with no force left along it ("natural").
 
 Near an end on a straight boundary the crest's height over Π is, along its length s from the end,
 
@@ -19,17 +20,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import curve_fit
 from scipy.stats import linregress, t
 
-from pcmc import Certificate, Surface, solve
+from pcmc import Certificate, Line, Surface
 from pcmc.base.arrays import Floats, Ints
 from pcmc.base.errors import SurfaceError
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.quality import edge_lengths
+from pcmc.solvers import solve
 from pcmc.solvers.result import Result
 from pcmc.surface.geometry import angles
 
@@ -64,8 +67,34 @@ def hold_bottoms(surface: Surface) -> Surface:
     return Surface(*args, fixed=fixed, plane=surface.plane)
 
 
+def free_ends(surface: Surface) -> Surface:
+    """The same surface with its ends sliding along the outline, where that is straight.
+
+    The outline's other vertices on the same straight side slide too, and make room.
+    """
+    topo, X = surface.topology, surface.vertices
+    outline = topo.edges[topo.boundary_edge & surface.fixed[topo.edges].all(axis=1)]
+    lines = {}
+    for vertex in ends(surface):
+        if abs(opening(surface, int(vertex)) - 180.0) > 1e-6:
+            continue
+        beside = outline[(outline == vertex).any(axis=1)].sum(axis=1) - vertex
+        line = Line(tuple(X[vertex]), tuple(X[beside[1]] - X[beside[0]]))
+        side = np.unique(outline[(line.distance(X[outline]) < 1e-9 * surface.size).all(axis=1)])
+        place = line.place(X[side])
+        lines[line] = side[(place > place.min()) & (place < place.max())]
+    return replace(surface, on_line=lines)
+
+
+SUPPORTS: dict[str, Callable[[Surface], Surface]] = {
+    "sliding": lambda surface: surface,
+    "held": hold_bottoms,
+    "natural": free_ends,
+}
+
+
 def climb(
-    surface: Surface, levels: int, radius: float, held: bool, project: Projection | None = None
+    surface: Surface, levels: int, radius: float, support: str, project: Projection | None = None
 ) -> tuple[list[dict[str, Any]], Surface]:
     """A row per level as long as there is an equilibrium, and the surface at the last one.
 
@@ -75,10 +104,10 @@ def climb(
     places = surface.vertices[vertices]
     shape, rows, reached = surface, [], surface
     for level in range(levels + 1):
-        result = _solved(shape, held)
+        result = _solved(shape, support)
         if not result.converged and level:
             anew = refine_near(surface, places, level, radius, project)
-            again = _solved(anew, held)
+            again = _solved(anew, support)
             shape, result = (anew, again) if again.converged else (shape, result)
         certificate = result.certify(modes=1) if result.converged else result.certificate
         at_end = np.isin(result.surface.topology.edges, vertices).any(axis=1)
@@ -102,8 +131,8 @@ def climb(
     return rows, reached
 
 
-def _solved(shape: Surface, held: bool) -> Result:
-    start = hold_bottoms(shape) if held else shape
+def _solved(shape: Surface, support: str) -> Result:
+    start = SUPPORTS[support](shape)
     return solve(start, "newton", target="stationary", iterations=ITERATIONS)
 
 
@@ -120,16 +149,16 @@ def _findings(certificate: Certificate, surface: Surface) -> dict[str, Any]:
     }
 
 
-def label(rows: Sequence[dict[str, Any]], levels: int, held: bool) -> str:
+def label(rows: Sequence[dict[str, Any]], levels: int, support: str) -> str:
     """Which of ``CATEGORIES`` the rows of ``climb`` are.
 
     >>> row = {"status": "converged", "index": 0, "walls_quality": 0.5}
-    >>> label([row, row | {"index": 1}], 1, False)
+    >>> label([row, row | {"index": 1}], 1, "sliding")
     'held by the mesh: a saddle in the limit'
     """
     last = rows[-1]
     if last["status"] != "converged":
-        if held and last["walls_quality"] < SUNK:
+        if support == "held" and last["walls_quality"] < SUNK:
             return SINKS
         return LOST if len(rows) > 1 else NONE
     assert len(rows) == levels + 1

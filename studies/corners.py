@@ -1,9 +1,10 @@
 """Where junctions end: does the surface have a limit there as the mesh is refined, or does the mesh hold it?
 
 Each example is solved on meshes that are graded towards the ends of its junctions, each with half the edge
-length there of the one before: ten times with the bottoms of its walls sliding on Π, eight times with
-them held; each equilibrium of Fig. 16's grid eight and five times. ``corner_ladder`` has the theory of the
-hold and how it is fitted.
+length there of the one before: ten times with the bottoms of its walls sliding on Π, eight times with them
+held; each equilibrium of Fig. 16's grid eight and five times. Where the outline is straight the ends slide
+along it, too: with this natural condition nothing is left for the mesh to hold. ``corner_ladder`` has the
+theory of the hold and how it is fitted.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import pandas as pd
 from generators import bezier_hall, four_fans, joined_caps, three_patches, two_caps, two_squares
 from pcmc import Surface
 from pcmc.base.arrays import Floats
+from pcmc.solvers import solve
 from pcmc.sweep import Sweep
 
 from .alpha_grid import AXES, EDGE_LENGTH, TENSIONS
@@ -30,9 +32,11 @@ from .corner_ladder import (
     PERSISTS,
     SADDLE,
     SINKS,
+    SUPPORTS,
     TURNS,
     climb,
     ends,
+    free_ends,
     label,
     law,
     loss,
@@ -44,7 +48,7 @@ from .panels import category_panels
 from .refinement import FAMILIES
 from .study import Study
 
-LEVELS = {"sliding": 10, "held": 8}  # of refinement at the ends
+LEVELS = {"sliding": 10, "held": 8, "natural": 8}  # of refinement at the ends
 GRID_LEVELS = {"sliding": 8, "held": 5}
 REACH = 0.15  # of the size: what the first refinement reaches around an end
 GRID_REACH = 1.5
@@ -53,8 +57,10 @@ COLORS = dict(
     zip(CATEGORIES, ("#08519C", "#CC79A7", "#F4A582", "#D6604D", "#FFF2AE", "#E6E6E6"), strict=True)
 )
 NO_CASE = "no equilibrium on the first mesh"
-BOTTOMS = {"sliding": False, "held": True}
+NAMES = {"sliding": "ends fixed", "held": "held", "natural": "ends slide too"}
+BOTTOMS = ("sliding", "held")  # of the walls
 DRAWN = "fig4"
+SHIFTS = (0.0, 0.025, 0.05, 0.1, 0.2)  # of the ends, in half widths
 
 
 @dataclass(frozen=True)
@@ -94,22 +100,24 @@ CASES = (
 
 
 def data(folder: Folder, short: bool) -> None:
-    """``ladder``: a row per example, bottom and level; ``ends``: a row per end; ``grid``: Fig. 16."""
+    """``ladder``: a row per example, support and level; ``ends``, per end; ``shifted``; ``grid``: Fig. 16."""
     rows, at_ends = [], []
-    for case in CASES[1::5] if short else CASES:
+    for case in CASES[1::6] if short else CASES:
         initial = case.build()
-        for bottom, held in BOTTOMS.items():
-            if not (held or initial.on_plane.any()):
+        for bottom in SUPPORTS:
+            if not _applies(initial, bottom):
                 continue
             levels = 4 if short else LEVELS[bottom]
-            found, reached = climb(initial, levels, REACH * initial.size, held, case.project)
+            found, reached = climb(initial, levels, REACH * initial.size, bottom, case.project)
             whose = {"case": case.name, "bottom": bottom}
             rows += [whose | row for row in found]
-            at_ends += [whose | row for row in _ends(initial, reached, found, levels, held)]
-            if case.name == DRAWN and held:
+            at_ends += [whose | row for row in _ends(initial, reached, found, levels, bottom)]
+            if case.name == DRAWN and bottom == "held":
                 folder.write_mesh(DRAWN, {"at rest": reached})
     folder.write_table("ladder", pd.DataFrame(rows))
     folder.write_table("ends", pd.DataFrame(at_ends))
+    shifted = [row for case in CASES if _applies(case.build(), "natural") for row in _shifted_ends(case)]
+    folder.write_table("shifted", pd.DataFrame(shifted))
     sweep = Sweep(grid_case, {"tensions": _equilibria(folder, short), "bottom": list(BOTTOMS)})
     found_grid = run_sweep(folder, "grid", sweep)
     triples = pd.DataFrame(
@@ -119,12 +127,42 @@ def data(folder: Folder, short: bool) -> None:
     folder.write_table("grid", pd.concat([triples, found_grid[columns].reset_index(drop=True)], axis=1))
 
 
+def _applies(initial: Surface, bottom: str) -> bool:
+    """Whether the bottoms of an example can have this support, and its ends a straight outline."""
+    if bottom == "natural":
+        return len(free_ends(initial).on_line) == len(ends(initial))
+    return bottom == "held" or bool(initial.on_plane.any())
+
+
+def _shifted_ends(case: Case) -> list[dict[str, Any]]:
+    """At rest with the ends fixed at another place of their straight outline: energy, and pull along it.
+
+    The pull is what the surface exerts on its ends, positive away from where they are drawn.
+    """
+    initial, rows = case.build(), []
+    X, half = initial.vertices, float(np.abs(initial.vertices[:, 0]).max())
+    for shift in SHIFTS:
+        moved = X + np.outer(shift * half * (1.0 - (X[:, 0] / half) ** 2), [1.0, 0.0, 0.0])
+        result = solve(initial.moved(moved), "newton", target="stationary")
+        forces = result.certificate.reactions[ends(initial), 0]
+        rows.append(
+            {
+                "case": case.name,
+                "shift": shift,
+                "status": result.status.name.lower(),
+                "energy": result.energy if result.converged else math.nan,
+                "pull": -float(forces.sum()) if result.converged else math.nan,
+            }
+        )
+    return rows
+
+
 def _ends(
-    initial: Surface, reached: Surface, rows: list[dict[str, Any]], levels: int, held: bool
+    initial: Surface, reached: Surface, rows: list[dict[str, Any]], levels: int, bottom: str
 ) -> list[dict[str, Any]]:
     """A row for each end: where it is, what meets there, its label and the fits."""
     last = [row for row in rows if row["status"] == "converged"]
-    shared = {"label": label(rows, levels, held), "levels": len(last), **loss(rows)}
+    shared = {"label": label(rows, levels, bottom), "levels": len(last), **loss(rows)}
     edge = last[-1]["edge_length"] if last else math.nan
     return [
         {
@@ -164,11 +202,11 @@ def _equilibria(folder: Folder, short: bool) -> list[list[float]]:
 def grid_case(tensions: list[float], bottom: str) -> dict[str, Any]:
     """Whether the equilibrium at tensions (wall, large, small) of the grid has a limit."""
     named = dict(zip(("wall", "large", "small"), tensions, strict=True))
-    initial, held = two_caps(EDGE_LENGTH).retensioned(named), BOTTOMS[bottom]
-    rows, _ = climb(initial, GRID_LEVELS[bottom], GRID_REACH, held, ROUND["example2_near"])
+    initial = two_caps(EDGE_LENGTH).retensioned(named)
+    rows, _ = climb(initial, GRID_LEVELS[bottom], GRID_REACH, bottom, ROUND["example2_near"])
     known = [row for row in rows if row["status"] == "converged"] or rows
     return {
-        "label": label(rows, GRID_LEVELS[bottom], held),
+        "label": label(rows, GRID_LEVELS[bottom], bottom),
         "levels": len(known) if known is not rows or rows[-1]["status"] == "converged" else 0,
         "index": known[0]["index"],
         "eigenvalue": known[0]["eigenvalue"],
@@ -229,15 +267,18 @@ def figure(folder: Folder) -> None:
     sizes = {case.name: case.build() for case in CASES if (ladder.case == case.name).any()}
     curves = {}
     for case in CASES:
-        for bottom in BOTTOMS:
+        for bottom in SUPPORTS:
             mine = ladder[(ladder.case == case.name) & (ladder.bottom == bottom)]
             mine = mine[mine.status == "converged"]
             if len(mine) > 1:
                 initial = sizes[case.name]
                 unit = initial.size**2 / initial.tensions.max()
-                curves[f"{case.title}, {bottom}"] = (mine.edge_length / initial.size, mine.eigenvalue * unit)
+                curves[f"{case.title}, {NAMES[bottom]}"] = (
+                    mine.edge_length / initial.size,
+                    mine.eigenvalue * unit,
+                )
     lines(
-        {name: curve for name, curve in curves.items() if "sliding" in name},
+        {name: curve for name, curve in curves.items() if "held" not in name},
         folder.figure("loss"),
         x="edge length at the end / size",
         y="lowest eigenvalue, α/size²",

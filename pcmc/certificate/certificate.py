@@ -188,6 +188,7 @@ def certify(
             index = system.negative
             if modes > 0 and space.size > 2:
                 eigenvalues, fields = lowest(system, modes)
+            del system  # the factor is most of a large surface's memory
 
     patches = _patch_table(surface, standing, areas, qualities)
     ratio, support_forces = load_ratio(standing), reactions(standing)

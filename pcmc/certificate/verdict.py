@@ -94,7 +94,9 @@ class Findings:
             Overload(self.load_ratio) if self.overloaded else None,
             unheld(self.surface, stable=False),
         )
-        return tuple(dict.fromkeys(proof for proof in (*of_shape, *self.given) if proof is not None))
+        proofs = [proof for proof in of_shape if proof is not None]
+        kinds = {type(proof) for proof in proofs}
+        return (*proofs, *(proof for proof in self.given if type(proof) not in kinds))
 
     @cached_property
     def hardly_balanced(self) -> str:

@@ -144,6 +144,8 @@ class Attempt:
         self.history.evaluations += self.state.evaluations
         self.history.factorisations += self.stepper.factorisations
         self.state.evaluations = self.stepper.factorisations = 0
+        if self.status is not Status.SADDLE:  # from which a run may go on
+            self.stepper.free()
         return self
 
     def _iterate(self) -> Status:
@@ -198,7 +200,10 @@ class Attempt:
         """Leave a saddle if a minimum is sought, or lift a resting junction; False if neither is due."""
         if self.options.target == "minimum" and self.stepper.leave_saddle():
             return True
-        if self.state.resting.any() and (self.state.lift_overpulled() or self.state.update_walls()):
+        if not self.state.resting.any():
+            return False
+        self.stepper.free()  # at rest no factor is needed, and after a release another
+        if self.state.lift_overpulled() or self.state.update_walls():
             self.stepper.kind = "release"
             return True
         return False

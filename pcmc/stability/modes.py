@@ -131,7 +131,7 @@ def morse_index(surface: Surface) -> int:
     >>> morse_index(roof)
     0
     """
-    return _of_standing_part(surface).negative
+    return second_variation(surface).negative
 
 
 def ways_down(surface: Surface) -> tuple[int, Floats]:
@@ -141,14 +141,19 @@ def ways_down(surface: Surface) -> tuple[int, Floats]:
     ------
     SingularMatrix : the second variation has no inertia that can be counted.
     """
-    system = _of_standing_part(surface)
+    system = second_variation(surface)
     if system.negative == 0 or system.space.size <= 2:
         return system.negative, np.empty((0, 3))
     return system.negative, lowest(system, 1)[1][0]
 
 
-def _of_standing_part(surface: Surface) -> Stiffness:
-    """The second variation of the part of a surface that stands."""
+def second_variation(surface: Surface) -> Stiffness:
+    """The second variation of the part of a surface that stands.
+
+    Raises
+    ------
+    SingularMatrix : it has no factorisation.
+    """
     part = standing_part(surface)
     X = part.surface.vertices
     space = motion_space(part.surface, part.classes, X)
