@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pcmc.base.errors import OptionError, unknown
 
 from . import (
+    accuracy,
     alpha_grid,
     alpha_grid_geometric,
     calibration,
@@ -17,6 +18,8 @@ from . import (
     example3,
     example4,
     existence,
+    gallery,
+    mesh_check,
     mesh_search,
     refinement,
     solvers,
@@ -39,6 +42,9 @@ MODULES = (
     refinement,
     solvers,
     existence,
+    mesh_check,
+    accuracy,
+    gallery,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out

@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import threading
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import pcmc
 from generators import bezier_hall, spherical_cap
 from pcmc import explore
 from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.certificate import Verdict
 from pcmc.explore import server
 from pcmc.explore.messages import pack, unpack
 
@@ -312,6 +314,14 @@ def test_in_a_notebook_the_page_is_a_frame_and_its_surface_is_at_hand():
         assert view.surface.patches[0].tension == 0.8
     finally:
         view.close()
+
+
+def test_the_page_has_a_sign_and_a_colour_for_every_verdict():
+    folder = files("pcmc.explore").joinpath("page")
+    signs, style = (folder.joinpath(name).read_text("utf-8") for name in ("findings.js", "style.css"))
+    for verdict in Verdict:
+        assert f'{verdict.name.lower()}: "' in signs
+        assert f"#verdict[data-verdict={verdict.name.lower()}]" in style
 
 
 def test_importing_pcmc_does_not_import_the_server():

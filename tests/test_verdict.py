@@ -78,16 +78,6 @@ def test_a_mode_is_soft_beside_the_tension_of_what_it_moves():
     assert down.verdict is Verdict.STABLE
 
 
-def test_strong_forces_do_not_hide_what_a_weak_patch_lacks():
-    found = certify(beside_a_stiff_cap(spherical_cap(0.25), 1e8))
-    assert found.residual < 1e-8
-    assert found.curvature_error > 0.1
-    assert found.verdict is Verdict.NOT_CONVERGED
-    assert found.detail.startswith("the forces left in patch 'soft' are 9.7e-02 of its own")
-    both = solve(beside_a_stiff_cap(spherical_cap(0.25), 1e8), tolerance=1e-18)
-    assert both.certificate.verdict is Verdict.STABLE
-
-
 def test_no_equilibrium_from_the_load_alone():
     found = certify(spherical_cap(0.25, alpha=0.45))
     assert found.load_ratio == pytest.approx(1.0 / 0.9, rel=0.03)
@@ -218,7 +208,9 @@ def findings(**changes):
         ({"softest": -1e-3, "index": 1}, Verdict.SADDLE),
         ({"own_residuals": np.array([1e-4])}, Verdict.NOT_CONVERGED),
         ({"own_residuals": np.array([1e-6])}, Verdict.STABLE),
-        ({"index": None}, Verdict.NOT_CONVERGED),
+        ({"index": None}, Verdict.UNDECIDED),
+        ({"residual": 1e-7, "rounding": 1e-8}, Verdict.UNDECIDED),
+        ({"residual": 1e-6, "rounding": 1e-8}, Verdict.NOT_CONVERGED),
         ({"residual": 1e-7}, Verdict.NOT_CONVERGED),
         ({"residual": 1e-7, "tolerance": 1e-6}, Verdict.STABLE),
         ({"quality": 1e-4}, Verdict.DEGENERATE),

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from .. import existence
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, SurfaceError
@@ -31,7 +32,7 @@ from ..solvers import solve
 from ..solvers.result import Result, Status
 from ..surface import Surface
 from ..surface.geometry import face_areas
-from .estimator import Goal, error_shares
+from .estimator import Goal, error_shares, evenness
 from .goals import Accuracy, accuracies, check_places, goals_in
 from .mesh_check import BOUNDARIES, MeshCheck, check_mesh, vertex_numbers, with_bar
 
@@ -244,15 +245,14 @@ class _Search:
 
     def run(self, surface: Surface) -> AccurateResult:
         """Rounds until one of the ends."""
-        first = result = solve(surface, **self.options)
+        first = result = existence.solve(surface, **self.options)
         status, detail = AccuracyStatus.ROUNDS, f"after {ROUNDS} rounds"
         try:
             for _ in range(ROUNDS):
                 if ended := self._unsolved(result) or self._round(result):
                     status, detail = ended
                     break
-                surface = self._remeshed(self.rounds[-1])
-                result = solve(surface, **self.options)
+                result = self._next(self.rounds[-1])
         except (StopIteration, KeyboardInterrupt):
             status, detail = AccuracyStatus.STOPPED, ""
         return self._end(status, detail, first)
@@ -285,18 +285,25 @@ class _Search:
             hint += ", or for that of the limit alone (accuracy_of='limit')"
         return AccuracyStatus.TRIANGLES, f"{needed}; {hint}"
 
+    def _next(self, here: _Round) -> Result:
+        """The surface on the next mesh; if it does not come to rest there, on the check's finer mesh."""
+        result = solve(self._remeshed(here), **self.options)
+        finer = here.check.surfaces[1:2]
+        if result.converged or result.status is Status.STOPPED or not finer:
+            return result
+        return solve(finer[0], **self.options) if finer[0].m <= self.most_triangles else result
+
     def _remeshed(self, here: _Round) -> Surface:
         """The surface on a mesh with equal shares of the error.
 
-        With equal shares N triangles have the error (Σ √η)² / N; the m triangles here have Σ η.
+        With equal shares N triangles have the error (Σ √η)² / N, the m triangles here have Σ η.
         """
         surface, fine = here.result.surface, here.check.surfaces[1:2]
         if fine:
             shares = error_shares(surface, fine[0], here.goals)
         else:  # no finer mesh has this surface: finer everywhere
             shares = face_areas(surface.vertices[surface.faces]) ** 2
-        evenness = float(np.sqrt(shares).sum() ** 2 / shares.sum()) / surface.m if shares.any() else 1.0
-        factor = SPARE * evenness * here.excess if math.isfinite(here.excess) else MOST
+        factor = SPARE * evenness(shares) * here.excess if math.isfinite(here.excess) else MOST
         triangles = min(float(np.clip(factor, LEAST, MOST)) * surface.m, self.most_triangles)
         return remesh(surface, size_field(surface, shares, triangles), growth=GROWTH, project=self.project)
 

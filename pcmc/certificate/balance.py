@@ -37,8 +37,9 @@ def load_ratio(surface: Surface) -> float:
     carrying = topo.boundary_edge | line
     capacity = float(sheets[carrying] @ segment_lengths(X, topo.edges[carrying]))
     inside[topo.edges[line]] = False
-    opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
-    capacity += 0.5 * float(tension @ (opposite * inside[F]).sum(axis=1))
+    if inside.any():
+        opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
+        capacity += 0.5 * float(tension @ (opposite * inside[F]).sum(axis=1))
     return abs(load(surface)) / capacity if capacity > 0.0 else 0.0
 
 

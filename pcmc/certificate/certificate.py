@@ -17,6 +17,7 @@ from ..base.arrays import Floats, Ints
 from ..contact.pinching import excess_pull, standing_part
 from ..energy.curvature import METHODS, curvature_error, mean_curvature
 from ..energy.functional import energy_and_gradient, patch_areas, volume
+from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
 from ..energy.motion_space import VertexClasses, force_scale, motion_space
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import triangle_quality
@@ -40,7 +41,7 @@ class Certificate:
     ----------
     verdict, detail : the verdict, and its reason (which mode, patch or place).
     residual : ‖Bᵀ∇E‖ over ``scale``: the forces left in the motion space, with the pull on pinched
-        vertices beyond what their wall can take, relative.
+        vertices beyond what their wall can take, relative. Of several loose parts, that of the worst.
     scale : norm of the single triangles' tension forces, force.
     energy, volume : E (force·length) and the volume under the roof (length³).
     index : Morse index; None where the surface is not at rest. Rigid motions are not counted.
@@ -173,8 +174,9 @@ def certify(
     space = motion_space(standing, classes, X)
     rigid = rigid_modes(space, rigid_motions(standing), X)
     in_motion_space = space.to_coordinates(forces)
-    residual = float(np.hypot(np.linalg.norm(in_motion_space), np.linalg.norm(unheld))) / scale
     left = space.to_vectors(in_motion_space)
+    lacking = np.column_stack([left, unheld])
+    residual = relative_forces(standing, classes, X, lacking)
 
     qualities = triangle_quality(X, standing.faces)
     in_wall = part.walls.pinchable[standing.patch_of_face]
@@ -186,6 +188,7 @@ def certify(
             index = system.negative
             if modes > 0 and space.size > 2:
                 eigenvalues, fields = lowest(system, modes)
+            del system  # the factor is most of a large surface's memory
 
     patches = _patch_table(surface, standing, areas, qualities)
     ratio, support_forces = load_ratio(standing), reactions(standing)
@@ -200,6 +203,7 @@ def certify(
         own_residuals=_own_residuals(standing, classes, left),
         softest=_softest(standing, classes, eigenvalues, fields),
         load_ratio=ratio,
+        rounding=rounding_left(standing, classes, X),
         evidence=evidence,
         given=proofs,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
@@ -231,16 +235,19 @@ def certify(
 
 
 def _own_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> Floats:
-    """(patches,) the forces left (n,3) inside each patch over the norm of its own triangles' forces."""
-    F, patch, count = surface.faces, surface.patch_of_face, len(surface.patches)
-    sides = surface.vertices[F[:, [1, 2, 0]]] - surface.vertices[F]
-    squared = 0.25 * surface.tensions[patch] ** 2 * np.einsum("fij,fij->f", sides, sides)
-    scale = np.bincount(patch, squared, count)
-    patch_of_vertex = np.zeros(surface.n, dtype=np.int64)
-    patch_of_vertex[F] = patch[:, None]
-    inside = np.einsum("ij,ij->i", left, left) * (classes.kind == SHEET)
-    total = np.bincount(patch_of_vertex, inside, count)
-    return np.asarray(np.sqrt(total / np.where(scale > 0.0, scale, 1.0)))
+    """(patches,) the forces left (n,3) inside each patch over the norm of its own triangles' forces.
+
+    Of a patch with several islands, the worst one counts.
+    """
+    island = islands(surface.topology)[classes.active]
+    own = squared_forces(surface, classes, surface.vertices)
+    island_of_vertex = np.zeros(surface.n, dtype=np.int64)
+    island_of_vertex[classes.faces] = island[:, None]
+    inside = left * (classes.kind == SHEET)[:, None]
+    out = np.zeros(len(surface.patches))
+    squares = ratios(inside, island_of_vertex, own, island)
+    np.maximum.at(out, classes.patch_of_face, squares[island])
+    return np.sqrt(out)
 
 
 def _softest(surface: Surface, classes: VertexClasses, values: Floats, fields: Floats) -> float:

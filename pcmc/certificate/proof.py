@@ -58,12 +58,10 @@ class Fold:
     value : the parameter at the fold; 1 is what the surface asks for.
     start : the parameter where the branch starts.
 
-    >>> print(Fold("pressure", 0.8, 0.0))
-    equilibria end at a fold at 0.800 of the pressure (followed from 0): lower all pressures below 0.800 of \
-theirs, or raise all tensions above 1.250 times theirs
-    >>> print(Fold("distance", 0.95, 0.5))
-    equilibria end at a fold at 0.950 of the distance between the held curves (followed from 0.5): bring \
-them nearer to each other
+    >>> print(Fold("pressure", 0.8, 0.4))  # doctest: +ELLIPSIS
+    the equilibria end at a fold at 0.800 of the pressure (followed from 0.4 of it): lower all ...
+    >>> print(Fold("distance", 0.95, 0.5))  # doctest: +ELLIPSIS
+    the film ends at a fold at 0.950 of the distance between the held curves (followed from 0.5 ...
     """
 
     parameter: str
@@ -71,17 +69,16 @@ them nearer to each other
     start: float
 
     def __str__(self) -> str:
-        if self.parameter == "pressure":
-            of = "pressure"
-            remedy = (
-                f"lower all pressures below {_three(self.value)} of theirs, or raise all tensions above"
-                f" {_three(1.0 / self.value)} times theirs"
+        value, start = _three(self.value), f"{self.start:.3g}"
+        if self.parameter == "distance":
+            return (
+                f"the film ends at a fold at {value} of the distance between the held curves (followed from"
+                f" {start} of it): bring them nearer to each other"
             )
-        else:
-            of, remedy = "distance between the held curves", "bring them nearer to each other"
         return (
-            f"equilibria end at a fold at {_three(self.value)} of the {of}"
-            f" (followed from {self.start:.3g}): {remedy}"
+            f"the equilibria end at a fold at {value} of the pressure (followed from {start} of it): lower"
+            f" all pressures below {value} of theirs, or raise all tensions above {_three(1.0 / self.value)}"
+            " times theirs"
         )
 
 

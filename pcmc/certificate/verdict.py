@@ -17,6 +17,8 @@ from .neck import Neck, pinched_neck
 from .proof import Overload, Proof
 from .slipping import describe_saddle
 
+NOISE = 10.0  # times what rounding of the coordinates leaves: forces up to here may be rounding alone
+FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
 NEUTRAL = 1e-2  # |λ| size²/α below which a mode counts as neutral
 SMALL = 1e3  # tolerances of its own forces that a patch may lack where stronger ones hide it
 COLLAPSED = 1e-3  # triangle quality up to which a mesh counts as degenerate
@@ -31,6 +33,7 @@ class Verdict(Enum):
     NOT_CONVERGED = "not converged: the forces do not balance yet; solve further"
     NO_EQUILIBRIUM = "no equilibrium: tension and pressure cannot balance, as the detail proves"
     RAN_AWAY = "ran away from this start: another start may come to rest; nothing proves that none does"
+    UNDECIDED = "undecided: rounding hides whether it is at rest, or stable; the detail says why"
     DEGENERATE = "degenerate mesh: triangles have collapsed; remesh, or start from another shape"
 
 
@@ -55,6 +58,7 @@ class Findings:
     index : Morse index; None where it is not known.
     own_residuals : (patches,) each patch's forces left, relative to its own.
     softest : lowest eigenvalue in units of α/size²; infinite where none is known.
+    rounding : what rounding of the coordinates alone leaves of the residual, about.
     load_ratio : pressure over the most that the boundary's tension could carry.
     evidence : what happened on the way, if a solver was there to see it.
     given : proofs that there is no equilibrium, which a solver brought.
@@ -70,6 +74,7 @@ class Findings:
     own_residuals: Floats
     softest: float
     load_ratio: float
+    rounding: float = 0.0
     evidence: Evidence | None = None
     given: tuple[Proof, ...] = ()
     mode: Floats = field(default_factory=lambda: np.empty((0, 3)))
@@ -89,7 +94,9 @@ class Findings:
             Overload(self.load_ratio) if self.overloaded else None,
             unheld(self.surface, stable=False),
         )
-        return tuple(dict.fromkeys(proof for proof in (*of_shape, *self.given) if proof is not None))
+        proofs = [proof for proof in of_shape if proof is not None]
+        kinds = {type(proof) for proof in proofs}
+        return (*proofs, *(proof for proof in self.given if type(proof) not in kinds))
 
     @cached_property
     def hardly_balanced(self) -> str:
@@ -161,9 +168,28 @@ def _forces_left(f: Findings) -> str:
 def _weak_patch(f: Findings) -> str:
     name = f.surface.patches[int(f.own_residuals.argmax())].name
     return (
-        f"the forces left in patch {name!r} are {f.own_residuals.max():.1e} of its own, which are small"
-        " beside those of other patches; solve with a smaller tolerance"
+        f"the forces left in patch {name!r}, or in an island of it, are {f.own_residuals.max():.1e} of its"
+        " own, which are small beside those of the rest; solve with a smaller tolerance"
     )
+
+
+def _hidden_forces(f: Findings) -> str:
+    return (
+        f"relative residual {f.residual:.1e}, tolerance {f.tolerance:.0e}, but rounding of the coordinates"
+        f" alone leaves about {f.rounding:.0e}: parts that are small beside their coordinates lose their"
+        " digits; move the origin near them, or solve them by themselves"
+    )
+
+
+def _hidden_stability(f: Findings) -> str:
+    reason = (
+        f"the forces balance (relative residual {f.residual:.1e}), but the second variation is singular to"
+        " rounding, so its negative eigenvalues cannot be counted"
+    )
+    tensions = f.surface.tensions[f.surface.tensions > 0.0]
+    if len(tensions) and tensions.max() > FACTOR * tensions.min():
+        reason += f"; the tensions differ by a factor of {tensions.max() / tensions.min():.0e}"
+    return reason
 
 
 def _ways_down(f: Findings) -> str:
@@ -187,8 +213,10 @@ RULES = (
         _ran_away,
     ),
     Rule(Verdict.DEGENERATE, lambda f: f.collapsed, _collapse),
-    Rule(Verdict.NOT_CONVERGED, lambda f: f.moving or f.index is None, _forces_left),
+    Rule(Verdict.UNDECIDED, lambda f: f.moving and f.residual <= NOISE * f.rounding, _hidden_forces),
+    Rule(Verdict.NOT_CONVERGED, lambda f: f.moving, _forces_left),
     Rule(Verdict.NOT_CONVERGED, lambda f: bool(f.own_residuals.max() > SMALL * f.tolerance), _weak_patch),
+    Rule(Verdict.UNDECIDED, lambda f: f.index is None, _hidden_stability),
     Rule(Verdict.SADDLE, lambda f: f.index != 0, _ways_down),
     Rule(
         Verdict.NEUTRAL,

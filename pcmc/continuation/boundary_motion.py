@@ -66,8 +66,11 @@ class BoundaryMotion:
             message = f"BoundaryMotion: positions({self.start:g}) is not the surface's boundary: fixed vertex"
             raise OptionError(
                 f"{message} {worst} is {off.max():.3g} away; check start= and the order of the vertices",
-                what="positions", where=worst, found=float(off.max()), expected=0.0,
-            )  # fmt: skip
+                what="positions",
+                where=worst,
+                found=float(off.max()),
+                expected=0.0,
+            )
         return line
 
 

@@ -93,9 +93,10 @@ class Branch:
         Returns
         -------
         (Branch, Branch)
-            Along the mode and against it. Of a symmetric bifurcation (a pitchfork) they are images of each
-            other, and λ turns at its start; of others λ passes it. The first row of ``points`` is the
-            first point off the bifurcation.
+            Along the mode and against it; in the first the surface rises over Π, if the mode lifts it at
+            all. Of a symmetric bifurcation (a pitchfork) they are images of each other, and λ turns at
+            their start; of others λ passes it. The first row of ``points`` is the first point off the
+            bifurcation.
 
         Raises
         ------

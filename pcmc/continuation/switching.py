@@ -20,11 +20,15 @@ from .options import FollowOptions
 from .state import BranchMesh, State
 
 NULL = 0.05  # of the next eigenvalue: how far from 0 that of the mode may be
+DRIFT = 1e-6  # of the size: mean displacement of a mode of size 1 below which it has no direction
 ALONG = 0.5  # cosine between mode and branch from which the branch itself turns: a fold
 
 
 def leaving(mesh: BranchMesh, parameter: float, options: FollowOptions, row: int) -> list[BranchPoint]:
     """The first point of the branch along φ and of that along -φ, from the bifurcation on a mesh.
+
+    φ has the sign with which the surface rises over Π in the mean; where it does not, the one with which
+    it moves along Π's first axis, or its second.
 
     Raises
     ------
@@ -38,9 +42,11 @@ def leaving(mesh: BranchMesh, parameter: float, options: FollowOptions, row: int
             f"no mode turns at event {row}: the eigenvalues nearest 0 are {values[0]:.3g}, {values[1]:.3g}"
         )
         raise OptionError(message, what="event", where=row, found=float(values[0]), expected=0.0)
-    weights = at.area_weights
+    weights, scale = at.area_weights, mesh.line.scale
     mode = modes[0] / np.sqrt(np.einsum("v,vi,vi->", weights, modes[0], modes[0]))
-    scale = mesh.line.scale
+    drift = mesh.surface.plane.axes[[2, 0, 1]] @ (weights @ mode)  # over Π, then along it
+    clear = np.abs(drift) > DRIFT * weights.sum()
+    mode *= np.sign(drift[clear.argmax()]) if clear.any() else 1.0
     return [_off(at, Tangent(sign * mode, 0.0, weights, scale), options, row) for sign in (1.0, -1.0)]
 
 

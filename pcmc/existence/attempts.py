@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from .. import solvers
-from ..continuation import Branch, Direction, follow
+from ..continuation import BoundaryMotion, Branch, Direction, follow
 from ..energy.functional import gradient
 from ..solvers.result import Callback, Progress, Result, Status
 from ..surface import Surface
@@ -45,7 +45,9 @@ class Attempts:
         rows = [{**row, "iteration": before + row["iteration"]} for row in result.rows]
         return replace(result, rows=rows)
 
-    def follow(self, surface: Surface, direction: Direction, stop: float, **options: Any) -> Branch:
+    def follow(
+        self, surface: Surface, direction: Direction | BoundaryMotion, stop: float, **options: Any
+    ) -> Branch:
         """Follow a branch until it arrives or turns; StopIteration if that was stopped."""
         interrupted: list[BaseException] = []
 

@@ -31,25 +31,32 @@ class Way:
     quality: float
 
 
-def until_turned(extra: Callable[[Progress], None] | None = None) -> Callable[[Progress], None]:
-    """A callback for ``follow``: ends a branch that has turned back, or whose triangles are poor."""
+def until_turned(
+    extra: Callable[[Progress], None] | None = None, back: float | None = None
+) -> Callable[[Progress], None]:
+    """A callback for ``follow``: ends a branch that has turned back, or whose triangles are poor.
+
+    ``extra`` is called with each point; ``back`` is as in ``way``.
+    """
     farthest = [0.0]
 
     def watch(progress: Progress) -> None:
         farthest[0] = max(farthest[0], progress.row["parameter"])
         if extra is not None:
             extra(progress)
-        if progress.row["parameter"] < (1.0 - BACK) * farthest[0] or progress.row["quality"] < POOR:
+        slack = BACK * farthest[0] if back is None else back
+        if progress.row["parameter"] < farthest[0] - slack or progress.row["quality"] < POOR:
             raise StopIteration
 
     return watch
 
 
-def way(branch: Branch) -> Way:
+def way(branch: Branch, back: float | None = None) -> Way:
     """How a branch ends that was followed towards larger values.
 
     It folds where the parameter turns for good, with an eigenvalue that changes its sign not far from
-    the turn and triangles that are sound: otherwise the mesh may be what turns.
+    the turn and triangles that are sound: otherwise the mesh may be what turns. ``back`` is how far from the
+    turn; by default 0.03 of the farthest value.
     """
     points = branch.points
     if branch.ending is Ending.REACHED:
@@ -58,5 +65,6 @@ def way(branch: Branch) -> Way:
     quality = float(points.quality.iloc[int(points.parameter.argmax())])
     opened = branch.events[branch.events.kind == "index"].parameter
     turned = len(branch.folds) and branch.folds.parameter.max() >= points.parameter.max()
-    folded = turned and quality > SOUND and (farthest - opened <= BACK * farthest).any()
+    slack = BACK * farthest if back is None else back
+    folded = turned and quality > SOUND and (farthest - opened <= slack).any()
     return Way(Arrival.FOLD if folded else Arrival.LOST, farthest, quality)

@@ -13,12 +13,13 @@ from ..contact.pinching import find_walls, place_wall_rows
 from ..meshing.quality import triangle_quality
 from ..surface import Surface
 
-RISE = 0.1  # of the plan's size: height of a low start over the lowest surface
+RISE = 0.1  # of the supports' extent along Π: height of a low start over the lowest surface
+WIDE = 1.5  # of that extent: a plan that is wider is not kept
 SOUND = 0.05  # quality of the plan's triangles above which the plan is kept
 
 
 def low_start(surface: Surface) -> Surface | None:
-    """The same mesh, low over the surface that its boundary spans; None where nothing is fixed.
+    """The same mesh, low over the surface that its boundary spans; None where it spans none.
 
     The lowest surface has each vertex at the mean height of its neighbours. Over a plan whose triangles
     are sound the vertices keep their places, and their heights over the lowest surface are scaled down
@@ -32,7 +33,7 @@ def low_start(surface: Surface) -> Surface | None:
     >>> low_start(spire).vertices[4].round(3).tolist()
     [0.0, 0.0, 0.283]
     """
-    if not surface.fixed.any():
+    if not _spans(surface.vertices[surface.fixed]):
         return None
     walls = surface.walls[surface.patch_of_face]
     faces = surface.faces[~walls] if not walls.all() else surface.faces
@@ -43,7 +44,8 @@ def low_start(surface: Surface) -> Surface | None:
     corners = place[faces, :2] - place[faces[:, :1], :2]
     turns = np.sign(corners[:, 1, 0] * corners[:, 2, 1] - corners[:, 1, 1] * corners[:, 2, 0])
     plan = triangle_quality(place * [1.0, 1.0, 0.0], faces)
-    kept = np.abs(turns.sum()) == len(turns) and plan.min() > SOUND
+    extent, span = _diagonal(place[roof]), _diagonal(place[held]) or _diagonal(place[roof])
+    kept = np.abs(turns.sum()) == len(turns) and plan.min() > SOUND and extent < WIDE * span
     low = place.copy()
     if not kept:
         low[:, :2] = _in_the_middle(faces, surface.fixed | ~roof, place[:, :2])
@@ -51,7 +53,7 @@ def low_start(surface: Surface) -> Surface | None:
     above = place[:, 2] - low[:, 2] if kept else _dome(faces, held | ~roof)
     if not (kept or walls.all()):
         above *= np.sign(load(_at(surface, low + above[:, None] * [0.0, 0.0, 1.0]))) or 1.0
-    rise = RISE * float(np.linalg.norm(np.ptp(place[:, :2], axis=0)))
+    rise = RISE * span
     most = float(np.abs(above[roof]).max())
     if surface.pressures.any() and most > 0.0:
         low[:, 2] += above * min(1.0, rise / most) if kept else above * (rise / most)
@@ -61,6 +63,19 @@ def low_start(surface: Surface) -> Surface | None:
         moved = _at(surface, low)
         return moved.moved(place_wall_rows(moved, find_walls(moved), moved.vertices))
     return _at(surface, low)
+
+
+def _spans(points: Floats) -> bool:
+    """Whether points (k,3) do not all lie on one line."""
+    if len(points) < 3:
+        return False
+    lengths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(lengths[1] > 1e-9 * lengths[0])
+
+
+def _diagonal(place: Floats) -> float:
+    """Diagonal of the bounding box along Π of coordinates (k,3)."""
+    return float(np.linalg.norm(np.ptp(place[:, :2], axis=0)))
 
 
 def _at(surface: Surface, place: Floats) -> Surface:

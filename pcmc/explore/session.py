@@ -13,6 +13,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
+from .. import existence
 from ..accuracy import MeshCheck, check_mesh
 from ..certificate import Certificate, Verdict, certify
 from ..solvers import solve
@@ -58,10 +59,10 @@ def solved_start(surface: Surface) -> State:
     """Solve a surface, unless it is at rest already; if no solver converges, return it unchanged."""
     certificate = certify(surface)
     failure = None if certificate.verdict in AT_REST else certificate
-    for target in ("stationary", "minimum"):
+    for solver, target in ((solve, "stationary"), (existence.solve, "minimum")):
         if failure is None:
             break
-        result = solve(surface, target=target)
+        result = solver(surface, target=target)
         ended = result.certify()
         if ended.verdict in AT_REST:
             return State(result.surface, ended, result.surface.patches)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Mapping
+from dataclasses import asdict, is_dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -120,6 +121,8 @@ def _plain(value: Any) -> Any:
         return value.name.lower()
     if isinstance(value, pd.DataFrame):
         return value.to_dict(orient="records")
+    if is_dataclass(value) and not isinstance(value, type):  # a proof
+        return {"kind": type(value).__name__, **asdict(value)}
     found = type(value).__name__
     text = f"certificate: cannot write a {found}; use numbers, texts, arrays and tables"
     raise FileError(text, where="certificate", found=found)

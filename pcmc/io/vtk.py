@@ -21,7 +21,7 @@ from .libraries import load_library
 from .mesh_data import MeshData, support_of
 from .metadata import metadata_text, parse_metadata
 from .polygons import from_polygons
-from .vtk_process import read_arrays
+from .reading_process import read_arrays
 
 RESERVED = ("support", "patch")
 FLAT = (5, 7, 9)  # VTK_TRIANGLE, VTK_POLYGON, VTK_QUAD
@@ -51,7 +51,7 @@ def read(path: Path) -> MeshData:
     if find_spec("vtkmodules") is None or find_spec("pyvista") is None:
         raise MissingExtra("pyvista", "files")
     _check_text(path)
-    arrays = read_arrays(path)
+    arrays = read_arrays("vtk", path)
     corners, counts, chosen = _cells(arrays)
     metadata = parse_metadata(arrays["text"])
     points = np.asarray(arrays["points"]).reshape(-1, 3)

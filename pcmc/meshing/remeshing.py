@@ -185,8 +185,8 @@ def _cut_curves(
     support = np.stack([fixed_edge[stay], sliding_edge[stay]], axis=1)
     while (counts > 1).any():
         mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
-    if project is not None:
-        new = mesh.fixed & (np.arange(len(mesh.X)) >= first)
+    new = mesh.fixed & (np.arange(len(mesh.X)) >= first)
+    if project is not None and new.any():
         X = mesh.X.copy()
         X[new] = projected(project, X[new])
         mesh = replace(mesh, X=X)

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .. import io
+from .. import io, solvers
 from ..base.arrays import Ints
 from ..base.errors import BalanceWarning, OptionError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
 from ..certificate.certificate import Certificate
 from ..contact.pinching import standing_part
+from ..existence import solve
 from ..meshing.remeshing import remesh
-from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from .file import Project, in_file, load, surface_of
@@ -246,7 +246,8 @@ def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcom
     if design is not None:
         result = design.result
     else:
-        result = solve(surface, project.method, reporter(report), **project.options)
+        solver = solve if project.search else solvers.solve
+        result = solver(surface, project.method, reporter(report), **project.options)
         if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
             raise KeyboardInterrupt
     report("certifying")

@@ -19,6 +19,7 @@ TARGETS = ("minimum", "stationary")
 DESCENTS = 5  # smooth steps after a Newton step that did not help
 PATIENCE = 8  # steps without halving the residual, once it is that small
 ROUNDED = 1e-10  # relative residual that counts as zero where rounding lets no step lower it
+NOISE = 10.0  # times what rounding of the coordinates leaves, which counts as zero in the same way
 COLLAPSED = 1e-3  # triangle quality below which the attempt ends
 POOR = 0.15  # triangle quality that explains why no step helps
 DOWN = ("shifted", "saddle")  # kinds of steps where the second variation is indefinite
@@ -143,6 +144,8 @@ class Attempt:
         self.history.evaluations += self.state.evaluations
         self.history.factorisations += self.stepper.factorisations
         self.state.evaluations = self.stepper.factorisations = 0
+        if self.status is not Status.SADDLE:  # from which a run may go on
+            self.stepper.free()
         return self
 
     def _iterate(self) -> Status:
@@ -190,13 +193,17 @@ class Attempt:
         """Whether the residual is below the tolerance, or as low as rounding lets it become."""
         residual = self.state.relative
         no_progress = self.stuck or self.steps_since_best > PATIENCE
-        return residual <= self.options.tolerance or (residual <= ROUNDED and no_progress)
+        rounded = max(ROUNDED, NOISE * self.state.rounding)
+        return residual <= self.options.tolerance or (residual <= rounded and no_progress)
 
     def _leave_rest(self) -> bool:
         """Leave a saddle if a minimum is sought, or lift a resting junction; False if neither is due."""
         if self.options.target == "minimum" and self.stepper.leave_saddle():
             return True
-        if self.state.resting.any() and (self.state.lift_overpulled() or self.state.update_walls()):
+        if not self.state.resting.any():
+            return False
+        self.stepper.free()  # at rest no factor is needed, and after a release another
+        if self.state.lift_overpulled() or self.state.update_walls():
             self.stepper.kind = "release"
             return True
         return False

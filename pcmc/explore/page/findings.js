@@ -4,8 +4,8 @@ import { colourOf, diverging, sequential } from "./colours.js";
 import { digits } from "./panel.js";
 
 const SIGNS = {
-  stable: "✓", neutral: "≈", saddle: "⤢", not_converged: "…", no_equilibrium: "✕", degenerate: "△",
-  opening: "…",
+  stable: "✓", neutral: "≈", saddle: "⤢", not_converged: "…", no_equilibrium: "✕", ran_away: "↗",
+  undecided: "?", degenerate: "△", opening: "…",
 };
 
 export const COLOURS = {

@@ -1,8 +1,8 @@
-"""A process in which VTK reads files, because a file that is wrong can end VTK's process.
+"""A process in which VTK and rhino3dm read files: a file that is wrong can crash them, or fill the memory.
 
-VTK believes the counts and offsets in a file. Checking them all beforehand means to parse the file a second
-time, so VTK reads elsewhere. Starting the process takes as long as importing PyVista here would. It is kept
-for the next file, and ends with this process.
+They believe the counts and offsets in a file. Checking them all beforehand means to parse the file a second
+time. So they read elsewhere, with limits of time and, on Linux, of memory. Starting the process takes as long
+as importing PyVista here would. It is kept for the next file, and ends with this process.
 """
 
 from __future__ import annotations
@@ -18,39 +18,42 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import FileError
-from . import vtk_script
+from . import reading_script
 
 SECONDS, PACE = 30.0, 1e6  # time limit of a file: this, and one more for so many bytes
 
 _lock = threading.Lock()
-_processes: dict[int, VtkProcess] = {}  # by the process that started it: a fork starts its own
+_processes: dict[int, ReadingProcess] = {}  # by the process that started it: a fork starts its own
 
 
-def read_arrays(path: Path) -> dict[str, Any]:
-    """The arrays of ``vtk_script.arrays``; FileError if VTK refuses the file, crashes or takes too long."""
+def read_arrays(kind: str, path: Path) -> dict[str, Any]:
+    """What the reader of this kind in ``reading_script`` returns.
+
+    FileError if the library refuses the file, crashes or takes too long.
+    """
     owner = os.getpid()
     with _lock:
         process = _processes.get(owner)
         if process is None or process.ended:
-            process = _processes[owner] = VtkProcess()
+            process = _processes[owner] = ReadingProcess()
         try:
-            kind, answer = process.read(path)
+            outcome, answer = process.read(kind, path)
         except BaseException:  # Ctrl-C: the next file must not get this one's answer
             process.close()
             raise
-    if kind == "failed":
+    if outcome == "failed":
         raise FileError(f"not a readable {path.suffix[1:]} file, or cut off ({answer[:120]})")
     arrays: dict[str, Any] = answer
     return arrays
 
 
-class VtkProcess:
+class ReadingProcess:
     """The process; ``read`` gives it one file at a time."""
 
     def __init__(self) -> None:
         self.owner = os.getpid()
         self.process = subprocess.Popen(
-            [sys.executable, "-P", str(vtk_script.__file__)],
+            [sys.executable, "-P", str(reading_script.__file__)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -66,7 +69,7 @@ class VtkProcess:
         """Whether the process can read no more files."""
         return self.process.poll() is not None
 
-    def read(self, path: Path) -> tuple[str, Any]:
+    def read(self, kind: str, path: Path) -> tuple[str, Any]:
         """("read", arrays), or ("failed", the reason)."""
         assert self.process.stdin is not None
         assert self.process.stdout is not None
@@ -78,14 +81,14 @@ class VtkProcess:
             if not self._begun:
                 self.process.stdin.write(pickle.dumps(sys.path))
                 self._begun = True
-            self.process.stdin.write(pickle.dumps((str(path.absolute()), size)))
+            self.process.stdin.write(pickle.dumps((kind, str(path.absolute()), size)))
             self.process.stdin.flush()
             answer: tuple[str, Any] = pickle.load(self.process.stdout)
         except (EOFError, OSError, pickle.UnpicklingError):
             late = not timer.is_alive()
             self.close()
             code = self.process.returncode
-            return "failed", f"stopped after {limit:.0f} s" if late else f"it ends VTK's process, code {code}"
+            return "failed", f"stopped after {limit:.0f} s" if late else f"it ends its reader, code {code}"
         finally:
             timer.cancel()
         return answer
