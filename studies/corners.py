@@ -56,7 +56,7 @@ SAMPLE = [[1.5, 6.0, 6.0], [4.0, 4.0, 3.0]]  # of the grid, where its equilibria
 COLORS = dict(
     zip(CATEGORIES, ("#08519C", "#CC79A7", "#F4A582", "#D6604D", "#FFF2AE", "#E6E6E6"), strict=True)
 )
-NO_CASE = "no equilibrium on the first mesh"
+NO_CASE = "no equilibrium in the grid"
 NAMES = {"sliding": "ends fixed", "held": "held", "natural": "ends slide too"}
 BOTTOMS = ("sliding", "held")  # of the walls
 DRAWN = "fig4"
@@ -288,7 +288,7 @@ def figure(folder: Folder) -> None:
         xscale="log",
         markers=True,
         levels={"saddle below": 0.0},
-        title="Bottoms slide: the ends lose their hold on finer meshes",
+        title="Bottoms slide: the hold of the ends fades",
     )
     lines(
         {name: curve for name, curve in curves.items() if "held" in name},
@@ -319,7 +319,7 @@ def _draw_fits(folder: Folder, ladder: pd.DataFrame) -> None:
             continue
         found, unit = fits.iloc[0], abs(mine.eigenvalue.iloc[0])
         first, last = -np.log(mine.edge_length.to_numpy()[[2, 1 + int(found.fitted)]])
-        depth = np.linspace(first, last, 50)
+        depth = np.linspace(first, last, 7)
         fitted = law(depth, found.limit, found.loss, found["shift"], found["last"])
         curves[case.title] = (mine.edge_length, mine.eigenvalue / unit)
         curves[f"limit {found.limit:.2g} ± {found.limit_margin:.1g}"] = (np.exp(-depth), fitted / unit)
