@@ -27,6 +27,7 @@ DOCS = Path(__file__).resolve().parent
 HOME = DOCS.parent
 MODULES = (  # modules with names that users need beside those of their package
     "pcmc.base.errors",
+    "pcmc.meshing.local_refinement",
     "pcmc.meshing.refinement",
     "pcmc.meshing.remeshing",
     "pcmc.solvers.lbfgs",

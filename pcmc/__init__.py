@@ -9,21 +9,22 @@ from .base import errors
 
 if TYPE_CHECKING:
     from . import explore
-    from .accuracy import MeshCheck, MeshVerdict, check_mesh
+    from .accuracy import MeshCheck, MeshVerdict, check_mesh, solve_to_accuracy
     from .certificate import Certificate, Verdict, certify
     from .continuation import BoundaryMotion, Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
     from .energy.curvature import curvature_error, mean_curvature, target_curvature
     from .energy.functional import energy, gradient, hessian
+    from .existence import solve
     from .io import read, write
-    from .solvers import solve
-    from .surface import Patch, Plane, Surface
+    from .surface import Line, Patch, Plane, Surface
 
 __all__ = [
     "BoundaryMotion",
     "Certificate",
     "Design",
     "Direction",
+    "Line",
     "MeshCheck",
     "MeshVerdict",
     "Parameter",
@@ -46,6 +47,7 @@ __all__ = [
     "read",
     "sensitivities",
     "solve",
+    "solve_to_accuracy",
     "target_curvature",
     "write",
 ]
@@ -53,15 +55,15 @@ __all__ = [
 # Each name is imported at its first use. So ``import pcmc`` takes milliseconds, and the command can
 # handle Ctrl-C before numpy and scipy are imported.
 _NAMES = {
-    "accuracy": ("MeshCheck", "MeshVerdict", "check_mesh"),
+    "accuracy": ("MeshCheck", "MeshVerdict", "check_mesh", "solve_to_accuracy"),
     "certificate": ("Certificate", "Verdict", "certify"),
     "continuation": ("BoundaryMotion", "Direction", "follow"),
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
     "energy.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
     "energy.functional": ("energy", "gradient", "hessian"),
+    "existence": ("solve",),
     "io": ("read", "write"),
-    "solvers": ("solve",),
-    "surface": ("Patch", "Plane", "Surface"),
+    "surface": ("Line", "Patch", "Plane", "Surface"),
 }
 
 

@@ -12,19 +12,19 @@ import numpy as np
 import pandas as pd
 
 from generators import two_caps
-from pcmc import Surface, certify, solve
+from pcmc import Surface, certify
 from pcmc.base.arrays import Bools, Floats
 from pcmc.base.errors import SurfaceError
 from pcmc.continuation import Branch, Direction, Ending, follow
+from pcmc.existence.folding import BACK, POOR, SOUND, Arrival, until_turned, way
 from pcmc.meshing.refinement import refine
+from pcmc.solvers import solve
 from pcmc.solvers.result import Progress, Result
 
 PATCHES = ("wall", "large", "small")
 STEPS, SHORTEST = 25, 3e-4
-BACK = 0.03  # of the way: how far behind its turn a branch may open a way down and still count as folded
-SOUND = 0.2  # triangle quality of an equilibrium from which a branch may start, and of a fold
-POOR = 0.1  # triangle quality at which a branch is given up
 REACHED, FOLD, SLIP = "reached", "fold", "slip"
+ENDINGS = {Arrival.REACHED: REACHED, Arrival.FOLD: FOLD, Arrival.LOST: SLIP}
 PAST = 1.03  # times its least tension: where a branch that weakens a patch has turned back
 
 
@@ -133,7 +133,8 @@ def branch_case(towards: list[Any], edge_length: float) -> dict[str, Any]:
     answer: dict[str, Any] = {}
     for start in towards[1:]:
         branch = _towards(target, np.array(start, dtype=float), edge_length)
-        ending, share, quality = _ending(branch)
+        end = way(branch, back=BACK)
+        ending, share, quality = ENDINGS[end.arrival], end.farthest, end.quality
         at = np.array(start) + share * (target - np.array(start))
         answer = {"ending": ending, "share": share, "quality": quality}
         answer |= {f"from_{name}": value for name, value in zip(PATCHES, start, strict=True)}
@@ -149,33 +150,10 @@ def _towards(target: Floats, start: Floats, edge_length: float) -> Branch:
     """The branch from an equilibrium along the line to other tensions, λ from 0 to 1."""
     at_rest = equilibrium(start, edge_length).surface
     line = {name: v for name, v in zip(PATCHES, (target - start).tolist(), strict=True) if v}
-    farthest = [0.0]
-
-    def watch(progress: Progress) -> None:
-        farthest[0] = max(farthest[0], progress.row["parameter"])
-        if progress.row["parameter"] < farthest[0] - BACK or progress.row["quality"] < POOR:
-            raise StopIteration
-
+    watch = until_turned(back=BACK)
     return follow(
         at_rest, Direction(line, relative=True), 1.0, callback=watch, steps=STEPS, smallest=SHORTEST
     )
-
-
-def _ending(branch: Branch) -> tuple[str, float, float]:
-    """Whether it arrives or folds, how far it comes, and the quality of the triangles there.
-
-    It folds where λ turns for good, with a way down that opens not far behind the turn and triangles
-    that are sound: otherwise the mesh may be what turns.
-    """
-    points = branch.points
-    if branch.ending is Ending.REACHED:
-        return REACHED, 1.0, float(points.quality.iloc[-1])
-    farthest = float(max(points.parameter.max(), branch.folds.parameter.max()))
-    quality = float(points.quality.iloc[int(points.parameter.argmax())])
-    opened = branch.events[branch.events.kind == "index"].parameter
-    turned = len(branch.folds) and branch.folds.parameter.max() >= points.parameter.max()
-    folded = turned and quality > SOUND and (farthest - opened <= BACK).any()
-    return FOLD if folded else SLIP, farthest, quality
 
 
 def _found(branch: Branch) -> dict[str, Any]:

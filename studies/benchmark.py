@@ -23,7 +23,9 @@ from pcmc import Surface
 from pcmc.base.arrays import Floats
 from pcmc.energy.functional import energy_and_gradient
 
+from . import benchmark_scaling as scaling
 from .benchmark_explore import EXPLORE
+from .benchmark_height import HEIGHT
 from .benchmark_solver import SOLVER
 from .benchmark_sweep import SWEEP
 from .folder import Folder, write_json
@@ -52,7 +54,7 @@ def energy_rate(quick: bool) -> list[Row]:
     return rows
 
 
-BENCHMARKS: list[Callable[[bool], list[Row]]] = [energy_rate, *SOLVER, *SWEEP, *EXPLORE]
+BENCHMARKS: list[Callable[[bool], list[Row]]] = [energy_rate, *SOLVER, *HEIGHT, *SWEEP, *EXPLORE]
 
 
 def numpy_energy_and_gradient(surface: Surface) -> tuple[float, Floats]:
@@ -83,19 +85,29 @@ def main(results: Path, quick: bool = False) -> int:
     """Print every benchmark's rows and write them to ``results / "benchmark"``; 1 if one is missed."""
     console = Console(width=None if sys.stdout.isatty() else 140)
     console.print(f"{machine()}; wall time, medians of repeats")
+    folder, name = Folder(results / "benchmark"), "quick" if quick else "full"
+    benchmarks = {each.__name__.replace("_", " "): each for each in BENCHMARKS}
     rows = []
-    for benchmark in BENCHMARKS:
+    for title, benchmark in (benchmarks | {"growth of cost": partial(growth, folder)}).items():
         found = benchmark(quick)
-        shown = Table(*COLUMNS, title=benchmark.__name__.replace("_", " "))
+        shown = Table(*COLUMNS, title=title)
         for row in found:
             shown.add_row(row.what, f"{row.value:.4g}", row.unit, row.asked, row.met, row.remark)
         console.print(shown)
         rows += [[row.what, row.value, row.unit, row.asked, row.met, row.remark] for row in found]
     table = pd.DataFrame(rows, columns=list(COLUMNS))
-    folder, name = Folder(results / "benchmark"), "quick" if quick else "full"
     folder.write_table(name, table)
     write_json(folder.path / f"{name}.json", {"machine": machine()})
     return int((table["met"] == "no").any())
+
+
+def growth(folder: Folder, quick: bool) -> list[Row]:
+    """How time and memory grow with the triangles; also a table and a figure of their own."""
+    table = scaling.measure(quick)
+    folder.write_table("quick-scaling" if quick else "scaling", table)
+    if not quick:
+        scaling.draw(table, folder)
+    return scaling.rows(table, quick)
 
 
 def machine() -> str:

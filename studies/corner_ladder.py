@@ -1,8 +1,9 @@
 """One surface on meshes that are finer and finer at the ends of its junctions: does it have a limit?
 
 Level k halves the edges within r 2^-k of the ends; the solver goes on from the level before, and where it
-fails, once more from the initial shape on a mesh of that level. The bottoms of the walls slide on Π, or
-they are held where they are drawn.
+fails, once more from the initial shape on a mesh of that level. The bottoms of the walls slide on Π
+("sliding"); they are held where they are drawn ("held"); or they slide, and the ends slide along a straight
+outline, with no force left along it ("natural").
 
 Near an end on a straight boundary the crest's height over Π is, along its length s from the end,
 
@@ -19,16 +20,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import curve_fit
 from scipy.stats import linregress, t
 
-from pcmc import Certificate, Surface, solve
+from pcmc import Certificate, Line, Surface
 from pcmc.base.arrays import Floats, Ints
 from pcmc.base.errors import SurfaceError
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.quality import edge_lengths
+from pcmc.solvers import solve
+from pcmc.solvers.result import Result
 from pcmc.surface.geometry import angles
 
 Projection = Callable[[Floats], Floats]
@@ -42,14 +47,17 @@ PERSISTS, SADDLE, TURNS, LOST, SINKS, NONE = CATEGORIES = (
 )
 SUNK = 1e-3  # quality of a wall's triangles at which its junction has come down on its bottom
 LEAST_FIT = 4  # levels
+ITERATIONS = 60  # of the solver on a mesh; from the level before it takes 5
 CONFIDENCE = 0.95
 
 
 def ends(surface: Surface) -> Ints:
-    """The fixed vertices where junctions end."""
+    """The fixed vertices of roofs where junctions end."""
+    roof = np.zeros(surface.n, dtype=bool)
+    roof[surface.faces[~surface.walls[surface.patch_of_face]]] = True
     curves = [curve.vertices[[0, -1]] for curve in surface.topology.junctions if not curve.closed]
     last = np.unique(np.concatenate(curves))
-    return last[surface.fixed[last] & surface.topology.on_boundary[last]]
+    return last[(surface.fixed & surface.topology.on_boundary & roof)[last]]
 
 
 def hold_bottoms(surface: Surface) -> Surface:
@@ -59,8 +67,34 @@ def hold_bottoms(surface: Surface) -> Surface:
     return Surface(*args, fixed=fixed, plane=surface.plane)
 
 
+def free_ends(surface: Surface) -> Surface:
+    """The same surface with its ends sliding along the outline, where that is straight.
+
+    The outline's other vertices on the same straight side slide too, and make room.
+    """
+    topo, X = surface.topology, surface.vertices
+    outline = topo.edges[topo.boundary_edge & surface.fixed[topo.edges].all(axis=1)]
+    lines = {}
+    for vertex in ends(surface):
+        if abs(opening(surface, int(vertex)) - 180.0) > 1e-6:
+            continue
+        beside = outline[(outline == vertex).any(axis=1)].sum(axis=1) - vertex
+        line = Line(tuple(X[vertex]), tuple(X[beside[1]] - X[beside[0]]))
+        side = np.unique(outline[(line.distance(X[outline]) < 1e-9 * surface.size).all(axis=1)])
+        place = line.place(X[side])
+        lines[line] = side[(place > place.min()) & (place < place.max())]
+    return replace(surface, on_line=lines)
+
+
+SUPPORTS: dict[str, Callable[[Surface], Surface]] = {
+    "sliding": lambda surface: surface,
+    "held": hold_bottoms,
+    "natural": free_ends,
+}
+
+
 def climb(
-    surface: Surface, levels: int, radius: float, held: bool, project: Projection | None = None
+    surface: Surface, levels: int, radius: float, support: str, project: Projection | None = None
 ) -> tuple[list[dict[str, Any]], Surface]:
     """A row per level as long as there is an equilibrium, and the surface at the last one.
 
@@ -70,10 +104,10 @@ def climb(
     places = surface.vertices[vertices]
     shape, rows, reached = surface, [], surface
     for level in range(levels + 1):
-        result = solve(_supported(shape, held), "newton", target="stationary")
+        result = _solved(shape, support)
         if not result.converged and level:
             anew = refine_near(surface, places, level, radius, project)
-            again = solve(_supported(anew, held), "newton", target="stationary")
+            again = _solved(anew, support)
             shape, result = (anew, again) if again.converged else (shape, result)
         certificate = result.certify(modes=1) if result.converged else result.certificate
         at_end = np.isin(result.surface.topology.edges, vertices).any(axis=1)
@@ -97,8 +131,9 @@ def climb(
     return rows, reached
 
 
-def _supported(shape: Surface, held: bool) -> Surface:
-    return hold_bottoms(shape) if held else shape
+def _solved(shape: Surface, support: str) -> Result:
+    start = SUPPORTS[support](shape)
+    return solve(start, "newton", target="stationary", iterations=ITERATIONS)
 
 
 def _findings(certificate: Certificate, surface: Surface) -> dict[str, Any]:
@@ -114,16 +149,16 @@ def _findings(certificate: Certificate, surface: Surface) -> dict[str, Any]:
     }
 
 
-def label(rows: Sequence[dict[str, Any]], levels: int, held: bool) -> str:
+def label(rows: Sequence[dict[str, Any]], levels: int, support: str) -> str:
     """Which of ``CATEGORIES`` the rows of ``climb`` are.
 
     >>> row = {"status": "converged", "index": 0, "walls_quality": 0.5}
-    >>> label([row, row | {"index": 1}], 1, False)
+    >>> label([row, row | {"index": 1}], 1, "sliding")
     'held by the mesh: a saddle in the limit'
     """
     last = rows[-1]
     if last["status"] != "converged":
-        if held and last["walls_quality"] < SUNK:
+        if support == "held" and last["walls_quality"] < SUNK:
             return SINKS
         return LOST if len(rows) > 1 else NONE
     assert len(rows) == levels + 1
@@ -147,18 +182,30 @@ def opening(surface: Surface, vertex: int) -> float:
 
 
 def loss(rows: Sequence[dict[str, Any]]) -> dict[str, float]:
-    """The lowest eigenvalue against log₂ of the edge length at the end: the slope with its interval.
+    """The law λ = λ∞ + B / (log(1/h) + ℓ) of the lowest eigenvalue against the edge length h at the end.
 
-    ``per_halving`` ± ``margin`` (95 %), over the last levels on which nothing rests on Π, at least four;
-    NaN where there are fewer.
+    ``limit`` λ∞ ± ``limit_margin``, ``loss`` B ± ``loss_margin`` (95 %) and ``shift`` ℓ, from the levels on
+    which nothing rests on Π but the first two, ``fitted`` many; NaN where these are fewer than five.
     """
-    free = [row for row in rows if row["status"] == "converged" and row["pinched"] == 0]
-    if len(free) < LEAST_FIT:
-        return {"fitted": len(free), "per_halving": math.nan, "margin": math.nan}
-    tail = free[-max(LEAST_FIT, len(free) - 2) :]
-    halvings = -np.log2([row["edge_length"] for row in tail])
-    slope, margin = fit(halvings, np.array([row["eigenvalue"] for row in tail]))
-    return {"fitted": len(tail), "per_halving": slope, "margin": margin}
+    free = [row for row in rows if row["status"] == "converged" and row["pinched"] == 0][2:]
+    none = dict.fromkeys(("limit", "limit_margin", "loss", "loss_margin", "shift"), math.nan)
+    if len(free) < 5:
+        return {"fitted": len(free), **none}
+    depth = -np.log([row["edge_length"] for row in free])
+    values = np.array([row["eigenvalue"] for row in free])
+    span = np.ptp(values) or 1.0
+    start = (0.0, 1.0, 1.0 - depth.min())
+    bounds = ((-np.inf, -np.inf, 1e-3 - depth.min()), np.inf)
+    scaled, covariance = curve_fit(law, depth, (values - values[-1]) / span, start, bounds=bounds)
+    margins = t.ppf(0.5 + 0.5 * CONFIDENCE, len(free) - 3) * np.sqrt(np.diag(covariance)) * span
+    limit, amount = values[-1] + span * scaled[0], span * scaled[1]
+    found = (limit, margins[0], amount, margins[1], scaled[2])
+    return {"fitted": len(free), **dict(zip(none, map(float, found), strict=True))}
+
+
+def law(depth: Floats, limit: float, amount: float, shift: float) -> Floats:
+    """λ∞ + B / (log(1/h) + ℓ) at depths log(1/h)."""
+    return np.asarray(limit + amount / (depth + shift))
 
 
 def fit(x: Floats, y: Floats) -> tuple[float, float]:

@@ -1,8 +1,10 @@
 """Where junctions end: does the surface have a limit there as the mesh is refined, or does the mesh hold it?
 
-Each example is solved on meshes that are graded towards the ends of its junctions, eight times finer each
-by a factor of two, with the bottoms of its walls sliding on Π and with them held. The same, five times, for
-each equilibrium of Fig. 16's grid. ``corner_ladder`` has the theory of the hold and how it is fitted.
+Each example is solved on meshes that are graded towards the ends of its junctions, each with half the edge
+length there of the one before: ten times with the bottoms of its walls sliding on Π, eight times with them
+held; each equilibrium of Fig. 16's grid eight and five times. Where the outline is straight the ends slide
+along it, too: with this natural condition nothing is left for the mesh to hold. ``corner_ladder`` has the
+theory of the hold and how it is fitted.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import pandas as pd
 from generators import bezier_hall, four_fans, joined_caps, three_patches, two_caps, two_squares
 from pcmc import Surface
 from pcmc.base.arrays import Floats
+from pcmc.solvers import solve
 from pcmc.sweep import Sweep
 
 from .alpha_grid import AXES, EDGE_LENGTH, TENSIONS
@@ -29,10 +32,13 @@ from .corner_ladder import (
     PERSISTS,
     SADDLE,
     SINKS,
+    SUPPORTS,
     TURNS,
     climb,
     ends,
+    free_ends,
     label,
+    law,
     loss,
     opening,
     rise,
@@ -42,7 +48,8 @@ from .panels import category_panels
 from .refinement import FAMILIES
 from .study import Study
 
-LEVELS, GRID_LEVELS = 8, 5
+LEVELS = {"sliding": 10, "held": 8, "natural": 8}  # of refinement at the ends
+GRID_LEVELS = {"sliding": 8, "held": 5}
 REACH = 0.15  # of the size: what the first refinement reaches around an end
 GRID_REACH = 1.5
 SAMPLE = [[1.5, 6.0, 6.0], [4.0, 4.0, 3.0]]  # of the grid, where its equilibria are not at hand
@@ -50,8 +57,10 @@ COLORS = dict(
     zip(CATEGORIES, ("#08519C", "#CC79A7", "#F4A582", "#D6604D", "#FFF2AE", "#E6E6E6"), strict=True)
 )
 NO_CASE = "no equilibrium on the first mesh"
-BOTTOMS = {"sliding": False, "held": True}
+NAMES = {"sliding": "ends fixed", "held": "held", "natural": "ends slide too"}
+BOTTOMS = ("sliding", "held")  # of the walls
 DRAWN = "fig4"
+SHIFTS = (0.0, 0.025, 0.05, 0.1, 0.2)  # of the ends, in half widths
 
 
 @dataclass(frozen=True)
@@ -82,7 +91,7 @@ CASES = (
     Case("example1-0.5", "Example 1, wall 0.5", lambda: two_squares(8, alpha_aux=0.5)),
     Case("example1-1", "Example 1, wall 1", lambda: two_squares(8, alpha_aux=1.0)),
     Case("example1-2", "Example 1, wall 2", lambda: two_squares(8)),
-    Case("example2", "Example 2", lambda: two_caps(0.6), ROUND["example2"]),
+    Case("example2", "Example 2", lambda: two_caps(0.6), ROUND["example2_near"]),
     Case("joined", "two spheres in balance", lambda: joined_caps(0.6), ROUND["joined_caps"]),
     Case("example3", "Example 3", lambda: four_fans(7), _on_rim(20.0)),
     Case("example4", "Example 4", bezier_hall),
@@ -91,22 +100,24 @@ CASES = (
 
 
 def data(folder: Folder, short: bool) -> None:
-    """``ladder``: a row per example, bottom and level; ``ends``: a row per end; ``grid``: Fig. 16."""
+    """``ladder``: a row per example, support and level; ``ends``, per end; ``shifted``; ``grid``: Fig. 16."""
     rows, at_ends = [], []
-    levels = 4 if short else LEVELS
-    for case in CASES[1::5] if short else CASES:
+    for case in CASES[1::6] if short else CASES:
         initial = case.build()
-        for bottom, held in BOTTOMS.items():
-            if not (held or initial.on_plane.any()):
+        for bottom in SUPPORTS:
+            if not _applies(initial, bottom):
                 continue
-            found, reached = climb(initial, levels, REACH * initial.size, held, case.project)
+            levels = 4 if short else LEVELS[bottom]
+            found, reached = climb(initial, levels, REACH * initial.size, bottom, case.project)
             whose = {"case": case.name, "bottom": bottom}
             rows += [whose | row for row in found]
-            at_ends += [whose | row for row in _ends(initial, reached, found, levels, held)]
-            if case.name == DRAWN and held:
+            at_ends += [whose | row for row in _ends(initial, reached, found, levels, bottom)]
+            if case.name == DRAWN and bottom == "held":
                 folder.write_mesh(DRAWN, {"at rest": reached})
     folder.write_table("ladder", pd.DataFrame(rows))
     folder.write_table("ends", pd.DataFrame(at_ends))
+    shifted = [row for case in CASES if _applies(case.build(), "natural") for row in _shifted_ends(case)]
+    folder.write_table("shifted", pd.DataFrame(shifted))
     sweep = Sweep(grid_case, {"tensions": _equilibria(folder, short), "bottom": list(BOTTOMS)})
     found_grid = run_sweep(folder, "grid", sweep)
     triples = pd.DataFrame(
@@ -116,12 +127,42 @@ def data(folder: Folder, short: bool) -> None:
     folder.write_table("grid", pd.concat([triples, found_grid[columns].reset_index(drop=True)], axis=1))
 
 
+def _applies(initial: Surface, bottom: str) -> bool:
+    """Whether the bottoms of an example can have this support, and its ends a straight outline."""
+    if bottom == "natural":
+        return len(free_ends(initial).on_line) == len(ends(initial))
+    return bottom == "held" or bool(initial.on_plane.any())
+
+
+def _shifted_ends(case: Case) -> list[dict[str, Any]]:
+    """At rest with the ends fixed at another place of their straight outline: energy, and pull along it.
+
+    The pull is what the surface exerts on its ends, positive away from where they are drawn.
+    """
+    initial, rows = case.build(), []
+    X, half = initial.vertices, float(np.abs(initial.vertices[:, 0]).max())
+    for shift in SHIFTS:
+        moved = X + np.outer(shift * half * (1.0 - (X[:, 0] / half) ** 2), [1.0, 0.0, 0.0])
+        result = solve(initial.moved(moved), "newton", target="stationary")
+        forces = result.certificate.reactions[ends(initial), 0]
+        rows.append(
+            {
+                "case": case.name,
+                "shift": shift,
+                "status": result.status.name.lower(),
+                "energy": result.energy if result.converged else math.nan,
+                "pull": -float(forces.sum()) if result.converged else math.nan,
+            }
+        )
+    return rows
+
+
 def _ends(
-    initial: Surface, reached: Surface, rows: list[dict[str, Any]], levels: int, held: bool
+    initial: Surface, reached: Surface, rows: list[dict[str, Any]], levels: int, bottom: str
 ) -> list[dict[str, Any]]:
     """A row for each end: where it is, what meets there, its label and the fits."""
     last = [row for row in rows if row["status"] == "converged"]
-    shared = {"label": label(rows, levels, held), "levels": len(last), **loss(rows)}
+    shared = {"label": label(rows, levels, bottom), "levels": len(last), **loss(rows)}
     edge = last[-1]["edge_length"] if last else math.nan
     return [
         {
@@ -161,11 +202,11 @@ def _equilibria(folder: Folder, short: bool) -> list[list[float]]:
 def grid_case(tensions: list[float], bottom: str) -> dict[str, Any]:
     """Whether the equilibrium at tensions (wall, large, small) of the grid has a limit."""
     named = dict(zip(("wall", "large", "small"), tensions, strict=True))
-    initial, held = two_caps(EDGE_LENGTH).retensioned(named), BOTTOMS[bottom]
-    rows, _ = climb(initial, GRID_LEVELS, GRID_REACH, held, ROUND["example2"])
+    initial = two_caps(EDGE_LENGTH).retensioned(named)
+    rows, _ = climb(initial, GRID_LEVELS[bottom], GRID_REACH, bottom, ROUND["example2_near"])
     known = [row for row in rows if row["status"] == "converged"] or rows
     return {
-        "label": label(rows, GRID_LEVELS, held),
+        "label": label(rows, GRID_LEVELS[bottom], bottom),
         "levels": len(known) if known is not rows or rows[-1]["status"] == "converged" else 0,
         "index": known[0]["index"],
         "eigenvalue": known[0]["eigenvalue"],
@@ -194,8 +235,7 @@ def table(folder: Folder) -> dict[str, float]:
                 "last_index": known["index"].iloc[-1],
                 "eigenvalue": known.eigenvalue.iloc[0],
                 "last_eigenvalue": known.eigenvalue.iloc[-1],
-                "loss_per_halving": here.per_halving.iloc[0],
-                "loss_margin": here.margin.iloc[0],
+                **{key: here[key].iloc[0] for key in ("limit", "limit_margin", "loss", "loss_margin")},
                 "c": here.c.mean(),
                 "c_margin": here.c_margin.max(),
                 "theory_c": here.theory_c.mean(),
@@ -210,7 +250,7 @@ def table(folder: Folder) -> dict[str, float]:
     found = {f"grid_{bottom}_{_short(name)}": float(n) for (bottom, name), n in counts.items()}
     for row in labels.to_dict("records"):
         found[f"{row['case']}_{row['bottom']}_levels"] = float(row["levels"])
-        found[f"{row['case']}_{row['bottom']}_loss"] = float(row["loss_per_halving"])
+        found[f"{row['case']}_{row['bottom']}_limit"] = float(row["limit"])
     return {key: value for key, value in found.items() if math.isfinite(value)}
 
 
@@ -227,15 +267,18 @@ def figure(folder: Folder) -> None:
     sizes = {case.name: case.build() for case in CASES if (ladder.case == case.name).any()}
     curves = {}
     for case in CASES:
-        for bottom in BOTTOMS:
+        for bottom in SUPPORTS:
             mine = ladder[(ladder.case == case.name) & (ladder.bottom == bottom)]
             mine = mine[mine.status == "converged"]
             if len(mine) > 1:
                 initial = sizes[case.name]
                 unit = initial.size**2 / initial.tensions.max()
-                curves[f"{case.title}, {bottom}"] = (mine.edge_length / initial.size, mine.eigenvalue * unit)
+                curves[f"{case.title}, {NAMES[bottom]}"] = (
+                    mine.edge_length / initial.size,
+                    mine.eigenvalue * unit,
+                )
     lines(
-        {name: curve for name, curve in curves.items() if "sliding" in name},
+        {name: curve for name, curve in curves.items() if "held" not in name},
         folder.figure("loss"),
         x="edge length at the end / size",
         y="lowest eigenvalue, α/size²",
@@ -259,28 +302,26 @@ def figure(folder: Folder) -> None:
 
 
 def _draw_fits(folder: Folder, ladder: pd.DataFrame, at_ends: pd.DataFrame) -> None:
-    """The eigenvalues of sliding bottoms from the first level on, with the fitted lines."""
+    """The eigenvalues of sliding bottoms as long as nothing rests, in units of the first; and the law."""
     from pcmc.plot import lines
 
+    free = ladder[(ladder.bottom == "sliding") & (ladder.pinched == 0) & (ladder.status == "converged")]
     curves: dict[str, Any] = {}
     for case in CASES:
-        mine = ladder[(ladder.case == case.name) & (ladder.bottom == "sliding") & (ladder.pinched == 0)]
-        mine = mine[mine.status == "converged"]
+        mine = free[free.case == case.name]
         fits = at_ends[(at_ends.case == case.name) & (at_ends.bottom == "sliding")]
-        if not len(fits) or not math.isfinite(fits.per_halving.iloc[0]):
+        if not len(fits) or not math.isfinite(fits.limit.iloc[0]):
             continue
-        slope, margin, count = fits.per_halving.iloc[0], fits.margin.iloc[0], int(fits.fitted.iloc[0])
-        tail = mine[-count:]
-        halvings = -np.log2(tail.edge_length)
-        fitted = tail.eigenvalue.mean() + slope * (halvings - halvings.mean())
-        unit = abs(tail.eigenvalue.iloc[0])
+        found, unit = fits.iloc[0], abs(mine.eigenvalue.iloc[0])
+        depth = np.linspace(*-np.log(mine.edge_length.iloc[[2, -1]]), 50)
+        fitted = law(depth, found.limit, found.loss, found["shift"])
         curves[case.title] = (mine.edge_length, mine.eigenvalue / unit)
-        curves[f"{slope:.2g} ± {margin:.1g} per halving"] = (tail.edge_length, fitted / unit)
+        curves[f"limit {found.limit:.2g} ± {found.limit_margin:.1g}"] = (np.exp(-depth), fitted / unit)
     lines(
         curves,
         folder.figure("fits"),
         x="edge length at the end",
-        y="lowest eigenvalue, first fitted = ±1",
+        y="lowest eigenvalue, first mesh: ±1",
         xscale="log",
         markers=True,
         title="The logarithmic loss of hold, with 95 % intervals",

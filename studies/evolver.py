@@ -39,11 +39,15 @@ def run(surface: pcmc.Surface, commands: str, timeout: float = 600.0, upright: b
     with tempfile.TemporaryDirectory() as folder:
         datafile = Path(folder) / "surface.fe"
         pcmc.write(datafile, surface)
-        if upright:
-            text = datafile.read_text()
-            datafile.write_text(text.replace("SYMMETRIC_CONTENT\n", "", 1))
-        with datafile.open("a") as file:
-            file.write(f"\nautodisplay off\n{commands}\nquit\nquit\n")
+        text = datafile.read_text()
+    return run_datafile(text.replace("SYMMETRIC_CONTENT\n", "", 1) if upright else text, commands, timeout)
+
+
+def run_datafile(text: str, commands: str, timeout: float = 600.0) -> str:
+    """What the program prints for commands given on the surface of a datafile's text."""
+    with tempfile.TemporaryDirectory() as folder:
+        datafile = Path(folder) / "surface.fe"
+        datafile.write_text(f"{text}\nautodisplay off\n{commands}\nquit\nquit\n")
         try:
             done = subprocess.run(
                 [PROGRAM, "-x", str(datafile)],
@@ -67,7 +71,7 @@ def run(surface: pcmc.Surface, commands: str, timeout: float = 600.0, upright: b
 def energy(surface: pcmc.Surface, commands: str = "", upright: bool = False) -> float:
     """The program's ``total_energy``, E of Eq. (20), after the commands, if any."""
     out = run(surface, commands + '\nprintf "E %.17g\\n", total_energy', upright=upright)
-    return float(_answers(out, "E", 1)[-1, 0])
+    return float(numbers(out, "E", 1)[-1, 0])
 
 
 def gradient(surface: pcmc.Surface) -> Floats:
@@ -83,14 +87,14 @@ def gradient(surface: pcmc.Surface) -> Floats:
         'foreach vertex vv do printf "F %.17g %.17g %.17g\\n",'
         " vv.__force[1], vv.__force[2], vv.__force[3]",
     )
-    return apply_supports(surface, -_answers(out, "F", 3))
+    return apply_supports(surface, -numbers(out, "F", 3))
 
 
 def positions(surface: pcmc.Surface, commands: str, upright: bool = False) -> Floats:
     """(n,3) vertices after the commands, which must keep the mesh."""
     show = '\nforeach vertex vv do printf "X %.17g %.17g %.17g\\n", x, y, z'
     out = run(surface, commands + show, upright=upright)
-    return _answers(out, "X", 3) + np.array(surface.plane.point)
+    return numbers(out, "X", 3) + np.array(surface.plane.point)
 
 
 @dataclass(frozen=True)
@@ -126,10 +130,10 @@ def seconds(
     timed = f'clock_was := clock\n{commands}\nprintf "T %.17g\\n", clock - clock_was\n'
     script = "clock_was := 0.0\n" + before + "\n" + timed * repeat
     out = run(surface, script, timeout=3600.0, upright=upright)
-    return _answers(out, "T", 1)[:, 0]
+    return numbers(out, "T", 1)[:, 0]
 
 
-def _answers(out: str, key: str, columns: int) -> Floats:
+def numbers(out: str, key: str, columns: int) -> Floats:
     """(k,columns) numbers of the lines that start with the key."""
     text = " ".join(re.findall(rf"^(?:Enter command: )?{key}((?: \S+){{{columns}}})$", out, re.M))
     numbers = np.array(text.split(), dtype=float).reshape(-1, columns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,3 +86,17 @@ def limit_order(h: Floats, values: Floats) -> Order:
         return UNKNOWN
     error = float(np.sqrt(covariance[0, 0]))
     return Order(float(found[0]), error, len(h), float(found[1]) * spread)
+
+
+def richardson(values: Floats, orders: Sequence[float]) -> float:
+    """The limit of values on meshes each twice as fine as the last, their error a sum of C h^p.
+
+    The first of the orders p is removed from each two neighbours, then the second, and so on.
+
+    >>> h = 0.5 ** np.arange(3.0)
+    >>> round(richardson(1.0 + h**2 - 3.0 * h**4, (2, 4)), 12)
+    1.0
+    """
+    for order in orders:
+        values = values[1:] + (values[1:] - values[:-1]) / (2.0**order - 1.0)
+    return float(values[-1])

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pcmc.base.errors import OptionError, unknown
 
 from . import (
+    accuracy,
     alpha_grid,
     alpha_grid_geometric,
     calibration,
@@ -18,6 +19,7 @@ from . import (
     example4,
     existence,
     gallery,
+    mesh_check,
     mesh_search,
     refinement,
     solvers,
@@ -40,6 +42,8 @@ MODULES = (
     refinement,
     solvers,
     existence,
+    mesh_check,
+    accuracy,
     gallery,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}

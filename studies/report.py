@@ -44,8 +44,9 @@ equilibrium every time; on Example 3 that is a saddle. With the default, `target
 saddles and descends until triangles collapse; the verdict then names the worst triangle."""
 
 SPEED = """\
-Surface Evolver solves the same mesh of Example 1 in the same run. `python -m studies benchmark` writes this
-table. Unlike all others here, it differs from run to run."""
+Surface Evolver solves the same mesh of Example 1, and the same cap, in the same run. `python -m studies
+benchmark` writes this table, and `benchmark/scaling.csv` and `scaling.png`, which show how time and memory
+grow with the number of triangles. Unlike all others here, they differ from run to run."""
 
 
 def write_comparison(results: Path) -> tuple[pd.DataFrame, pd.DataFrame]:

@@ -24,7 +24,8 @@ import numpy as np
 import pandas as pd
 
 from generators import bezier_hall, four_fans, two_caps, two_squares
-from pcmc import Surface, certify, solve
+from pcmc import Surface, certify
+from pcmc.solvers import solve
 from pcmc.solvers.result import Progress
 
 from .flow import NOISE_RESIDUAL, PAPER, SHORT_ITERATIONS, errors, forced_steps

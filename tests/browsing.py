@@ -92,7 +92,7 @@ class Explored:
 
         shot = imread(io.BytesIO(self.find("#canvas").screenshot_as_png))[..., :3]
         h, w = shot.shape[:2]
-        return shot[int(0.3 * h) : int(0.78 * h), int(0.1 * w) : int(0.9 * w)]
+        return shot[int(0.4 * h) : int(0.78 * h), int(0.1 * w) : int(0.9 * w)]
 
     def complaints(self) -> list[str]:
         """Warnings and errors in the browser's console since the last call."""

@@ -10,16 +10,29 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from generators import two_squares
+from generators import spherical_cap_exact, two_squares
 from pcmc import hessian
 from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.sweep import Sweep
-from studies import benchmark, benchmark_explore, benchmark_solver, benchmark_sweep, evolver
+from studies import (
+    benchmark,
+    benchmark_explore,
+    benchmark_height,
+    benchmark_scaling,
+    benchmark_solver,
+    benchmark_sweep,
+    evolver,
+)
 from studies.__main__ import main
 from studies.alpha_grid import TENSIONS
 from studies.benchmark_solver import Step
+from studies.orders import richardson
 from studies.timing import Row, median, median_seconds, peak_bytes
 
+TIMES = (
+    *("build_seconds", "solve_seconds", "solve_processor_seconds", "solve_gigabytes", "solve_peak_gigabytes"),
+    *("certify_seconds", "certify_peak_gigabytes", "steps", "residual", "index"),
+)
 HOME = Path(__file__).resolve().parent.parent
 
 
@@ -31,6 +44,7 @@ def small(monkeypatch):
     monkeypatch.setattr(benchmark_solver, "QUICK", 4)
     monkeypatch.setattr(benchmark_solver, "DESIGN", 3)
     monkeypatch.setattr(benchmark_solver, "SCRIPT_STEPS", 1)
+    monkeypatch.setattr(benchmark_scaling, "FEW", (3, 4, 6))
     monkeypatch.setattr(benchmark_sweep, "FEW", (4.0,))
     monkeypatch.setattr(benchmark_sweep, "SHORT", 2)
     monkeypatch.setattr(benchmark_explore, "STEPS", 3)
@@ -46,10 +60,12 @@ def test_the_quick_form_prints_and_writes(small, tmp_path, capsys):
     for what in table["what"]:
         assert what.split(",")[0].split(":")[0] in shown
     expected = {"Newton step, superlu", "peak memory", "initial shape to rest"}
+    expected |= {"height, extrapolated", "surface and solution", "exponent of time"}
     expected |= {"grid of Fig. 16, 2 workers over 1", "slider followed"}
     assert expected <= set(table["what"])
     numbers = pd.to_numeric(table["median"], errors="coerce")
-    assert (numbers.dropna() > 0.0).all()
+    slope = table["what"].str.startswith("exponent")  # of so small surfaces: only noise
+    assert (numbers[~slope].dropna() > 0.0).all()
     if evolver.available():
         assert numbers.notna().all()
     assert "machine" in json.loads((tmp_path / "benchmark" / "quick.json").read_text())
@@ -107,6 +123,39 @@ def test_sweeps_are_timed_whole_and_in_turn(monkeypatch):
     assert [row.asked for row in rows] == ["", "≤ 60", "≥ 1.7", "", "≤ 300", "≥ 1.7", ""]
     assert [row.value for row in rows if "over" in row.what] == [pytest.approx(1.9)] * 2
     assert [row.asked for row in benchmark_sweep.sweeps(True)] == [""] * 7
+
+
+def test_the_caps_height_is_extrapolated_at_its_orders():
+    exact = spherical_cap_exact().height
+    heights = benchmark_height.our_heights(benchmark_height.RINGS, benchmark_height.MESHES)
+    once = heights[1:] + np.diff(heights) / 3.0
+    error = [np.abs(heights - exact), np.abs(once - exact)]
+    assert np.log2(error[0][:-1] / error[0][1:]) == pytest.approx([2.0, 2.0], abs=0.07)
+    assert np.log2(error[1][0] / error[1][1]) == pytest.approx(3.0, abs=0.15)
+    assert abs(richardson(heights, benchmark_height.ORDERS) - exact) < benchmark_height.ERROR
+
+
+@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+def test_the_programs_cap_follows_its_circle():
+    exact = spherical_cap_exact().height
+    for elements, order, close in (("linear", 2.0, 2e-3), ("quadratic", 3.2, 8e-6)):
+        heights, clock = benchmark_height.ladder(elements, 4, 1, steps=2)
+        error = np.abs(heights - exact)
+        assert np.log2(error[0] / error[1]) == pytest.approx(order, abs=0.1)
+        assert error[1] < close
+        assert clock[0] <= clock[1]
+
+
+def test_the_growth_of_cost_is_a_slope():
+    triangles = np.array([1e4, 1e5, 1e6])
+    table = pd.DataFrame({"triangles": triangles} | dict.fromkeys(TIMES, 0.5))
+    table = table.assign(solve_seconds=1e-6 * triangles**1.1, solve_gigabytes=1e-9 * triangles**1.2)
+    rows = {row.what: row for row in benchmark_scaling.rows(table, quick=False)}
+    assert rows["exponent of time"].value == pytest.approx(1.1)
+    assert rows["exponent of memory"].value == pytest.approx(1.2)
+    assert rows["surface and solution"].value == pytest.approx(1e-6 * 1e6**1.1)
+    if benchmark_solver.available()[0] == "pardiso":
+        assert (rows["exponent of time"].met, rows["exponent of memory"].met) == ("yes", "no")
 
 
 def test_the_flows_workers_wait_for_no_large_library():

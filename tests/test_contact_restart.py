@@ -9,7 +9,13 @@ from starts import bezier_hall, stationary, two_caps, two_squares
 
 from pcmc import Surface, certify, solve
 from pcmc.base.errors import SurfaceError
-from pcmc.contact.pinching import find_walls, place_wall_rows, remove_pinched_walls, resting_vertices
+from pcmc.contact.pinching import (
+    find_walls,
+    place_wall_rows,
+    remove_pinched_walls,
+    resting_vertices,
+    standing_part,
+)
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.solvers.state import State
@@ -113,6 +119,16 @@ def test_refined_a_pinched_wall_has_rows_again_where_it_stands(make):
     places = np.column_stack([rows.top_ends, rows.fraction, rows.relative_height])
     standing_rows = places[above > 1e-6]
     assert len(np.unique(standing_rows, axis=0)) == len(standing_rows)
+
+
+def test_a_wall_pinched_at_its_ends_is_refined_again_and_again():
+    """Below the last resting vertex two rows coincide; their new neighbours must not."""
+    surface = solve(two_squares(16, alpha_aux=2.0), target="stationary").surface
+    for _ in range(2):
+        assert standing_part(surface).resting.any()
+        result = solve(refine(surface), target="stationary")
+        assert result.converged
+        surface = result.surface
 
 
 CONVERGED = {

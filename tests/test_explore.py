@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import threading
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import pcmc
 from generators import bezier_hall, spherical_cap
 from pcmc import explore
 from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.certificate import Verdict
 from pcmc.explore import server
 from pcmc.explore.messages import pack, unpack
 
@@ -166,6 +168,29 @@ def test_the_least_recently_used_session_expires(client, monkeypatch):
     client.ask(f"/api/{names[0]}/state")
 
 
+def test_the_mesh_check_comes_as_a_table_in_words(client):
+    header, arrays = client.ask(f"/api/{client.ask('/api/open')[0]['session']}/check")
+    check = header["check"]
+    assert (check["name"], check["word"], arrays) == ("persists", "persists", {})
+    names = [row["name"] for row in check["rows"]]
+    assert {"height of left", "volume", "energy", "lowest eigenvalue"} <= set(names)
+    height = check["rows"][names.index("height of left")]
+    value, bar = map(float, height["value"].split(" ± "))
+    limit, narrower = map(float, height["limit"].split(" ± "))
+    assert abs(value - limit) <= bar
+    assert narrower < bar
+
+
+def test_a_surface_that_is_not_at_rest_has_no_mesh_check():
+    running = explore.start(CAP.retensioned({"cap": 0.2}))
+    try:
+        client = Client(running)
+        name = client.ask("/api/open")[0]["session"]
+        assert "needs a surface at rest" in client.ask(f"/api/{name}/check", status=400)
+    finally:
+        running.close()
+
+
 @pytest.mark.parametrize(
     ("path", "body", "status", "line"),
     [
@@ -289,6 +314,14 @@ def test_in_a_notebook_the_page_is_a_frame_and_its_surface_is_at_hand():
         assert view.surface.patches[0].tension == 0.8
     finally:
         view.close()
+
+
+def test_the_page_has_a_sign_and_a_colour_for_every_verdict():
+    folder = files("pcmc.explore").joinpath("page")
+    signs, style = (folder.joinpath(name).read_text("utf-8") for name in ("findings.js", "style.css"))
+    for verdict in Verdict:
+        assert f'{verdict.name.lower()}: "' in signs
+        assert f"#verdict[data-verdict={verdict.name.lower()}]" in style
 
 
 def test_importing_pcmc_does_not_import_the_server():

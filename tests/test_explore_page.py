@@ -159,6 +159,20 @@ def test_the_export_downloads_the_surface(page, driver, explorer):
     assert page.complaints() == []
 
 
+def test_the_mesh_check_is_shown_until_the_surface_changes(page):
+    assert not page.find("#check-result").is_displayed()
+    page.find("#check").click()
+    until(lambda: page.find("#check-result").is_displayed(), "the mesh check")
+    assert page.text("#check-result .word").startswith("Persists")
+    assert "Height of left" in page.text("#check-result tbody")
+    assert "±" in page.text("#check-result tbody")
+    aside = page.find("aside")
+    assert aside.get_property("scrollWidth") <= aside.get_property("clientWidth")
+    page.enter("Tension α of left wall", 12)
+    assert not page.find("#check-result").is_displayed()
+    assert page.complaints() == []
+
+
 def test_two_pages_are_two_sessions(driver, explorer):
     one = Explored(driver, explorer.url)
     first = driver.current_window_handle

@@ -11,6 +11,7 @@ from refusals import refused
 
 import pcmc
 from generators import bezier_hall, four_fans, spherical_cap
+from pcmc.accuracy import check_mesh
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate import Verdict
 from pcmc.explore.session import Session, between, reach, solved_start
@@ -149,6 +150,26 @@ def test_a_newer_request_ends_the_work_on_an_older_one(cap):
     assert not states["new"].superseded
     assert [p.tension for p in session.surface.patches] == [0.8]
     assert states["new"].undo == 1
+
+
+def test_the_mesh_check_is_of_the_surface_shown(cap):
+    session = Session(cap)
+    check = session.check_mesh()
+    assert check.surfaces[0] is cap.surface
+    assert check.persists
+
+
+def test_a_surface_that_changes_meanwhile_ends_its_mesh_check(cap, monkeypatch):
+    session, solves = Session(cap), []
+
+    def check(surface, callback):
+        session.settle({"tensions": {"cap": 0.7}})  # another request, in the middle of the first solve
+        solves.append(surface)
+        return check_mesh(surface, callback=callback)
+
+    monkeypatch.setattr("pcmc.explore.session.check_mesh", check)
+    assert session.check_mesh() is None
+    assert solves == [cap.surface]
 
 
 def test_a_saddle_is_followed_and_becomes_stable_with_weaker_walls():

@@ -196,3 +196,16 @@ def test_counts_beyond_all_meaning_are_refused_and_not_begun(what, options):
 def test_refinements_are_counted_before_they_are_made():
     with refused(OptionError, what="levels", found=15, expected="a whole number ≥ 0 and ≤ 14"):
         refine(pyramid(), 15)
+
+
+SCALES = [(1e-20, 1.0), (1e-45, 1.0), (1e20, 1.0), (1.0, 1e-40), (1.0, 1e40), (1e-20, 1e20), (1e30, 1e30)]
+
+
+@pytest.mark.parametrize(("size", "alpha"), SCALES)
+@pytest.mark.parametrize("method", ["nesterov", "lbfgs", "newton"])
+def test_no_method_takes_another_scale_for_rest(method, size, alpha):
+    """The same shape at any size and tension, and not where it starts."""
+    options = {"t0": 0.1 / alpha} if method == "nesterov" else {}
+    result = solve(surface(size * X, patches=[Patch("roof", alpha, alpha / size)]), method, **options)
+    assert result.surface.vertices[4, 2] / size == pytest.approx(1.0 / 8**0.5, rel=1e-3)
+    assert result.certify(tolerance=2e-4).verdict is Verdict.STABLE

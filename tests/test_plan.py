@@ -99,7 +99,7 @@ def test_the_same_plan_gives_the_same_surface():
 def test_arcs_and_circles_keep_their_radius():
     half = join(polyline([[10, 0], [-10, 0]]), arc([-10, 0], [0, -10], [10, 0]))
     surface = Plan(half, [[[0, 0], [0, -10]]], tension=10.0).surface()
-    X = surface.vertices[surface.fixed]
+    X = surface.vertices[surface.fixed & ~np.isin(np.arange(surface.n), vertices_of(surface, "wall 1"))]
     round_part = X[X[:, 1] < -1e-9]
     np.testing.assert_allclose(np.linalg.norm(round_part, axis=1), 10.0, rtol=1e-12)
     assert len(surface.patches) == 3
@@ -135,7 +135,8 @@ def test_boundaries_in_space_with_sloped_walls():
 
 def test_raised_boundary_has_posts_at_the_walls_ends():
     high = [[0, 0, 2], [20, 0, 3], [20, 12, 4], [0, 12, 2]]
-    surface = Plan(high, [[[10, 0], [10, 12]]], tension=10.0, edge_length=1.5).surface()
+    wall = Divider([[10, 0], [10, 12]], bottom="sliding")
+    surface = Plan(high, [wall], tension=10.0, edge_length=1.5).surface()
     wall = vertices_of(surface, "wall 1")
     X = surface.vertices
     end = wall[np.abs(X[wall, 1]) < 1e-9]
@@ -156,7 +157,8 @@ def test_lines_across_a_hole_or_beyond_the_outline_are_left_out():
 
 
 def test_a_free_hole_rises_and_its_walls_end_free():
-    plan = Plan(BOX, [[[10, 0], [10, 12]]], [Hole(circle([10, 6], 2), "free")], tension=10.0)
+    wall = Divider([[10, 0], [10, 12]], bottom="sliding")
+    plan = Plan(BOX, [wall], [Hole(circle([10, 6], 2), "free")], tension=10.0)
     with pytest.warns(PlanWarning, match=r"nothing holds hole 1 at .* \(12 such vertices\)"):
         surface = plan.surface()
     X = surface.vertices
@@ -172,7 +174,9 @@ def test_a_closed_divider():
     assert names(surface) == ["patch 1", "patch 2", "wall 1"]
     wall = surface.topology.junctions
     assert all(c.sheets == (0, 1, 2) for c in wall)
-    assert surface.on_plane.sum() == 31
+    assert not surface.on_plane.any()  # a bottom is held unless it is to slide
+    at_rim = np.linalg.norm(surface.vertices[:, :2], axis=1) > 9.9
+    assert (surface.fixed & ~at_rim).sum() == 31
     assert minimum_angle(surface) > 24.0
 
 

@@ -58,7 +58,7 @@ def test_a_collapse_is_told_with_its_cause(kind):
         said = "comes down on the held bottom of its wall"
     else:  # seen away from the corners, where the mesh has no fixed vertex
         start = platform(15, 5, 60, (23, 43), alpha=3.0, wall=2.4, h=2.5, turn=8.0)
-        said = "slips along a support"
+        said = "slips along a support, which does not hold its end: hold the bottom of its wall"
     assert solve(start).certificate.verdict is Verdict.STABLE
     fine = remesh(start, 0.8)
     assert triangle_quality(fine.vertices, fine.faces).min() > 0.3

@@ -5,10 +5,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from refusals import refused
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from shapes import cap, hexagon, octahedron, pyramid, three_patches
 
 from pcmc import Patch, Surface
-from pcmc.surface.topology import CURVE, POINT, SHEET, curve_neighbours
+from pcmc.base.errors import SurfaceError
+from pcmc.surface.topology import CURVE, FEW, POINT, SHEET, components, curve_neighbours, topology
 
 
 def edges_by_hand(surface):
@@ -28,7 +32,29 @@ def two_bubbles():
     return Surface(X, F, [0, 0, 0, 1, 1, 1, 2], patches, fixed=[0])
 
 
-@pytest.mark.parametrize("make", [pyramid, octahedron, three_patches, two_bubbles, lambda: cap(3)])
+def umbrella():
+    """A vertex with more triangles than are sorted one by one, its number the lowest."""
+    angle = 2.0 * np.pi * np.arange(FEW + 5) / (FEW + 5)
+    X = np.vstack([[0, 0, 1], np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])])
+    ring = np.random.default_rng(3).permutation(len(angle)) + 1  # neighbours out of order
+    X[ring] = X[1:].copy()
+    F = [[0, a, b] for a, b in zip(ring, np.roll(ring, -1), strict=True)]
+    return Surface(X, F, [0] * len(F), [Patch("roof", 1.0)], fixed=ring)
+
+
+def shuffled():
+    """The three patches with vertices and faces in any order."""
+    surface, random = three_patches(3), np.random.default_rng(4)
+    place, face = random.permutation(surface.n), random.permutation(surface.m)
+    X, fixed = np.empty_like(surface.vertices), place[np.flatnonzero(surface.fixed)]
+    X[place] = surface.vertices
+    F = place[surface.faces][face]
+    return Surface(X, F, surface.patch_of_face[face], surface.patches, fixed=fixed)
+
+
+@pytest.mark.parametrize(
+    "make", [pyramid, octahedron, three_patches, two_bubbles, lambda: cap(3), umbrella, shuffled]
+)
 def test_edges_and_their_faces(make):
     surface = make()
     t, expected = surface.topology, edges_by_hand(surface)
@@ -157,3 +183,37 @@ def test_relabelled_vertices_have_the_same_topology():
         mine = {(c.sheets, frozenset(map(int, new[c.vertices]))) for c in getattr(t, name)}
         theirs = {(c.sheets, frozenset(map(int, c.vertices))) for c in getattr(other, name)}
         assert mine == theirs
+
+
+def test_numbers_of_many_vertices_do_not_overflow():
+    n = 3_000_000  # n² has more than 32 bits
+    F = np.array([[0, n - 2, n - 1], [n - 3, n - 1, n - 2]])
+    t = topology(F, np.zeros(2, dtype=int), n)
+    assert t.edges.tolist() == [[0, n - 2], [0, n - 1], [n - 3, n - 2], [n - 3, n - 1], [n - 2, n - 1]]
+    assert t.edge_of_face.tolist() == [[4, 1, 0], [4, 2, 3]]
+    assert t.valence.tolist() == [1, 1, 1, 1, 2]
+    assert t.edges.dtype == t.edge_of_face.dtype == np.int32
+
+
+def test_parts_are_numbered_by_their_first_vertices():
+    random = np.random.default_rng(5)
+    for n, count in ((1, 0), (40, 15), (40, 60)):
+        edges = random.integers(0, n, (count, 2))
+        graph = coo_array((np.ones(count), edges.T), shape=(n, n)).tocsr()
+        assert components(edges, n).tolist() == connected_components(graph, directed=False)[1].tolist()
+
+
+@pytest.mark.parametrize("pages", [3, 40])  # the second are sorted to be checked, the first are not
+def test_a_book_of_patches_is_sound_until_a_page_comes_twice(pages):
+    angle = np.linspace(0.0, np.pi, pages)
+    outer = np.column_stack([np.cos(angle), np.sin(angle), 0.5 + 0 * angle])
+    X = np.vstack([[0, 0, 0], [0, 0, 1], outer])
+    F = np.array([[0, 1, 2 + k] for k in range(pages)])
+    patches = [Patch(f"page {k}", 1.0) for k in range(pages)]
+    book = Surface(X, F, np.arange(pages), patches, fixed=[0])
+    assert book.topology.valence.max() == pages
+    with refused(SurfaceError, what="faces", where=pages, found=[2, 0, 1]):
+        Surface(X, [*F, [2, 0, 1]], [*range(pages), pages - 1], patches, fixed=[0])
+    one_less = np.minimum(np.arange(pages), pages - 2)  # the last two are one patch, and run the same way
+    with refused(SurfaceError, what="faces", where=pages - 1):
+        Surface(X, F, one_less, patches[:-1], fixed=[0])

@@ -44,7 +44,7 @@ def line_of(surface: Surface):
 
 
 def test_walls_of_a_mesh_stand_on_the_plane_under_its_border():
-    surface = add_walls(bare([[4, 0], [4, 6]]), 1.5)
+    surface = add_walls(bare([[4, 0], [4, 6]]), 1.5, bottom="sliding")
     wall = surface.patches[-1]
     assert (wall.name, wall.tension, wall.pressure) == ("wall-patch 1-patch 2", 1.5, 0.0)
     assert minimum_angle(surface) > 24.0
@@ -108,7 +108,9 @@ def test_four_quarters_of_two_patches_get_a_wall_for_each_border():
 def test_a_border_that_is_a_ring():
     X, F = grid(12, bump)
     inner = (np.abs(X[F].mean(axis=1)[:, :2]) < 0.5).all(axis=1)
-    surface = surface_from_labels(X, F, np.where(inner, "in", "out"), tension=2.0, walls=1.0)
+    surface = surface_from_labels(
+        X, F, np.where(inner, "in", "out"), tension=2.0, walls=1.0, bottom="sliding"
+    )
     assert [p.name for p in surface.patches] == ["out", "in", "wall-out-in"]
     assert minimum_angle(surface) > 20.0
     assert surface.on_plane.sum() == 24

@@ -1,9 +1,18 @@
 """Accuracy: how far an answer depends on its mesh.
 
-Gives ``check_mesh`` and its values. May import ``solvers`` and ``continuation`` and the rooms below them.
+Gives ``check_mesh``, ``solve_to_accuracy`` and their values. May import ``continuation``,
+``design``, ``solvers`` and the rooms below them.
 """
 
+from .adaptive import AccuracyStatus, AccurateResult, solve_to_accuracy
 from .mesh_check import MeshCheck, check_mesh
 from .persistence import MeshVerdict
 
-__all__ = ["MeshCheck", "MeshVerdict", "check_mesh"]
+__all__ = [
+    "AccuracyStatus",
+    "AccurateResult",
+    "MeshCheck",
+    "MeshVerdict",
+    "check_mesh",
+    "solve_to_accuracy",
+]

@@ -9,39 +9,43 @@ h ∝ r^(1 - λ/2), and to an error ∝ 1 / N, as for a smooth surface: order 2 
 
 from __future__ import annotations
 
+import importlib.util
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
+from .. import existence
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, SurfaceError
-from ..meshing.held_curves import onto_held_curves
+from ..meshing.curve_projection import onto_held_curves
+from ..meshing.refinement import Projection
 from ..meshing.remeshing import remesh
 from ..meshing.sizes import limit_growth, triangles_for
 from ..solvers import solve
 from ..solvers.result import Result, Status
 from ..surface import Surface
 from ..surface.geometry import face_areas
-from .estimator import Goal, error_shares
+from .estimator import Goal, error_shares, evenness
 from .goals import Accuracy, accuracies, check_places, goals_in
-from .mesh_check import MeshCheck, check_mesh
-from .persistence import MeshVerdict
+from .mesh_check import BOUNDARIES, MeshCheck, check_mesh, vertex_numbers, with_bar
 
 TRIANGLES = 50_000  # of the mesh returned, by default at most
 ROUNDS = 12
+PATIENCE = 3  # rounds in turn without a limit in sight
 GROWTH = 1.5  # of neighbouring edges
 FINER, COARSER = 0.25, 3.0  # times the edge length, in one round
 LEAST, MOST = 1.5, 3.0  # times as many triangles from round to round
 SPARE = 1.3  # times the triangles foreseen, so that fewer rounds are needed
 FLOOR = 1e-12  # of the largest share: a share below counts as that much
 WORTHWHILE = 0.8  # of the limit of triangles: from here on a further round gains little
-VALUES = ("mesh", "limit")
+ACCURACY_OF = ("mesh", "limit")
 
 
 class AccuracyStatus(Enum):
@@ -53,6 +57,10 @@ class AccuracyStatus(Enum):
     ROUNDS = "accuracy not reached: further rounds do not help"
     NOT_AT_REST = "accuracy not reached: the solver finds no equilibrium"
     STOPPED = "accuracy not reached: stopped on request"
+
+
+End = tuple[AccuracyStatus, str]
+"""How a search ends, and why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +102,9 @@ class AccurateResult:
         """A sentence, and each quantity with its bar on this mesh and in the limit."""
         head = "; ".join(filter(None, (self.status.value, self.detail)))
         parts = [
-            f"{_name((row.quantity, row.of))} {row.value:.6g} ± {row.error:.2g} on this mesh,"
-            f" {row.limit:.8g} ± {row.limit_error:.2g} in the limit, wanted ± {row.accuracy:g}"
-            for row in self.values.itertuples()
+            f"{_name(row)} {with_bar(row['value'], row['error'])} on this mesh,"
+            f" {with_bar(row['limit'], row['limit_error'])} in the limit, wanted ± {row['accuracy']:g}"
+            for row in self.values.to_dict("records")
         ]
         return "; ".join([f"{head} ({self.surface.m} triangles)", *parts])
 
@@ -105,7 +113,9 @@ def solve_to_accuracy(
     surface: Surface,
     accuracy: Accuracy,
     *,
-    value: str = "mesh",
+    accuracy_of: str = "mesh",
+    boundary: str | Projection = "smooth",
+    corners: npt.ArrayLike = (),
     most_triangles: int = TRIANGLES,
     callback: Callable[[Mapping[str, Any]], None] | None = None,
     **options: Any,
@@ -113,7 +123,7 @@ def solve_to_accuracy(
     """Solve on meshes that get finer where the error comes from, until the error bars are small enough.
 
     Start from a coarse mesh: remeshing keeps the vertices of boundaries and junctions. The error bars
-    are those of ``check_mesh``. New vertices of held boundaries lie on smooth curves through the old ones.
+    are those of ``check_mesh``.
 
     Parameters
     ----------
@@ -121,8 +131,10 @@ def solve_to_accuracy(
     accuracy : the error bar wanted, by quantity, in its unit: ``{"height": 1e-3}`` or ``"height=1e-3"``.
         Quantities are those of the mesh check: height, area, volume, energy, reaction, thrust, reaction
         per length, lowest eigenvalue; with a patch, as in ``"height of north"``, that patch's alone.
-    value : ``"mesh"``, the value on the mesh returned is to be so accurate; ``"limit"``, the
+    accuracy_of : ``"mesh"``, the value on the mesh returned is to be so accurate; ``"limit"``, the
         extrapolated value is, which needs far fewer triangles.
+    boundary, corners : as in ``check_mesh``: where new vertices of a held boundary or held line go. The
+        smooth curves are those through the vertices of the first mesh.
     most_triangles : the most that the mesh returned may have; the check solves on 16 times as many.
     callback : called after each round with a row of numbers. StopIteration in it, or Ctrl-C, ends the
         search with the best surface so far.
@@ -144,13 +156,20 @@ def solve_to_accuracy(
     ('REACHED', True, True)
     """
     wanted = accuracies(accuracy)
-    validate.choice("value", value, VALUES)
+    validate.choice("accuracy_of", accuracy_of, ACCURACY_OF)
     validate.integer("most_triangles", most_triangles, least=1)
     if not isinstance(surface, Surface):
         validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
     check_places(wanted, surface)
     _require_mmg()
-    return _Search(wanted, value, most_triangles, callback, options).run(surface)
+    project: Projection | None
+    if callable(boundary):
+        project = boundary
+    else:
+        validate.choice("boundary", boundary, BOUNDARIES)
+        sharp = vertex_numbers(corners, surface.n)
+        project = onto_held_curves(surface, corners=sharp) if boundary == "smooth" else None
+    return _Search(wanted, accuracy_of, project, most_triangles, callback, options).run(surface)
 
 
 def size_field(surface: Surface, shares: Floats, triangles: float, growth: float = GROWTH) -> Floats:
@@ -184,151 +203,133 @@ def size_field(surface: Surface, shares: Floats, triangles: float, growth: float
 
 @dataclass(frozen=True, eq=False)
 class _Round:
-    """A surface at rest, its check, and the rows of the quantities wanted."""
+    """A surface at rest, its check, the quantities wanted, and the largest error bar over its accuracy."""
 
     result: Result
     check: MeshCheck
+    goals: Mapping[Goal, float]
     values: pd.DataFrame
+    excess: float
 
-    def excess(self, value: str) -> float:
-        """The largest error bar over its accuracy."""
-        bar = self.values["error" if value == "mesh" else "limit_error"]
-        return float((bar / self.values["accuracy"]).max())
+    @classmethod
+    def of(cls, result: Result, check: MeshCheck, wanted: Mapping[str, float], accuracy_of: str) -> _Round:
+        goals = goals_in(check.table, wanted)
+        names = list(zip(check.table["quantity"], check.table["of"], strict=True))
+        rows = check.table.iloc[[names.index(goal) for goal in goals]].reset_index(drop=True)
+        values = rows.assign(accuracy=list(goals.values()))
+        bar = values["error" if accuracy_of == "mesh" else "limit_error"]
+        return cls(result, check, goals, values, float((bar / values["accuracy"]).max()))
+
+    @property
+    def settled(self) -> bool:
+        """Whether finer meshes have this surface, and all of its quantities a limit."""
+        return self.check.persists and math.isfinite(self.excess)
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The numbers for the history."""
+        return {"triangles": self.result.surface.m, "verdict": self.check.verdict.name.lower()}
 
 
+@dataclass(eq=False)
 class _Search:
-    """The rounds of a search for an accuracy."""
+    """The rounds of a search for an accuracy, and the first solve."""
 
-    def __init__(
-        self,
-        wanted: Mapping[str, float],
-        value: str,
-        most_triangles: int,
-        callback: Callable[[Mapping[str, Any]], None] | None,
-        options: Mapping[str, Any],
-    ) -> None:
-        self.wanted, self.value, self.most, self.options = wanted, value, most_triangles, options
-        self.callback = callback
-        self.rounds: list[_Round] = []
-        self.last: Result | None = None
+    wanted: Mapping[str, float]
+    accuracy_of: str
+    project: Projection | None
+    most_triangles: int
+    callback: Callable[[Mapping[str, Any]], None] | None
+    options: Mapping[str, Any]
+    rounds: list[_Round] = field(default_factory=list)
 
     def run(self, surface: Surface) -> AccurateResult:
-        """All rounds."""
+        """Rounds until one of the ends."""
+        first = result = existence.solve(surface, **self.options)
+        status, detail = AccuracyStatus.ROUNDS, f"after {ROUNDS} rounds"
         try:
-            status, detail = self._rounds(surface)
+            for _ in range(ROUNDS):
+                if ended := self._unsolved(result) or self._round(result):
+                    status, detail = ended
+                    break
+                result = self._next(self.rounds[-1])
         except (StopIteration, KeyboardInterrupt):
-            if self.last is None:
-                raise
             status, detail = AccuracyStatus.STOPPED, ""
-        return self._end(status, detail)
+        return self._end(status, detail, first)
 
-    def _rounds(self, surface: Surface) -> tuple[AccuracyStatus, str]:
-        project = onto_held_curves(surface)
-        for _ in range(ROUNDS):
-            result = solve(surface, **self.options)
-            self.last = self.last or result
-            if result.status is Status.STOPPED:
-                raise StopIteration
-            if not result.converged:
-                return AccuracyStatus.NOT_AT_REST, f"on {surface.m} triangles: {result.message}"
-            check = check_mesh(result, boundary=project)
-            goals = goals_in(check.table, self.wanted)
-            here = _Round(result, check, _values(check, goals))
-            self.rounds.append(here)
-            self._report(here)
-            if here.excess(self.value) <= 1.0 and check.persists:
-                return AccuracyStatus.REACHED, ""
-            if ended := self._hopeless():
-                return ended
-            shares = _shares(check, goals)
-            triangles = self._next(here, shares)
-            size = size_field(result.surface, shares, triangles)
-            surface = remesh(result.surface, size, growth=GROWTH, project=project)
-        return AccuracyStatus.ROUNDS, f"after {ROUNDS} rounds"
+    def _unsolved(self, result: Result) -> End | None:
+        if result.converged:
+            return None
+        if result.status is Status.STOPPED:
+            return AccuracyStatus.STOPPED, ""
+        return AccuracyStatus.NOT_AT_REST, f"on {result.surface.m} triangles: {result.message}"
 
-    def _next(self, here: _Round, shares: Floats) -> float:
-        """How many triangles the next mesh is to have.
-
-        With equal shares N triangles have the error (Σ √η)² / N, here it is Σ η.
-        """
-        m = here.result.surface.m
-        evenness = float(np.sqrt(shares).sum() ** 2 / (m * shares.sum())) if shares.any() else 1.0
-        foreseen = SPARE * m * evenness * here.excess(self.value)
-        factor = float(np.clip(foreseen / m, LEAST, MOST)) if math.isfinite(foreseen) else MOST
-        return min(factor * m, self.most)
-
-    def _hopeless(self) -> tuple[AccuracyStatus, str] | None:
-        """The end where a further round does not help, and why."""
-        here = self.rounds[-1]
-        m, check = here.result.surface.m, here.check
-        settled = [
-            r.check.verdict is MeshVerdict.PERSISTS and math.isfinite(r.excess(self.value))
-            for r in self.rounds
-        ]
-        if not any(settled[-3:]) and len(settled) >= 3:
-            if check.persists:
-                bars = here.values[~np.isfinite(here.values["error"])]
-                names = ", ".join(_name((row.quantity, row.of)) for row in bars.itertuples())
-                return AccuracyStatus.NO_LIMIT, f"{names} on three meshes in turn"
-            return AccuracyStatus.NO_LIMIT, "; ".join(filter(None, (check.detail, check.advice)))
-        if m >= WORTHWHILE * self.most:
-            needed = m * here.excess(self.value)
-            about = f"about {needed:.0f} are needed" if math.isfinite(needed) else "its error is not known"
-            hint = f"{about}; raise most_triangles= (now {self.most}), or ask for less accuracy"
-            return AccuracyStatus.TRIANGLES, hint
-        return None
-
-    def _report(self, here: _Round) -> None:
+    def _round(self, result: Result) -> End | None:
+        """Check the mesh of a surface at rest; the end of the search if this is the last round."""
+        check = check_mesh(result, boundary=self.project or "polygon")
+        here = _Round.of(result, check, self.wanted, self.accuracy_of)
+        self.rounds.append(here)
         if self.callback is not None:
-            verdict = here.check.verdict.name.lower()
-            self.callback(
-                {
-                    "round": len(self.rounds),
-                    "triangles": here.result.surface.m,
-                    "verdict": verdict,
-                    "excess": here.excess(self.value),
-                }
-            )
+            self.callback({"round": len(self.rounds), **here.record, "excess": here.excess})
+        if here.excess <= 1.0 and check.persists:
+            return AccuracyStatus.REACHED, ""
+        if len(self.rounds) >= PATIENCE and not any(r.settled for r in self.rounds[-PATIENCE:]):
+            return AccuracyStatus.NO_LIMIT, _why_no_limit(here)
+        m = result.surface.m
+        if m < WORTHWHILE * self.most_triangles:
+            return None
+        known = math.isfinite(here.excess)
+        needed = f"about {m * here.excess:.2g} are needed" if known else "the error is not known"
+        hint = f"raise most_triangles= (now {self.most_triangles}), or ask for less accuracy"
+        if self.accuracy_of == "mesh":
+            hint += ", or for that of the limit alone (accuracy_of='limit')"
+        return AccuracyStatus.TRIANGLES, f"{needed}; {hint}"
 
-    def _end(self, status: AccuracyStatus, detail: str) -> AccurateResult:
-        """The last round, or the first solve if there is none."""
-        history = [
-            here.values.assign(
-                round=k + 1, triangles=here.result.surface.m, verdict=here.check.verdict.name.lower()
-            )
-            for k, here in enumerate(self.rounds)
-        ]
+    def _next(self, here: _Round) -> Result:
+        """The surface on the next mesh; if it does not come to rest there, on the check's finer mesh."""
+        result = solve(self._remeshed(here), **self.options)
+        finer = here.check.surfaces[1:2]
+        if result.converged or result.status is Status.STOPPED or not finer:
+            return result
+        return solve(finer[0], **self.options) if finer[0].m <= self.most_triangles else result
+
+    def _remeshed(self, here: _Round) -> Surface:
+        """The surface on a mesh with equal shares of the error.
+
+        With equal shares N triangles have the error (Σ √η)² / N, the m triangles here have Σ η.
+        """
+        surface, fine = here.result.surface, here.check.surfaces[1:2]
+        if fine:
+            shares = error_shares(surface, fine[0], here.goals)
+        else:  # no finer mesh has this surface: finer everywhere
+            shares = face_areas(surface.vertices[surface.faces]) ** 2
+        factor = SPARE * evenness(shares) * here.excess if math.isfinite(here.excess) else MOST
+        triangles = min(float(np.clip(factor, LEAST, MOST)) * surface.m, self.most_triangles)
+        return remesh(surface, size_field(surface, shares, triangles), growth=GROWTH, project=self.project)
+
+    def _end(self, status: AccuracyStatus, detail: str, first: Result) -> AccurateResult:
+        history = [r.values.assign(round=k + 1, **r.record) for k, r in enumerate(self.rounds)]
         rows = pd.concat(history, ignore_index=True) if history else pd.DataFrame()
-        surfaces = tuple(here.result.surface for here in self.rounds)
-        if self.rounds:
-            best = self.rounds[-1]
-            return AccurateResult(status, best.result, best.check, best.values, rows, surfaces, detail)
-        if self.last is None:
-            raise AssertionError
-        return AccurateResult(status, self.last, None, pd.DataFrame(), rows, surfaces, detail)
+        surfaces = tuple(r.result.surface for r in self.rounds)
+        if not self.rounds:
+            return AccurateResult(status, first, None, pd.DataFrame(), rows, surfaces, detail)
+        last = self.rounds[-1]
+        return AccurateResult(status, last.result, last.check, last.values, rows, surfaces, detail)
 
 
-def _values(check: MeshCheck, goals: Mapping[Goal, float]) -> pd.DataFrame:
-    """The rows of the quantities wanted, and their accuracy."""
-    names = list(zip(check.table["quantity"], check.table["of"], strict=True))
-    rows = check.table.iloc[[names.index(goal) for goal in goals]].reset_index(drop=True)
-    return rows.assign(accuracy=list(goals.values()))
+def _why_no_limit(here: _Round) -> str:
+    """The mesh check's reason, or the quantities whose values do not settle."""
+    if not here.check.persists:
+        return "; ".join(filter(None, (here.check.detail, here.check.advice)))
+    rows = here.values[~np.isfinite(here.values["error"])]
+    names = ", ".join(map(_name, rows.to_dict("records")))
+    return f"the values of {names} do not settle from mesh to mesh"
 
 
-def _shares(check: MeshCheck, goals: Mapping[Goal, float]) -> Floats:
-    """The triangles' shares in the error, of the goals that are not yet reached most of all."""
-    if len(check.surfaces) < 2:  # a finer mesh has no such surface: finer everywhere
-        return np.asarray(face_areas(check.surfaces[0].vertices[check.surfaces[0].faces]) ** 2)
-    return error_shares(check.surfaces[0], check.surfaces[1], goals)
-
-
-def _name(goal: Goal) -> str:
-    quantity, of = goal
-    return f"{quantity} of {of}" if of else quantity
+def _name(row: Mapping[Any, Any]) -> str:
+    return f"{row['quantity']} of {row['of']}" if row["of"] else str(row["quantity"])
 
 
 def _require_mmg() -> None:
-    try:
-        import mmgpy  # noqa: F401
-    except ImportError:
-        raise MissingExtra("mmgpy", "remesh") from None
+    if importlib.util.find_spec("mmgpy") is None:
+        raise MissingExtra("mmgpy", "remesh")

@@ -81,6 +81,16 @@ def error_shares(coarse: Surface, fine: Surface, goals: Mapping[Goal, float]) ->
     return np.asarray((total / np.maximum(faces, 1))[edge_of_face].sum(axis=1))
 
 
+def evenness(shares: Floats) -> float:
+    """(Σ √η)² / (m Σ η): the error of a mesh with as many triangles and equal shares, over that of this one.
+
+    >>> evenness(np.array([1.0, 1.0])), evenness(np.array([1.0, 0.0]))
+    (1.0, 0.5)
+    """
+    total = float(shares.sum())
+    return float(np.sqrt(shares).sum() ** 2 / (len(shares) * total)) if total > 0.0 else 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class _FineMesh:
     """The fine surface at rest, its second variation, and the interpolation errors of the coarse one."""
@@ -103,7 +113,7 @@ class _FineMesh:
             system = None  # the duals are unknown; every quantity takes the shares of the energy
         tension = np.repeat(coarse.tensions[coarse.patch_of_face], 3)
         edge_of_face = coarse.topology.edge_of_face.ravel()
-        k = sqrt(3.0) * np.bincount(edge_of_face, tension, len(coarse.topology.edges))
+        k: Floats = np.bincount(edge_of_face, tension, len(coarse.topology.edges)).astype(float)
         missing = np.zeros_like(X)
         missing[coarse.n :] = _interpolation_error(coarse, X)
         held = np.where(fine.fixed[:, None], missing, 0.0)

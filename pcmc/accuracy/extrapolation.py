@@ -16,8 +16,10 @@ from ..base.arrays import Bools, Floats
 
 USUAL = 2.0  # order of smooth surfaces on triangles
 LOWEST, HIGHEST = 0.25, 4.0  # orders between which the observed one is used
-SAFETY = 1.5  # times the distance of two extrapolations
-LEAST = 0.05  # of the last correction: least uncertainty of the limit, as p = 2 may be a coincidence
+SAFETY = 2.0  # times the distance of two extrapolations
+UNSETTLED = 1.5  # order of the surface's own moves below which quantities are not believed more
+CURVES = 4.0  # times the doubt about curved boundaries
+LEAST = 0.02  # of the last correction: least uncertainty of the limit, as p = 2 may be a coincidence
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,16 +42,23 @@ class Extrapolation:
     order: Floats
 
 
-def extrapolate(estimates: Floats, rounding: Floats, value: Floats | None = None) -> Extrapolation:
+def extrapolate(
+    estimates: Floats,
+    rounding: Floats,
+    value: Floats | None = None,
+    *,
+    shape_order: float = USUAL,
+    curve_doubt: float = 0.0,
+) -> Extrapolation:
     """Limits and error bars of quantities from their values on nested meshes.
 
     ====================================  ==================================  =============================
     the last two differences d_1, d_2     limit                               its bar
     ====================================  ==================================  =============================
     both at most ``rounding``             q_2                                 ``rounding``
-    1.19 ≤ d_1 / d_2 ≤ 16                 q_2 + d_2 / (d_1/d_2 - 1)           1.5 × its distance from
+    1.19 ≤ d_1 / d_2 ≤ 16                 q_2 + d_2 / (d_1/d_2 - 1)           2 × its distance from
                                                                               q_2 + d_2 / 3 (order 2), at
-                                                                              least 0.05 |d_2|
+                                                                              least 0.02 |d_2|
     d_1 / d_2 > 16, or a small d_2 of     q_2 + d_2 / 3                       the larger of |d_2| and
     the other sign: they swing                                                |d_1| / 12, what order 2
                                                                               leaves of d_1
@@ -58,7 +67,8 @@ def extrapolate(estimates: Floats, rounding: Floats, value: Floats | None = None
     only one mesh                         NaN                                 infinite
     ====================================  ==================================  =============================
 
-    The bar of the value is its distance from the limit plus the limit's bar.
+    The bar of the value is its distance from the limit plus the limit's bar. Two things that one quantity
+    alone may not show make the bar of a limit wider, see the last two parameters.
 
     Parameters
     ----------
@@ -66,13 +76,19 @@ def extrapolate(estimates: Floats, rounding: Floats, value: Floats | None = None
     rounding : (q,) differences up to which two values count as equal.
     value : (q,) the values whose bars are wanted; by default those on the first mesh. They may be read
         in another way than the estimates, if both have the same limit.
+    shape_order : observed order s of the surface itself, from how far it moves from mesh to mesh. Below
+        1.5 a quantity may owe its own better order to errors that cancel. Then its bar is at least
+        |d_1| / (S (S - 1)), S = 2^s: what is left where d_1 shrinks by S with each mesh. If s ≤ 0, no
+        limit is in sight.
+    curve_doubt : share of the rise of curved boundaries that is in doubt; 4 × that share of the first
+        difference is added.
 
     Examples
     --------
     >>> h = np.array([[1.0], [0.5], [0.25]])
     >>> found = extrapolate(7.0 - 3.0 * h**1.5, np.array([1e-12]))
     >>> found.limit.round(12).tolist(), found.order.round(12).tolist(), found.error.round(2).tolist()
-    ([7.0], [1.5], [3.22])
+    ([7.0], [1.5], [3.29])
     >>> still = extrapolate(np.full((3, 1), 2.0), np.array([1e-12]))
     >>> still.limit.tolist(), still.error.tolist(), still.order.tolist()
     ([2.0], [1e-12], [nan])
@@ -82,12 +98,19 @@ def extrapolate(estimates: Floats, rounding: Floats, value: Floats | None = None
     none, steps = np.full(q.shape[1], np.nan), np.diff(q, axis=0)
     equal = (np.abs(steps[-2:]) <= rounding).all(axis=0) & (len(steps) > 0)
     if len(steps) == 0:
-        order, limit, bar = none, none, none + np.inf
+        order, limit, bar = none, none, np.full_like(none, np.inf)
     elif len(steps) == 1:
         order, limit, bar = none, q[-1] + steps[-1] / 3.0, np.abs(steps[-1]) + rounding
     else:
         order, limit, bar = _three(q[-1], steps[-2], steps[-1], rounding)
-    bar = np.where(np.isnan(limit), np.inf, bar)
+    if shape_order <= 0.0:
+        bar = np.full_like(none, np.inf)
+    elif shape_order < UNSETTLED and len(steps) > 1:
+        factor = 2.0**shape_order
+        bar = np.maximum(bar, np.abs(steps[-2]) / (factor * (factor - 1.0)))
+    if curve_doubt > 0.0 and len(steps):
+        bar = bar + CURVES * curve_doubt * np.abs(steps[0])
+    limit, bar = np.where(np.isinf(bar), np.nan, limit), np.where(np.isnan(limit), np.inf, bar)
     limit, bar = np.where(equal, q[-1], limit), np.where(equal, rounding, bar)
     order = np.where(equal, np.nan, order)
     error = np.where(np.isnan(limit), np.inf, np.abs(limit - value) + bar)

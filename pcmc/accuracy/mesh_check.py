@@ -9,18 +9,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from ..base import validate
+from ..base.arrays import Ints
 from ..base.errors import FreeSurfaceWarning, OptionError, SurfaceError
 from ..certificate import Certificate, certify
-from ..meshing.held_curves import smooth_midpoints
+from ..meshing.held_curves import curve_doubt, held_corners, smooth_midpoints
 from ..meshing.refinement import Projection, refine
 from ..solvers import solve
 from ..solvers.result import Callback, Result, Status
 from ..surface import Surface
 from .extrapolation import extrapolate
-from .persistence import MeshVerdict, compared, lost
+from .persistence import MeshVerdict, compared, lost, shape_order
 from .quantities import Key, Reading, readings
 
 MOST = 4_000_000  # triangles of the finest mesh, by default
@@ -77,7 +79,8 @@ class MeshCheck:
 
         The height is that of the highest patch. Keys are such as ``height_error`` and ``volume_limit``.
         """
-        found: dict[str, Any] = {"mesh_check": self.verdict.name.lower(), "mesh_check_detail": self.detail}
+        verdict = self.verdict.name.lower().replace("_", " ")
+        found: dict[str, Any] = {"mesh_verdict": verdict, "mesh_detail": self.detail}
         heights = self.table[self.table["quantity"] == "height"].nlargest(1, "value")
         for row in pd.concat([heights, self.table[self.table["of"] == ""]]).to_dict("records"):
             for column in ("error", "limit", "limit_error", "order"):
@@ -101,6 +104,7 @@ def check_mesh(
     meshes: int = 3,
     *,
     boundary: str | Projection = "smooth",
+    corners: npt.ArrayLike = (),
     callback: Callback | None = None,
     most_triangles: int = MOST,
 ) -> MeshCheck:
@@ -121,6 +125,7 @@ def check_mesh(
         through the old ones, which turn by up to 40° at a vertex (straight lines stay straight);
         ``"polygon"``, on the straight edges; or a function (k,3) → (k,3) that puts points of the edges
         on the exact curve. Vertices that slide on Π stay on it.
+    corners : vertices (k,) at which held curves have corners though they turn by less.
     callback : called with a ``Progress`` after each step of the solver. Where it raises StopIteration,
         the check ends with KeyboardInterrupt, as with Ctrl-C.
     most_triangles : the most that the finest mesh may have.
@@ -128,7 +133,8 @@ def check_mesh(
     Raises
     ------
     OptionError
-        For ``meshes`` below 2, another ``boundary``, or more than ``most_triangles``.
+        For ``meshes`` below 2, another ``boundary``, ``corners`` that are no vertices, or more than
+        ``most_triangles``.
     SurfaceError
         If the surface is not at rest.
 
@@ -153,6 +159,7 @@ def check_mesh(
     if not isinstance(first, Surface):
         validate.refuse("surface", type(first).__name__, "a Surface or a Result", error=SurfaceError)
     validate.integer("most_triangles", most_triangles)
+    sharp = np.union1d(vertex_numbers(corners, first.n), held_corners(first))
     finest = first.m * 4 ** (meshes - 1)
     if finest > most_triangles:
         raise OptionError(
@@ -165,18 +172,22 @@ def check_mesh(
     certificate = surface.certificate if isinstance(surface, Result) else certify(surface)
     _refuse_unsolved(certificate)
     surfaces, certificates = [first], [certificate]
-    finding = None
+    finding, order = None, None
     for _ in range(meshes - 1):
-        result = _solved(_refined(surfaces[-1], boundary), callback)
+        result = _solved(_refined(surfaces[-1], boundary, sharp), callback)
         if not result.converged or result.certificate.index is None:
-            finding = lost(result)
+            finding, order = lost(result), -np.inf
             break
         surfaces.append(result.surface)
         certificates.append(result.certificate)
     if finding is None or len(surfaces) > 1:
         found = compared(surfaces, certificates)
         finding = found if finding is None or found.verdict is MeshVerdict.CHANGES else finding
-    table = _table([readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)])
+    table = _table(
+        [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)],
+        shape_order=shape_order(surfaces) if order is None else order,
+        curve_doubt=curve_doubt(first, corners=sharp) if boundary == "smooth" else 0.0,
+    )
     return MeshCheck(finding.verdict, finding.reason, finding.place, finding.advice, table, tuple(surfaces))
 
 
@@ -187,11 +198,20 @@ def _refuse_unsolved(certificate: Certificate) -> None:
         raise SurfaceError(message, what="surface", found=certificate.residual)
 
 
-def _refined(surface: Surface, boundary: str | Projection) -> Surface:
+def vertex_numbers(corners: npt.ArrayLike, n: int) -> Ints:
+    """The numbers (k,) of the corners, checked."""
+    numbers = np.asarray(corners)
+    whole = numbers.size == 0 or (numbers.ndim == 1 and np.issubdtype(numbers.dtype, np.integer))
+    if not whole or (numbers.size and not (numbers.min() >= 0 and numbers.max() < n)):
+        validate.refuse("corners", corners, f"whole numbers of vertices, 0..{n - 1}")
+    return numbers.astype(np.int64)
+
+
+def _refined(surface: Surface, boundary: str | Projection, corners: Ints) -> Surface:
     """The surface on a mesh with four times as many triangles."""
     project = boundary if callable(boundary) else None
     if boundary == "smooth":
-        project = lambda _: smooth_midpoints(surface)  # noqa: E731
+        project = lambda _: smooth_midpoints(surface, corners=corners)  # noqa: E731
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FreeSurfaceWarning)  # given with the first surface
         return refine(surface, 1, project)
@@ -204,13 +224,13 @@ def _solved(start: Surface, callback: Callback | None) -> Result:
     return result
 
 
-def _table(found: Sequence[dict[Key, Reading]]) -> pd.DataFrame:
+def _table(found: Sequence[dict[Key, Reading]], **doubts: float) -> pd.DataFrame:
     """Values, limits, bars and orders; NaN for a quantity that a finer mesh does not have."""
     first = list(found[0].values())
     estimates = np.array([[_of(one, key, "estimate") for key in found[0]] for one in found])
     rounding = np.array([[_of(one, key, "rounding") for key in found[0]] for one in found])
     value = np.array([reading.value for reading in first])
-    result = extrapolate(estimates, np.nanmax(rounding, axis=0), value)
+    result = extrapolate(estimates, np.nanmax(rounding, axis=0), value, **doubts)
     return pd.DataFrame(
         {
             "quantity": [reading.quantity for reading in first],
@@ -238,27 +258,28 @@ def _text_table(table: pd.DataFrame) -> str:
         {
             "quantity": table.quantity,
             "of": table.of,
-            "on this mesh": [_with_bar(*pair) for pair in zip(table.value, table.error, strict=True)],
-            "limit": [_with_bar(*pair) for pair in zip(table.limit, table.limit_error, strict=True)],
+            "on this mesh": [with_bar(*pair) for pair in zip(table.value, table.error, strict=True)],
+            "limit": [with_bar(*pair) for pair in zip(table.limit, table.limit_error, strict=True)],
             "order": ["-" if math.isnan(p) else f"{p:.1f}" for p in table.order],
         }
     )
     return lines.to_string(index=False)
 
 
-def _with_bar(value: float, bar: float) -> str:
+def with_bar(value: float, bar: float) -> str:
     """A value and its bar, with two digits of the bar.
 
-    >>> _with_bar(2.71828, 0.0123), _with_bar(1234.5, 45.0), _with_bar(2.0, math.inf), _with_bar(2.0, 1e-12)
-    ('2.718 ± 0.012', '1234 ± 45', '2 ± no limit', '2 ± 1e-12')
+    >>> with_bar(2.71828, 0.0123), with_bar(1234.5, 45.0), with_bar(2.0, math.inf), with_bar(2.0, 1e-12)
+    ('2.718 ± 0.012', '1234 ± 45', '2 ± unknown', '2 ± 1e-12')
     """
     if math.isnan(value):
         return "none in sight"
     if not math.isfinite(bar):
-        return f"{value:.4g} ± no limit"
+        return f"{value:.4g} ± unknown"
     if bar <= 1e-9 * abs(value) or bar == 0.0:
         return f"{value:.8g} ± {bar:.0e}"
     digits = 1 - math.floor(math.log10(bar))
-    if 0 <= digits <= 9:
-        return f"{value:.{digits}f} ± {bar:.{digits}f}"
+    if -6 <= digits <= 9:
+        shown = max(digits, 0)
+        return f"{round(value, digits):.{shown}f} ± {round(bar, digits):.{shown}f}"
     return f"{value:.4g} ± {bar:.2g}"

@@ -83,8 +83,8 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
             return _at(MeshVerdict.CHANGES, surface, reason, place)
         if contact := _other_contact(surface, fine):
             return contact
-    mean = [float(np.sqrt((move**2).mean())) for move in moves]
-    if len(moves) > 1 and mean[-1] > max(mean[-2], STILL * first.size):
+    mean = [_mean(move) for move in moves]
+    if shape_order(surfaces) < 0.0:
         place = surfaces[-2].vertices[int(moves[-1].argmax())]
         reason = (
             f"each finer surface is farther from the last one (by {mean[-2]:.2g}, then {mean[-1]:.2g} in the"
@@ -92,6 +92,22 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
         )
         return _at(MeshVerdict.HELD_BY_MESH, surfaces[-1], reason, place)
     return _stability(surfaces, certificates)
+
+
+def shape_order(surfaces: Sequence[Surface]) -> float:
+    """Observed order of the surface itself: log2 of the last two mean moves from mesh to mesh.
+
+    Infinite with fewer than three meshes, or where the last move is none.
+    """
+    if len(surfaces) < 3:
+        return np.inf
+    before, last = (_mean(_moves(a, b)) for a, b in pairwise(surfaces[-3:]))
+    return float(np.log2(before / last)) if last > STILL * surfaces[0].size else np.inf
+
+
+def _mean(moves: Floats) -> float:
+    """Root mean square."""
+    return float(np.sqrt((moves**2).mean()))
 
 
 def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -> Finding:

@@ -22,10 +22,10 @@ def check_regular(path: Path) -> None:
     FileError : also for a name with the character NUL, and a path that the system refuses. A file that is
         missing passes.
 
-    >>> check_regular(Path("roof\0.obj"))
+    >>> check_regular(Path("/"))
     Traceback (most recent call last):
     ...
-    pcmc.base.errors.FileError: 'roof\\x00.obj': a file name cannot have the character NUL
+    pcmc.base.errors.FileError: /: is no regular file but a folder; name a file on a disk
     """
     check_name(path)
     try:

@@ -12,6 +12,7 @@ from ..energy.functional import apply_supports
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths, vertex_sums
 from ..surface.topology import Curve
+from .proof import UnbalancedJunction, Unheld
 
 HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets meet at about 20°
 ROUNDING = 1e-12  # of the size: a coordinate below is 0
@@ -36,8 +37,9 @@ def load_ratio(surface: Surface) -> float:
     carrying = topo.boundary_edge | line
     capacity = float(sheets[carrying] @ segment_lengths(X, topo.edges[carrying]))
     inside[topo.edges[line]] = False
-    opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
-    capacity += 0.5 * float(tension @ (opposite * inside[F]).sum(axis=1))
+    if inside.any():
+        opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
+        capacity += 0.5 * float(tension @ (opposite * inside[F]).sum(axis=1))
     return abs(load(surface)) / capacity if capacity > 0.0 else 0.0
 
 
@@ -67,15 +69,14 @@ def coarseness(surface: Surface) -> float:
     return float((length.mean() * length.sum() / (2.0 * plan)) ** 2)
 
 
-def unbalanced(surface: Surface, pinchable: Bools) -> str:
-    """Names a junction whose tensions cannot balance at any angles; empty if there is none.
+def unbalanced(surface: Surface, pinchable: Bools) -> UnbalancedJunction | None:
+    """A junction whose tensions cannot balance at any angles; None if there is none.
 
     Σ α n = 0 (7) needs the largest tension to be at most the sum of the others. A junction that is held
     all along is left out, as its support takes the difference, and so is one with a wall that slides on
     Π and is stronger than its sheets: it comes down to rest on Π. ``pinchable`` (k,) marks such walls.
     """
-    names, strongest, others = _strained(surface, pinchable, 1.0 + 1e-9)
-    return names and f"the tensions at the junction {names} cannot balance: {strongest} > {others}"
+    return _strained(surface, pinchable, 1.0 + 1e-9)
 
 
 def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
@@ -84,24 +85,45 @@ def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
     At the limit, 5 = 4.5 + 0.5, two of three lie on each other, and no mesh can follow. Arguments as
     for ``unbalanced``.
     """
-    names, strongest, others = _strained(surface, pinchable, HARDLY)
-    return names and (
-        f"the tensions at the junction {names} could balance only with its sheets nearly on each other:"
-        f" {strongest} against {others}"
+    strained = _strained(surface, pinchable, HARDLY)
+    if strained is None:
+        return ""
+    others = " + ".join(f"{tension:g}" for tension in strained.others)
+    return (
+        f"the tensions at the junction {' | '.join(strained.junction)} could balance only with its sheets"
+        f" nearly on each other: {strained.strongest:g} against {others}"
     )
 
 
-def _strained(surface: Surface, pinchable: Bools, share: float) -> tuple[str, str, str]:
-    """A junction whose largest tension is over ``share`` of the sum of the others: names and tensions."""
+def _strained(surface: Surface, pinchable: Bools, share: float) -> UnbalancedJunction | None:
+    """A junction whose largest tension is over ``share`` of the sum of the others."""
     held = surface.fixed | surface.on_plane
     for curve in surface.topology.junctions:
         strongest = max(curve.sheets, key=lambda patch: surface.tensions[patch])
         *others, largest = sorted(surface.tensions[list(curve.sheets)])
         excused = pinchable[strongest] or held[curve.vertices].all()
         if largest > share * sum(others) and not excused:
-            names = " | ".join(surface.patches[i].name for i in curve.sheets)
-            return names, f"{largest:g}", " + ".join(f"{t:g}" for t in others)
-    return "", "", ""
+            names = tuple(surface.patches[i].name for i in curve.sheets)
+            return UnbalancedJunction(names, float(largest), tuple(float(t) for t in others))
+    return None
+
+
+def unheld(surface: Surface, stable: bool) -> Unheld | None:
+    """A part that no vertex fixes and that so has no equilibrium, or no ``stable`` one; or None.
+
+    >>> from pcmc import Patch
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
+    >>> tent = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("tent", 1.0)], on_plane=range(4))
+    >>> unheld(tent, stable=True), unheld(tent, stable=False)
+    (Unheld(vertex=0, pressed=True), None)
+    """
+    parts, used = surface.topology.components, surface.faces[:, 0]
+    pressed = np.unique(parts[used[surface.pressures[surface.patch_of_face] != 0.0]])
+    for part in np.setdiff1d(parts[used], parts[surface.fixed]):
+        if stable or part not in pressed:
+            return Unheld(int(np.flatnonzero(parts == part)[0]), bool(part in pressed))
+    return None
 
 
 def pressures_left_over(surface: Surface) -> str:

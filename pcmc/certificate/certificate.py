@@ -17,6 +17,7 @@ from ..base.arrays import Floats, Ints
 from ..contact.pinching import excess_pull, standing_part
 from ..energy.curvature import METHODS, curvature_error, mean_curvature
 from ..energy.functional import energy_and_gradient, patch_areas, volume
+from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
 from ..energy.motion_space import VertexClasses, force_scale, motion_space
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import triangle_quality
@@ -26,6 +27,7 @@ from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
 from .balance import boundary_table, junction_table, load, load_ratio, pressures_left_over, reactions
+from .proof import Proof
 from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
@@ -39,7 +41,7 @@ class Certificate:
     ----------
     verdict, detail : the verdict, and its reason (which mode, patch or place).
     residual : ‖Bᵀ∇E‖ over ``scale``: the forces left in the motion space, with the pull on pinched
-        vertices beyond what their wall can take, relative.
+        vertices beyond what their wall can take, relative. Of several loose parts, that of the worst.
     scale : norm of the single triangles' tension forces, force.
     energy, volume : E (force·length) and the volume under the roof (length³).
     index : Morse index; None where the surface is not at rest. Rigid motions are not counted.
@@ -58,6 +60,8 @@ class Certificate:
     pinched : (k,) vertices where a junction rests on Π and its wall has no height.
     load_ratio : pressure along Π's normal over the most that the boundary's tension could carry; see
         the function ``load_ratio``.
+    proofs : why there is no equilibrium, if that is the verdict: ``Overload``, ``UnbalancedJunction``,
+        ``Fold`` or ``Unheld``.
     """
 
     verdict: Verdict
@@ -80,6 +84,7 @@ class Certificate:
     reactions: Floats
     pinched: Ints
     load_ratio: float
+    proofs: tuple[Proof, ...] = ()
 
     @property
     def certified(self) -> bool:
@@ -128,7 +133,12 @@ class Certificate:
 
 
 def certify(
-    surface: Surface, *, modes: int = 1, tolerance: float = TOLERANCE, evidence: Evidence | None = None
+    surface: Surface,
+    *,
+    modes: int = 1,
+    tolerance: float = TOLERANCE,
+    evidence: Evidence | None = None,
+    proofs: tuple[Proof, ...] = (),
 ) -> Certificate:
     """Examine a surface.
 
@@ -137,7 +147,8 @@ def certify(
     surface : the surface; it is not changed.
     modes : how many of the lowest modes to compute; the index is counted in any case.
     tolerance : relative residual, > 0, up to which it counts as at rest.
-    evidence : what happened to it while it was solved. ``Result.certify`` passes it on.
+    evidence, proofs : what happened to it while it was solved, and what that proves.
+        ``Result.certify`` passes them on.
 
     Examples
     --------
@@ -163,8 +174,9 @@ def certify(
     space = motion_space(standing, classes, X)
     rigid = rigid_modes(space, rigid_motions(standing), X)
     in_motion_space = space.to_coordinates(forces)
-    residual = float(np.hypot(np.linalg.norm(in_motion_space), np.linalg.norm(unheld))) / scale
     left = space.to_vectors(in_motion_space)
+    lacking = np.column_stack([left, unheld])
+    residual = relative_forces(standing, classes, X, lacking)
 
     qualities = triangle_quality(X, standing.faces)
     in_wall = part.walls.pinchable[standing.patch_of_face]
@@ -176,24 +188,27 @@ def certify(
             index = system.negative
             if modes > 0 and space.size > 2:
                 eigenvalues, fields = lowest(system, modes)
+            del system  # the factor is most of a large surface's memory
 
     patches = _patch_table(surface, standing, areas, qualities)
     ratio, support_forces = load_ratio(standing), reactions(standing)
     notes = _pulled_off(unheld), pressures_left_over(standing)
-    verdict, reason = judge(
-        Findings(
-            surface=surface,
-            pinchable=part.walls.pinchable,
-            residual=residual,
-            tolerance=tolerance,
-            quality=quality,
-            index=index,
-            own_residuals=_own_residuals(standing, classes, left),
-            softest=_softest(standing, classes, eigenvalues, fields),
-            load_ratio=ratio,
-            evidence=evidence,
-        )
+    findings = Findings(
+        surface=surface,
+        pinchable=part.walls.pinchable,
+        residual=residual,
+        tolerance=tolerance,
+        quality=quality,
+        index=index,
+        own_residuals=_own_residuals(standing, classes, left),
+        softest=_softest(standing, classes, eigenvalues, fields),
+        load_ratio=ratio,
+        rounding=rounding_left(standing, classes, X),
+        evidence=evidence,
+        given=proofs,
+        mode=fields[0] if len(fields) else np.empty((0, 3)),
     )
+    verdict, reason = judge(findings)
     return Certificate(
         verdict=verdict,
         detail="; ".join(filter(None, (reason, *notes))),
@@ -215,20 +230,24 @@ def certify(
         reactions=support_forces,
         pinched=np.flatnonzero(part.resting),
         load_ratio=ratio,
+        proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),
     )
 
 
 def _own_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> Floats:
-    """(patches,) the forces left (n,3) inside each patch over the norm of its own triangles' forces."""
-    F, patch, count = surface.faces, surface.patch_of_face, len(surface.patches)
-    sides = surface.vertices[F[:, [1, 2, 0]]] - surface.vertices[F]
-    squared = 0.25 * surface.tensions[patch] ** 2 * np.einsum("fij,fij->f", sides, sides)
-    scale = np.bincount(patch, squared, count)
-    patch_of_vertex = np.zeros(surface.n, dtype=np.int64)
-    patch_of_vertex[F] = patch[:, None]
-    inside = np.einsum("ij,ij->i", left, left) * (classes.kind == SHEET)
-    total = np.bincount(patch_of_vertex, inside, count)
-    return np.asarray(np.sqrt(total / np.where(scale > 0.0, scale, 1.0)))
+    """(patches,) the forces left (n,3) inside each patch over the norm of its own triangles' forces.
+
+    Of a patch with several islands, the worst one counts.
+    """
+    island = islands(surface.topology)[classes.active]
+    own = squared_forces(surface, classes, surface.vertices)
+    island_of_vertex = np.zeros(surface.n, dtype=np.int64)
+    island_of_vertex[classes.faces] = island[:, None]
+    inside = left * (classes.kind == SHEET)[:, None]
+    out = np.zeros(len(surface.patches))
+    squares = ratios(inside, island_of_vertex, own, island)
+    np.maximum.at(out, classes.patch_of_face, squares[island])
+    return np.sqrt(out)
 
 
 def _softest(surface: Surface, classes: VertexClasses, values: Floats, fields: Floats) -> float:

@@ -11,6 +11,7 @@ from ..surface import Surface
 
 REACH = 1.5  # median edge lengths: the cause is looked for this near to the worst triangle
 LOW = 0.2  # median edge lengths: a held wall this low has no room for triangles
+KEY = 'in a plan, bottom = "{}"'
 ALONG = 30.0  # degrees: at a smaller angle to the support a junction counts as lying along it
 
 
@@ -35,11 +36,12 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
         return worst + (
             "; the junction there comes down on the held bottom of its wall, so the wall has no height"
             " left: make the wall weaker, or let its bottom slide so that the junction can rest on the plane"
+            f" ({KEY.format('sliding')})"
         )
     if _slips(surface, pinchable, place, REACH * edge):
         worst += (
             "; the junction there slips along a support, which does not hold its end: hold the bottom"
-            " of its wall"
+            f" of its wall ({KEY.format('held')})"
         )
     return worst
 

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 
+import numpy as np
+
 from ..base.arrays import Bools, Floats
 from ..surface import Surface
-from .balance import coarseness, hardly_balanced, unbalanced
+from .balance import coarseness, hardly_balanced, unbalanced, unheld
 from .collapse import where_collapsed
+from .neck import Neck, pinched_neck
+from .proof import Overload, Proof
+from .slipping import describe_saddle
 
+NOISE = 10.0  # times what rounding of the coordinates leaves: forces up to here may be rounding alone
+FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
 NEUTRAL = 1e-2  # |λ| size²/α below which a mode counts as neutral
 SMALL = 1e3  # tolerances of its own forces that a patch may lack where stronger ones hide it
 COLLAPSED = 1e-3  # triangle quality up to which a mesh counts as degenerate
@@ -24,7 +31,9 @@ class Verdict(Enum):
     NEUTRAL = "neutral: at rest, and some change of shape costs almost no energy"
     SADDLE = "saddle: at rest, but some change of shape lowers the energy"
     NOT_CONVERGED = "not converged: the forces do not balance yet; solve further"
-    NO_EQUILIBRIUM = "no equilibrium: tension and pressure cannot balance; change the tensions"
+    NO_EQUILIBRIUM = "no equilibrium: tension and pressure cannot balance, as the detail proves"
+    RAN_AWAY = "ran away from this start: another start may come to rest; nothing proves that none does"
+    UNDECIDED = "undecided: rounding hides whether it is at rest, or stable; the detail says why"
     DEGENERATE = "degenerate mesh: triangles have collapsed; remesh, or start from another shape"
 
 
@@ -49,8 +58,11 @@ class Findings:
     index : Morse index; None where it is not known.
     own_residuals : (patches,) each patch's forces left, relative to its own.
     softest : lowest eigenvalue in units of α/size²; infinite where none is known.
+    rounding : what rounding of the coordinates alone leaves of the residual, about.
     load_ratio : pressure over the most that the boundary's tension could carry.
     evidence : what happened on the way, if a solver was there to see it.
+    given : proofs that there is no equilibrium, which a solver brought.
+    mode : (n,3) displacements of the lowest mode; empty where none is known.
     """
 
     surface: Surface
@@ -62,7 +74,10 @@ class Findings:
     own_residuals: Floats
     softest: float
     load_ratio: float
+    rounding: float = 0.0
     evidence: Evidence | None = None
+    given: tuple[Proof, ...] = ()
+    mode: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
     @property
     def moving(self) -> bool:
@@ -70,9 +85,18 @@ class Findings:
         return self.residual > self.tolerance
 
     @cached_property
-    def unbalanced(self) -> str:
-        """Names a junction whose tensions cannot balance, while forces are left; else empty."""
-        return unbalanced(self.surface, self.pinchable) if self.moving else ""
+    def proofs(self) -> tuple[Proof, ...]:
+        """Why there is no equilibrium, while forces are left; those of the shape first."""
+        if not self.moving:
+            return ()
+        of_shape = (
+            unbalanced(self.surface, self.pinchable),
+            Overload(self.load_ratio) if self.overloaded else None,
+            unheld(self.surface, stable=False),
+        )
+        proofs = [proof for proof in of_shape if proof is not None]
+        kinds = {type(proof) for proof in proofs}
+        return (*proofs, *(proof for proof in self.given if type(proof) not in kinds))
 
     @cached_property
     def hardly_balanced(self) -> str:
@@ -85,10 +109,13 @@ class Findings:
 
         Where a solver saw the surface inflate or collapse, the mesh leaves nothing open.
         """
-        if not self.moving:
-            return False
         settled = self.evidence in (Evidence.INFLATED, Evidence.COLLAPSED)
         return self.load_ratio > 1.0 + (0.0 if settled else coarseness(self.surface))
+
+    @cached_property
+    def neck(self) -> Neck | None:
+        """The neck that pinches off, if triangles have collapsed there."""
+        return pinched_neck(self.surface) if self.moving and self.collapsed else None
 
     @property
     def collapsed(self) -> bool:
@@ -111,9 +138,15 @@ def judge(findings: Findings) -> tuple[Verdict, str]:
     return rule.verdict, rule.reason(findings)
 
 
-def _overload(f: Findings) -> str:
-    digits = ".3f" if f.load_ratio < 1.1 else ".2f" if f.load_ratio < 1e4 else ".3g"
-    return f"the pressure is {f.load_ratio:{digits}} times what the boundary's tension could carry"
+def _ran_away(f: Findings) -> str:
+    if f.neck is not None:
+        return f"{f.neck}; bring the held curves nearer to each other, or raise the pressure"
+    if f.evidence is Evidence.INFLATED:
+        return (
+            "it grew without bound; start lower, raise the tensions or lower the pressures, or follow the"
+            " pressure from a lower one (pcmc.follow)"
+        )
+    return "it shrank to nothing; hold it with fixed= or on_plane=, raise the pressure, or start larger"
 
 
 def _collapse(f: Findings) -> str:
@@ -135,13 +168,32 @@ def _forces_left(f: Findings) -> str:
 def _weak_patch(f: Findings) -> str:
     name = f.surface.patches[int(f.own_residuals.argmax())].name
     return (
-        f"the forces left in patch {name!r} are {f.own_residuals.max():.1e} of its own, which are small"
-        " beside those of other patches; solve with a smaller tolerance"
+        f"the forces left in patch {name!r}, or in an island of it, are {f.own_residuals.max():.1e} of its"
+        " own, which are small beside those of the rest; solve with a smaller tolerance"
     )
 
 
+def _hidden_forces(f: Findings) -> str:
+    return (
+        f"relative residual {f.residual:.1e}, tolerance {f.tolerance:.0e}, but rounding of the coordinates"
+        f" alone leaves about {f.rounding:.0e}: parts that are small beside their coordinates lose their"
+        " digits; move the origin near them, or solve them by themselves"
+    )
+
+
+def _hidden_stability(f: Findings) -> str:
+    reason = (
+        f"the forces balance (relative residual {f.residual:.1e}), but the second variation is singular to"
+        " rounding, so its negative eigenvalues cannot be counted"
+    )
+    tensions = f.surface.tensions[f.surface.tensions > 0.0]
+    if len(tensions) and tensions.max() > FACTOR * tensions.min():
+        reason += f"; the tensions differ by a factor of {tensions.max() / tensions.min():.0e}"
+    return reason
+
+
 def _ways_down(f: Findings) -> str:
-    return f"index {f.index}: {'1 way' if f.index == 1 else f'{f.index} ways'} down"
+    return describe_saddle(f.surface, f.index or 0, f.mode)
 
 
 RULES = (
@@ -150,21 +202,21 @@ RULES = (
         lambda f: not f.surface.tensions.any(),
         lambda f: "no patch has a tension: every shape is at rest",
     ),
-    Rule(Verdict.NO_EQUILIBRIUM, lambda f: bool(f.unbalanced), lambda f: f.unbalanced),
-    Rule(Verdict.NO_EQUILIBRIUM, lambda f: f.overloaded, _overload),
     Rule(
         Verdict.NO_EQUILIBRIUM,
-        lambda f: f.moving and f.evidence is Evidence.INFLATED,
-        lambda f: "the surface inflates without bound (from this start; others may differ)",
+        lambda f: bool(f.proofs),
+        lambda f: "; ".join([*map(str, f.proofs), *([str(f.neck)] if f.neck else [])]),
     ),
     Rule(
-        Verdict.NO_EQUILIBRIUM,
-        lambda f: f.moving and f.evidence is Evidence.VANISHED,
-        lambda f: "nothing holds the surface, and it shrinks to nothing",
+        Verdict.RAN_AWAY,
+        lambda f: f.moving and (f.evidence in (Evidence.INFLATED, Evidence.VANISHED) or f.neck is not None),
+        _ran_away,
     ),
     Rule(Verdict.DEGENERATE, lambda f: f.collapsed, _collapse),
-    Rule(Verdict.NOT_CONVERGED, lambda f: f.moving or f.index is None, _forces_left),
+    Rule(Verdict.UNDECIDED, lambda f: f.moving and f.residual <= NOISE * f.rounding, _hidden_forces),
+    Rule(Verdict.NOT_CONVERGED, lambda f: f.moving, _forces_left),
     Rule(Verdict.NOT_CONVERGED, lambda f: bool(f.own_residuals.max() > SMALL * f.tolerance), _weak_patch),
+    Rule(Verdict.UNDECIDED, lambda f: f.index is None, _hidden_stability),
     Rule(Verdict.SADDLE, lambda f: f.index != 0, _ways_down),
     Rule(
         Verdict.NEUTRAL,

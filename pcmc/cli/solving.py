@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,6 +11,9 @@ from typing import Annotated
 import typer
 
 from .. import project as projects
+from ..accuracy import check_mesh
+from ..accuracy.adaptive import TRIANGLES
+from ..base import validate
 from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
@@ -17,6 +21,14 @@ from . import NOT_CERTIFIED, OK, arguments
 from .arguments import MANY_FILES, TOML, Input, Pressures, Settings, number, option
 from .progress import working
 
+MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
+CHECKED = f"Solve on two finer meshes, too, for error bars; by default up to {MOST_CHECKED} triangles."
+MESHES = "Check the mesh on this many meshes in all, 3 for error bars and orders."
+ACCURACY = (
+    "Error bar wanted, such as height=1e-3: finer triangles where the error comes from; may be repeated."
+)
+ACCURACY_OF = "mesh: the value on the mesh is to be so accurate; limit: the extrapolated one."
+MOST_TRIANGLES = f"The most that the mesh for an accuracy may have, {TRIANGLES} by default."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
 
@@ -32,31 +44,60 @@ def solve_(
     pressure: Pressures = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
     anyway: Annotated[bool, typer.Option("--anyway", help="Write the output even if not certified.")] = False,
+    accuracy: Annotated[list[str] | None, option("QUANTITY=NUMBER", ACCURACY, "--accuracy")] = None,
+    accuracy_of: Annotated[str | None, option("NAME", ACCURACY_OF, "--accuracy-of")] = None,
+    most_triangles: Annotated[int | None, option("NUMBER", MOST_TRIANGLES, parser=arguments.integer)] = None,
+    mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
 ) -> int:
-    """Solve a surface or a project, certify it, and write all files, or none.
+    """Solve a surface or a project, certify it, write all files, or none; then check its mesh.
+
+    The mesh check solves the surface on two finer meshes and prints error bars. Ctrl-C ends it; the files
+    are written before.
 
     \b
     Examples:
       pcmc solve roof.toml
+      pcmc solve roof.toml --accuracy height=1e-3
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
     project = _project(file, folder, output, picture)
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
         options["target"] = target
-    project = replace(project, method=method or project.method, options=options)
+    given = {"accuracy_of": accuracy_of, "most_triangles": most_triangles}
+    given["accuracy"] = ", ".join(accuracy) if accuracy else None
+    goal = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
+    wanted = project.mesh_check if mesh_check is None else mesh_check
+    project = replace(project, method=method or project.method, options=options, wanted=goal)
+    project = replace(project, mesh_check=False)
     with working() as say:
         changed = partial(arguments.retensioned, tension=tension, pressure=pressure)
         outcome = projects.run_project(project, say, anyway=anyway, changed=changed)
     _report(outcome)
     if project.outputs and not outcome.files:
         print("nothing written (use --anyway to write it)")
+    _check_mesh(project, outcome, wanted)
     return OK if outcome.good else NOT_CERTIFIED
+
+
+def _check_mesh(project: projects.Project, outcome: projects.Outcome, wanted: bool | None) -> None:
+    """Check the mesh of a surface at rest and print its table, unless it is not wanted or too large."""
+    if outcome.certificate.index is None or wanted is False:
+        return
+    if wanted is None and outcome.surface.m > MOST_CHECKED:
+        print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
+        return
+    sys.stdout.flush()
+    with working() as say:
+        check = projects.check_of(project, outcome, say)
+    print(f"\n{check.brief()}")
 
 
 def _report(outcome: projects.Outcome) -> None:
     """Print how the solver ended, the targets and parameters, the verdict, and the files written."""
     print(f"{outcome.surface.m} triangles; {outcome.result.message}")
+    if outcome.accurate is not None:
+        print(outcome.accurate.message)
     if outcome.design is not None:
         print(f"targets {outcome.design.message}")
         if outcome.design.met:  # otherwise the message has the values
@@ -80,17 +121,32 @@ def _project(
     return replace(project, files=output or project.files, picture=picture or project.picture)
 
 
-def certify_(file: Input, tension: Settings = None, pressure: Pressures = None) -> int:
+def certify_(
+    file: Input,
+    tension: Settings = None,
+    pressure: Pressures = None,
+    meshes: Annotated[int | None, option("NUMBER", MESHES, parser=arguments.integer)] = None,
+) -> int:
     """Check a surface: residual forces, curvature errors, stability, reactions.
 
     \b
-    Example:
+    Examples:
       pcmc certify roof.pcmc
+      pcmc certify roof.pcmc --meshes 3
     """
+    if meshes is not None:
+        validate.integer("--meshes", meshes, least=2)
     with working() as say:
         say("certifying")
-        certificate = certify(arguments.retensioned(arguments.surface_in(file), tension, pressure))
+        surface = arguments.retensioned(arguments.surface_in(file), tension, pressure)
+        certificate = certify(surface)
     print(certificate)
+    if meshes is not None and certificate.index is not None:
+        sys.stdout.flush()
+        with working() as say:
+            say("checking the mesh")
+            check = check_mesh(surface, meshes)
+        print(f"\n{check}")
     return OK if certificate.certified else NOT_CERTIFIED
 
 

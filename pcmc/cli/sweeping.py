@@ -17,6 +17,7 @@ from .progress import sweeping
 
 TABLES = (".csv", ".parquet")
 WHAT = "A project (.toml), a surface, or package.module:function that returns a Surface."
+SEARCH = "Try further starts where the first leads to no equilibrium: slower, but with the proof."
 STORE = "File for finished cases. The same command again runs only the missing ones."
 
 
@@ -35,6 +36,10 @@ def sweep(
     time_limit: Annotated[
         float, option("SECONDS", "Time limit per case, in seconds.", parser=number)
     ] = 600.0,
+    mesh_check: Annotated[
+        bool, typer.Option("--mesh-check", help="Solve each case on two finer meshes, too, for error bars.")
+    ] = False,
+    search: Annotated[bool, typer.Option("--search", help=SEARCH)] = False,
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Run the stored cases that failed again.")
     ] = False,
@@ -68,7 +73,7 @@ def sweep(
     grid = {name: listed for name, listed in given.items() if len(listed) > 1}
     fixed = {name: listed[0] for name, listed in given.items() if len(listed) == 1}
     with sweeping() as draw:
-        cases = _cases(what, grid, fixed, method)
+        cases = _cases(what, grid, fixed, method, {"mesh_check": mesh_check, "search": search})
         table = run(
             cases,
             store,
@@ -82,7 +87,7 @@ def sweep(
         return INTERRUPTED
     if csv is not None:
         write_table(csv, table)
-    columns = [c for c in (*grid, "status", "verdict", "targets_met") if c in table]
+    columns = [c for c in (*grid, "status", "verdict", "mesh_verdict", "targets_met") if c in table]
     print(table[columns].to_string())
     _print_failures(table[table["status"].isin(FAILED)])
     if len(table) < len(cases):
@@ -91,16 +96,19 @@ def sweep(
     return OK if good.all() else NOT_CERTIFIED
 
 
-def _cases(what: str, grid: dict[str, Any], fixed: dict[str, Any], method: str | None) -> Any:
+def _cases(
+    what: str, grid: dict[str, Any], fixed: dict[str, Any], method: str | None, wanted: dict[str, bool]
+) -> Any:
     from ..sweep import Sweep, solve_case
     from ..sweep.projects import project_sweep
 
     if Path(what).suffix.lower() in (TOML, *FORMATS):
-        return project_sweep(what, grid, fixed, method=method)
+        return project_sweep(what, grid, fixed, method=method, **wanted)
     if ":" not in what:
         kinds = f"a project (.toml), a surface ({' '.join(FORMATS)}), or a generator"
         raise OptionError(f"{what}: expected {kinds} such as generators:two_caps", what="WHAT", found=what)
-    return Sweep(solve_case, grid, {"generator": what, "method": method or "newton", **fixed})
+    about = {"generator": what, "method": method or "newton"}
+    return Sweep(solve_case, grid, about | {name: True for name, on in wanted.items() if on} | fixed)
 
 
 def _print_failures(failed: Any) -> None:

@@ -117,7 +117,7 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
     top[rows.vertices] = rows.top_places(X)
     direction[rows.vertices] = rows.directions(surface)
     down = resting.copy()
-    down[rows.vertices] = (resting | walls.corner)[rows.top_ends].all(axis=1)
+    down[rows.vertices] = _under_low(rows, resting | walls.corner)
     of_wall = resting | walls.top_free
     of_wall[rows.vertices] = True
     rising = of_wall[start] & of_wall[end] & (down[start] != down[end])
@@ -298,10 +298,14 @@ def _lie_on_plane(walls: Walls, resting: Bools) -> Bools:
     """(n,) vertices on Π: resting ones, corners, feet, and wall vertices below such alone."""
     down = resting | walls.corner
     rows = walls.rows
-    i, j = rows.top_ends.T
-    low_i, low_j = down[i] | (rows.fraction == 1.0), down[j] | (rows.fraction == 0.0)
-    down[rows.vertices] = (low_i & low_j) | (rows.relative_height == 0.0)
+    down[rows.vertices] = _under_low(rows, down) | (rows.relative_height == 0.0)
     return down
+
+
+def _under_low(rows: WallRows, low: Bools) -> Bools:
+    """(w,) wall vertices whose place on the top edge is on Π: straight below a low end, or between two."""
+    i, j = rows.top_ends.T
+    return (low[i] | (rows.fraction == 1.0)) & (low[j] | (rows.fraction == 0.0))
 
 
 def _pressure_push(surface: Surface, at: Bools) -> Floats:

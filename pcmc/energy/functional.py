@@ -90,8 +90,15 @@ def gradient(surface: Surface) -> Floats:
 
 
 def apply_supports(surface: Surface, vectors: Floats) -> Floats:
-    """Zero vectors (n,3) at fixed vertices and their part normal to Π at sliding ones, in place."""
+    """Leave of vectors (n,3) what the supports allow, in place.
+
+    Nothing at fixed vertices, the part along the line at those that slide along one, and the part along Π
+    at those that slide there.
+    """
+    along = [line.along(vectors[vertices]) for line, vertices in surface.on_line]
     vectors[surface.fixed] = 0.0
+    for (_, vertices), part in zip(surface.on_line, along, strict=True):
+        vectors[vertices] = part
     sliding = surface.on_plane
     vectors[sliding] = surface.plane.along(vectors[sliding])
     return vectors

@@ -45,6 +45,7 @@ class Linearisation:
 
     Attributes
     ----------
+    sheet_rows : (s,) vertices inside sheets whose normal may turn.
     sheet_factor : (n,3) (∇E - n n·∇E) / |a| inside sheets, which Da is multiplied with; zero elsewhere.
     curve_rows, curve_factor : (b,) numbers in ``classes.curve`` of the vertices whose curve may turn,
         and -(t·∇E) / |c| there, which Dc is multiplied with.
@@ -54,6 +55,7 @@ class Linearisation:
     classes: VertexClasses
     space: MotionSpace
     X: Floats
+    sheet_rows: Ints
     sheet_factor: Floats
     curve_rows: Ints
     curve_factor: Floats
@@ -67,8 +69,7 @@ class Linearisation:
         turned = curve_chords(surface, classes, d)[self.curve_rows]
         change[classes.curve[self.curve_rows]] += self.curve_factor[:, None] * turned
         out = space.to_coordinates(change)
-        single = (classes.kind == SHEET) & (space.dimension == 1)
-        out[space.start[:-1][single]] += turn[single]
+        out[space.start[self.sheet_rows]] += turn[self.sheet_rows]
         return out
 
 
@@ -76,29 +77,33 @@ def linearise(
     surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
 ) -> Linearisation:
     """The derivative of the forces of ``surface`` at X, where ∇E is ``gradient`` (n,3)."""
-    sheet_factor = _sheet_factor(surface, classes, space, X, gradient)
+    single = (classes.kind == SHEET) & (space.dimension == 1)
+    for _, along_line in surface.on_line:
+        single &= ~along_line
+    sheet_factor = _sheet_factor(surface, classes, single, space.basis, X, gradient)
     slides = surface.on_plane[classes.curve]
     rows = np.flatnonzero(space.dimension[classes.curve] == np.where(slides, 1, 2))
     chord = curve_chords(surface, classes, X)[rows]
     chord[slides[rows]] = surface.plane.along(chord[slides[rows]])
     square = np.einsum("ij,ij->i", chord, chord)
     along = np.einsum("ij,ij->i", chord, gradient[classes.curve[rows]])
-    return Linearisation(surface, classes, space, X, sheet_factor, rows, -along / square)
+    sheet_rows = np.flatnonzero(single)
+    return Linearisation(surface, classes, space, X, sheet_rows, sheet_factor, rows, -along / square)
 
 
 def _sheet_factor(
-    surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
+    surface: Surface, classes: VertexClasses, single: Bools, basis: Floats, X: Floats, gradient: Floats
 ) -> Floats:
-    single = (classes.kind == SHEET) & (space.dimension == 1)
+    """``Linearisation.sheet_factor``; ``single`` (n,) are the vertices whose normal may turn."""
     out = np.zeros_like(X)
     area_vector = vertex_area_vectors(X, classes.faces)[0]
-    _across_normals(area_vector, single, space.basis, gradient, out)
+    _across_normals(area_vector, single, basis, gradient, out)
     sliding = np.flatnonzero(single & surface.on_plane)
     if len(sliding):
         length = np.linalg.norm(area_vector[sliding], axis=1)
         normal = area_vector[sliding] / length[:, None]
         shadow = np.linalg.norm(surface.plane.along(normal), axis=1)
-        b, g = space.basis[sliding, 0], gradient[sliding]
+        b, g = basis[sliding, 0], gradient[sliding]
         rest = surface.plane.along(g - np.einsum("ij,ij->i", g, b)[:, None] * b)
         rest -= np.einsum("ij,ij->i", rest, normal)[:, None] * normal
         out[sliding] = rest / (shadow * length)[:, None]

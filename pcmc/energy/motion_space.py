@@ -4,7 +4,7 @@
 - on a curve where sheets meet or end: the plane perpendicular to the curve;
 - at a point where such curves meet, or which sheets share that have no edge in common there: all
   three directions;
-- always within what the support allows: nothing where fixed, along Π where sliding.
+- always within what the support allows: nothing where fixed, along Π where sliding, or along a line.
 
 The remaining directions only slide vertices along the shape and belong to mesh quality. Faces without
 tension and pressure exert no force: they are left out, and a vertex of such faces alone has no motion.
@@ -14,6 +14,7 @@ A P-CMC surface is Bᵀ∇E = 0, with B the basis of this space.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,18 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..surface import Surface
-from ..surface.geometry import accumulate, divided, dot, norm, point, scaled, sub, vector, vertex_area_vectors
+from ..surface.geometry import (
+    accumulate,
+    add,
+    divided,
+    dot,
+    norm,
+    point,
+    scaled,
+    sub,
+    vector,
+    vertex_area_vectors,
+)
 from ..surface.topology import (
     CURVE,
     POINT,
@@ -100,6 +112,10 @@ class MotionSpace(NamedTuple):
         """B s (n,3): the vectors that have these components (size,)."""
         return _to_vectors(self, components)
 
+    def from_other(self, other: MotionSpace, components: Floats) -> Floats:
+        """Bᵀ B' s (size,): the components here of the vectors that have these in another space."""
+        return _between(other, self, components)
+
     def project(self, vectors: Floats) -> Floats:
         """B Bᵀ v (n,3): the part of the vectors that changes the shape."""
         return self.to_vectors(self.to_coordinates(vectors))
@@ -155,6 +171,8 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     n = surface.n
     basis, dimension = np.zeros((n, 3, 3)), np.zeros(n, dtype=np.int64)
     moving = ~(surface.fixed | classes.idle)
+    for _, along_line in surface.on_line:
+        moving |= along_line & ~classes.idle
 
     sheet = moving & (classes.kind == SHEET)
     _along_normals(vertex_area_vectors(X, classes.faces)[0], sheet, basis, dimension)
@@ -174,6 +192,8 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     sliding = np.flatnonzero(moving & surface.on_plane)
     if len(sliding):
         _within_plane(np.array(surface.plane.normal), tangent, sliding, basis, dimension)
+    for line, along_line in surface.on_line:
+        _within_line(np.array(line.direction), np.flatnonzero(along_line & moving), basis, dimension)
     return MotionSpace.of(basis, dimension)
 
 
@@ -187,8 +207,12 @@ def curve_chords(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
 
 def force_scale(surface: Surface, classes: VertexClasses, X: Floats) -> float:
     """The norm of the single triangles' tension forces ½ α |e|, which cancel at rest, force."""
-    square = _square_of_forces(X, classes.faces, surface.tensions[classes.patch_of_face])
-    return float(np.sqrt(square)) or 1.0
+    return _norm_of_forces(X, classes.faces, surface.tensions[classes.patch_of_face]) or 1.0
+
+
+def tension_forces(surface: Surface) -> float:
+    """The same norm for all triangles of a surface, force; 0 without tension."""
+    return _norm_of_forces(surface.vertices, surface.faces, surface.tensions[surface.patch_of_face])
 
 
 def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
@@ -237,6 +261,14 @@ def _within_plane(normal: Floats, tangent: Floats, sliding: Ints, basis: Floats,
         dimension[chosen] = np.where(single, 1, 2)
 
 
+def _within_line(direction: Floats, sliding: Ints, basis: Floats, dimension: Ints) -> None:
+    """Leave the line's direction where moving along it changes the shape, and nothing elsewhere; in place."""
+    across = np.linalg.norm(basis[sliding] @ direction, axis=1) > PARALLEL
+    basis[sliding] = 0.0
+    basis[sliding[across], 0] = direction
+    dimension[sliding] = across
+
+
 @compiled
 def _along_normals(area_vector: Floats, chosen: Bools, basis: Floats, dimension: Ints) -> None:
     for v in range(len(area_vector)):
@@ -248,7 +280,7 @@ def _along_normals(area_vector: Floats, chosen: Bools, basis: Floats, dimension:
 
 
 @compiled
-def _square_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
+def _norm_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
     total = 0.0
     for f in range(len(F)):
         square = 0.0
@@ -256,7 +288,7 @@ def _square_of_forces(X: Floats, F: Ints, tension: Floats) -> float:
             edge = sub(point(X, F[f, i]), point(X, F[f, i - 1]))
             square += dot(edge, edge)
         total += 0.25 * tension[f] ** 2 * square
-    return total
+    return sqrt(total)
 
 
 @compiled
@@ -274,4 +306,16 @@ def _to_vectors(space: MotionSpace, components: Floats) -> Floats:
     for v in range(len(space.dimension)):
         for c in range(space.dimension[v]):
             accumulate(out, v, scaled(components[space.start[v] + c], vector(space.basis[v, c])))
+    return out
+
+
+@compiled
+def _between(space: MotionSpace, other: MotionSpace, components: Floats) -> Floats:
+    out = np.empty(other.start[-1])
+    for v in range(len(space.dimension)):
+        moved = (0.0, 0.0, 0.0)
+        for c in range(space.dimension[v]):
+            moved = add(moved, scaled(components[space.start[v] + c], vector(space.basis[v, c])))
+        for c in range(other.dimension[v]):
+            out[other.start[v] + c] = dot(vector(other.basis[v, c]), moved)
     return out

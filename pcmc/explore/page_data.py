@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..accuracy.mesh_check import MeshCheck, with_bar
 from ..base.arrays import Floats
 from ..certificate.balance import reactions_per_length
 from ..certificate.certificate import Certificate
@@ -86,4 +87,26 @@ def findings(surface: Surface, certificate: Certificate) -> dict[str, Any]:
             {"name": row["patch"], "mean_H": row["mean_H"], "area": row["area"]}
             for row in certificate.patches.to_dict(orient="records")
         ],
+    }
+
+
+def mesh_findings(check: MeshCheck) -> dict[str, Any]:
+    """The verdict of the mesh check, and its table in words."""
+    word, _, sentence = check.verdict.value.partition(": ")
+    rows = [
+        {
+            "name": " of ".join(filter(None, (row["quantity"], row["of"]))),
+            "value": with_bar(row["value"], row["error"]),
+            "limit": with_bar(row["limit"], row["limit_error"]),
+            "order": float(row["order"]),
+        }
+        for row in check.table.to_dict(orient="records")
+    ]
+    detail = "; ".join(filter(None, (check.detail, check.advice)))
+    return {
+        "name": check.verdict.name.lower(),
+        "word": word,
+        "sentence": sentence,
+        "detail": detail,
+        "rows": rows,
     }

@@ -6,10 +6,13 @@ It is the standard library's, so that exploring needs the core install alone.
 from __future__ import annotations
 
 import json
+import math
+import re
 import secrets
 import socket
 import tempfile
 import threading
+import time
 import warnings
 from collections import OrderedDict
 from contextlib import suppress
@@ -26,12 +29,15 @@ from ..io import FORMATS, write
 from ..project.output import fields as written_fields
 from ..surface import Patch, Surface
 from .messages import pack, plain
-from .page_data import centre, fields, findings, outline
+from .page_data import centre, fields, findings, mesh_findings, outline
 from .session import Session, State, solved_start
 
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
 SOLVES_AT_ONCE = 2
 LONGEST_REQUEST = 1_000_000  # bytes
+LONGEST_NAME = 1000  # characters
+REQUEST_SECONDS = 30.0  # to send a request, from its first byte or the last answer; and to take an answer
+WAITING = 128  # connections that the system keeps until they are accepted
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 HEADERS = {
@@ -136,26 +142,36 @@ class View:
 
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
+    request_queue_size = WAITING
     explorer: Explorer
 
     def __init__(self, address: tuple[str, int]) -> None:
-        self._connections: set[socket.socket] = set()
+        self._deadlines: dict[socket.socket, float] = {}
         super().__init__(address, _Handler)
 
     def get_request(self) -> tuple[socket.socket, Any]:
         connection, address = super().get_request()
-        self._connections.add(connection)
+        self.limit(connection, REQUEST_SECONDS)
         return connection, address
 
+    def limit(self, connection: Any, seconds: float) -> None:
+        """Close the connection after so many seconds, unless another limit is set before."""
+        self._deadlines[connection] = time.monotonic() + seconds
+
     def shutdown_request(self, request: Any) -> None:
-        self._connections.discard(request)
+        self._deadlines.pop(request, None)
         super().shutdown_request(request)
 
-    def close_connections(self) -> None:
-        """Close the connections that browsers leave open."""
-        for connection in list(self._connections):
-            with suppress(OSError):
-                connection.shutdown(socket.SHUT_RDWR)
+    def service_actions(self) -> None:
+        """Close the connections whose request or answer takes too long; ``serve_forever`` calls this."""
+        self.close_connections(time.monotonic())
+
+    def close_connections(self, now: float = math.inf) -> None:
+        """Close the connections whose time is over; by default all, for browsers leave them open."""
+        for connection, deadline in list(self._deadlines.items()):
+            if deadline <= now:
+                with suppress(OSError):
+                    connection.shutdown(socket.SHUT_RDWR)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Say nothing: a browser may leave in the middle of an answer."""
@@ -183,6 +199,10 @@ class _Handler(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         self._answer(self._post)
 
+    def handle_one_request(self) -> None:
+        self.server.limit(self.connection, REQUEST_SECONDS)
+        super().handle_one_request()
+
     def log_message(self, format: str, *args: Any) -> None:
         """Nothing: the terminal is the user's."""
 
@@ -190,11 +210,20 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, act: Any) -> None:
         try:
+            self._content = self._read_content()
             self._check_origin()
             act()
         except (RequestError, PcmcError, MissingExtra) as error:
-            status = getattr(error, "status", HTTPStatus.BAD_REQUEST)
-            self._send(json.dumps({"error": str(error)}).encode(), "application/json", status=status)
+            self._refuse(str(error), getattr(error, "status", HTTPStatus.BAD_REQUEST))
+        except OSError:
+            raise  # the browser has left
+        except Exception as error:  # the net: no request may end without an answer
+            self._refuse(f"{type(error).__name__}: {error}", HTTPStatus.INTERNAL_SERVER_ERROR)
+
+    def _refuse(self, line: str, status: HTTPStatus) -> None:
+        """Answer with one line, and close: what is left of the request must not be read as another one."""
+        self.close_connection = True
+        self._send(json.dumps({"error": " ".join(line.split())}).encode(), "application/json", status=status)
 
     def _check_origin(self) -> None:
         """Refuse requests from pages of other sites, and under other names of this machine."""
@@ -202,9 +231,14 @@ class _Handler(BaseHTTPRequestHandler):
         origin = self.headers.get("Origin")
         explorer = self.server.explorer
         name = host.rsplit(":", 1)[0].strip("[]")
+        try:
+            source = None if origin is None else urlsplit(origin).netloc
+            urlsplit(self.path)
+        except ValueError as error:
+            raise RequestError(f"a broken address: {error}") from None
         if explorer.local and name not in LOOPBACK:
             raise RequestError(f"open this page at {explorer.url}", HTTPStatus.FORBIDDEN)
-        if origin is not None and urlsplit(origin).netloc != host:
+        if source is not None and source != host:
             raise RequestError("requests from pages of other sites are refused", HTTPStatus.FORBIDDEN)
 
     def _get(self) -> None:
@@ -218,7 +252,7 @@ class _Handler(BaseHTTPRequestHandler):
             suffix = parse_qs(parts.query).get("suffix", [""])[0]
             self._export(self.server.explorer.session(steps[1]), suffix)
         else:
-            raise RequestError(f"there is nothing at {parts.path}", HTTPStatus.NOT_FOUND)
+            raise RequestError(f"there is nothing at {parts.path:.60}", HTTPStatus.NOT_FOUND)
 
     def _post(self) -> None:
         asked = self._json()
@@ -226,24 +260,40 @@ class _Handler(BaseHTTPRequestHandler):
         explorer = self.server.explorer
         if steps == ["api", "open"]:
             name = asked.get("session")
+            if not isinstance(name, str | None):
+                raise RequestError(f"session: expected a name, found {name!r:.60}")
             name, session = (name, explorer.session(name)) if name else explorer.open()
             header, arrays = outline(session.surface)
             first = {"session": name, "title": explorer.title, "formats": list(FORMATS), **header}
             self._send_state(session.state(), first, arrays)
+        elif len(steps) == 3 and steps[0] == "api" and steps[2] == "check":
+            check = explorer.session(steps[1]).check_mesh()
+            header = {"superseded": True} if check is None else {"check": mesh_findings(check)}
+            self._send(pack(header, {}), "application/octet-stream")
         elif len(steps) == 3 and steps[0] == "api" and steps[2] in ACTS:
             session = explorer.session(steps[1])
             given = (_values(asked),) if steps[2] in ("follow", "settle") else ()
             self._send_state(getattr(session, steps[2])(*given))
         else:
-            raise RequestError(f"there is nothing at {self.path}", HTTPStatus.NOT_FOUND)
+            raise RequestError(f"there is nothing at {self.path:.60}", HTTPStatus.NOT_FOUND)
+
+    def _read_content(self) -> bytes:
+        """What follows the headers: all of it, or what is left would be read as another request."""
+        length = self.headers.get("Content-Length", "0" if self.command == "GET" else "")
+        sized = re.fullmatch("[0-9]{1,8}", length) and "Transfer-Encoding" not in self.headers
+        if not sized or int(length) > LONGEST_REQUEST:
+            raise RequestError(f"a request needs a length of at most {LONGEST_REQUEST} bytes")
+        content = self.rfile.read(int(length))
+        self.server.limit(self.connection, math.inf)
+        if len(content) < int(length):
+            raise RequestError(f"cut off: {len(content)} of {length} bytes arrived")
+        return content
 
     def _json(self) -> dict[str, Any]:
-        length = self.headers.get("Content-Length", "")
-        if not length.isdigit() or int(length) > LONGEST_REQUEST:
-            self.close_connection = True
-            raise RequestError(f"a request needs a length of at most {LONGEST_REQUEST} bytes")
         try:
-            asked = json.loads(self.rfile.read(int(length)) or b"{}")
+            asked = json.loads(self._content or b"{}")
+        except RecursionError:
+            raise RequestError("not JSON: nested too deep") from None
         except ValueError as error:
             raise RequestError(f"not JSON: {error}") from None
         if not isinstance(asked, dict):
@@ -273,7 +323,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _export(self, session: Session, suffix: str) -> None:
         state = session.state()
         if suffix not in FORMATS:
-            raise RequestError(unknown("format", suffix, FORMATS))
+            raise RequestError(unknown("format", suffix[:60], FORMATS))
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the page says which formats carry the numbers
             path = Path(folder) / f"surface{suffix}"
@@ -285,8 +335,8 @@ class _Handler(BaseHTTPRequestHandler):
     def _send_file(self, name: str) -> None:
         kind = TYPES.get(Path(name).suffix)
         file = files(__package__).joinpath("page", name)
-        if kind is None or "\\" in name or not file.is_file():
-            raise RequestError(f"there is no file {name!r}", HTTPStatus.NOT_FOUND)
+        if kind is None or not re.fullmatch(r"[\w.-]{1,80}", name) or not file.is_file():
+            raise RequestError(f"there is no file {name!r:.60}", HTTPStatus.NOT_FOUND)
         self._send(file.read_bytes(), f"{kind}; charset=utf-8")
 
     def _send(
@@ -295,6 +345,9 @@ class _Handler(BaseHTTPRequestHandler):
         headers = {**HEADERS, "Content-Type": kind, "Content-Length": str(len(body))}
         if disposition:
             headers["Content-Disposition"] = disposition
+        if self.close_connection:
+            headers["Connection"] = "close"
+        self.server.limit(self.connection, REQUEST_SECONDS)
         self.send_response(status)
         for name, value in headers.items():
             self.send_header(name, value)
@@ -309,10 +362,16 @@ def _values(asked: dict[str, Any]) -> dict[str, dict[str, float]]:
         given = asked.get(key, {})
         if not isinstance(given, dict):
             raise RequestError(f"{key}: expected numbers by patch")
+        values[key] = {}
         for name, value in given.items():
+            if len(name) > LONGEST_NAME:
+                raise RequestError(f"{key}: a name of {len(name)} characters: {name[:40]!r}...")
             if not isinstance(value, int | float) or isinstance(value, bool):
-                raise RequestError(f"{key}: {name!r}: expected a number, found {value!r}")
-        values[key] = given
+                raise RequestError(f"{key}: {name!r}: expected a number, found {value!r:.60}")
+            try:
+                values[key][name] = float(value)
+            except OverflowError:
+                raise RequestError(f"{key}: {name!r}: expected a number up to 1.8e308") from None
     return values
 
 

@@ -13,6 +13,8 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
+from .. import existence
+from ..accuracy import MeshCheck, check_mesh
 from ..certificate import Certificate, Verdict, certify
 from ..solvers import solve
 from ..solvers.result import Progress, Result
@@ -57,10 +59,10 @@ def solved_start(surface: Surface) -> State:
     """Solve a surface, unless it is at rest already; if no solver converges, return it unchanged."""
     certificate = certify(surface)
     failure = None if certificate.verdict in AT_REST else certificate
-    for target in ("stationary", "minimum"):
+    for solver, target in ((solve, "stationary"), (existence.solve, "minimum")):
         if failure is None:
             break
-        result = solve(surface, target=target)
+        result = solver(surface, target=target)
         ended = result.certify()
         if ended.verdict in AT_REST:
             return State(result.surface, ended, result.surface.patches)
@@ -136,6 +138,20 @@ class Session:
                 self._failure = certificate
 
         return self._run(act)
+
+    def check_mesh(self) -> MeshCheck | None:
+        """The mesh check of the surface shown; None if the page shows another one before it ends."""
+        checked = self.surface
+
+        def check(_: Progress) -> None:
+            if self.surface is not checked:
+                raise StopIteration
+
+        with self._turn:
+            try:
+                return check_mesh(checked, callback=check)
+            except KeyboardInterrupt:
+                return None
 
     def undo(self) -> State:
         """One step back; if the values asked for were not reached, back to those of the surface shown."""

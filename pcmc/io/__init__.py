@@ -39,6 +39,7 @@ class Format:
     shared : whether patches certainly share their vertices, so that reading needs no merging.
     separate : whether it has a mesh per patch, which cannot have triangles without area.
     walls : whether such triangles go with a separate format as text.
+    lines : whether it holds the lines that vertices slide along.
     loses : what it never holds.
     """
 
@@ -48,11 +49,12 @@ class Format:
     shared: bool = False
     separate: bool = False
     walls: bool = False
+    lines: bool = False
     loses: tuple[str, ...] = ()
 
 
 FORMATS = {
-    ".pcmc": Format("native", scalars="both", certificate=True, shared=True),
+    ".pcmc": Format("native", scalars="both", certificate=True, shared=True, lines=True),
     ".fe": Format("evolver", shared=True),
     ".dmp": Format("evolver", shared=True),
     ".obj": Format("obj"),
@@ -186,6 +188,8 @@ def write(
     lost = [name for name, scalar in scalars.items() if len(scalar) not in sizes]
     if certificate is not None and not form.certificate:
         lost.append("certificate")
+    if surface.on_line and not form.lines:
+        lost.append("lines that vertices slide along (they are fixed in it)")
     shown, walls = surface, None
     if form.separate:
         shown = standing_part(surface).surface

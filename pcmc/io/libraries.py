@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -9,9 +10,12 @@ from typing import Any
 
 from ..base.errors import FileError, MissingExtra, PcmcError
 
+SILENT = logging.NullHandler()  # a library's log of a bad file goes to those who ask for it, not to stderr
+
 
 def load_library(name: str, extra: str = "files") -> Any:
     """The module of that name, or MissingExtra."""
+    logging.getLogger(name).addHandler(SILENT)
     try:
         return import_module(name)
     except ImportError:

@@ -12,10 +12,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
 from ..base.validate import choice
-from ..surface import Patch, Plane, Surface, checks
+from ..surface import Line, Patch, Plane, Surface, checks
 from ..surface.geometry import bounding_size
 from ..surface.topology import topology
 
@@ -42,6 +42,7 @@ class MeshData:
         vertices at one place stay two: those of a wall without height below a junction on Π.
     walls : the text of ``flat_walls.encode_walls``, where patches are separate meshes and a wall has
         no height.
+    lines : as ``on_line`` in Surface.
     """
 
     vertices: Floats
@@ -55,6 +56,7 @@ class MeshData:
     notes: tuple[str, ...] = ()
     joined: bool = False
     walls: str | None = None
+    lines: tuple[tuple[Line, Bools], ...] = ()
 
 
 def checked(data: MeshData) -> MeshData:
@@ -66,7 +68,7 @@ def checked(data: MeshData) -> MeshData:
     X = _numeric(data.vertices, "vertices", "fiu", (None, 3)).astype(np.float64)
     checks.positions(X)
     n, m = len(X), len(data.faces)
-    F = _within(_numeric(data.faces, "faces", "iu", (None, 3)), "faces", "vertices", n)
+    F = within(_numeric(data.faces, "faces", "iu", (None, 3)), "faces", n)
     patch = _numeric(data.patch_of_face, "patch_of_face", "iu", (m,))
     support = data.support
     if support is not None:
@@ -74,7 +76,7 @@ def checked(data: MeshData) -> MeshData:
     for name, values in data.scalars.items():
         if np.shape(values) != (m,):
             _numeric(values, f"scalar {name}", "fiub", (n,))
-    patch = _within(patch, "patch_of_face", "patches", len(data.patches))
+    patch = within(patch, "patch_of_face", len(data.patches))
     scalars = {name: np.asarray(values, dtype=np.float64) for name, values in data.scalars.items()}
     return replace(data, vertices=X, faces=F, patch_of_face=patch, support=support, scalars=scalars)
 
@@ -94,13 +96,13 @@ def _numeric(values: Any, name: str, kinds: str, shape: tuple[int | None, ...]) 
     raise FileError(text, what=name, where=name, found=array.shape, expected=shape)
 
 
-def _within(numbers: Any, name: str, what: str, size: int) -> Ints:
-    """The array as int64 if all its numbers are in 0..size-1."""
-    rows = numbers.reshape(len(numbers), -1)
+def within(numbers: Any, name: str, size: int) -> Ints:
+    """The indices as int64 if all are in 0..size-1; FileError with the first that is not."""
+    rows = np.asarray(numbers).reshape(len(numbers), -1)
     bad = np.flatnonzero(((rows < 0) | (rows >= size)).any(axis=1))
     if len(bad):
         found = rows[bad[0]].tolist()
-        text = f"{name}: entry {bad[0]} is {found}, outside the {size} {what} 0..{size - 1}"
+        text = f"{name}: entry {bad[0]} is {str(found).strip('[]')}, outside 0..{size - 1}"
         raise FileError(text, what=name, where=int(bad[0]), found=found, expected=(0, size - 1))
     return np.asarray(numbers, dtype=np.int64)
 
@@ -168,6 +170,7 @@ def _selected(data: MeshData, keep: Ints, place: Ints) -> MeshData:
         faces=place[data.faces],
         support=None if data.support is None else data.support[keep],
         scalars={k: v[keep] if len(v) == n else v for k, v in data.scalars.items()},
+        lines=tuple((line, along[keep]) for line, along in data.lines),
     )
 
 
@@ -198,7 +201,8 @@ def to_surface(
     rounded = sliding & ~held & (np.abs(height) < ROUNDING * size) & (np.abs(height) > 1e-12 * size)
     if rounded.any():  # back onto the plane
         X = X - np.where(rounded, height, 0.0)[:, None] * np.array(plane.normal)
-    return Surface(X, data.faces, data.patch_of_face, patches, held, sliding, plane)
+    lines = data.lines if fixed is None else ()
+    return Surface(X, data.faces, data.patch_of_face, patches, held, sliding, plane, lines)
 
 
 def _changed(

@@ -1,9 +1,10 @@
 """The native format (.pcmc): everything there is to a surface, to the last bit.
 
 A zip archive of NumPy arrays (an .npz) that ``numpy.load`` opens: ``vertices``, ``faces``,
-``patch_of_face``, ``support``, one ``scalar <name>`` per scalar, one ``certificate <name>`` per array
-of the certificate, and ``meta``, a JSON text with the format's version, the patches, the plane and the
-rest of the certificate, its tables as lists of rows.
+``patch_of_face``, ``support``; where vertices slide along lines, ``lines`` and ``on_line``; one
+``scalar <name>`` per scalar, one ``certificate <name>`` per array of the certificate, and ``meta``, a JSON
+text with the format's version, the patches, the plane and the rest of the certificate, its tables as lists
+of rows.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Mapping
+from dataclasses import asdict, is_dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -18,14 +20,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Floats
+from ..base.arrays import Bools, Floats
 from ..base.errors import FileError
-from ..surface import Surface
+from ..surface import Line, Surface
 from .libraries import translated_errors
 from .mesh_data import MeshData, support_of
 from .metadata import metadata_text, parse_metadata
 
-VERSION = 1
+VERSION = 2  # since 2 with lines; a surface without them is written as 1
 FORMAT = "pcmc surface"
 INFLATED = 100  # most bytes for each byte of the file; a flat grid of a million triangles has 7
 ROOM = 64_000_000  # bytes that any file may become
@@ -38,12 +40,15 @@ def write(
     tables = {k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object}
     meta = {
         "format": FORMAT,
-        "version": VERSION,
+        "version": VERSION if surface.on_line else 1,
         "description": metadata_text(surface),
         "certificate": {k: v for k, v in certificate.items() if k not in tables},
     }
     arrays: dict[str, Any] = {f"scalar {name}": value for name, value in scalars.items()}
     arrays |= {f"certificate {name}": value for name, value in tables.items()}
+    if surface.on_line:
+        arrays["lines"] = np.array([[line.point, line.direction] for line, _ in surface.on_line])
+        arrays["on_line"] = np.array([along for _, along in surface.on_line])
     with path.open("wb") as file:
         np.savez_compressed(
             file,
@@ -80,9 +85,18 @@ def read(path: Path) -> MeshData:
             tuple(metadata.patches.values()),
             arrays.pop("support"),
             metadata.plane,
+            lines=_lines(arrays.pop("lines", ()), arrays.pop("on_line", ())),
             scalars=_under("scalar ", arrays),
             certificate={**meta["certificate"], **_under("certificate ", arrays)},
         )
+
+
+def _lines(ends: Any, along: Any) -> tuple[tuple[Line, Bools], ...]:
+    """The lines (k,2,3) of the file with the masks (k,n) of their vertices."""
+    if len(ends) != len(along) or np.shape(ends)[1:] not in ((), (2, 3)):
+        text = f"lines: expected a point and a direction for each of {len(along)} masks"
+        raise FileError(text, where="lines", found=np.shape(ends), expected=(len(along), 2, 3))
+    return tuple((Line(*one.tolist()), mask) for one, mask in zip(ends, along, strict=True))
 
 
 def _check_size(path: Path) -> None:
@@ -107,6 +121,8 @@ def _plain(value: Any) -> Any:
         return value.name.lower()
     if isinstance(value, pd.DataFrame):
         return value.to_dict(orient="records")
+    if is_dataclass(value) and not isinstance(value, type):  # a proof
+        return {"kind": type(value).__name__, **asdict(value)}
     found = type(value).__name__
     text = f"certificate: cannot write a {found}; use numbers, texts, arrays and tables"
     raise FileError(text, where="certificate", found=found)

@@ -6,6 +6,7 @@ on the layers "fixed" and "sliding". Scalars are lost.
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +15,16 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError
+from ..base.errors import FileError, MissingExtra
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.geometry import bounding_size
 from . import flat_walls
-from .libraries import load_library, translated_errors
-from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of
+from .libraries import load_library
+from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of, within
 from .metadata import Metadata, metadata_text, parse_metadata
 from .polygons import triangulate
+from .reading_process import read_arrays
 
 KEY = "pcmc"
 VERSION = 7  # of Rhino's format
@@ -76,32 +78,32 @@ def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str)
 
 def read(path: Path) -> MeshData:
     """Layers as patches; curves, surfaces and other objects are left out, with a note."""
-    rhino = load_library("rhino3dm")
-    with translated_errors("3DM"):
-        model = rhino.File3dm.Read(str(path))
-    if model is None:
-        raise FileError("not a Rhino file, or cut off")
+    if find_spec("rhino3dm") is None:
+        raise MissingExtra("rhino3dm", "files")
+    arrays = read_arrays("rhino", path)
+    layers = arrays["layers"]
     X, corners, counts, named = [], [], [], []
     held: dict[int, list[Floats]] = {FIXED: [], SLIDING: []}
     metadata, walls, others, start = Metadata(), None, 0, 0
-    for item in model.Objects:
-        place, geometry = item.Attributes.LayerIndex, item.Geometry
-        layer = model.Layers[place] if 0 <= place < len(model.Layers) else None
-        name = path.stem if layer is None else layer.Name
-        text = None if layer is None else layer.GetUserString(KEY)
-        if layer is not None and text:
-            metadata = parse_metadata(text)
-            walls = layer.GetUserString(flat_walls.KEY) or walls
-        if isinstance(geometry, rhino.Mesh):
-            X.append(_coordinates(geometry.Vertices.ToPoint3dArray()))
-            faces = np.array([geometry.Faces[k] for k in range(geometry.Faces.Count)]).reshape(-1, 4)
+    for item in arrays["objects"]:
+        layer = (
+            layers[item["layer"]] if 0 <= item["layer"] < len(layers) else {"name": path.stem, "texts": {}}
+        )
+        name, texts = layer["name"], layer["texts"]
+        if texts.get(KEY):
+            metadata = parse_metadata(texts[KEY])
+            walls = texts.get(flat_walls.KEY) or walls
+        if "faces" in item:
+            faces = item["faces"]
+            X.append(item["points"])
             size = np.where(faces[:, 2] == faces[:, 3], 3, 4)  # a triangle names its last corner twice
-            corners.append(faces[np.arange(4) < size[:, None]] + start)
+            local = within(faces[np.arange(4) < size[:, None]], f"corners in layer {name!r}", len(X[-1]))
+            corners.append(local + start)
             counts.append(size)
             named += [name] * len(size)
             start += len(X[-1])
-        elif isinstance(geometry, rhino.PointCloud) and name in HELD:
-            held[HELD[name]].append(_coordinates(geometry.GetPoints()))
+        elif "points" in item and name in HELD:
+            held[HELD[name]].append(item["points"])
         else:
             others += 1
     if not X:
@@ -115,10 +117,6 @@ def read(path: Path) -> MeshData:
     patch, names = pd.factorize(np.array(named, dtype=object))
     patches = metadata.named(names.tolist())
     return MeshData(points, F, patch[source], patches, support, metadata.plane, notes=notes, walls=walls)
-
-
-def _coordinates(points: Any) -> Floats:
-    return np.array([(p.X, p.Y, p.Z) for p in points], dtype=np.float64).reshape(-1, 3)
 
 
 def _supports(X: Floats, held: dict[int, list[Floats]]) -> Ints:

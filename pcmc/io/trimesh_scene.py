@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ..base.errors import FileError
-from .mesh_data import MeshData
+from .mesh_data import MeshData, within
 from .metadata import Metadata
 
 
@@ -27,10 +27,11 @@ def from_meshes(scene: Any, default: str, metadata: Metadata) -> MeshData:
         if not np.array_equal(transform, np.eye(4)):
             points = points @ transform[:3, :3].T + transform[:3, 3]
         X.append(points)
-        F.append(np.asarray(mesh.faces) + start)
+        F.append(within(mesh.faces, f"faces of {node!r}", len(points)) + start)
         named += [default if unnamed else node] * len(mesh.faces)
         for attribute, values in mesh.vertex_attributes.items():
-            data.setdefault(attribute, []).append(np.asarray(values, dtype=np.float64).ravel())
+            if np.size(values) == len(points):
+                data.setdefault(attribute, []).append(np.asarray(values, dtype=np.float64).ravel())
         start += len(points)
     if not X:
         raise FileError("the file has no triangles", where="faces", found=0)

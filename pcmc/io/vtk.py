@@ -6,23 +6,26 @@ tensions, pressures and plane are field data.
 
 from __future__ import annotations
 
-import warnings
+import re
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError
+from ..base.errors import FileError, MissingExtra
 from ..surface import Surface
-from .libraries import load_library, translated_errors
+from .libraries import load_library
 from .mesh_data import MeshData, support_of
 from .metadata import metadata_text, parse_metadata
 from .polygons import from_polygons
+from .reading_process import read_arrays
 
 RESERVED = ("support", "patch")
 FLAT = (5, 7, 9)  # VTK_TRIANGLE, VTK_POLYGON, VTK_QUAD
+ITEMS = 100  # of an array, for each byte of a file; those of one value compress so far
 FIRST_SOLID = 10  # VTK_TETRA; the kinds above it are solid or curved
 
 
@@ -45,32 +48,41 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any)
 
 def read(path: Path) -> MeshData:
     """Triangles, quads and polygons of either; lines and points are left out."""
-    pyvista = load_library("pyvista")
-    if not path.read_bytes()[-64:].rstrip().endswith(b"</VTKFile>"):
+    if find_spec("vtkmodules") is None or find_spec("pyvista") is None:
+        raise MissingExtra("pyvista", "files")
+    _check_text(path)
+    arrays = read_arrays("vtk", path)
+    corners, counts, chosen = _cells(arrays)
+    metadata = parse_metadata(arrays["text"])
+    points = np.asarray(arrays["points"]).reshape(-1, 3)
+    cell_data = {name: values[chosen] for name, values in arrays["cell data"].items()}
+    return from_polygons(points, corners, counts, arrays["point data"], cell_data, metadata, path.stem)
+
+
+def _check_text(path: Path) -> None:
+    """Refuse a file without its end, and counts that no file of its size can have."""
+    data = path.read_bytes()
+    if not data[-64:].rstrip().endswith(b"</VTKFile>"):
         raise FileError("not a VTK XML file, or cut off before '</VTKFile>'", expected="</VTKFile>")
-    with translated_errors(path.suffix[1:]), pyvista.vtk_verbosity("off"), warnings.catch_warnings():
-        warnings.simplefilter("error")  # VTK's errors come as warnings
-        mesh = pyvista.read(path)
-        if isinstance(mesh, pyvista.PolyData):
-            mesh = (mesh.triangulate() if mesh.n_strips else mesh).cast_to_unstructured_grid()
-        corners, counts, chosen = _cells(mesh)
-        points, text = np.asarray(mesh.points), mesh.field_data.get("pcmc")
-        point_data = {k: np.asarray(v) for k, v in mesh.point_data.items()}
-        cell_data = {k: np.asarray(v)[chosen] for k, v in mesh.cell_data.items()}
-    metadata = parse_metadata(None if text is None else str(text[0]))
-    return from_polygons(points, corners, counts, point_data, cell_data, metadata, path.stem)
+    for match in re.finditer(rb"\bNumberOf\w+=[\"'](\d+)[\"']", data):
+        if len(match[1]) > 18 or int(match[1]) > ITEMS * len(data):
+            text = f"{match[0][:60].decode()}, but the file has only {len(data)} bytes"
+            raise FileError(text, where=1 + data.count(b"\n", 0, match.start()), found=match[1][:60].decode())
 
 
-def _cells(mesh: Any) -> tuple[Ints, Ints, Ints]:
+def _cells(arrays: Mapping[str, Any]) -> tuple[Ints, Ints, Ints]:
     """Corners, corners per face, and the faces' places among all cells."""
-    solid = np.flatnonzero(mesh.celltypes >= FIRST_SOLID)
+    types, offsets, connected = (np.asarray(arrays[name]) for name in ("types", "offsets", "corners"))
+    solid = np.flatnonzero(types >= FIRST_SOLID)
     if len(solid):
-        kind = int(mesh.celltypes[solid[0]])
+        kind = int(types[solid[0]])
         text = f"cell {solid[0]} is of VTK's type {kind}; pcmc reads triangles, quads and polygons"
         raise FileError(text, where=int(solid[0]), found=kind)
-    chosen = np.flatnonzero(np.isin(mesh.celltypes, FLAT))
-    offsets = np.asarray(mesh.cell_offsets)
-    counts = np.diff(offsets)[chosen]
+    if len(types):
+        sound = len(offsets) == len(types) + 1 and offsets[0] == 0 and offsets[-1] <= len(connected)
+        if not sound or (np.diff(offsets) < 0).any():
+            raise FileError("the offsets of its cells do not fit their corners", where="offsets")
+    chosen = np.flatnonzero(np.isin(types, FLAT))
+    counts = np.diff(offsets)[chosen] if len(chosen) else np.zeros(0, dtype=np.int64)
     start = np.repeat(offsets[chosen] - np.cumsum(counts) + counts, counts)
-    corners = np.asarray(mesh.cell_connectivity)[start + np.arange(counts.sum())]
-    return corners, counts, chosen
+    return connected[start + np.arange(counts.sum())], counts, chosen

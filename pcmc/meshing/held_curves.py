@@ -7,18 +7,16 @@ is a mesh of another boundary; here they are put on a smooth curve through the p
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface
-from .refinement import Projection, held_midpoints
+from .refinement import held_midpoints
 
 CORNER = 40.0  # degrees: where held edges turn by more, the curve has a corner
-HALVINGS = 8  # of each edge of a curve that points are projected onto
 STRAIGHT = 1e-9  # of the length of an edge: smaller rises of an arc over it count as none
 
 
-def smooth_midpoints(surface: Surface, corner: float = CORNER) -> Floats:
+def smooth_midpoints(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> Floats:
     """(k,3) places for the new held vertices of ``refine(surface)``, on smooth curves.
 
     Over each held edge stand two arcs, each through its ends and through the next vertex of the curve on
@@ -30,6 +28,7 @@ def smooth_midpoints(surface: Surface, corner: float = CORNER) -> Floats:
     ----------
     corner : angle in degrees. A vertex where two held edges turn by more is a corner. Where several held
         edges meet, the two that turn least go on into each other.
+    corners : vertices that are corners in any case.
 
     Examples
     --------
@@ -41,62 +40,67 @@ def smooth_midpoints(surface: Surface, corner: float = CORNER) -> Floats:
     >>> np.linalg.norm(smooth_midpoints(disc), axis=1).round(12).tolist() == [1.0] * 12
     True
     """
-    edges = surface.topology.edges[held_midpoints(surface)[0]]
-    return _smooth_middles(surface.vertices, edges, corner)
+    edges = held_edges(surface)
+    rises, arcs = arcs_over(surface.vertices, edges, corner, corners)
+    middle = surface.vertices[edges].mean(axis=1)
+    return middle + rises.sum(axis=1) / np.maximum(arcs.sum(axis=1), 1.0)[:, None]
 
 
-def onto_held_curves(surface: Surface, corner: float = CORNER) -> Projection:
-    """A function (k,3) → (k,3) that puts points near a surface's held edges on the smooth curves there.
+def curve_doubt(surface: Surface, corner: float = CORNER, corners: Ints | None = None) -> float:
+    """How far ``smooth_midpoints`` may be from the curve that was meant, over the rises of the arcs.
 
-    The curves of ``smooth_midpoints``, each edge cut into 256. All meshes made with one such function,
-    by ``refine``, ``remesh`` or ``check_mesh``, have the same boundary.
+    With r, s the rises of the two arcs over an edge, this is the mean of |r - s|² / |r + s|² over the held
+    edges, weighted by |r + s|. It is 0 on circles and straight lines; on others it falls as the square of
+    the edge length, as the error of ``smooth_midpoints`` does.
 
-    Examples
-    --------
-    >>> angle = 2 * np.pi * np.arange(12) / 12
-    >>> rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     >>> from pcmc import Patch
-    >>> disc = Surface([[0, 0, 0], *rim], [[0, k + 1, (k + 1) % 12 + 1] for k in range(12)], [0] * 12,
-    ...                [Patch("disc", 1.0)], fixed=range(1, 13))
-    >>> float(np.linalg.norm(onto_held_curves(disc)(np.array([[0.95, 0.1, 0.0]]))).round(5))
-    1.0
+    >>> angle = 2 * np.pi * np.arange(24) / 24
+    >>> rim = np.stack([2 * np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> plate = Surface([[0, 0, 0], *rim], [[0, k + 1, (k + 1) % 24 + 1] for k in range(24)], [0] * 24,
+    ...                 [Patch("plate", 1.0)], fixed=range(1, 25))
+    >>> round(curve_doubt(plate), 3)
+    0.037
     """
-    X, edges = surface.vertices, surface.topology.edges[held_midpoints(surface)[0]]
-    if not len(edges):
-        return lambda points: points
-    for _ in range(HALVINGS):
-        number = len(X) + np.arange(len(edges))
-        X = np.concatenate([X, _smooth_middles(X, edges, corner)])
-        edges = np.concatenate([np.stack([edges[:, 0], number], 1), np.stack([number, edges[:, 1]], 1)])
-    start, side = X[edges[:, 0]], X[edges[:, 1]] - X[edges[:, 0]]
-    tree = cKDTree(start + 0.5 * side)
-
-    def project(points: Floats) -> Floats:
-        near = tree.query(points, k=min(3, len(start)))[1].reshape(len(points), -1)
-        away = points[:, None] - start[near]
-        share = np.einsum("pnd,pnd->pn", away, side[near]) / np.einsum("pnd,pnd->pn", side[near], side[near])
-        foot = start[near] + np.clip(share, 0.0, 1.0)[..., None] * side[near]
-        nearest = np.linalg.norm(points[:, None] - foot, axis=2).argmin(axis=1)
-        return np.asarray(foot[np.arange(len(points)), nearest])
-
-    return project
+    rises, arcs = arcs_over(surface.vertices, held_edges(surface), corner, corners)
+    both = rises[arcs.all(axis=1)]
+    total, apart = (np.linalg.norm(both[:, 0] + sign * both[:, 1], axis=1) for sign in (1.0, -1.0))
+    share = np.divide(apart, total, out=np.ones_like(apart), where=total > apart)
+    share[apart == 0.0] = 0.0
+    return float(np.average(share**2, weights=total)) if total.any() else 0.0
 
 
-def _smooth_middles(X: Floats, edges: Ints, corner: float) -> Floats:
-    """(k,3) the middles of edges (k,2), moved onto the arcs over them."""
-    middle = 0.5 * (X[edges[:, 0]] + X[edges[:, 1]])
-    rise, arcs = np.zeros_like(middle), np.zeros(len(edges))
-    edge, beyond = _continuations(X, edges, corner)
-    np.add.at(rise, edge, _rises(X, edges[edge], beyond))
-    np.add.at(arcs, edge, 1.0)
-    return middle + rise / np.maximum(arcs, 1.0)[:, None]
+def held_corners(surface: Surface, corner: float = CORNER) -> Ints:
+    """Vertices (k,) of held edges at which none of these goes on into another one.
+
+    On a finer mesh curves turn less at them. So that they stay corners there, keep their numbers.
+    """
+    edges = held_edges(surface)
+    edge, end, _ = _continuations(surface.vertices, edges, corner)
+    return np.setdiff1d(edges, edges[edge, end])
 
 
-def _continuations(X: Floats, edges: Ints, corner: float) -> tuple[Ints, Ints]:
-    """Edges that go on beyond one of their ends, and the next vertex (c,) of the curve there."""
+def held_edges(surface: Surface) -> Ints:
+    """(e,2) the edges whose new vertices are held."""
+    return np.asarray(surface.topology.edges[held_midpoints(surface)[0]])
+
+
+def arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> tuple[Floats, Bools]:
+    """The rises (e,2,3) of the arcs over held edges (e,2), and which of the two there are (e,2)."""
+    rises, arcs = np.zeros((len(edges), 2, 3)), np.zeros((len(edges), 2), dtype=bool)
+    edge, end, beyond = _continuations(X, edges, corner)
+    if corners is not None:
+        smooth = ~np.isin(edges[edge, end], corners)
+        edge, end, beyond = edge[smooth], end[smooth], beyond[smooth]
+    rises[edge, end] = _rises(X, edges[edge], beyond)
+    arcs[edge, end] = True
+    return rises, arcs
+
+
+def _continuations(X: Floats, edges: Ints, corner: float) -> tuple[Ints, Ints, Ints]:
+    """Edges (c,) that go on beyond one of their ends, which end, and the next vertex of the curve there."""
     vertex, other = edges.ravel(), edges[:, ::-1].ravel()
     order = np.argsort(vertex, kind="stable")
-    vertex, other, edge = vertex[order], other[order], np.repeat(np.arange(len(edges)), 2)[order]
+    vertex, other = vertex[order], other[order]
     out = X[other] - X[vertex]
     length = np.linalg.norm(out, axis=1)
     out /= np.where(length > 0.0, length, 1.0)[:, None]
@@ -110,7 +114,7 @@ def _continuations(X: Floats, edges: Ints, corner: float) -> tuple[Ints, Ints]:
             best[one[better]], partner[one[better]] = cosine[better], two[better]
     going_on = np.flatnonzero(partner >= 0)
     going_on = going_on[partner[partner[going_on]] == going_on]
-    return edge[going_on], other[partner[going_on]]
+    return order[going_on] // 2, order[going_on] % 2, other[partner[going_on]]
 
 
 def _rises(X: Floats, edges: Ints, beyond: Ints) -> Floats:

@@ -11,7 +11,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..contact.pinching import midpoints
-from ..surface import Surface, expect_surface
+from ..surface import Line, Surface, expect_surface
 
 Projection = Callable[[Floats], Floats]
 
@@ -136,4 +136,24 @@ def _refine_once(surface: Surface, project: Projection | None) -> Surface:
     X, patch = np.concatenate([surface.vertices, middle]), np.repeat(surface.patch_of_face, 4)
     F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
     fixed, sliding = np.concatenate([surface.fixed, held]), np.concatenate([surface.on_plane, slides])
-    return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane)
+    lines = carry_lines(surface, X, fixed, surface.n)
+    return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane, lines)
+
+
+def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tuple[tuple[Line, Bools], ...]:
+    """The lines along which vertices X (n,3) of a finer mesh slide; the first ``kept`` are the old ones.
+
+    A new vertex slides if it is fixed, on the line, and between vertices of the old mesh of which one slides
+    and the other is the next that does not.
+    """
+    lines, near = [], 1e-9 * surface.size
+    for line, along in surface.on_line:
+        ends = surface.topology.edges[surface.topology.boundary_edge]
+        beside = np.unique(ends[along[ends].any(axis=1)])
+        beside = beside[line.distance(surface.vertices[beside]) <= near]
+        low, high = np.sort(line.place(surface.vertices[beside]))[[0, -1]]
+        place = line.place(X)
+        inside = fixed & (line.distance(X) <= near) & (place > low + near) & (place < high - near)
+        inside[:kept] = along[:kept]
+        lines.append((line, inside))
+    return tuple(lines)

@@ -18,7 +18,7 @@ from ..surface import Surface
 from ..surface.geometry import angles, area_vectors, face_areas, segment_lengths
 from .angles import improve_angles
 from .quality import edge_lengths
-from .refinement import Projection, held_midpoints, projected, prolongation, refine
+from .refinement import Projection, carry_lines, held_midpoints, projected, prolongation, refine
 from .sizes import check_sizes, edges_between, equilateral_area, limit_growth, place_between, triangles_for
 
 CHORD = 0.1  # of the edge length
@@ -185,8 +185,8 @@ def _cut_curves(
     support = np.stack([fixed_edge[stay], sliding_edge[stay]], axis=1)
     while (counts > 1).any():
         mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
-    if project is not None:
-        new = mesh.fixed & (np.arange(len(mesh.X)) >= first)
+    new = mesh.fixed & (np.arange(len(mesh.X)) >= first)
+    if project is not None and new.any():
         X = mesh.X.copy()
         X[new] = projected(project, X[new])
         mesh = replace(mesh, X=X)
@@ -389,7 +389,8 @@ def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Sur
     X = np.concatenate([mesh.X for mesh in meshes])[used]
     fixed = np.concatenate([mesh.fixed for mesh in meshes])[used]
     sliding = np.concatenate([mesh.sliding for mesh in meshes])[used]
-    return Surface(X, F, patch_of_face, surface.patches, fixed, sliding, surface.plane)
+    lines = carry_lines(surface, X, fixed)
+    return Surface(X, F, patch_of_face, surface.patches, fixed, sliding, surface.plane, lines)
 
 
 def _patch_angles(mesh: _Mesh, count: int) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -100,7 +101,7 @@ def _check_size(plan: PlanData) -> None:
 
     x, y = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2].T
     area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
-    count = area / (np.sqrt(0.1875) * plan.edge_length**2)
+    count = area / math.sqrt(0.1875) / plan.edge_length / plan.edge_length  # its square may be 0 or infinite
     size = float(np.hypot(np.ptp(x), np.ptp(y)))
     if count > MAX_TRIANGLES:
         problem = f"would make about {count:.2g} triangles; at most {MAX_TRIANGLES} are allowed"

@@ -29,7 +29,7 @@ def surface_from_labels(
     pressure: float | Mapping[str, float] = 1.0,
     boundary: str = "fixed",
     walls: float | Mapping[tuple[str, str], float] | None = None,
-    bottom: str = "sliding",
+    bottom: str = "held",
     plane: Plane | None = None,
     weld: float = 0.0,
 ) -> Surface:

@@ -31,16 +31,15 @@ class Divider:
         pressures the wall takes the difference.
     name : of the wall's patch; by default "wall 1", "wall 2", … in order. Where the difference of
         pressure changes along the divider, each part is a patch of its own: "wall 1-1", "wall 1-2".
-    bottom : "sliding" on Π; "held" on Π in all directions; or "sloped": held in all directions on the
-        surface that the boundary curves span (for boundaries that leave Π). A sliding wall that ends
-        on a straight edge tends to slip along it to where it is shorter; hold it, or end it in
-        re-entrant corners.
+    bottom : "held" on Π in all directions; "sliding" on Π; or "sloped": held in all directions on the
+        surface that the boundary curves span (for boundaries that leave Π). A junction over a sliding
+        bottom is held at its ends by the mesh alone: on finer meshes it slips, or the shape is a saddle.
     """
 
     curve: Any
     wall: float | None = 1.0
     name: str = ""
-    bottom: str = "sliding"
+    bottom: str = "held"
 
 
 @dataclass(frozen=True, eq=False)

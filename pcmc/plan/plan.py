@@ -6,9 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ..base import validate
+from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError
 from ..surface import Plane, Surface
+from .curves import Curve, to_local, to_space
 from .parts import EDGES, PlanData, areas_of, check_keys, curve_of, divider_of, hole_of, support_of
 
 
@@ -82,6 +86,20 @@ class Plan(PlanData):
             if name in names[:place]:
                 problem = f"the name {name!r} is used twice; each patch and wall needs its own"
                 raise OptionError(problem, what="name", found=name)
+
+    @property
+    def corners(self) -> Floats:
+        """(c,3) the points where the curves of the plan turn by more than 10°, also down on Π.
+
+        >>> Plan([[0, 0], [4, 0], [0, 3]], edge_length=0.5, tension=2.0).corners.tolist()
+        [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]]
+        """
+        curves = [self.outline, *(d.curve for d in self.dividers), *(h.curve for h in self.holes)]
+        curves += [support for support in self.supports if isinstance(support, Curve)]
+        local = [to_local(curve.at(curve.corners), self.plane) for curve in curves]
+        raised = np.concatenate([points for points in local if len(points)] or [np.empty((0, 3))])
+        below = raised[raised[:, 2] != 0.0] * [1.0, 1.0, 0.0]
+        return to_space(np.concatenate([raised, below]), self.plane)
 
     def surface(self) -> Surface:
         """The mesh of the plan at its initial height, with its walls and supports."""

@@ -44,7 +44,7 @@ class WallMesh:
 def add_walls(
     surface: Surface,
     tension: float | Mapping[tuple[str, str], float] = 1.0,
-    bottom: str = "sliding",
+    bottom: str = "held",
     edge_length: float | None = None,
 ) -> Surface:
     """Add a wall, down to Π, under every border between two patches that has none.
@@ -56,7 +56,7 @@ def add_walls(
     ----------
     tension : of all walls, force/length; or a mapping from pairs of patch names, for those borders
         only.
-    bottom : "sliding" on Π, or "held" there in all directions.
+    bottom : "held" on Π in all directions, or "sliding" there.
     edge_length : of the walls' triangles; by default the mean length of the borders' edges.
 
     Raises

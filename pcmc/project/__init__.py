@@ -29,7 +29,7 @@ from .file import Project, build, load, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
 from .output import COLOURS, check_names, check_outputs, check_picture, paint, write_all
 from .remeshing import Remeshing
-from .running import Outcome, run, run_project, solve_project
+from .running import Outcome, check_of, check_project_mesh, run, run_project, solve_project
 from .varied import check_varied, digest, is_project, varied
 
 __all__ = [
@@ -42,7 +42,9 @@ __all__ = [
     "Section",
     "build",
     "check_names",
+    "check_of",
     "check_outputs",
+    "check_project_mesh",
     "check_picture",
     "check_varied",
     "digest",

@@ -9,6 +9,7 @@ from typing import Any
 from ..base.errors import FileError, unknown
 from .keys import KINDS, REQUIRED, Section, main_sections, solve_section, target_sections
 
+LONGEST = 1023  # bits of a float's exponent
 Place = tuple[str, ...]  # the keys that lead to a table or a value
 
 
@@ -18,6 +19,7 @@ def check_keys(text: str, data: Mapping[str, Any]) -> None:
     ``text`` is the file as it is written, ``data`` as TOML reads it. In a FileError ``what`` is the
     dotted key, ``where`` its line.
     """
+    _check_range(text, data, ())
     root, *below = main_sections()
     _check_table(text, root, (), data)
     method = data.get("solve", {}).get("method", "newton")
@@ -25,6 +27,19 @@ def check_keys(text: str, data: Mapping[str, Any]) -> None:
     for section in (*below, solve_section(str(method)), *targets):
         for place, table in _tables(data, section):
             _check_table(text, section, place, table)
+
+
+def _check_range(text: str, value: Any, place: Place) -> None:
+    """Refuse integers beyond the range of floats, wherever they are."""
+    if isinstance(value, Mapping):
+        for name, item in value.items():
+            _check_range(text, item, (*place, name))
+    elif isinstance(value, list):
+        for item in value:
+            _check_range(text, item, place)
+    elif isinstance(value, int) and value.bit_length() > LONGEST:
+        message = f"{'.'.join(place)}: a number of {value.bit_length()} bits; up to 1.8e308 are read"
+        raise _error(text, place, message, expected="a number up to 1.8e308")
 
 
 def _tables(data: Any, section: Section) -> Iterator[tuple[Place, Any]]:

@@ -8,14 +8,16 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 from .. import io
 from ..base.errors import FileError, OptionError, PcmcError
+from ..base.files import check_name, check_regular
 from ..plan import Plan, plan_from
 from ..solvers import find_method
 from ..surface import Surface
+from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
@@ -24,6 +26,11 @@ if TYPE_CHECKING:
     from ..design import Parameter, Target
 
 PathLike = str | os.PathLike[str]
+
+ELSEWHERE = "name files in it, and give --folder to write them elsewhere"
+LARGEST = 4_000_000  # bytes of a project file
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+DEEP = re.compile(rf"(?<![\w\"'-])(?:{_PART}[ \t]*\.[ \t]*){{30}}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +42,9 @@ class Project:
     path : the file.
     plan : of the surface; None if ``path`` holds a surface itself.
     method, options : as in ``pcmc.solve``.
+    wanted : the accuracy asked for.
+    mesh_check : whether the result is solved on finer meshes, too; None if the file does not say.
+    search : whether further starts are tried where the first leads to no equilibrium.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
     files, picture : the output.
@@ -46,6 +56,9 @@ class Project:
     plan: Plan | None = None
     method: str = "newton"
     options: Mapping[str, Any] = field(default_factory=dict)
+    wanted: AccuracyWanted = field(default_factory=AccuracyWanted)
+    mesh_check: bool | None = None
+    search: bool = True
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
     vary: Sequence[Parameter] = ()
@@ -61,8 +74,13 @@ class Project:
         return [Path(f) for f in (*self.files, *([] if self.picture is None else [self.picture]))]
 
     def in_folder(self, folder: PathLike) -> Project:
-        """The same project with its output in a folder."""
+        """The same project with its output in a folder; FileError for output that a link leads out of it."""
         base = Path(folder)
+        for path in self.outputs:
+            place = (base / path).parent.resolve()
+            if not place.is_relative_to(base.resolve()):
+                text = f"{self.path}: {path} is outside the folder {base}, in {place}; {ELSEWHERE}"
+                raise FileError(text, what="output", found=str(path), expected=str(base))
         picture = None if self.picture is None else base / self.picture
         return replace(self, files=[base / name for name in self.files], picture=picture, folder=base)
 
@@ -82,8 +100,15 @@ def load(path: PathLike) -> Project:
 
 def read_data(path: Path) -> tuple[str, dict[str, Any]]:
     """The text of a project file and its data, all keys checked. Errors as in ``load``."""
+    check_regular(path)
     try:
+        if path.stat().st_size > LARGEST:
+            text = (
+                f"{path}: {path.stat().st_size} bytes are too many for a project; {LARGEST} at most are read"
+            )
+            raise FileError(text, what=str(path), found=path.stat().st_size, expected=LARGEST)
         text = path.read_text(encoding="utf-8-sig")  # skips the byte-order mark of Windows editors
+        _check_depth(path, text)
         data = tomllib.loads(text)
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
@@ -93,9 +118,25 @@ def read_data(path: Path) -> tuple[str, dict[str, Any]]:
     except tomllib.TOMLDecodeError as error:
         line, hint = _toml_error(text, str(error))
         raise FileError(f"{path}: not TOML: {error}{hint}", what=str(path), where=line) from None
+    except PcmcError:
+        raise
+    except RecursionError:
+        text = f"{path}: lists or tables in it are nested too deep; no key of a project needs more than five"
+        raise FileError(text, what=str(path)) from None
+    except ValueError as error:  # Python's own limits, such as the digits of an integer
+        raise FileError(f"{path}: not TOML: {error}", what=str(path)) from None
     with in_file(path, FileError):
         check_keys(text, data)
     return text, data
+
+
+def _check_depth(path: Path, text: str) -> None:
+    """Refuse keys of very many parts: TOML's reader takes the square of their number."""
+    deep = DEEP.search(text)
+    if deep is not None:
+        line = 1 + text.count("\n", 0, deep.start())
+        message = f"{path}: line {line}: a key of more than 30 parts; no key of a project has more than five"
+        raise FileError(message, what=str(path), where=line)
 
 
 def _toml_error(text: str, message: str) -> tuple[int | None, str]:
@@ -134,11 +175,13 @@ def surface_of(project: Project) -> Surface:
 def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     """The project with the given data. Errors as in ``load``."""
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
-    method = options.pop("method", "newton")
+    method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
     files, picture = output.get("files", []), output.get("picture")
     view, colour = output.get("view", "diagonal"), output.get("colour", "patches")
     with in_file(path, FileError):
+        wanted = take_accuracy(options)
         find_method(method).options(**options)  # refuses bad values before the plan is meshed
+        _check_inside([*files, *([] if picture is None else [picture])])
         check_names(files, picture)
         check_picture(view, colour)
         return Project(
@@ -146,6 +189,8 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             plan=plan_from(data["plan"]),
             method=method,
             options=options,
+            wanted=wanted,
+            mesh_check=mesh_check,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
             **(_search(data["targets"]) if "targets" in data else {}),
             files=files,
@@ -153,6 +198,16 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             view=tuple(view) if isinstance(view, list) else view,
             colour=colour,
         )
+
+
+def _check_inside(names: Sequence[str]) -> None:
+    """Refuse output outside the project's folder: a project from others must not replace one's files."""
+    for name in names:
+        check_name(Path(name))
+        windows = PureWindowsPath(name)  # knows both kinds of slashes
+        if windows.drive or windows.root or ".." in windows.parts:
+            text = f"output: {name!r} is outside the project's folder; {ELSEWHERE}"
+            raise FileError(text, what="output", found=name)
 
 
 def _search(table: Mapping[str, Any]) -> dict[str, Any]:

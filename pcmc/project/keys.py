@@ -9,13 +9,16 @@ from functools import cache
 from inspect import cleandoc
 from typing import Any
 
+from ..accuracy.adaptive import ACCURACY_OF
 from ..plan import Area, Divider, Hole, Plan
 from ..plan.parts import BOTTOMS, EDGES
 from ..solvers import METHODS, find_method
 from ..surface import Plane
+from .accuracy import AccuracyWanted
 from .output import COLOURS
 from .remeshing import WHEN, Remeshing
 
+CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
 REQUIRED = MISSING  # the default of a key that must be given
 
 
@@ -169,12 +172,18 @@ def main_sections() -> tuple[Section, ...]:
 @cache
 def solve_section(method: str) -> Section:
     """The keys of [solve] for a method; for one that does not exist ``method`` alone."""
-    known = Key("method", "a text", "newton", "the solver", tuple(METHODS))
+    known = (
+        Key("method", "a text", "newton", "the solver", tuple(METHODS)),
+        Key("mesh_check", "true or false", None, CHECKED),
+    )
     if method not in METHODS:
-        return Section("solve", "The solver and its options.", (known,))
+        return Section("solve", "The solver and its options.", known)
     choices = {"target": ("minimum", "stationary"), "armijo": ("printed", "sufficient")}
     options = _of_class(find_method(method).options, choices=choices)
-    return Section("solve", "The solver and its options.", (known, *options), f'method = "{method}"')
+    keys = (*known, *options)
+    if method == "newton":
+        keys += _of_class(AccuracyWanted, {"accuracy": "a table"}, {"accuracy_of": ACCURACY_OF})
+    return Section("solve", "The solver and its options.", keys, f'method = "{method}"')
 
 
 @cache

@@ -16,7 +16,7 @@ from .. import io
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknown
-from ..base.files import atomic_writes
+from ..base.files import atomic_writes, check_name
 from ..base.interrupts import defer_interrupts
 from ..certificate.certificate import Certificate
 from ..energy.curvature import curvature_error, mean_curvature
@@ -126,11 +126,16 @@ def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
     if made is not None and made.exists() and not made.is_dir():
         raise FileError(f"{made} is a file; the output needs a folder", what=str(made))
     for path in paths:
+        check_name(path)
         place = os.path.normcase(path.resolve())
         folder = path.parent
-        there = next(f for f in (folder.absolute(), *folder.absolute().parents) if f.exists())
+        try:
+            is_folder = path.is_dir()
+            there = next(f for f in (folder.absolute(), *folder.absolute().parents) if f.exists())
+        except OSError as error:  # a name that is too long
+            raise FileError(f"{path}: cannot be written ({error.strerror})", what=str(path)) from None
         problem = None
-        if path.is_dir():
+        if is_folder:
             problem = "is a folder; give the name of a file"
         elif place in seen:
             problem = "is named twice; name two files for the output"

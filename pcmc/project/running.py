@@ -3,37 +3,51 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import io
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .. import io, solvers
+from ..base.arrays import Ints
 from ..base.errors import BalanceWarning, OptionError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
 from ..certificate.certificate import Certificate
 from ..contact.pinching import standing_part
+from ..existence import solve
 from ..meshing.remeshing import remesh
-from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from .file import Project, in_file, load, surface_of
 from .output import OnStep, PathLike, check_names, check_outputs, fields, ignore, paint, write_all
 
 if TYPE_CHECKING:
+    from ..accuracy import AccurateResult, MeshCheck
     from ..design import Design
+
+
+SAME = 1e-9  # of the size: a vertex this near to a corner of the plan is that corner
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """The result of a project, the files written, and the search for its targets if it has any."""
+    """The result of a project, the files written, the search for its targets, and its mesh check.
+
+    ``design``, ``mesh_check`` and ``accurate``, the search for an accuracy, are None where the project asks
+    for none.
+    """
 
     result: Result
     files: Sequence[Path]
     design: Design | None = None
+    mesh_check: MeshCheck | None = None
+    accurate: AccurateResult | None = None
 
     @property
     def surface(self) -> Surface:
@@ -47,8 +61,9 @@ class Outcome:
 
     @property
     def good(self) -> bool:
-        """Whether the surface is certified and every target is met."""
-        return self.certificate.certified and (self.design is None or self.design.met)
+        """Whether the surface is certified, every target is met, and every accuracy reached."""
+        met = self.design is None or self.design.met
+        return self.certificate.certified and met and (self.accurate is None or self.accurate.reached)
 
 
 def run(
@@ -90,8 +105,49 @@ def run_project(
     changed: Callable[[Surface], Surface] | None = None,
     anyway: bool = False,
 ) -> Outcome:
-    """As ``run``, for a loaded project; ``changed`` is applied to its initial surface."""
-    report, outputs = progress or ignore, project.outputs
+    """As ``run``, for a loaded project; ``changed`` is applied to its initial surface.
+
+    The mesh check comes after the files are written: Ctrl-C during it leaves them.
+    """
+    outcome = _solve_and_write(project, progress or ignore, changed, anyway)
+    if project.mesh_check and outcome.certificate.index is not None:
+        outcome = replace(outcome, mesh_check=check_of(project, outcome, progress))
+    return outcome
+
+
+def check_of(project: Project, outcome: Outcome, progress: OnStep | None = None) -> MeshCheck:
+    """The mesh check of an outcome: that of its accuracy, where its surface is the same."""
+    accurate = outcome.accurate
+    if accurate is not None and accurate.check is not None and accurate.surface is outcome.surface:
+        return accurate.check
+    return check_project_mesh(project, outcome.result, progress)
+
+
+def check_project_mesh(project: Project, result: Result, progress: OnStep | None = None) -> MeshCheck:
+    """``pcmc.check_mesh`` of a project's result; the corners of its plan stay corners."""
+    from ..accuracy import check_mesh  # takes long to import
+
+    report, corners = progress or ignore, _plan_corners(project, result.surface)
+
+    def callback(state: Progress) -> None:
+        report(f"mesh check: {state.surface().m} triangles, step {state.iteration}")
+
+    return check_mesh(result, corners=corners, callback=callback)
+
+
+def _plan_corners(project: Project, surface: Surface) -> Ints:
+    """(k,) the vertices of a surface at the corners of the project's plan."""
+    if project.plan is None or not len(project.plan.corners):
+        return np.empty(0, dtype=np.int64)
+    away, nearest = cKDTree(surface.vertices).query(project.plan.corners)
+    return np.asarray(nearest)[np.asarray(away) <= SAME * surface.size]
+
+
+def _solve_and_write(
+    project: Project, report: OnStep, changed: Callable[[Surface], Surface] | None, anyway: bool
+) -> Outcome:
+    """The outcome of a project, its output written."""
+    outputs = project.outputs
     check_names(project.files, project.picture)
     check_outputs(outputs, project.folder)
     report("reading" if project.plan is None else "meshing the plan")
@@ -123,7 +179,8 @@ def _check_balance(surface: Surface) -> None:
 def solve_project(project: Project, surface: Surface, progress: OnStep | None = None) -> Outcome:
     """Solve a surface with the project's options, remesh it, meet its targets; write nothing.
 
-    A surface that is not certified, or misses a target, is not remeshed.
+    A surface that is not certified, or misses a target, is not remeshed. The accuracy comes last; targets
+    are met once more on its mesh.
     """
     report = progress or ignore
     with in_file(project.path):
@@ -131,15 +188,56 @@ def solve_project(project: Project, surface: Surface, progress: OnStep | None = 
             if stage.when == "before":
                 report("remeshing")
                 surface = remesh(surface, **stage.options)
+        after = [stage for stage in project.remeshing if stage.when == "after"]
+        if project.wanted.accuracy and not after and not project.targets:
+            return _solve_to_accuracy(project, surface, report)
         outcome = _solve_or_meet(project, surface, report)
-        for stage in project.remeshing:
-            if stage.when == "after" and outcome.good:
+        for stage in after:
+            if outcome.good:
                 report("remeshing")
-                surface = remesh(outcome.surface, **stage.options)
-                outcome = _solve_or_meet(replace(project, targets=()), surface, report)
-                if project.targets and outcome.good:  # otherwise its verdict is the better explanation
-                    outcome = _solve_or_meet(project, outcome.surface, report)
+                outcome = _again(project, remesh(outcome.surface, **stage.options), report)
+        if project.wanted.accuracy and outcome.good:
+            accurate = _solve_to_accuracy(project, outcome.surface, report)
+            if not (project.targets and accurate.good):
+                return replace(accurate, design=outcome.design)
+            outcome = replace(_again(project, accurate.surface, report), accurate=accurate.accurate)
     return outcome
+
+
+def _again(project: Project, surface: Surface, report: OnStep) -> Outcome:
+    """Solve the surface on another mesh, and meet the targets there."""
+    outcome = _solve_or_meet(replace(project, targets=()), surface, report)
+    if project.targets and outcome.good:  # otherwise its verdict is the better explanation
+        outcome = _solve_or_meet(project, outcome.surface, report)
+    return outcome
+
+
+def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Outcome:
+    """Solve on finer and finer meshes, and certify."""
+    from ..accuracy import AccuracyStatus, solve_to_accuracy
+
+    def callback(row: Mapping[str, Any]) -> None:
+        report(f"accuracy: {row['triangles']} triangles, error {row['excess']:.2g} of the accuracy wanted")
+
+    _newton_alone(project, "reach an accuracy")
+    report("solving to the accuracy")
+    accurate = solve_to_accuracy(
+        surface,
+        corners=_plan_corners(project, surface),
+        callback=callback,
+        **vars(project.wanted),
+        **project.options,
+    )
+    if accurate.status is AccuracyStatus.STOPPED:  # by Ctrl-C, which ends the command
+        raise KeyboardInterrupt
+    accurate.result.certificate  # noqa: B018 — computed here, while the progress is shown
+    return Outcome(accurate.result, (), accurate=accurate)
+
+
+def _newton_alone(project: Project, act: str) -> None:
+    if project.method != "newton":
+        message = f"only method 'newton' can {act}, found {project.method!r}"
+        raise OptionError(message, what="solve.method", found=project.method, expected="newton")
 
 
 def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
@@ -148,7 +246,8 @@ def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcom
     if design is not None:
         result = design.result
     else:
-        result = solve(surface, project.method, reporter(report), **project.options)
+        solver = solve if project.search else solvers.solve
+        result = solver(surface, project.method, reporter(report), **project.options)
         if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
             raise KeyboardInterrupt
     report("certifying")
@@ -169,9 +268,7 @@ def reporter(report: OnStep) -> Callable[[Progress], None]:
 def _meet(project: Project, surface: Surface, report: OnStep) -> Design:
     from ..design import DesignStatus, meet  # needed by projects with targets only
 
-    if project.method != "newton":
-        message = f"only method 'newton' can meet targets, found {project.method!r}"
-        raise OptionError(message, what="solve.method", found=project.method, expected="newton")
+    _newton_alone(project, "meet targets")
     solves = count(1)
 
     def callback(row: object) -> None:

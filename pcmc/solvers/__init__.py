@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..base import validate
-from ..base.errors import SurfaceError
+from ..base.errors import OptionError, SurfaceError
 from ..surface import Surface, expect_surface
 
 if TYPE_CHECKING:
@@ -95,6 +95,9 @@ def solve(
     """
     expect_surface(surface)
     solver = find_method(method)
+    if surface.on_line and method != "newton":
+        message = f"method {method!r} cannot slide vertices along lines; use method='newton'"
+        raise OptionError(message, what="method", found=method, expected="newton")
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a Progress")
     if surface.size == 0.0:

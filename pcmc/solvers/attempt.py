@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
+from ..energy.functional import patch_areas
 from ..meshing.quality import worst_quality
 from ..surface import Surface
 from .result import Callback, Progress, Status, until_stopped
@@ -18,8 +19,13 @@ TARGETS = ("minimum", "stationary")
 DESCENTS = 5  # smooth steps after a Newton step that did not help
 PATIENCE = 8  # steps without halving the residual, once it is that small
 ROUNDED = 1e-10  # relative residual that counts as zero where rounding lets no step lower it
+NOISE = 10.0  # times what rounding of the coordinates leaves, which counts as zero in the same way
 COLLAPSED = 1e-3  # triangle quality below which the attempt ends
 POOR = 0.15  # triangle quality that explains why no step helps
+DOWN = ("shifted", "saddle")  # kinds of steps where the second variation is indefinite
+CRAWLS = (3, 30)  # steps down from a saddle that hardly lower E: when one that slips is accepted, when any
+NEAR = 1e-3  # relative residual near a saddle
+CREEP = 1e-6  # of Σ α A: by less E is hardly lowered in these steps
 SHRUNK = 5e-2  # of its first size: a surface that nothing holds has vanished
 
 
@@ -103,6 +109,8 @@ class Attempt:
     smooth_steps : descent steps to take before the next Newton step.
     stuck : whether the last step failed: none lowers the residual or the energy.
     best, steps_since_best : the least residual, and steps taken since it was last halved.
+    crawl : how many steps down from a saddle may hardly lower E, if a minimum is sought.
+    uphill : the positions where the present way down from a saddle began, and the state's version there.
     """
 
     def __init__(
@@ -114,6 +122,10 @@ class Attempt:
         self.status = Status.ITERATION_LIMIT
         self.first_quality = self.state.quality
         self._shown = self.state.X, self.state.version  # as in the last row
+        self.crawl = float(CRAWLS[0]) if options.target == "minimum" else np.inf
+        self._steps = 0
+        self._descent: list[float] = []  # E after each step of the present way down from a saddle
+        self.uphill = self.state.X, self.state.version
         self.restart(smooth_steps)
 
     def restart(self, smooth_steps: int = 0) -> None:
@@ -122,7 +134,7 @@ class Attempt:
         self.best, self.steps_since_best = self.state.relative, 0
 
     def run(self) -> Attempt:
-        """Step until the end; ``status`` then gives the reason."""
+        """Step until the end, or on from there; ``status`` then gives the reason."""
         self.status = until_stopped(self._iterate)
         if self.status is Status.STOPPED:  # perhaps in the middle of a step
             X, version = self._shown
@@ -131,11 +143,15 @@ class Attempt:
             self.state.measure()
         self.history.evaluations += self.state.evaluations
         self.history.factorisations += self.stepper.factorisations
+        self.state.evaluations = self.stepper.factorisations = 0
+        if self.status is not Status.SADDLE:  # from which a run may go on
+            self.stepper.free()
         return self
 
     def _iterate(self) -> Status:
         state = self.state
-        for step in range(self.options.iterations + 1):
+        for step in range(self._steps, self.options.iterations + 1):
+            self._steps = step + 1
             self._shown = state.X, state.version
             self.history.add(state, self.stepper, self.level)
             if self._at_rest():
@@ -150,7 +166,8 @@ class Attempt:
                 if state.maintain_mesh():
                     self.stepper.drop_factor()
                 self._step()
-            if (status := self._ended()) is not None:
+            status = self._ended() or (Status.SADDLE if self._crawls() else None)
+            if status is not None:
                 self.history.add(state, self.stepper, self.level)
                 return status
         return Status.ITERATION_LIMIT
@@ -176,16 +193,40 @@ class Attempt:
         """Whether the residual is below the tolerance, or as low as rounding lets it become."""
         residual = self.state.relative
         no_progress = self.stuck or self.steps_since_best > PATIENCE
-        return residual <= self.options.tolerance or (residual <= ROUNDED and no_progress)
+        rounded = max(ROUNDED, NOISE * self.state.rounding)
+        return residual <= self.options.tolerance or (residual <= rounded and no_progress)
 
     def _leave_rest(self) -> bool:
         """Leave a saddle if a minimum is sought, or lift a resting junction; False if neither is due."""
         if self.options.target == "minimum" and self.stepper.leave_saddle():
             return True
-        if self.state.resting.any() and (self.state.lift_overpulled() or self.state.update_walls()):
+        if not self.state.resting.any():
+            return False
+        self.stepper.free()  # at rest no factor is needed, and after a release another
+        if self.state.lift_overpulled() or self.state.update_walls():
             self.stepper.kind = "release"
             return True
         return False
+
+    def _crawls(self) -> bool:
+        """Whether the way down from a saddle hardly lowers E: often it only spoils triangles.
+
+        True once for each number of steps in ``CRAWLS``.
+        """
+        state = self.state
+        if self.crawl == np.inf or self.stepper.kind not in DOWN or state.relative > NEAR:
+            self._descent, self.uphill = [], (state.X, state.version)
+            return False
+        self._descent.append(state.energy)
+        if len(self._descent) <= self.crawl:
+            return False
+        scale = float(state.surface.tensions @ patch_areas(state.surface.moved(state.X)))
+        return self._descent[-int(self.crawl) - 1] - state.energy < CREEP * scale
+
+    def surface_uphill(self) -> Surface:
+        """The whole surface where the present way down from a saddle began."""
+        state, (X, version) = self.state, self.uphill
+        return state.result_surface(X if version == state.version else state.X)
 
     def _ended(self) -> Status | None:
         """Why no further step makes sense, or None."""

@@ -11,9 +11,12 @@ from ..base.arrays import Bools, Floats
 from ..base.compiled import blocks, compiled, threads
 from ..energy import kernels
 from ..energy.functional import total
+from ..energy.motion_space import tension_forces
 from ..surface import Surface
 from ..surface.checks import reachable
 from ..surface.geometry import accumulate, dot, point, scaled, vector
+
+ROUNDING = 1e-14  # of the triangles' forces: what is left of them to rounding where they cancel
 
 
 class Point(NamedTuple):
@@ -28,6 +31,25 @@ class Point(NamedTuple):
     def finite(self) -> bool:
         """Whether energy and gradient are numbers, and the positions are not too far out for a Surface."""
         return isfinite(self.energy) and isfinite(self.squared) and reachable(self.X)
+
+
+def converged_below(surface: Surface, tolerance: float | None) -> float:
+    """‖∇E‖² up to which a run from a surface has converged, force²; 0 for none.
+
+    This is the tolerance wherever the norm F of the single triangles' forces, at the start, is 1 or more.
+    Where F is less, it is tolerance · F², or a surface small enough would be at rest in any shape. Nor is
+    it below (ROUNDING · F)², which rounding keeps a large surface from.
+
+    >>> from pcmc import Patch, Surface
+    >>> corners, faces = [[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]]
+    >>> large, small = (Surface(corners, faces, [0], [Patch("a", t)], [0]) for t in (1.0, 1e-3))
+    >>> converged_below(large, 1e-8), converged_below(small, 1e-8)
+    (1e-08, 4e-14)
+    """
+    if not tolerance:
+        return 0.0
+    forces = tension_forces(surface)
+    return max(tolerance * min(1.0, forces) ** 2, (ROUNDING * forces) ** 2)
 
 
 class Evaluator:

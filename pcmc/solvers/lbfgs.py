@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import frexp, ldexp
 from typing import Any
 
 import nlopt
@@ -14,10 +15,11 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..surface import Surface
 from ..surface.geometry import bounding_size
-from .evaluate import Evaluator, Point
+from .evaluate import Evaluator, Point, converged_below
 from .result import Callback, Progress, Result, Status, until_stopped
 
 COLUMNS = ("evaluation", "energy", "gradient_squared")
+ORDINARY = 20  # powers of two from 1: NLopt's fixed numbers do no harm within
 NOISE = 1e-13  # of the energy: two energies closer than this are equal in floats
 
 
@@ -27,7 +29,8 @@ class LbfgsOptions:
 
     Parameters
     ----------
-    tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 or None to go on until no step helps.
+    tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 or None to go on until no step helps. Where
+        all forces are small it is taken relative to them; see ``converged_below``.
     evaluations : the most evaluations of E and ∇E; NLopt counts no iterations.
     memory : number of pairs of moves and gradient changes that approximate the Hessian; 0 lets NLopt choose.
     inflation : diverged when the bounding box is more than this many times its first diagonal.
@@ -51,7 +54,8 @@ class Coordinates:
 
     They are displacements divided by √(4 α), α the largest tension. L-BFGS starts with the step 1,
     here the move -∇E / (4 α): about the longest the stiffest vertex takes (Σ cot is 3.5 on an
-    equilateral mesh). Its later steps do not depend on the unit.
+    equilateral mesh). Its later steps do not depend on the unit. NLopt bounds its steps by fixed numbers,
+    so where size · √α is far from 1, they are measured in a power of two near it.
 
     >>> from pcmc import Patch, Surface
     >>> sail = Surface([[0, 0, 0], [1, 0, 0], [0, 0, 1]], [[0, 1, 2]], [0],
@@ -66,13 +70,16 @@ class Coordinates:
         self.sliding = np.flatnonzero(surface.on_plane)
         # The last two right singular vectors of nᵀ span what is perpendicular to it.
         self.basis = np.linalg.svd(np.array([surface.plane.normal]))[2][1:]
-        self.unit = 0.5 / np.sqrt(surface.tensions.max() or 1.0)
+        stiffness = np.sqrt(surface.tensions.max() or 1.0)
+        self.unit = 0.5 / stiffness
+        exponent = frexp(surface.size * stiffness)[1]
+        self.scale = ldexp(1.0, exponent) if abs(exponent) > ORDINARY else 1.0
         self.count = 3 * len(self.free) + 2 * len(self.sliding)
 
     def positions(self, s: Floats) -> Floats:
         """X (n,3) of the unknowns s (count,), which are zero at the start."""
         X = self.start.copy()
-        moves = self.unit * s
+        moves = (self.unit * self.scale) * s
         cut = 3 * len(self.free)
         with np.errstate(all="ignore"):  # after an overflow the energy is not finite
             X[self.free] += moves[:cut].reshape(-1, 3)
@@ -80,9 +87,9 @@ class Coordinates:
         return X
 
     def reduce(self, gradient: Floats) -> Floats:
-        """∂E/∂s (count,) of ∇E (n,3)."""
+        """∂E/∂s (count,) of ∇E (n,3), in units of scale²."""
         along = gradient[self.sliding] @ self.basis.T
-        return self.unit * np.concatenate([gradient[self.free].ravel(), along.ravel()])
+        return (self.unit / self.scale) * np.concatenate([gradient[self.free].ravel(), along.ravel()])
 
 
 class Objective:
@@ -101,6 +108,7 @@ class Objective:
         self.surface, self.options, self.callback = surface, options, callback
         self.coordinates = Coordinates(surface)
         self.evaluate = Evaluator(surface)
+        self.tolerance = converged_below(surface, options.tolerance)
         self.rows: list[tuple[Any, ...]] = []
         self.best: Point | None = None
         self.status: Status | None = None
@@ -119,12 +127,12 @@ class Objective:
             return math.nan
         if out.size:
             out[:] = self.coordinates.reduce(point.gradient)
-        return point.energy
+        return point.energy / self.coordinates.scale**2
 
     def visit(self, X: Floats) -> Point:
         """Measure and record one point, and set the status if it is the last."""
         point = self.evaluate(X)
-        converged = point.squared <= (self.options.tolerance or 0.0)
+        converged = point.squared <= self.tolerance
         if point.finite or not self.rows:
             self.rows.append((self.evaluate.count, point.energy, point.squared))
             if self.best is None or converged or _better(point, self.best):

@@ -12,7 +12,7 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..surface import Surface
 from ..surface.geometry import bounding_size
-from .evaluate import Evaluator, Point
+from .evaluate import Evaluator, Point, converged_below
 from .result import Callback, Progress, Result, Status, until_stopped
 
 
@@ -32,7 +32,8 @@ class NesterovOptions:
     armijo : ``"printed"``, Eq. (25) as printed, E(Q) ≤ E(Y) + ξ t ‖∇E(Q)‖², which lets E rise; or
         ``"sufficient"``, the standard test of the source cited there, E(Q) ≤ E(Y) - ξ t ‖∇E(Y)‖².
         Here Y = P + γ d and Q = Y - t ∇E(Y).
-    tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 or None to run all iterations.
+    tolerance : converged when ‖∇E‖² ≤ tolerance, force²; 0 or None to run all iterations. Where all
+        forces are small it is taken relative to them; see ``converged_below``.
     iterations : the most iterations.
     inflation : diverged when the bounding box is more than this many times its first diagonal.
     """
@@ -124,6 +125,7 @@ class _Flow:
     def __init__(self, surface: Surface, options: NesterovOptions, callback: Callback | None) -> None:
         self.surface, self.options, self.callback = surface, options, callback
         self.evaluate = Evaluator(surface)
+        self.tolerance = converged_below(surface, self.options.tolerance)
         start = self.evaluate(surface.vertices)
         self.move = Move(0, start, np.zeros_like(start.X), np.nan, True)
         self.rows = [self.row(self.move)]
@@ -148,7 +150,7 @@ class _Flow:
         point = self.move.point
         if not point.finite:
             return Status.NON_FINITE
-        if point.squared <= (self.options.tolerance or 0.0):
+        if point.squared <= self.tolerance:
             return Status.CONVERGED
         if bounding_size(point.X) > self.options.inflation * self.surface.size:
             return Status.DIVERGED

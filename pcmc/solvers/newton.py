@@ -12,17 +12,18 @@ or none was asked for; or, if that is what has failed, with smooth steps first.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
 from ..base.errors import SurfaceError
+from ..certificate.slipping import describe_saddle, slipping_ends
 from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import morse_index
+from ..stability.modes import ways_down
 from ..surface import Surface
-from .attempt import DESCENTS, POOR, Attempt, History, NewtonOptions
+from .attempt import CRAWLS, DESCENTS, POOR, Attempt, History, NewtonOptions
 from .result import Callback, Result, Status
 
 __all__ = ["NewtonOptions", "newton"]
@@ -58,6 +59,14 @@ def newton(
 def _solve_level(surface: Surface, options: NewtonOptions, history: History, level: int) -> Attempt:
     """Solve on one mesh; where that fails, once more from the same start in another way."""
     first = Attempt(surface, options, history, level).run()
+    for more in (*CRAWLS[1:], inf):
+        if first.status is not Status.SADDLE:
+            break
+        end = _saddle_near(first, must_slip=first.crawl == CRAWLS[0])
+        if end is not None:
+            return end
+        first.crawl = more
+        first.run()
     if first.status not in LOST:
         return first
     rows, minimum = len(history.rows), options.target == "minimum"
@@ -67,16 +76,49 @@ def _solve_level(surface: Surface, options: NewtonOptions, history: History, lev
         if second.state.relative < first.state.relative:
             return second
         first.status = Status.STOPPED
-    if second.status is Status.CONVERGED and second.state.quality >= POOR:
-        if not minimum:
-            return second
-        with suppress(SingularMatrix):
-            index = morse_index(second.state.result_surface())
-            if index == 0:
-                return second
-            history.note = f"a saddle of index {index} is near: target='stationary' returns it"
+    if not minimum and second.status is Status.CONVERGED and second.state.quality >= POOR:
+        return second
+    if minimum and _rests(second, must_slip=True):
+        return second
     del history.rows[rows:]
     return first
+
+
+def _saddle_near(crawling: Attempt, must_slip: bool) -> Attempt | None:
+    """The saddle from which an attempt only crawls, or a minimum there; None if there is neither.
+
+    ``must_slip``: only a saddle in whose lowest mode an end of a junction slips.
+    """
+    history, rows = crawling.history, len(crawling.history.rows)
+    other_way = replace(crawling.options, target="stationary")
+    end = Attempt(crawling.surface_uphill(), other_way, history, crawling.level).run()
+    if end.status is Status.STOPPED or _rests(end, must_slip):
+        return end
+    del history.rows[rows:]
+    history.note = ""
+    return None
+
+
+def _rests(end: Attempt, must_slip: bool) -> bool:
+    """Whether an attempt to find any stationary point ends what was asked for: a minimum, or the saddle.
+
+    The saddle ends it, with status SADDLE, if an end of a junction slips in its lowest mode, as the way
+    down then leads to collapsed triangles, or if that does not matter. The history's note names it.
+    """
+    if end.status is not Status.CONVERGED or end.state.quality < POOR:
+        return False
+    surface = end.state.result_surface()
+    try:
+        index, mode = ways_down(surface)
+    except SingularMatrix:
+        return False
+    if index == 0:
+        return True
+    if slipping_ends(surface, mode) or not must_slip:
+        end.status, end.history.note = Status.SADDLE, describe_saddle(surface, index, mode)
+        return True
+    end.history.note = f"a saddle of index {index} is near: target='stationary' returns it"
+    return False
 
 
 def _refuse_loose_parts(surface: Surface) -> None:

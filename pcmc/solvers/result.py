@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from ..certificate import Certificate
+    from ..certificate.proof import Proof
 
 
 class Status(Enum):
@@ -42,6 +43,18 @@ class Status(Enum):
     )
     DEGENERATE = "stopped because triangles collapse; remesh; the certificate names the place"
     STOPPED = "stopped on request; the surface returned is the best so far"
+    SADDLE = (
+        "stopped at a saddle: the way down from it leads to no minimum; hold what slips, or accept the"
+        " saddle with target='stationary'"
+    )
+    PINCHED = (
+        "stopped because a neck pinches off; bring the held curves nearer to each other, or raise the"
+        " pressure"
+    )
+    NO_EQUILIBRIUM = (
+        "ended without an equilibrium, as there is none; change the tensions, the pressures or the"
+        " supports, as the proof says"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +73,7 @@ class Result:
     history : a row per iteration (per evaluation for ``"lbfgs"``) with at least ``evaluation``,
         ``energy`` and ``gradient_squared`` (‖∇E‖², the paper's squared sum).
     note : a further finding of the solver, shown in the message.
+    proofs : why there is no equilibrium, where that was proved.
     """
 
     surface: Surface
@@ -70,6 +84,7 @@ class Result:
     evaluations: int
     rows: Sequence[Mapping[str, Any]] = field(repr=False)
     note: str = ""
+    proofs: tuple[Proof, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -89,9 +104,10 @@ class Result:
             Status.DIVERGED: Evidence.INFLATED,
             Status.VANISHED: Evidence.VANISHED,
             Status.DEGENERATE: Evidence.COLLAPSED,
+            Status.PINCHED: Evidence.COLLAPSED,
         }.get(self.status)
         tolerance = TOLERANCE if tolerance is None else tolerance
-        return certify(self.surface, modes=modes, tolerance=tolerance, evidence=evidence)
+        return certify(self.surface, modes=modes, tolerance=tolerance, evidence=evidence, proofs=self.proofs)
 
     @cached_property
     def certificate(self) -> Certificate:

@@ -21,7 +21,7 @@ from ..stability.factorisation import factoriser
 from ..surface import Surface
 from ..surface.topology import SHEET
 
-FLOOR = 1e-2  # of the largest tension: the least tension of any patch in L_α
+FLOOR = 1e-2  # of the largest tension it is connected with: the least tension of any patch in L_α
 PIN = 1e8  # of a vertex's stiffness: the weight that makes it follow its prescribed motion
 SHIFT = 1e-9  # of the diagonal, added so that L_α is regular without supports, too
 
@@ -34,8 +34,8 @@ class Smoother:
     """
 
     def __init__(self, surface: Surface, classes: VertexClasses, backend: str | None = None) -> None:
-        floor = FLOOR * float(surface.tensions.max())
-        tensions = {p.name: max(p.tension, floor) for p in surface.patches}
+        floor = FLOOR * _largest_around(surface)
+        tensions = {p.name: max(p.tension, least) for p, least in zip(surface.patches, floor, strict=True)}
         moderated = surface.retensioned(tensions, dict.fromkeys(tensions, 0.0))
         faces = {name: getattr(surface, name) for name in ("faces", "patch_of_face", "topology")}
         all_faces = replace(classes, active=np.ones(surface.m, dtype=bool), **faces)
@@ -61,6 +61,15 @@ class Smoother:
         out[:, :2] = self._coordinates[0].solve(local[:, :2])
         out[:, 2:] = self._coordinates[-1].solve(local[:, 2:])
         return out @ self._axes
+
+
+def _largest_around(surface: Surface) -> Floats:
+    """(patches,) the largest tension in the connected parts of the surface that a patch belongs to."""
+    part = surface.topology.components[surface.faces[:, 0]]
+    of_part, of_patch = np.zeros(part.max() + 1), np.zeros(len(surface.patches))
+    np.maximum.at(of_part, part, surface.tensions[surface.patch_of_face])
+    np.maximum.at(of_patch, surface.patch_of_face, of_part[part])
+    return of_patch
 
 
 def _one_unknown_each(vertices: Bools) -> MotionSpace:

@@ -20,6 +20,7 @@ from ..contact.pinching import (
     top_spacing,
 )
 from ..energy.functional import energy_and_gradient, energy_at
+from ..energy.loose_parts import relative_forces, rounding_left
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..meshing.quality import compare, redistribute, worst_quality
 from ..surface import Surface
@@ -45,7 +46,8 @@ class State:
     X : (n,3) the positions reached.
     space : the motion space there.
     energy, gradient, residual, norm, scale : E, ∇E, Bᵀ∇E, its norm, and the norm of the single
-        triangles' forces to compare with.
+        triangles' forces to compare with. Of several loose parts the worst counts, as if it were all.
+    rounding : what rounding of the coordinates alone leaves of the relative residual, about.
     version : changes whenever the faces or the number of unknowns do.
     evaluations : passes over the triangles so far: E, ∇E or its derivative along a motion.
     """
@@ -69,6 +71,7 @@ class State:
         self.resting, self.classes = part.resting, part.classes
         self.quality_faces: Ints = part.quality_faces
         self.X: Floats = self.surface.vertices.copy()
+        self.rounding = rounding_left(self.surface, self.classes, self.X)
         self.version += 1
         self.space: MotionSpace = motion_space(self.surface, self.classes, self.X)
         self.measure()
@@ -84,6 +87,9 @@ class State:
         self.scale = force_scale(self.surface, self.classes, self.X)
         self.residual = self.space.to_coordinates(self.gradient)
         self.norm = float(np.linalg.norm(self.residual))
+        if self.surface.topology.components.any():
+            left = self.space.to_vectors(self.residual)
+            self.norm = self.scale * relative_forces(self.surface, self.classes, self.X, left)
 
     def energy_at(self, X: Floats) -> float:
         """E of the standing surface at X."""
@@ -100,9 +106,9 @@ class State:
         """Quality of the worst triangle outside walls that can pinch."""
         return worst_quality(self.X, self.quality_faces)
 
-    def result_surface(self) -> Surface:
+    def result_surface(self, X: Floats | None = None) -> Surface:
         """The whole surface at X, with pinched walls placed on their resting junctions."""
-        X = self.X
+        X = self.X if X is None else X
         if self.resting.any():
             X = place_pinched_walls(self.full, self.walls, self.resting, X)
         return self.full.moved(X)

@@ -15,7 +15,7 @@ from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import edge_lengths
 from ..stability.factorisation import Factor, Factoriser, SingularMatrix, factoriser
-from ..stability.modes import SOFT, full_matrix, lowest, negatives_without, stiffness
+from ..stability.modes import SOFT, full_matrix, lowest, negatives_without, stiffness, strength_units
 from ..surface.checks import reachable
 from ..surface.geometry import vertex_area_vectors
 from .smoother import HarmonicExtension, Smoother
@@ -51,14 +51,19 @@ class Stepper:
         """Drop everything that belongs to other faces or unknowns than the present ones."""
         if self._version == self.state.version:
             return
+        self.free()
         self._version = self.state.version
+        self._motions = rigid_motions(self.state.surface)
+
+    def free(self) -> None:
+        """Drop all factors: they are most of a large surface's memory."""
+        self._version = -1
         self._pattern: Pattern | None = None
         self._factoriser: Factoriser | None = None
         self._factor: Factor | None = None
         self._added: csr_array | None = None  # stiffness of a singular matrix
         self._smoother: Smoother | None = None
         self._extension: HarmonicExtension | None = None
-        self._motions = rigid_motions(self.state.surface)
         self._smoother_age = REFRESH
 
     def drop_factor(self) -> None:
@@ -183,7 +188,8 @@ class Stepper:
         state = self.state
         if self._pattern is None or self._factoriser is None:
             self._pattern = hessian_pattern(state.classes, state.space)
-            self._factoriser = factoriser(self._pattern, self.backend)
+            units = strength_units(state.surface, state.classes, state.space)
+            self._factoriser = factoriser(self._pattern, self.backend, units)
         rigid = rigid_modes(state.space, self._motions, state.X)
         for weight in (shift, shift + SOFT):
             data = assemble(state.surface, state.classes, state.space, self._pattern, state.X, 1.0, weight)
@@ -206,7 +212,7 @@ class Stepper:
         now, then = self.state.space, self._factor_space
         if now is then:
             return action(s)
-        return now.to_coordinates(then.to_vectors(action(then.to_coordinates(now.to_vectors(s)))))
+        return now.from_other(then, action(then.from_other(now, s)))
 
     def _direction(self) -> Floats:
         """-B J⁻¹ r with J the derivative of r itself, by GMRES preconditioned with the factor.

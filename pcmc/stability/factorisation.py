@@ -76,8 +76,11 @@ def available() -> tuple[str, ...]:
     return BACKENDS if importlib.util.find_spec("pypardiso") is not None else ("superlu",)
 
 
-def factoriser(pattern: Pattern, backend: str | None = None) -> Factoriser:
+def factoriser(pattern: Pattern, backend: str | None = None, units: Floats | None = None) -> Factoriser:
     """A factoriser for the pattern, by the fastest backend installed or the one named.
+
+    ``units`` (N,) are positive numbers u: U A U is factorised in place of A, with U = diag(u), so that weak
+    parts are not taken for zero beside strong ones. Neither the solution nor the inertia depends on them.
 
     Raises
     ------
@@ -97,12 +100,39 @@ def factoriser(pattern: Pattern, backend: str | None = None) -> Factoriser:
     if chosen not in available():
         raise MissingExtra("pypardiso", "fast")
     # MKL refuses a matrix without rows
-    return _Pardiso(pattern) if chosen == "pardiso" and pattern.size else _SuperLU(pattern)
+    plain = _Pardiso(pattern) if chosen == "pardiso" and pattern.size else _SuperLU(pattern)
+    return plain if units is None else _Scaled(plain, pattern, units)
 
 
 def _finite(data: Floats) -> None:
     if not np.isfinite(data).all():
         raise SingularMatrix("the matrix has entries that are not finite")
+
+
+class _Scaled:
+    """Factorises U A U."""
+
+    def __init__(self, plain: Factoriser, pattern: Pattern, units: Floats) -> None:
+        self._plain, self._units = plain, units
+        rows = np.repeat(units, np.diff(pattern.indptr))
+        self._products = rows * units[pattern.indices]
+
+    def factor(self, data: Floats) -> Factor:
+        return _ScaledFactor(self._plain.factor(self._products * data), self._units)
+
+
+@dataclass(frozen=True, eq=False)
+class _ScaledFactor:
+    plain: Factor
+    units: Floats
+
+    @property
+    def negative(self) -> int:
+        return self.plain.negative
+
+    def solve(self, right: Floats) -> Floats:
+        units = self.units if right.ndim == 1 else self.units[:, None]
+        return units * self.plain.solve(units * right)
 
 
 class _SuperLU:

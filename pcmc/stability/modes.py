@@ -23,6 +23,7 @@ from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from .factorisation import Factor, SingularMatrix, factoriser
 
+STRONG = 1e-6  # of the largest tension: where all are at least this, factors need no units
 SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
 
 
@@ -46,6 +47,20 @@ class Stiffness:
     factor: Factor
     rigid: Floats
     negative: int
+
+
+def strength_units(surface: Surface, classes: VertexClasses, space: MotionSpace) -> Floats | None:
+    """(N,) 1/√α of the tension around each unknown, as powers of two; None if all are of one order.
+
+    Factorised in these units, a patch that pulls far less than another still counts.
+    """
+    tension = surface.tensions[np.unique(classes.patch_of_face)]
+    if not len(tension) or tension.min() >= STRONG * tension.max():
+        return None
+    strongest = np.zeros(surface.n)
+    np.maximum.at(strongest, classes.faces, surface.tensions[classes.patch_of_face, None])
+    unknown = np.repeat(strongest, space.dimension)
+    return np.asarray(2.0 ** -np.round(0.5 * np.log2(unknown)))
 
 
 def full_matrix(pattern: Pattern, data: Floats) -> csr_array:
@@ -87,7 +102,7 @@ def stiffness(
     """
     X = surface.vertices
     pattern = hessian_pattern(classes, space)
-    solver = factoriser(pattern, backend)
+    solver = factoriser(pattern, backend, strength_units(surface, classes, space))
     for added in (0.0, SOFT):
         data = assemble(surface, classes, space, pattern, X, 1.0, added)
         with suppress(SingularMatrix):
@@ -116,11 +131,34 @@ def morse_index(surface: Surface) -> int:
     >>> morse_index(roof)
     0
     """
+    return second_variation(surface).negative
+
+
+def ways_down(surface: Surface) -> tuple[int, Floats]:
+    """The Morse index of a surface at rest and its lowest mode (n,3); empty if there is no way down.
+
+    Raises
+    ------
+    SingularMatrix : the second variation has no inertia that can be counted.
+    """
+    system = second_variation(surface)
+    if system.negative == 0 or system.space.size <= 2:
+        return system.negative, np.empty((0, 3))
+    return system.negative, lowest(system, 1)[1][0]
+
+
+def second_variation(surface: Surface) -> Stiffness:
+    """The second variation of the part of a surface that stands.
+
+    Raises
+    ------
+    SingularMatrix : it has no factorisation.
+    """
     part = standing_part(surface)
     X = part.surface.vertices
     space = motion_space(part.surface, part.classes, X)
     rigid = rigid_modes(space, rigid_motions(part.surface), X)
-    return stiffness(part.surface, part.classes, space, rigid).negative
+    return stiffness(part.surface, part.classes, space, rigid)
 
 
 def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:

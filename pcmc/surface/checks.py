@@ -9,10 +9,12 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..base.errors import SurfaceError
 from .geometry import bounding_size, cross, dot, norm, point, sub
+from .line import Line
 from .topology import Topology
 
 ZERO_AREA = 1e-14  # of the squared longest edge: below this a triangle has no direction in floats
@@ -198,6 +200,37 @@ def on_plane(height: Floats, sliding: Bools, X: Floats, size: float) -> None:
         fault = f"slides on the plane, but is {height[bad[0]]:.3g} away from it"
         hint = "move it onto the plane or hold it with fixed="
         _refuse_rows("vertices", X, bad, fault, hint=hint)
+
+
+def on_line(given: Any, X: Floats) -> list[tuple[Line, Bools]]:
+    """The lines that vertices slide along, each with their (n,) mask; no vertex on two."""
+    pairs = given.items() if isinstance(given, Mapping) else given
+    lines, taken = [], np.zeros(len(X), dtype=bool)
+    if not isinstance(pairs, Iterable):
+        validate.refuse("on_line", given, "a mapping from Lines to vertices", error=SurfaceError)
+    for pair in pairs:
+        if not (isinstance(pair, Sequence) and len(pair) == 2 and isinstance(pair[0], Line)):
+            validate.refuse("on_line", given, "a mapping from Lines to vertices", error=SurfaceError)
+        along = mask(pair[1], len(X), "on_line")
+        bad = np.flatnonzero(along & taken)
+        if len(bad):
+            _refuse_rows("vertices", X, bad, "slides along two lines", hint="hold it with fixed= instead")
+        taken |= along
+        lines.append((pair[0], along))
+    on_lines(lines, X)
+    return lines
+
+
+def on_lines(lines: Iterable[tuple[Line, Bools]], X: Floats) -> None:
+    """Vertices must lie on the lines they slide along to 1e-9 of the size, or to rounding."""
+    for line, along in lines:
+        near = max(1e-9 * bounding_size(X), ROUNDED * float(np.abs(X).max(initial=0.0)))
+        distance = line.distance(X)
+        bad = np.flatnonzero(along & (distance > near))
+        if len(bad):
+            fault = f"slides along the line through {line.point}, but is {distance[bad[0]]:.3g} away from it"
+            hint = "move it onto the line or hold it with fixed="
+            _refuse_rows("vertices", X, bad, fault, hint=hint)
 
 
 def _oriented(F: Ints, patch: Ints, topo: Topology, names: Sequence[str]) -> None:

@@ -17,9 +17,10 @@ from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
 from . import checks
 from .geometry import Vector, bounding_size
+from .line import Line
 from .topology import Topology, topology
 
-FIELDS = ("vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane")
+FIELDS = ("vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane", "on_line")
 FAR = 30.0  # sizes from the point of Π: farther, volumes seen from it lose over three digits
 
 
@@ -164,6 +165,9 @@ class Surface:
     fixed : index array or (n,) bool mask: vertices that do not move.
     on_plane : index array or (n,) bool mask: vertices that slide on ``plane`` (fixed wins).
     plane : Π.
+    on_line : mapping from a Line to an index array or (n,) mask: vertices that slide along that line and
+        are fixed but for that. On a straight boundary the end of a junction can slide so; let the other
+        vertices of the boundary slide too, but for its corners, so that they can make room.
 
     Raises
     ------
@@ -185,6 +189,7 @@ class Surface:
     fixed: Bools = field(default=cast(Bools, ()))
     on_plane: Bools = field(default=cast(Bools, ()))
     plane: Plane = Plane()
+    on_line: tuple[tuple[Line, Bools], ...] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.plane, Plane):
@@ -197,6 +202,10 @@ class Surface:
             validate.refuse("patches", self.patches, "a sequence of Patch", error=SurfaceError)
         patch = checks.patch_array(self.patch_of_face, len(F), patches)
         fixed = checks.mask(self.fixed, len(X), "fixed")
+        on_line = checks.on_line(self.on_line, X)
+        for _, along in on_line:
+            fixed |= along
+        object.__setattr__(self, "on_line", tuple((line, read_only(along)) for line, along in on_line))
         sliding = checks.mask(self.on_plane, len(X), "on_plane") & ~fixed
         arrays = {"vertices": X, "faces": F, "patch_of_face": patch, "fixed": fixed}
         for key, value in (arrays | {"on_plane": sliding}).items():
@@ -291,12 +300,14 @@ class Surface:
     def moved(self, vertices: npt.ArrayLike) -> Surface:
         """The same surface with its vertices elsewhere, (n,3); faces, supports, patches are shared.
 
-        Sliding vertices must stay on Π. Triangles may collapse; ``solve`` can repair many of them.
+        Sliding vertices must stay on Π or on their lines. Triangles may collapse; ``solve`` can repair many
+        of them.
         """
         X = checks.positions(vertices)
         if X.shape != self.vertices.shape:
             checks.refuse_shape("vertices", X, self.vertices.shape)
         checks.on_plane(self.plane.height(X), self.on_plane, X, self.size)
+        checks.on_lines(self.on_line, X)
         return self._with(vertices=read_only(X))
 
     def retensioned(
@@ -338,6 +349,8 @@ class Surface:
     def __setstate__(self, state: dict[str, object]) -> None:
         for name, value in state.items():
             vars(self)[name] = read_only(value) if isinstance(value, np.ndarray) else value
+        for _, along in self.on_line:
+            read_only(along)
 
     def patch_faces(self, patches: Sequence[int]) -> Bools:
         """(m,) mask of the triangles of the given patches."""

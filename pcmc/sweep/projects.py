@@ -5,14 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from .. import project as projects
+from ..base import validate
 from ..base.errors import FileError
 from ..solvers import find_method
 from .grid import Sweep
-from .solving import row
+from .solving import mesh_columns, row
 
 
 def project_sweep(
@@ -21,6 +23,8 @@ def project_sweep(
     fixed: Mapping[str, Any] | None = None,
     *,
     method: str | None = None,
+    mesh_check: bool = False,
+    search: bool = False,
 ) -> Sweep:
     """The cases of a project at every combination of some of its numbers.
 
@@ -30,6 +34,10 @@ def project_sweep(
     grid, fixed : as of ``Sweep``, by the names of ``pcmc.project.varied``: ``NAME.tension`` and
         ``NAME.pressure`` of patches, and the numbers of the file, such as ``plan.edge_length``.
     method : replaces the project's method and its options.
+    mesh_check : whether to check the mesh of each case, as ``solve_case`` does; the project's own key
+        ``solve.mesh_check`` asks for it, too.
+    search : whether a case whose start leads to no equilibrium tries further ones, as ``pcmc.solve`` does:
+        slower where there is none, with the proof as ``message``.
 
     Raises
     ------
@@ -45,16 +53,24 @@ def project_sweep(
     fixed = dict(fixed or {})
     if method is not None:
         find_method(method)
-    about = {"project": Path(path).as_posix(), "project_digest": projects.digest(path)}
+    about: dict[str, Any] = {"project": Path(path).as_posix(), "project_digest": projects.digest(path)}
     if method is not None:
         about["method"] = method
+    for name, value in {"mesh_check": mesh_check, "search": search}.items():
+        if validate.flag(name, value):
+            about[name] = True
     sweep = Sweep(solve_project, grid, about | fixed)
     projects.check_varied(path, dict(sweep.grid) | {name: [value] for name, value in fixed.items()})
     return sweep
 
 
 def solve_project(
-    project: str, project_digest: str, method: str | None = None, **values: Any
+    project: str,
+    project_digest: str,
+    method: str | None = None,
+    mesh_check: bool = False,
+    search: bool = False,
+    **values: Any,
 ) -> dict[str, Any]:
     """Build and solve a project, with its remeshing and targets and some of its numbers replaced.
 
@@ -62,7 +78,8 @@ def solve_project(
     ----------
     project : its file. project_digest : ``pcmc.project.digest`` of it when the sweep was declared: a case and
         its store belong to one state of the project.
-    method : replaces the project's. values : as of ``pcmc.project.varied``.
+    method, mesh_check, search : as of ``project_sweep``.
+    values : as of ``pcmc.project.varied``.
 
     Returns
     -------
@@ -84,6 +101,8 @@ def solve_project(
     design, start = projects.varied(project, values)
     if method not in (None, design.method):
         design = replace(design, method=method, options={})
-    outcome = projects.solve_project(design, start)
-    answer = row(outcome.result, ("project", "project_digest", "method", *values))
+    outcome = projects.solve_project(replace(design, search=search), start)
+    answer = row(outcome.result, ("project", "project_digest", "method", "mesh_check", "search", *values))
+    if mesh_check or design.mesh_check:
+        answer |= mesh_columns(outcome.result, partial(projects.check_project_mesh, design))
     return answer if outcome.design is None else answer | {"targets_met": outcome.design.met}

@@ -7,15 +7,19 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
+from .. import existence, solvers
+from ..base import validate
 from ..base.errors import OptionError, unknown
 from ..energy.functional import gradient
-from ..solvers import find_method, solve
+from ..solvers import find_method
 from ..solvers.result import Result
 from .case_script import resolve
 from .grid import checked
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from ..accuracy import MeshCheck
 
 Parts = tuple[Callable[..., Any], dict[str, Any], dict[str, Any]]
 
@@ -44,14 +48,27 @@ def _split(generator: str, method: str, arguments: Mapping[str, Any]) -> Parts:
     return build, shape, solver
 
 
-@checked(lambda generator, method="newton", **arguments: _split(generator, method, arguments))
-def solve_case(generator: str, method: str = "newton", **arguments: Any) -> dict[str, Any]:
+def _check(
+    generator: str, method: str = "newton", mesh_check: bool = False, search: bool = False, **arguments: Any
+) -> None:
+    validate.flag("mesh_check", mesh_check)
+    validate.flag("search", search)
+    _split(generator, method, arguments)
+
+
+@checked(_check)
+def solve_case(
+    generator: str, method: str = "newton", mesh_check: bool = False, search: bool = False, **arguments: Any
+) -> dict[str, Any]:
     """Build a surface with a generator, solve it, certify it; every number of the certificate.
 
     Parameters
     ----------
     generator : a function that returns a Surface: ``"generators:two_caps"``.
     method : as of ``pcmc.solve``.
+    mesh_check : whether to solve each surface at rest on two finer meshes, too (``pcmc.check_mesh``).
+    search : whether further starts are tried where the first leads to no equilibrium, as ``pcmc.solve``
+        does: slower where there is none, with the proof as ``message``.
     arguments : parameters of the generator and options of the method. A name that both have is the
         generator's.
 
@@ -61,7 +78,9 @@ def solve_case(generator: str, method: str = "newton", **arguments: Any) -> dict
         ``iterations_taken``, ``evaluations_made``, ``triangles``, ``gradient_squared`` (‖∇E‖², the
         paper's squared sum); the certificate's numbers; and each number of its tables as
         ``large.area``, ``junction 0.length``, ``boundary 0.reaction_z``. A number with the name of
-        one of the arguments is called ``name_reached``.
+        one of the arguments is called ``name_reached``. With ``mesh_check`` also ``mesh_verdict``,
+        ``mesh_detail``, and of the height, volume, energy, reaction and lowest eigenvalue
+        ``height_error``, ``height_limit``, ``height_limit_error``, ``height_order`` and so on.
 
     Raises
     ------
@@ -75,8 +94,14 @@ def solve_case(generator: str, method: str = "newton", **arguments: Any) -> dict
     ('converged', 58.5059, 17.583)
     """
     build, shape, solver = _split(generator, method, arguments)
+    solve = existence.solve if search else solvers.solve
     result = solve(build(**shape), method, **solver)
-    return row(result, arguments)
+    answer = row(result, arguments)
+    if mesh_check:
+        from ..accuracy import check_mesh  # needs pandas, which takes long to import
+
+        answer |= mesh_columns(result, check_mesh)
+    return answer
 
 
 def row(result: Result, names: Container[str]) -> dict[str, Any]:
@@ -98,6 +123,11 @@ def row(result: Result, names: Container[str]) -> dict[str, Any]:
         "message": result.message,
     }
     return words | {f"{n}_reached" if n in names else n: v for n, v in numbers.items()}
+
+
+def mesh_columns(result: Result, check: Callable[[Result], MeshCheck]) -> dict[str, Any]:
+    """What a mesh check adds to the answer of a case; nothing where the surface is not at rest."""
+    return {} if result.certificate.index is None else check(result).numbers()
 
 
 def _cells(frame: pd.DataFrame, names: Iterable[str]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import os
 import sqlite3
 import time
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,10 +24,12 @@ from typing import Any
 from warnings import warn
 
 from ..base.errors import FileError, FileWarning
-from .case_script import version
-from .grid import Sweep, cases
+from ..base.files import check_regular
+from .case_script import WORDS, answer, version
+from .grid import Sweep
 
 FORMAT = 2  # 1 was lines of JSON
+COLUMNS = ["parameters", "record", "crc"]  # of the table of cases
 SQLITE, LINES = b"SQLite format 3\0", b'{"pcmc sweep"'  # how files of the two formats begin
 READERS = 60.0  # seconds that a commit waits for programs that read the store
 FAILED = ("raised", "timed out", "killed")  # statuses that ``run`` gives; a case gives all others
@@ -121,7 +123,7 @@ def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
         database.execute("UPDATE sweep SET declaration = ?", (json.dumps(_declared(sweep)),))
         database.execute("COMMIT")
         database.execute("BEGIN IMMEDIATE")
-        yield Store(path, database, _records(path, database, sweep))
+        yield Store(path, database, _records(path, database, sweep.grid, sweep.fixed))
 
 
 def read_store(path: str | os.PathLike[str]) -> list[Record]:
@@ -147,7 +149,7 @@ def read_store(path: str | os.PathLike[str]) -> list[Record]:
     with _connected(path, "rw") as database:
         database.execute("BEGIN")
         declared = _declaration(path, database)
-        records = _records(path, database, cases(declared["grid"], declared["fixed"]))
+        records = _records(path, database, declared["grid"], declared["fixed"])
     return [records[number] for number in sorted(records)]
 
 
@@ -169,10 +171,8 @@ def _connected(path: Path, mode: str) -> Iterator[sqlite3.Connection]:
 
 def _check_file(path: Path) -> None:
     """Refuse a folder, a pipe, a device (some can be read without end), and a file of another kind."""
+    check_regular(path)
     try:
-        irregular = path.exists() and not path.is_file()
-        if irregular or "\0" in str(path):
-            raise FileError(f"{path}: is no regular file; name a file on a disk", what=str(path))
         with path.open("rb") as file:
             start = file.read(len(SQLITE))
     except FileNotFoundError:
@@ -227,7 +227,7 @@ def _declaration(path: Path, database: sqlite3.Connection) -> dict[str, Any]:
     if damage != "ok":
         raise FileError(f"{path}: is damaged ({damage}); name another file", what=str(path))
     (found,) = database.execute("PRAGMA user_version").fetchone()
-    written_by, text = database.execute("SELECT version, declaration FROM sweep").fetchone()
+    written_by, text = database.execute("SELECT version, declaration FROM sweep").fetchone() or ("", "")
     if found != FORMAT:
         raise FileError(
             f"{path}: written in store format {found}, this is format {FORMAT}; read it with pcmc"
@@ -236,7 +236,17 @@ def _declaration(path: Path, database: sqlite3.Connection) -> dict[str, Any]:
             found=found,
             expected=FORMAT,
         )
-    return {"version": written_by, **json.loads(text)}
+    columns = [row[1] for row in database.execute("PRAGMA table_info(cases)")]
+    try:
+        declared = {**json.loads(text), "version": written_by}
+        axes = declared["grid"].values()
+        sound = isinstance(declared["case"], str) and isinstance(declared["fixed"], dict)
+        if columns != COLUMNS or not sound or not all(isinstance(axis, list) for axis in axes):
+            raise ValueError
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        text = f"{path}: is damaged (it does not say which sweep it belongs to); name another file"
+        raise FileError(text, what=str(path), where="declaration") from None
+    return declared
 
 
 def _check_declaration(path: Path, stored: dict[str, Any], sweep: Sweep) -> None:
@@ -272,8 +282,8 @@ def _check_declaration(path: Path, stored: dict[str, Any], sweep: Sweep) -> None
         )
 
 
-def _key(parameters: Mapping[str, Any]) -> str:
-    return json.dumps(parameters, sort_keys=True)
+def _key(value: Any) -> str:
+    return json.dumps(value, sort_keys=True)
 
 
 def _row(record: Record) -> tuple[str, str, int]:
@@ -285,22 +295,63 @@ def _row(record: Record) -> tuple[str, str, int]:
     return key, text, zlib.crc32((key + text).encode())
 
 
-def _records(path: Path, database: sqlite3.Connection, sweep: Iterable[dict[str, Any]]) -> dict[int, Record]:
-    """The stored records of the sweep's cases by case number."""
-    rows = {key: rest for key, *rest in database.execute("SELECT * FROM cases")}
+def _records(
+    path: Path, database: sqlite3.Connection, grid: Mapping[str, Sequence[Any]], fixed: Mapping[str, Any]
+) -> dict[int, Record]:
+    """The stored records of the grid's cases by case number; a record that is not sound is left out."""
+    places = {name: {_key(value): place for place, value in enumerate(grid[name])} for name in grid}
+    rest = {name: _key(value) for name, value in fixed.items()}
     records = {}
-    for number, parameters in enumerate(sweep):
-        key = _key(parameters)
-        if key not in rows:
+    for key, text, crc in database.execute("SELECT parameters, record, crc FROM cases"):
+        place = _place(key, places, rest)
+        if place is None:
             continue
-        text, crc = rows[key]
-        if zlib.crc32((key + str(text)).encode()) == crc:
-            records[number] = Record(case=number, parameters=parameters, **json.loads(text))
-        else:
+        number = 0
+        for name, axis in grid.items():
+            number = number * len(axis) + place[name]
+        parameters = {name: grid[name][place[name]] for name in grid} | dict(fixed)
+        try:
+            if zlib.crc32((key + str(text)).encode()) != crc:
+                raise ValueError
+            records[number] = _record(number, parameters, json.loads(text))
+        except (ValueError, TypeError, RecursionError):
             warn(
                 f"{path}: the record of case {number} is damaged; the next sweep on this store runs the"
                 " case again",
                 FileWarning,
                 stacklevel=4,
             )
-    return records
+    return dict(sorted(records.items()))
+
+
+def _place(
+    key: Any, places: Mapping[str, Mapping[str, int]], fixed: Mapping[str, str]
+) -> dict[str, int] | None:
+    """Where on each axis the case with this key is; None if it is no case of the grid."""
+    try:
+        values = {name: _key(value) for name, value in json.loads(key).items()}
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        return None
+    if values.keys() != places.keys() | fixed.keys() or any(values[name] != fixed[name] for name in fixed):
+        return None
+    place = {name: axis.get(values[name], -1) for name, axis in places.items()}
+    return None if min(place.values(), default=0) < 0 else place
+
+
+def _record(number: int, parameters: dict[str, Any], fields: Mapping[str, Any]) -> Record:
+    """The record of a case; ValueError or TypeError for one that no case can have.
+
+    A table puts a record's parameters, words and numbers side by side, so a number with the name of one of
+    the others would take its place.
+    """
+    record = Record(case=number, parameters=parameters, **fields)
+    words = (record.status, record.verdict, record.message)
+    tables = (record.numbers, record.provenance)
+    if not all(isinstance(word, str) for word in words) or not all(isinstance(t, dict) for t in tables):
+        raise TypeError
+    if {*WORDS, "case"} & record.numbers.keys() or {"case", "wall_time"} & record.provenance.keys():
+        raise ValueError
+    if isinstance(record.wall_time, bool) or not isinstance(record.wall_time, int | float):
+        raise TypeError
+    answer(record.numbers, parameters)
+    return record

@@ -1,6 +1,6 @@
 // The page: it sends one request at a time to the server and shows the answers.
 
-import { arrowsOf, COLOURS, fieldOf, showFindings, showLegend, showVerdict } from "./findings.js";
+import { arrowsOf, COLOURS, fieldOf, showCheck, showFindings, showLegend, showVerdict } from "./findings.js";
 import { digits, Panel } from "./panel.js";
 import { Viewer } from "./viewer.js";
 import { ask, fetchFile } from "./server.js";
@@ -128,6 +128,8 @@ class Page {
     this.arrays = { ...arrays, underPressure: this.underPressure };
     showVerdict(find("#verdict"), header);
     showFindings(find("#findings tbody"), header.findings);
+    find("#check-result").hidden = true; // it was about the last surface
+    find("#check").disabled = !header.at_rest;
     if (!this.next) this.panel.show(header.asked, header.shown, values);
     find("#undo").disabled = !header.undo;
     find("#redo").disabled = !header.redo;
@@ -147,6 +149,22 @@ class Page {
     if (!this.viewer) return;
     this.viewer.setField(field);
     this.viewer.setArrows(this.choice === "reactions" ? arrowsOf(this.arrays, field, this.size) : null);
+  }
+
+  /** Check the surface shown on finer meshes; a newer surface leaves the answer behind. */
+  async check() {
+    const [button, { header: checked }] = [find("#check"), this];
+    const label = button.textContent;
+    button.disabled = true;
+    button.textContent = "Solving on finer meshes…";
+    try {
+      const { header } = await ask(`api/${this.name}/check`);
+      if (header.check && this.header === checked) showCheck(find("#check-result"), header.check);
+    } catch (error) {
+      this.notify(error.message);
+    }
+    button.textContent = label;
+    button.disabled = !this.header.at_rest;
   }
 
   /** Move slowly along the softest mode and back. */
@@ -226,6 +244,7 @@ class Page {
     for (const name of ["undo", "redo", "reset", "stabilise"]) {
       find(`#${name}`).addEventListener("click", () => this.act(name));
     }
+    find("#check").addEventListener("click", () => this.check());
     find("#back").addEventListener("click", () => this.act("undo"));
     find("#sway").addEventListener("click", () => {
       if (this.swaying) this.viewer.setVertices(this.arrays.vertices);

@@ -4,8 +4,8 @@ import { colourOf, diverging, sequential } from "./colours.js";
 import { digits } from "./panel.js";
 
 const SIGNS = {
-  stable: "✓", neutral: "≈", saddle: "⤢", not_converged: "…", no_equilibrium: "✕", degenerate: "△",
-  opening: "…",
+  stable: "✓", neutral: "≈", saddle: "⤢", not_converged: "…", no_equilibrium: "✕", ran_away: "↗",
+  undecided: "?", degenerate: "△", opening: "…",
 };
 
 export const COLOURS = {
@@ -69,6 +69,27 @@ export function showFindings(body, findings) {
     cell.textContent = text;
     row.append(head, cell);
     return row;
+  }));
+}
+
+/** The answer of the mesh check. */
+export function showCheck(root, check) {
+  root.hidden = false;
+  root.dataset.verdict = check.name;
+  root.querySelector(".word").textContent = capital(`${check.word}: ${check.sentence}`);
+  root.querySelector(".detail").textContent = capital(check.detail);
+  root.querySelector("tbody").replaceChildren(...check.rows.flatMap(({ name, value, limit, order }) => {
+    const [title, values] = [document.createElement("tr"), document.createElement("tr")];
+    values.title = order === null ? "No settled order" : `The error falls with order ${digits(order, 2)} of the edge length`;
+    const head = document.createElement("th");
+    Object.assign(head, { scope: "rowgroup", colSpan: 2, textContent: capital(name) });
+    title.append(head);
+    values.append(...[value, limit].map((text) => {
+      const cell = document.createElement("td");
+      cell.textContent = text;
+      return cell;
+    }));
+    return [title, values];
   }));
 }
 

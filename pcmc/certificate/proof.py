@@ -1,0 +1,113 @@
+"""Proofs that a surface has no equilibrium: what was found, with its numbers. ``str`` gives the sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Overload:
+    """Vertical balance of the whole: the load exceeds what tension at the boundary can carry.
+
+    Attributes
+    ----------
+    ratio : load over capacity, above 1; see ``pcmc.certificate.balance.load_ratio``.
+
+    >>> print(Overload(1.2))
+    the pressure is 1.20 times what the boundary's tension could carry
+    """
+
+    ratio: float
+
+    def __str__(self) -> str:
+        digits = ".3f" if self.ratio < 1.1 else ".2f" if self.ratio < 1e4 else ".3g"
+        return f"the pressure is {self.ratio:{digits}} times what the boundary's tension could carry"
+
+
+@dataclass(frozen=True)
+class UnbalancedJunction:
+    """Tensions at a junction that cannot balance at any angles, Eq. (7).
+
+    Attributes
+    ----------
+    junction : names of the patches that meet there.
+    strongest, others : the largest tension, and those of the other patches, force/length.
+
+    >>> print(UnbalancedJunction(("left", "right", "wall"), 5.0, (1.0, 3.0)))
+    the tensions at the junction left | right | wall cannot balance: 5 > 1 + 3
+    """
+
+    junction: tuple[str, ...]
+    strongest: float
+    others: tuple[float, ...]
+
+    def __str__(self) -> str:
+        others = " + ".join(f"{tension:g}" for tension in self.others)
+        names = " | ".join(self.junction)
+        return f"the tensions at the junction {names} cannot balance: {self.strongest:g} > {others}"
+
+
+@dataclass(frozen=True)
+class Fold:
+    """A fold on the way from an equilibrium: a branch of equilibria that turns back before it arrives.
+
+    Attributes
+    ----------
+    parameter : what grows along the branch: ``"pressure"``, all pressures in proportion, or
+        ``"distance"``, that of the held curves from each other.
+    value : the parameter at the fold; 1 is what the surface asks for.
+    start : the parameter where the branch starts.
+
+    >>> print(Fold("pressure", 0.8, 0.4))  # doctest: +ELLIPSIS
+    the equilibria end at a fold at 0.800 of the pressure (followed from 0.4 of it): lower all ...
+    >>> print(Fold("distance", 0.95, 0.5))  # doctest: +ELLIPSIS
+    the film ends at a fold at 0.950 of the distance between the held curves (followed from 0.5 ...
+    """
+
+    parameter: str
+    value: float
+    start: float
+
+    def __str__(self) -> str:
+        value, start = _three(self.value), f"{self.start:.3g}"
+        if self.parameter == "distance":
+            return (
+                f"the film ends at a fold at {value} of the distance between the held curves (followed from"
+                f" {start} of it): bring them nearer to each other"
+            )
+        return (
+            f"the equilibria end at a fold at {value} of the pressure (followed from {start} of it): lower"
+            f" all pressures below {value} of theirs, or raise all tensions above {_three(1.0 / self.value)}"
+            " times theirs"
+        )
+
+
+@dataclass(frozen=True)
+class Unheld:
+    """A part that no vertex fixes has no stable equilibrium, and none at all without pressure.
+
+    Its homotheties about Π's point are free, so that E(s) = s² T - s³ P with T = Σ α A and P = Σ p V.
+    At rest 2 T = 3 P, and there E'' = -2 T < 0.
+
+    Attributes
+    ----------
+    vertex : one of its vertices.
+    pressed : whether any of its patches is under pressure.
+    """
+
+    vertex: int
+    pressed: bool
+
+    def __str__(self) -> str:
+        part = f"nothing fixes the part of the surface around vertex {self.vertex}"
+        if self.pressed:
+            return f"{part}: from every equilibrium it grows or shrinks to nothing, so that none is stable"
+        return f"{part}, which has no pressure: it shrinks to nothing"
+
+
+Proof = Overload | UnbalancedJunction | Fold | Unheld
+
+
+def _three(value: float) -> str:
+    """Three digits behind the point, or three in all for small and large numbers."""
+    return f"{value:.3f}" if 1e-2 <= value < 1e4 else f"{value:.3g}"

@@ -1,0 +1,76 @@
+"""Whether there is an equilibrium: further starts if the first leads to none, and the proof that none exists.
+
+Gives ``solve``, the package's own, and the parts of its search. May import ``continuation`` and below.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from .. import solvers
+
+if TYPE_CHECKING:
+    from ..solvers.result import Callback, Result
+    from ..surface import Surface
+
+__all__ = ["solve"]
+
+
+def solve(
+    surface: Surface, method: str = "newton", callback: Callback | None = None, **options: Any
+) -> Result:
+    """Find an equilibrium, first from the given surface; if that leads to none, from further starts.
+
+    With ``method="newton"``, a surface that inflates, pinches off, collapses or does not converge is
+    solved again: from a low start; by raising the pressure along the branch of equilibria; and, for a film
+    between several held curves, by moving these apart. Where such a branch folds before it arrives,
+    the fold is the proof that it holds no equilibrium, and its value is part of the result.
+
+    Parameters
+    ----------
+    surface : the surface to start from; it is not changed.
+    method : ``"newton"``, the geometric solver; ``"nesterov"``, the paper's flow; ``"lbfgs"``,
+        NLopt's L-BFGS. Only the first tries further starts.
+    callback : called with a Progress after each iteration (each evaluation for ``"lbfgs"``). Raise
+        StopIteration in it to stop; any other exception passes through.
+    options : fields of the method's options class: ``NewtonOptions``, ``NesterovOptions``, ``LbfgsOptions``.
+
+    Returns
+    -------
+    Result
+        Not converging is a status there, never an exception. Its ``proofs`` say why there is no
+        equilibrium, if that was proved. Ctrl-C stops as StopIteration does.
+
+    Raises
+    ------
+    OptionError
+        For an unknown method or option, with the nearest known one, or a value out of range.
+    SurfaceError
+        If ``surface`` is no Surface, or all of its vertices are at one point.
+
+    See Also
+    --------
+    pcmc.solvers.solve : the same from the given start alone.
+
+    Examples
+    --------
+    A pyramid of tension α over a square, E = 4 α √(1 + h²) - 4h/3, has an equilibrium for α > 1/3.
+
+    >>> from pcmc import Patch, Surface
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
+    >>> pyramid = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                   [Patch("roof", 1.0)], fixed=range(4))
+    >>> solve(pyramid).surface.vertices[4].round(6).tolist()
+    [0.0, 0.0, 0.353553]
+    >>> result = solve(pyramid.retensioned({"roof": 0.2}))
+    >>> result.status.name, result.certificate.verdict.name
+    ('NO_EQUILIBRIUM', 'NO_EQUILIBRIUM')
+    >>> print(result.proofs[0])
+    the pressure is 2.50 times what the boundary's tension could carry
+    """
+    first = solvers.solve(surface, method, callback, **options)
+    if method != "newton" or first.converged:
+        return first
+    from .search import search
+
+    return search(surface, first, callback, options)

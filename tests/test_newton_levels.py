@@ -1,0 +1,80 @@
+"""The geometric solver from coarse to fine: each level as if solved by itself, with memory of its own."""
+
+import gc
+import weakref
+
+import numpy as np
+import pytest
+
+from generators import spherical_cap, two_squares
+from pcmc.certificate import certificate
+from pcmc.meshing.refinement import refine
+from pcmc.solvers import solve, steps
+from pcmc.stability import modes
+from pcmc.stability.factorisation import available
+
+pytestmark = pytest.mark.parametrize("backend", available())
+
+
+@pytest.mark.parametrize("target", ["minimum", "stationary"])
+def test_levels_are_the_solutions_one_after_the_other(backend, target):
+    start = two_squares(4, alpha_aux=1.0)
+    options = {"target": target, "backend": backend}
+    by_hand = solve(start, **options)
+    steps_by_hand = by_hand.iterations
+    for _ in range(2):
+        by_hand = solve(refine(by_hand.surface), **options)
+        steps_by_hand += by_hand.iterations + 1  # each level begins with a row of its own
+    at_once = solve(start, levels=2, **options)
+    np.testing.assert_array_equal(at_once.surface.vertices, by_hand.surface.vertices)
+    np.testing.assert_array_equal(at_once.surface.faces, by_hand.surface.faces)
+    assert at_once.iterations == steps_by_hand
+    assert at_once.energy == by_hand.energy
+
+
+def test_from_coarse_to_fine_takes_fewer_steps_on_the_finest_mesh(backend):
+    coarse = two_squares(4, alpha_aux=1.0)
+    rows = solve(coarse, levels=2, target="stationary", backend=backend).history
+    alone = solve(refine(coarse, 2), target="stationary", backend=backend)
+    assert (rows["level"] == 2).sum() - 1 < alone.iterations
+    assert rows["energy"].iloc[-1] == pytest.approx(alone.energy, rel=1e-3)  # vertices lie elsewhere along it
+
+
+@pytest.fixture
+def factorisers(monkeypatch):
+    """Those alive, counted whenever another is made."""
+    made, alive = [], []
+
+    def counted(module):
+        make = module.factoriser
+
+        def factoriser(*arguments):
+            gc.collect()
+            alive.append(sum(each() is not None for each in made))
+            new = make(*arguments)
+            made.append(weakref.ref(new))
+            return new
+
+        monkeypatch.setattr(module, "factoriser", factoriser)
+
+    counted(steps)
+    counted(modes)
+    yield alive
+    gc.collect()
+    assert not any(each() is not None for each in made)
+
+
+def test_one_factor_at_a_time(backend, factorisers):
+    """Also where a junction comes down to Π and is lifted: the next faces begin without the last ones."""
+    result = solve(two_squares(8, alpha_aux=2.0), target="stationary", levels=1, backend=backend)
+    assert result.converged
+    assert result.history["resting"].any()
+    assert len(factorisers) > 2
+    assert set(factorisers) == {0}
+
+
+def test_a_certificate_keeps_no_factor(backend, factorisers):
+    result = solve(spherical_cap(0.3), backend=backend)
+    del factorisers[:]
+    assert certificate.certify(result.surface).certified
+    assert factorisers == [0]

@@ -1,0 +1,260 @@
+"""The search for an equilibrium beyond the first start, and the proofs that there is none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapes import pyramid, tube
+from starts import sphere, spherical_cap, two_squares
+
+from generators import spherical_cap_exact
+from pcmc import Patch, Verdict, certify, solve, write
+from pcmc.certificate.neck import narrowest_neck
+from pcmc.certificate.proof import Fold, Overload, UnbalancedJunction, Unheld
+from pcmc.existence.starts import low_start
+from pcmc.io import native
+from pcmc.solvers import solve as one_start
+from pcmc.solvers.result import Status
+from pcmc.sweep import solve_case
+
+pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
+
+HEIGHTS = (0.001, 0.05, 0.3, 1.0, 2.5, 5.0, 8.0)
+WIDEST = 0.6627434193491816  # half the distance of unit rings at which catenoids end
+
+
+def paraboloid(height, alpha, edge=0.25):
+    """A disc of radius 1 raised to this height in the middle."""
+    cap = spherical_cap(edge, alpha=alpha)
+    X = cap.vertices * [1.0, 1.0, 0.0]
+    X[:, 2] = height * (1.0 - (X**2).sum(axis=1)) * cap.free
+    return cap.moved(X)
+
+
+def film(half, around=16, pressure=0.0, radius=1.0):
+    """A film between two rings, started as a cylinder."""
+    rows = 2 * max(1, round(half * around / (np.sqrt(3.0) * np.pi)))
+    return tube(
+        rows, around, lambda t: (radius + 0.0 * t, half * (2.0 * t - 1.0)), Patch("film", 1.0, pressure)
+    )
+
+
+@pytest.mark.parametrize("alpha", [0.51, 0.6, 0.8, 1.0, 3.0])
+def test_every_cap_above_the_fold_is_found_from_any_height(alpha):
+    for height in HEIGHTS:
+        result = solve(paraboloid(height, alpha))
+        assert result.converged, height
+        assert result.certificate.verdict is Verdict.STABLE
+        top = result.surface.vertices[:, 2].max()
+        # near the fold the height goes as the square root of what is left
+        assert top == pytest.approx(
+            spherical_cap_exact(alpha=alpha).height, abs=0.13 if alpha < 0.55 else 0.02
+        )
+
+
+@pytest.mark.parametrize("alpha", [0.3, 0.45])
+def test_every_cap_below_the_fold_ends_with_it_as_proof(alpha):
+    for height in HEIGHTS[::2]:
+        result = solve(paraboloid(height, alpha))
+        assert result.status is Status.NO_EQUILIBRIUM
+        overload, fold = result.proofs
+        assert overload == Overload(pytest.approx(0.5 / alpha, rel=0.02))
+        assert fold.parameter == "pressure"
+        assert fold.value == pytest.approx(2.0 * alpha, rel=0.03)
+        found = result.certificate
+        assert found.verdict is Verdict.NO_EQUILIBRIUM
+        assert found.proofs[1] is fold
+        for text in (result.message, found.detail, str(found)):
+            assert f"a fold at {fold.value:.3f} of the pressure" in text
+
+
+def test_the_fold_tends_to_the_hemisphere_with_the_mesh():
+    errors = [solve(paraboloid(0.3, 0.45, edge)).proofs[1].value - 0.9 for edge in (0.25, 0.125)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
+
+
+def test_where_the_first_start_converges_nothing_else_is_tried():
+    one, all_starts = one_start(paraboloid(0.3, 0.6)), solve(paraboloid(0.3, 0.6))
+    assert one.evaluations == all_starts.evaluations
+    assert one.rows == all_starts.rows
+    np.testing.assert_array_equal(one.surface.vertices, all_starts.surface.vertices)
+
+
+def test_the_note_tells_which_start_led_there():
+    result = solve(paraboloid(5.0, 0.6))
+    assert "found from a lower start, as the given start led to none (diverged)" in result.message
+    history = result.history
+    assert history["iteration"].is_monotonic_increasing
+    assert result.energy == history["energy"].iloc[-1]
+    assert result.iterations == history["iteration"].iloc[-1]
+    assert result.evaluations > one_start(paraboloid(5.0, 0.6)).evaluations
+
+
+def test_an_inflated_mesh_is_spread_anew():
+    """Its plan is no plan any more: triangles lie on each other."""
+    inflated = one_start(paraboloid(5.0, 0.6))
+    assert inflated.status is Status.DIVERGED
+    again = inflated.surface.retensioned({"cap": 0.7})
+    assert solve(again).certificate.verdict is Verdict.STABLE
+    low = low_start(again)
+    assert low.vertices[:, 2].max() == pytest.approx(0.1 * np.sqrt(8.0), rel=1e-6)
+
+
+def test_the_flow_of_the_paper_is_not_rescued():
+    for method in ("nesterov", "lbfgs"):
+        result = solve(paraboloid(5.0, 0.6), method)
+        assert not result.converged
+        assert result.proofs == ()
+
+
+@pytest.mark.parametrize(("half", "target"), [(0.7, "minimum"), (0.7, "stationary"), (1.0, "minimum")])
+def test_a_neck_between_rings_too_far_apart(half, target):
+    result = solve(film(half), target=target)
+    assert result.status is Status.NO_EQUILIBRIUM
+    (fold,) = result.proofs
+    assert isinstance(fold, Fold)
+    assert fold.parameter == "distance"
+    assert fold.value * half == pytest.approx(WIDEST, rel=0.02)
+    found = result.certificate
+    assert found.verdict is Verdict.NO_EQUILIBRIUM
+    assert "the film ends at a fold at" in found.detail
+    assert "remesh" not in result.message
+    if target == "minimum":
+        assert "a neck pinches off near [0.0, 0.0, " in found.detail
+
+
+def test_half_a_film_with_its_neck_free_on_the_plane():
+    def half_film(height):
+        bottom, top = range(20), range(6 * 20, 7 * 20)
+        patch = Patch("film", 1.0, 0.0)
+        return tube(6, 20, lambda t: (1.0 + 0.0 * t, height * t), patch, on_plane=bottom, fixed=top)
+
+    assert solve(half_film(0.6)).certificate.verdict is Verdict.STABLE
+    (fold,) = solve(half_film(0.75)).proofs
+    assert 0.75 * fold.value == pytest.approx(WIDEST, rel=0.02)
+
+
+def test_a_neck_that_pinches_off_without_proof_is_called_that():
+    pinched = one_start(film(0.8))
+    assert pinched.status is Status.DEGENERATE
+    found = pinched.certificate
+    assert found.verdict is Verdict.RAN_AWAY
+    assert found.detail.startswith("a neck pinches off near")
+    assert found.proofs == ()
+    alone = replace(pinched, status=Status.PINCHED).certificate
+    assert alone.verdict is Verdict.RAN_AWAY
+
+
+def test_the_neck_is_the_shortest_cut():
+    c = 0.3
+    profile = lambda t: (c * np.cosh((t - 0.5) / c), t - 0.5)  # noqa: E731
+    surface = tube(16, 24, profile, Patch("film", 1.0, 0.0))
+    neck = narrowest_neck(surface)
+    assert neck.girth == pytest.approx(2 * 24 * c * np.sin(np.pi / 24), rel=1e-9)
+    assert neck.place == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+    assert narrowest_neck(spherical_cap(0.25)) is None
+
+
+def test_a_film_under_pressure_stands_farther_apart():
+    """At p = α / R the cylinder is at rest up to the length 2 π R."""
+    assert solve(film(1.0, pressure=1.0)).certificate.verdict is Verdict.STABLE
+
+
+def test_tensions_that_cannot_balance_are_the_proof():
+    surface = two_squares(4, alpha_aux=1.0).retensioned({"left": 4.0, "right": 2.0})
+    result = solve(surface)
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert result.proofs == (UnbalancedJunction(("left", "right", "wall"), 4.0, (1.0, 2.0)),)
+    assert result.certificate.verdict is Verdict.NO_EQUILIBRIUM
+    assert certify(surface).proofs == result.proofs
+
+
+def test_a_bubble_has_no_stable_equilibrium_and_one_that_is_not():
+    result = solve(sphere(0.8))
+    assert result.proofs == (Unheld(0, True),)
+    assert result.certificate.verdict is Verdict.NO_EQUILIBRIUM
+    assert "none is stable" in result.certificate.detail
+    assert solve(sphere(0.8), target="stationary").converged
+    limp = sphere(0.8).retensioned(None, {patch.name: 0.0 for patch in sphere(0.8).patches})
+    for target in ("minimum", "stationary"):
+        (proof,) = solve(limp, target=target).proofs
+        assert proof == Unheld(0, False)
+    assert certify(limp).verdict is Verdict.NO_EQUILIBRIUM
+
+
+@pytest.mark.slow
+def test_a_way_that_crawls_ends_at_the_saddle_and_names_the_ends_that_slip():
+    surface = two_squares(64, alpha_aux=1.0)
+    saddle = solve(surface, target="stationary")
+    result = solve(surface)
+    assert result.status is Status.SADDLE
+    assert result.iterations < 3 * saddle.iterations
+    assert result.energy == pytest.approx(saddle.energy, rel=1e-12)
+    found = result.certificate
+    assert found.verdict is Verdict.SADDLE
+    for text in (result.message, found.detail):
+        assert "index 1: 1 way down; the mode moves the junction left | right | wall most" in text
+        assert "[0.0, -2.0, 0.0]" in text
+        assert "[0.0, 2.0, 0.0]" in text
+        assert "slip: one edge away the junction moves 0.54 as far" in text
+
+
+def test_stopped_in_the_search_the_first_result_is_the_best():
+    first = one_start(paraboloid(5.0, 0.3))
+    seen = []
+
+    def callback(progress):
+        seen.append(progress.row)
+        if len(seen) > first.iterations + 6:
+            raise StopIteration
+
+    result = solve(paraboloid(5.0, 0.3), callback=callback)
+    assert result.status is Status.STOPPED
+    assert [row["iteration"] for row in seen] == list(range(len(seen)))
+    np.testing.assert_array_equal(result.surface.vertices, first.surface.vertices)
+
+
+def test_stopped_on_the_branch_and_errors_pass_through():
+    def stop(kind):
+        def callback(progress):
+            if progress.row["step"] == "branch":
+                raise kind("on the branch")
+
+        return callback
+
+    surface = paraboloid(5.0, 0.45)
+    assert solve(surface, callback=stop(StopIteration)).status is Status.STOPPED
+    assert solve(surface, callback=stop(KeyboardInterrupt)).status is Status.STOPPED
+    with pytest.raises(ZeroDivisionError, match="on the branch"):
+        solve(surface, callback=stop(ZeroDivisionError))
+    with pytest.raises(ValueError, match="on the branch"):
+        solve(surface, callback=stop(ValueError))
+
+
+def test_refinement_goes_on_from_a_further_start():
+    result = solve(paraboloid(5.0, 0.6), levels=1)
+    assert result.certificate.verdict is Verdict.STABLE
+    assert result.surface.m == 4 * paraboloid(5.0, 0.6).m
+    assert result.history["level"].iloc[-1] == 1
+
+
+def test_a_surface_at_rest_needs_no_proof():
+    """One free vertex is at rest down to α = 1/3, where no smooth roof would be."""
+    result = solve(pyramid(0.4))
+    assert result.proofs == ()
+    assert result.certificate.verdict is Verdict.STABLE
+
+
+def test_a_file_keeps_the_proof(tmp_path):
+    result = solve(paraboloid(1.0, 0.45))
+    write(tmp_path / "cap.pcmc", result.surface, certificate=result.certificate)
+    overload, fold = native.read(tmp_path / "cap.pcmc").certificate["proofs"]
+    assert overload == {"kind": "Overload", "ratio": pytest.approx(result.proofs[0].ratio)}
+    assert fold["kind"] == "Fold"
+    assert fold["value"] == result.proofs[1].value
+
+
+def test_sweeps_search_only_if_asked():
+    case = {"generator": "generators:spherical_cap", "edge_length": 0.25, "alpha": 0.6, "height": 2.5}
+    assert solve_case(**case, inflation=2.0)["verdict"] == "ran away"
+    assert solve_case(**case, inflation=2.0, search=True)["verdict"] == "stable"

@@ -1,0 +1,332 @@
+"""Refinement where it pays: size fields, where errors come from, and how a search for an accuracy ends."""
+
+import sys
+
+import numpy as np
+import pytest
+from refusals import refused
+from scipy.spatial import cKDTree
+
+import generators
+import pcmc
+from pcmc import Patch, Surface, cli, solve, solve_to_accuracy
+from pcmc.accuracy import adaptive, check_mesh
+from pcmc.accuracy.adaptive import AccuracyStatus, size_field
+from pcmc.accuracy.estimator import _held_vertices, _slope, error_shares
+from pcmc.accuracy.goals import goals_in
+from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
+from pcmc.certificate.balance import held_lengths, reactions
+from pcmc.energy.functional import energy
+from pcmc.meshing.curve_projection import onto_held_curves
+from pcmc.meshing.quality import edge_lengths, minimum_angle
+from pcmc.meshing.refinement import refine
+from pcmc.meshing.remeshing import remesh
+from pcmc.meshing.sizes import limit_growth
+from pcmc.plan import Divider, Plan
+from pcmc.surface.geometry import angles, face_areas
+from studies.orders import slope
+
+
+def l_roof(edge_length: float = 1.5) -> Surface:
+    """Two roofs over an L, their wall from the re-entrant corner straight to the other side."""
+    outline = [[0, 0], [8, 0], [8, 4], [4, 4], [4, 8], [0, 8]]
+    wall = Divider([[4, 4], [4, 0]], wall=1.0, bottom="held")
+    return Plan(outline, dividers=[wall], tension=4.0, edge_length=edge_length).surface()
+
+
+@pytest.fixture(scope="module")
+def roof() -> Surface:
+    return solve(l_roof()).surface
+
+
+@pytest.fixture(scope="module")
+def fine_roof(roof) -> Surface:
+    return solve(refine(roof)).surface
+
+
+def test_sizes_grow_no_faster_than_asked_and_stay_where_they_may():
+    surface = generators.two_squares(6)
+    X, edges = surface.vertices, surface.topology.edges
+    wanted = np.random.default_rng(1).uniform(0.01, 2.0, surface.n)
+    size = limit_growth(X, edges, wanted, 1.3)
+    rise = np.abs(np.diff(size[edges], axis=1))[:, 0]
+    assert (rise <= 0.3 * edge_lengths(surface) * (1 + 1e-12)).all()
+    assert (size <= wanted).all()
+    assert size.min() == wanted.min()
+    np.testing.assert_allclose(limit_growth(X, edges, size, 1.3), size)
+
+
+def test_remeshed_edges_follow_the_size_field(roof):
+    corner = np.array([4.0, 4.0, 0.0])
+    wanted = 0.1 + 0.3 * np.linalg.norm(roof.vertices - corner, axis=1)
+    graded = remesh(roof, wanted, growth=1.4)
+    middle = graded.vertices[graded.topology.edges].mean(axis=1)
+    ratio = edge_lengths(graded) / (0.1 + 0.3 * np.linalg.norm(middle - corner, axis=1))
+    assert 0.7 < np.median(ratio) < 1.4
+    assert np.quantile(ratio, 0.99) < 2.5
+    assert edge_lengths(graded).min() < 0.15
+    sheets = graded.faces[~graded.walls[graded.patch_of_face]]
+    assert angles(graded.vertices[sheets]).min() > 15.0
+    assert graded.m < 0.2 * remesh(roof, 0.1).m
+    gap = cKDTree(graded.vertices).query(roof.vertices[roof.topology.on_boundary])[0]
+    assert gap.max() == 0.0
+
+
+def test_new_boundary_vertices_lie_on_the_curve_that_is_given():
+    cap = generators.spherical_cap(0.5)
+    sizes = np.where(cap.vertices[:, 0] > 0.0, 0.1, 0.4)
+    fine = remesh(cap, sizes, growth=1.5, project=onto_held_curves(cap))
+    radius = np.linalg.norm(fine.vertices[fine.fixed], axis=1)
+    np.testing.assert_allclose(radius, 1.0, atol=1e-5)
+    assert fine.fixed.sum() > 1.5 * cap.fixed.sum()
+    flat = remesh(cap, sizes, growth=1.5)
+    assert np.linalg.norm(flat.vertices[flat.fixed], axis=1).min() < 0.999
+
+
+def test_large_triangles_from_curve_to_curve_are_split():
+    hall = solve(generators.bezier_hall(14.0)).surface
+    assert minimum_angle(remesh(hall, 5.0)) > 15.0
+
+
+@pytest.mark.parametrize("wrong", [[1.0, 2.0], ["fine"], np.full(5, 0.5)])
+def test_sizes_of_the_wrong_shape_are_refused(roof, wrong):
+    with refused(OptionError, what="edge_length", expected=(roof.n,)):
+        remesh(roof, wrong)
+
+
+def test_a_size_that_is_not_positive_is_refused(roof):
+    sizes = np.full(roof.n, 0.5)
+    sizes[7] = np.nan
+    with refused(OptionError, what="edge_length", where=7):
+        remesh(roof, sizes)
+
+
+@pytest.mark.parametrize("quantity", ["reaction", "thrust", "reaction per length"])
+def test_slopes_of_reactions_are_derivatives(roof, quantity):
+    motion = np.random.default_rng(2).normal(size=roof.vertices.shape) * 1e-6
+    of = roof.patches[0].name
+    held, lengths = _held_vertices(roof, of), held_lengths(roof)
+    top = held[(np.linalg.norm(reactions(roof)[held], axis=1) / lengths[held]).argmax()]
+    motion[held] = 0.0  # so that the lengths of held edges stay
+
+    def value(surface: Surface) -> float:
+        forces = reactions(surface)
+        if quantity == "reaction":
+            return float(forces[held, 2].sum())
+        if quantity == "thrust":
+            return float(np.linalg.norm(forces[held].sum(axis=0)[:2]))
+        return float(np.linalg.norm(forces[top]) / lengths[top])
+
+    ahead, back = (value(roof.moved(roof.vertices + s * motion)) for s in (1.0, -1.0))
+    predicted = float((_slope(roof, quantity, of) * motion).sum())
+    assert 0.5 * (ahead - back) == pytest.approx(predicted, rel=1e-4)
+
+
+@pytest.mark.parametrize("quantity", ["energy", "volume", "area", "height", "reaction"])
+def test_the_shares_add_up_to_the_error_and_not_to_much_more(roof, fine_roof, quantity):
+    of = {"area": "wall", "height": roof.patches[0].name}.get(quantity, "")
+    names = [patch.name for patch in roof.patches]
+    of = next((n for n in names if n.startswith(of)), of) if of else of
+    check = check_mesh(roof, 2)
+    coarse, fine = check.surfaces
+    assert quantity != "energy" or energy(fine) == pytest.approx(energy(fine_roof))
+    values = [_value(s, quantity, of) for s in check.surfaces]
+    total = float(error_shares(coarse, fine, {(quantity, of): 1.0}).sum())
+    assert abs(values[1] - values[0]) < 3.0 * total
+    if quantity in ("energy", "volume"):
+        assert total < 3.0 * abs(values[1] - values[0])
+
+
+def _value(surface: Surface, quantity: str, of: str) -> float:
+    return float(check_mesh(surface, 2).row(quantity, of).value)
+
+
+def test_shares_are_largest_at_the_re_entrant_corner_and_scale_with_the_accuracy(roof, fine_roof):
+    wall = roof.patches[-1].name
+    one = error_shares(roof, fine_roof, {("reaction", wall): 1.0})
+    two = error_shares(roof, fine_roof, {("reaction", wall): 0.5})
+    np.testing.assert_allclose(two, 2.0 * one)
+    middle = roof.vertices[roof.faces[one.argmax()]].mean(axis=0)
+    assert np.linalg.norm(middle[:2] - 4.0) < 1.5
+
+
+def test_the_lowest_eigenvalue_has_shares(roof, fine_roof):
+    shares = error_shares(roof, fine_roof, {("lowest eigenvalue", ""): 1.0})
+    assert (shares >= 0.0).all()
+    assert shares.max() > 0.0
+
+
+def test_equal_shares_lead_to_equal_edges_and_the_number_asked_for():
+    cap = generators.spherical_cap(0.5)
+    size = size_field(cap, face_areas(cap.vertices[cap.faces]) ** 2, 400)
+    assert size.max() < 1.05 * size.min()
+    assert 320 < remesh(cap, size).m < 500
+    assert size_field(cap, np.zeros(cap.m), 400).min() > 0.0
+
+
+@pytest.mark.slow
+def test_order_two_is_regained_at_a_re_entrant_corner():
+    start = solve(l_roof(2.0)).surface
+    wall = start.patches[-1].name
+    found = solve_to_accuracy(start, {f"area of {wall}": 1e-12}, most_triangles=3000)
+    limit = found.values.limit[0]
+    uniform, surface = [], start
+    for _ in range(4):
+        surface = solve(surface).surface
+        area = float(pcmc.certify(surface).patches.set_index("patch").area[wall])
+        uniform.append((surface.m, abs(area - limit)))
+        surface = refine(surface)
+    graded = found.history[["triangles", "value"]].to_numpy()
+    graded[:, 1] = np.abs(graded[:, 1] - limit)
+    orders = [slope(m**-0.5, e).order for m, e in (np.array(uniform).T, graded.T)]
+    assert orders[0] < 1.5
+    assert orders[1] > 1.9
+    assert graded[-1, 1] < 0.25 * np.interp(graded[-1, 0], *np.array(uniform).T)
+
+
+def test_a_patch_alone_and_several_quantities():
+    name = l_roof().patches[0].name
+    found = solve_to_accuracy(l_roof(), {f"height of {name}": 0.05, "volume": 8.0}, accuracy_of="limit")
+    assert found.reached
+    assert found.values["quantity"].tolist() == ["height", "volume"]
+    assert (found.values["limit_error"] <= found.values["accuracy"]).all()
+    assert found.surface is found.check.surfaces[0]
+    assert found.history["round"].max() == len(found.surfaces)
+    assert f"height of {name}" in found.message
+
+
+def test_an_end_of_a_junction_that_the_mesh_holds_has_no_limit():
+    found = solve_to_accuracy(generators.two_caps(1.6), "height=1e-2", most_triangles=4000)
+    assert found.status is AccuracyStatus.NO_LIMIT
+    assert "held" in found.detail
+    assert len(found.surfaces) == adaptive.PATIENCE
+
+
+def test_the_limit_of_triangles():
+    found = solve_to_accuracy(l_roof(), "height=1e-7", most_triangles=300)
+    assert found.status is AccuracyStatus.TRIANGLES
+    assert "most_triangles" in found.detail
+    assert found.surface.m < 450
+
+
+def test_no_equilibrium_and_too_many_rounds(monkeypatch):
+    weak = l_roof().retensioned({patch.name: 0.5 for patch in l_roof().patches})
+    found = solve_to_accuracy(weak, "height=0.1")
+    assert found.status is AccuracyStatus.NOT_AT_REST
+    assert found.check is None
+    assert not len(found.history)
+    monkeypatch.setattr(adaptive, "ROUNDS", 1)
+    assert solve_to_accuracy(l_roof(), "height=1e-4").status is AccuracyStatus.ROUNDS
+
+
+def test_stopped_on_request():
+    rows = []
+
+    def stop(row):
+        rows.append(row)
+        raise StopIteration
+
+    found = solve_to_accuracy(l_roof(), "height=1e-4", callback=stop)
+    assert found.status is AccuracyStatus.STOPPED
+    assert len(found.surfaces) == len(rows) == 1
+    assert rows[0]["excess"] > 1.0
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "what"),
+    [
+        ({"hight": 1e-3}, "quantity"),
+        ("height", "accuracy"),
+        ("height=small", "accuracy"),
+        ("=1", "accuracy"),
+        ({}, "accuracy"),
+        (1e-3, "accuracy"),
+        ({"height": 0.0}, "accuracy"),
+        ("volume=-1", "accuracy"),
+        ({"height": np.nan}, "accuracy"),
+        ({"height": True}, "accuracy"),
+    ],
+)
+def test_a_wrong_accuracy_is_refused(accuracy, what):
+    with refused(OptionError, what=what):
+        solve_to_accuracy(l_roof(), accuracy)
+
+
+def test_other_wrong_arguments_are_refused():
+    with refused(SurfaceError, what="surface"):
+        solve_to_accuracy(None, "height=1")
+    with refused(OptionError, what="accuracy_of", found="mash"):
+        solve_to_accuracy(l_roof(), "height=1", accuracy_of="mash")
+    with refused(OptionError, what="boundary", found="round"):
+        solve_to_accuracy(l_roof(), "height=1", boundary="round")
+    with refused(OptionError, what="most_triangles", found=0):
+        solve_to_accuracy(l_roof(), "height=1", most_triangles=0)
+    with refused(OptionError, what="patch", found="nort"):
+        solve_to_accuracy(l_roof(), "height of nort=1")
+
+
+def test_a_quantity_that_the_surface_lacks(roof):
+    with refused(OptionError, what="accuracy", found="height of wall 1"):
+        goals_in(check_mesh(roof, 2).table, {"height of wall 1": 1.0})
+
+
+def test_without_mmgpy_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mmgpy", None)
+    with pytest.raises(MissingExtra, match=r"pcmc-surfaces\[remesh\]"):
+        solve_to_accuracy(l_roof(), "height=0.1")
+
+
+PROJECT = """
+[plan]
+outline = [[0, 0], [4, 0], [4, 3], [0, 3]]
+edge_length = 1.0
+patches = {roof = {tension = 4.0}}
+[solve]
+accuracy = {height = 0.02}
+[output]
+files = ["roof.pcmc"]
+"""
+
+
+def test_a_project_asks_for_an_accuracy(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "roof.toml").write_text(PROJECT, encoding="utf-8")
+    assert cli.main(["solve", "roof.toml"]) == 0
+    out = capsys.readouterr().out
+    assert "accuracy reached" in out
+    assert "persists" in out
+    fine = pcmc.read(tmp_path / "roof.pcmc")
+    assert check_mesh(fine).row("height", "roof").error <= 0.02
+    assert cli.main(["solve", "roof.toml", "--accuracy", "height=1e-9", "--most-triangles", "100"]) == 1
+    out = capsys.readouterr().out
+    assert "within the limit of triangles" in out
+    assert "nothing written" in out
+    assert cli.main(["solve", "roof.toml", "--accuracy", "hight=1"]) == 2
+    assert "did you mean 'height'" in capsys.readouterr().err
+    (tmp_path / "roof.toml").write_text(PROJECT.replace("height", "hight"), encoding="utf-8")
+    assert cli.main(["solve", "roof.toml"]) == 2
+    assert "solve: unknown quantity 'hight'" in capsys.readouterr().err
+
+
+def test_targets_are_met_on_the_mesh_of_the_accuracy(tmp_path):
+    targets = '\n[targets]\nmeet = [{quantity = "apex", of = "roof", value = 0.4}]\nvary = ["roof"]\n'
+    (tmp_path / "roof.toml").write_text(PROJECT.replace("0.02", "0.05") + targets, encoding="utf-8")
+    outcome = pcmc.project.run(tmp_path / "roof.toml")
+    assert outcome.good
+    assert outcome.accurate.reached
+    assert outcome.design.met
+    assert outcome.surface.vertices[:, 2].max() == pytest.approx(0.4, rel=1e-6)
+    assert outcome.surface.m == outcome.accurate.surface.m
+
+
+def test_a_patch_without_a_name_of_its_own_is_not_confused():
+    pair = Surface(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],
+        [[0, 1, 2], [0, 2, 3]],
+        [0, 1],
+        [Patch("a", 1.0), Patch("near", 1.0)],
+        fixed=range(4),
+    )
+    with refused(OptionError, what="patch", found="b"):
+        adaptive.check_places({"area of b": 1.0}, pair)
+    adaptive.check_places({"area of near": 1.0, "reaction of a near (1, 2, 3)": 1.0}, pair)
