@@ -9,7 +9,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -23,7 +22,6 @@ from generators import catenoid_fold, lens_circle
 from generators.exact import ExactSolution
 from pcmc import Surface, energy, solve
 from pcmc.base.arrays import Floats
-from pcmc.base.errors import FreeSurfaceWarning
 from pcmc.energy.functional import patch_areas, volume
 
 from . import gallery_changes as changes
@@ -200,11 +198,13 @@ def figure(folder: Folder) -> None:
     records = folder.read_table("records")
     shown = [example for example in EXAMPLES if (records.example == example.name).any()]
     panel(
-        [_drawn(folder, example.name) for example in shown],
+        [folder.read_mesh(example.name)["at rest"] for example in shown],
         folder.figure("surfaces"),
         titles=[f"{e.title}: index {_index(records, e.name)}" for e in shown],
         columns=4,
         one_scale=False,
+        edges=False,
+        width=1000,
         supports=False,
         views=[e.view for e in shown],
     )
@@ -223,12 +223,6 @@ def figure(folder: Folder) -> None:
         }
     curve_panels(panels, folder.figure("errors"), columns=5, xlabel="edge length / size", ylabel="error")
     changes.figure(folder)
-
-
-def _drawn(folder: Folder, name: str) -> Surface:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FreeSurfaceWarning)  # closed surfaces are free
-        return folder.read_mesh(name)["at rest"]
 
 
 def _index(records: pd.DataFrame, name: str) -> int:

@@ -150,7 +150,7 @@ def _compare(folder: Folder, branch: Branch, rings: int, areas: list[dict[str, A
             if rings == PICTURED and radius == COMPARED[-1]:
                 folder.write_mesh(f"wire-{name}", {f"R = {radius:g}": result.surface})
     if rings == DIAGRAM:
-        ends = zip(("one", "other"), branch.switch(stop=WIDE), strict=True)
+        ends = zip(("one", "other"), branch.switch(stop=WIDE, step=0.005), strict=True)
         followed = [_points(name, other) for name, other in ends]
         own = _points("Enneper", branch)
         event = branch.bifurcations.iloc[0]

@@ -133,7 +133,7 @@ def _minimal_cut(edge_of_face: Ints, inner: Ints, lengths: Floats, starts: Ints,
     )
     row, column, data = (np.concatenate([pair[i] for pair in pairs]) for i in range(3))
     graph = csr_array(coo_array((data.astype(np.int32), (row, column)), shape=(sink + 1, sink + 1)))
-    left = csr_array(graph - maximum_flow(graph, source, sink).flow, dtype=float)
+    left = (graph - csr_array(maximum_flow(graph, source, sink).flow)).astype(float)
     left.eliminate_zeros()
     reached = np.zeros(sink + 1, dtype=bool)
     reached[breadth_first_order(left, source, return_predecessors=False)] = True
