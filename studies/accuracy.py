@@ -31,7 +31,7 @@ from .orders import Order, slope
 from .study import Study
 
 LEVELS = 4  # uniform meshes
-MOST = 6_000  # triangles of an adaptive mesh
+MOST = 4_000  # triangles of an adaptive mesh
 NEVER = 1e-12  # an accuracy that is not reached, so that the ladder goes on up to MOST
 COLUMNS = ["value", "error", "limit", "limit_error", "order"]  # of a mesh check
 LADDERS = ("uniform", "adaptive")
