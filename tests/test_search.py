@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from shapes import pyramid, tube
-from starts import sphere, spherical_cap, two_squares
+from starts import sphere, spherical_cap, two_caps, two_squares
 
 from generators import spherical_cap_exact
 from pcmc import Patch, Verdict, certify, solve, write
@@ -258,3 +258,20 @@ def test_sweeps_search_only_if_asked():
     case = {"generator": "generators:spherical_cap", "edge_length": 0.25, "alpha": 0.6, "height": 2.5}
     assert solve_case(**case, inflation=2.0)["verdict"] == "ran away"
     assert solve_case(**case, inflation=2.0, search=True)["verdict"] == "stable"
+
+
+def test_from_equal_tensions_to_those_asked_for():
+    """The pressure cannot be raised from low ones: there the stronger patch pulls the wall away."""
+    weak = two_caps(1.2, alpha_large=1.0, alpha_small=1.5, alpha_aux=6.0)
+    result = solve(weak, target="stationary")
+    overload, fold = result.proofs
+    assert isinstance(overload, Overload)
+    assert fold.parameter == "tensions"
+    assert 0.0 < fold.value < 1.0
+    tensions = dict(fold.tensions)
+    assert tensions["large"] > 1.0
+    assert tensions["small"] > 1.5
+    assert f"a fold at large {tensions['large']:.4g}, small" in result.message
+    found = solve(two_caps(1.2, alpha_large=6.0, alpha_small=5.0, alpha_aux=16.0), target="stationary")
+    assert found.certificate.verdict is Verdict.STABLE
+    assert "along the branch from equal tensions" in found.message

@@ -102,7 +102,7 @@ def _cut(surface: Surface, groups: Ints, lengths: Floats, number: int) -> Neck |
     others = (groups >= 0) & ~source & np.isin(topo.components, topo.components[source])
     starts, ends = (np.flatnonzero(mask[surface.faces].sum(axis=1) > 1) for mask in (source, others))
     shorter = float(min(lengths[number], lengths[np.unique(groups[others])].min()))
-    if not np.isfinite(shorter) or len(np.intersect1d(starts, ends)):
+    if not 0.0 < shorter < np.inf or len(np.intersect1d(starts, ends)):
         return None
     inner = np.flatnonzero(topo.valence > 1)
     cut = inner[_minimal_cut(topo.edge_of_face, inner, segment_lengths(X, topo.edges[inner]), starts, ends)]
@@ -133,7 +133,7 @@ def _minimal_cut(edge_of_face: Ints, inner: Ints, lengths: Floats, starts: Ints,
     )
     row, column, data = (np.concatenate([pair[i] for pair in pairs]) for i in range(3))
     graph = csr_array(coo_array((data.astype(np.int32), (row, column)), shape=(sink + 1, sink + 1)))
-    left = csr_array(graph - maximum_flow(graph, source, sink).flow, dtype=float)
+    left = (graph - csr_array(maximum_flow(graph, source, sink).flow)).astype(float)
     left.eliminate_zeros()
     reached = np.zeros(sink + 1, dtype=bool)
     reached[breadth_first_order(left, source, return_predecessors=False)] = True

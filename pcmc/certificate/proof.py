@@ -54,9 +54,11 @@ class Fold:
     Attributes
     ----------
     parameter : what grows along the branch: ``"pressure"``, all pressures in proportion, or
-        ``"distance"``, that of the held curves from each other.
+        ``"distance"``, that of the held curves from each other; ``"tensions"``, the share of the way from
+        equal tensions of the patches under pressure.
     value : the parameter at the fold; 1 is what the surface asks for.
     start : the parameter where the branch starts.
+    tensions : names and tensions at the fold, where these vary.
 
     >>> print(Fold("pressure", 0.8, 0.4))  # doctest: +ELLIPSIS
     the equilibria end at a fold at 0.800 of the pressure (followed from 0.4 of it): lower all ...
@@ -67,8 +69,15 @@ class Fold:
     parameter: str
     value: float
     start: float
+    tensions: tuple[tuple[str, float], ...] = ()
 
     def __str__(self) -> str:
+        if self.parameter == "tensions":
+            at = ", ".join(f"{name} {tension:.4g}" for name, tension in self.tensions)
+            return (
+                f"from equal tensions the equilibria end at a fold at {at}, {_three(self.value)} of the way:"
+                " stay on that side of it"
+            )
         value, start = _three(self.value), f"{self.start:.3g}"
         if self.parameter == "distance":
             return (

@@ -46,9 +46,17 @@ class Attempts:
         return replace(result, rows=rows)
 
     def follow(
-        self, surface: Surface, direction: Direction | BoundaryMotion, stop: float, **options: Any
+        self,
+        surface: Surface,
+        direction: Direction | BoundaryMotion,
+        stop: float,
+        back: float | None = None,
+        **options: Any,
     ) -> Branch:
-        """Follow a branch until it arrives or turns; StopIteration if that was stopped."""
+        """Follow a branch until it arrives or turns; StopIteration if that was stopped.
+
+        ``back`` is as in ``way``.
+        """
         interrupted: list[BaseException] = []
 
         def count(progress: Progress) -> None:
@@ -61,7 +69,7 @@ class Attempts:
                 interrupted.append(error)
                 raise
 
-        branch = follow(surface, direction, stop, callback=until_turned(count), **options)
+        branch = follow(surface, direction, stop, callback=until_turned(count, back), **options)
         if interrupted:
             raise interrupted[0]
         self.evaluations += int(branch.points.iterations.sum())

@@ -16,6 +16,7 @@ from .apart import move_apart
 from .attempts import Attempts
 from .pressure import raise_pressure
 from .starts import low_start
+from .tensions import relax_tensions
 
 RAN = (Status.DIVERGED, Status.DEGENERATE, Status.STALLED, Status.ITERATION_LIMIT, Status.VANISHED)
 
@@ -56,6 +57,13 @@ def _search(start: Surface, first: Result, attempts: Attempts) -> Result:
                 how = f"by raising the pressure from {raised.start:.3g} of it"
                 return _found(first, result, attempts, how)
         proofs.append(raised.fold)
+        if raised.fold is None:
+            relaxed = relax_tensions(low, attempts)
+            if relaxed.surface is not None:
+                result = attempts.solve(relaxed.surface)
+                if result.converged:
+                    return _found(first, result, attempts, "along the branch from equal tensions")
+            proofs.append(relaxed.fold)
     if low is not None and not any(proofs):
         apart = move_apart(start, attempts)
         if apart.surface is not None:

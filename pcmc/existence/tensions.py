@@ -1,0 +1,61 @@
+"""From equal tensions, at which the surface stands, along a line to the tensions asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+from ..base.errors import OptionError, SurfaceError
+from ..certificate.balance import load_ratio
+from ..certificate.proof import Fold
+from ..continuation import Direction
+from ..surface import Surface
+from .attempts import Attempts
+from .folding import BACK, Arrival, way
+
+ROOM = 1.3  # of the load: at least so much the equal tensions could carry
+RAISED = (1.0, 1.6)  # times these tensions, tried in turn
+WALLS = (1.0, 0.6)  # of the equal tension: the most that a wall has at the start, tried in turn
+STEPS = 40
+SMALLEST = 3e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Relaxed:
+    """What changing the tensions has shown: a surface at those asked for, or a fold on the way."""
+
+    surface: Surface | None = None
+    fold: Fold | None = None
+
+
+def relax_tensions(low: Surface, attempts: Attempts) -> Relaxed:
+    """Follow the equilibria from equal tensions of all patches under pressure to those of ``low``."""
+    asked = {patch.name: patch.tension for patch in low.patches if patch.tension > 0.0}
+    pressed = [patch.name for patch in low.patches if not patch.auxiliary]
+    if len(pressed) < 2:
+        return Relaxed()
+    strongest = max(asked[name] for name in pressed)
+    overload = load_ratio(low.retensioned(dict.fromkeys(pressed, strongest)))
+    for raised, most in product(RAISED, WALLS):
+        equal = raised * strongest * max(1.0, ROOM * overload)
+        start = {name: equal if name in pressed else min(t, most * equal) for name, t in asked.items()}
+        result = attempts.solve(low.retensioned(start), levels=0)
+        if result.converged:
+            break
+    else:
+        return Relaxed()
+    change = {name: asked[name] - start[name] for name in asked if asked[name] != start[name]}
+    direction = Direction(change, relative=True)
+    try:
+        branch = attempts.follow(
+            result.surface, direction, 1.0, back=BACK, steps=STEPS, smallest=SMALLEST, min_quality=0.3
+        )
+    except (OptionError, SurfaceError):  # no branch: rigid motions are free
+        return Relaxed()
+    end = way(branch, back=BACK)
+    if end.arrival is Arrival.REACHED:
+        return Relaxed(surface=branch.last.retensioned(asked))
+    if end.arrival is Arrival.FOLD:
+        at = tuple((name, start[name] + end.farthest * change.get(name, 0.0)) for name in asked)
+        return Relaxed(fold=Fold("tensions", end.farthest, 0.0, at))
+    return Relaxed()
