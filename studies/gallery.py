@@ -96,7 +96,7 @@ EXACT = "tetrahedron"  # flat films: no error to draw
 def data(folder: Folder, short: bool) -> None:
     """Solve every example on every mesh; follow the branches on which the index changes."""
     examples = [EXAMPLES[5], EXAMPLES[14], EXAMPLES[16]] if short else EXAMPLES
-    rows = []
+    rows: list[dict[str, Any]] = []
     for example in examples:
         for level in range(3 if short else LEVELS):
             surface = _solved(example, level, rows)
