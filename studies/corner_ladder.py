@@ -19,8 +19,9 @@ of this, falls like 1/log(1/h), and it is gone at h = exp(-A/c), where the junct
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,7 @@ PERSISTS, SADDLE, TURNS, LOST, SINKS, NONE = CATEGORIES = (
 )
 SUNK = 1e-3  # quality of a wall's triangles at which its junction has come down on its bottom
 LEAST_FIT = 4  # levels
+NEAR_REST = 0.2  # of log(1/h): closer to where the junction rests the law has no use
 ITERATIONS = 60  # of the solver on a mesh; from the level before it takes 5
 CONFIDENCE = 0.95
 
@@ -74,7 +76,7 @@ def free_ends(surface: Surface) -> Surface:
     """
     topo, X = surface.topology, surface.vertices
     outline = topo.edges[topo.boundary_edge & surface.fixed[topo.edges].all(axis=1)]
-    lines = {}
+    lines = []
     for vertex in ends(surface):
         if abs(opening(surface, int(vertex)) - 180.0) > 1e-6:
             continue
@@ -82,8 +84,9 @@ def free_ends(surface: Surface) -> Surface:
         line = Line(tuple(X[vertex]), tuple(X[beside[1]] - X[beside[0]]))
         side = np.unique(outline[(line.distance(X[outline]) < 1e-9 * surface.size).all(axis=1)])
         place = line.place(X[side])
-        lines[line] = side[(place > place.min()) & (place < place.max())]
-    return replace(surface, on_line=lines)
+        inner = side[(place > place.min()) & (place < place.max())]
+        lines.append((line, np.isin(np.arange(surface.n), inner)))
+    return replace(surface, on_line=tuple(lines))
 
 
 SUPPORTS: dict[str, Callable[[Surface], Surface]] = {
@@ -181,31 +184,44 @@ def opening(surface: Surface, vertex: int) -> float:
     return float(angles(flat[faces])[faces == vertex].sum())
 
 
-def loss(rows: Sequence[dict[str, Any]]) -> dict[str, float]:
-    """The law λ = λ∞ + B / (log(1/h) + ℓ) of the lowest eigenvalue against the edge length h at the end.
+def loss(rows: Sequence[Mapping[Any, Any]], rest: float = 0.0) -> dict[str, float]:
+    """The law λ = λ∞ + B K of the lowest eigenvalue against the edge length h at the end; see ``law``.
 
-    ``limit`` λ∞ ± ``limit_margin``, ``loss`` B ± ``loss_margin`` (95 %) and ``shift`` ℓ, from the levels on
-    which nothing rests on Π but the first two, ``fitted`` many; NaN where these are fewer than five.
+    ``limit`` λ∞ ± ``limit_margin``, ``loss`` B ± ``loss_margin`` (95 %, of the scatter about the law) and
+    ``shift`` ℓ, from the levels on which nothing rests on Π but the first two, ``fitted`` many; NaN where
+    these are fewer than five. ``rest`` is the distance from the end at which the junction comes to rest.
     """
+    last = -math.log(rest) if rest > 0.0 else math.inf
     free = [row for row in rows if row["status"] == "converged" and row["pinched"] == 0][2:]
+    free = [row for row in free if -math.log(row["edge_length"]) < last - NEAR_REST]
     none = dict.fromkeys(("limit", "limit_margin", "loss", "loss_margin", "shift"), math.nan)
     if len(free) < 5:
-        return {"fitted": len(free), **none}
+        return {"fitted": len(free), "last": last, **none}
     depth = -np.log([row["edge_length"] for row in free])
     values = np.array([row["eigenvalue"] for row in free])
     span = np.ptp(values) or 1.0
-    start = (0.0, 1.0, 1.0 - depth.min())
-    bounds = ((-np.inf, -np.inf, 1e-3 - depth.min()), np.inf)
-    scaled, covariance = curve_fit(law, depth, (values - values[-1]) / span, start, bounds=bounds)
+    scaled, covariance = curve_fit(
+        partial(law, last=last),
+        depth,
+        (values - values[-1]) / span,
+        (0.0, 1.0, 1.0 - depth.min()),
+        bounds=((-np.inf, -np.inf, 1e-3 - depth.min()), np.inf),
+    )
     margins = t.ppf(0.5 + 0.5 * CONFIDENCE, len(free) - 3) * np.sqrt(np.diag(covariance)) * span
     limit, amount = values[-1] + span * scaled[0], span * scaled[1]
     found = (limit, margins[0], amount, margins[1], scaled[2])
-    return {"fitted": len(free), **dict(zip(none, map(float, found), strict=True))}
+    return {"fitted": len(free), "last": last, **dict(zip(none, map(float, found), strict=True))}
 
 
-def law(depth: Floats, limit: float, amount: float, shift: float) -> Floats:
-    """λ∞ + B / (log(1/h) + ℓ) at depths log(1/h)."""
-    return np.asarray(limit + amount / (depth + shift))
+def law(depth: Floats, limit: float, amount: float, shift: float, last: float = math.inf) -> Floats:
+    """λ∞ + B K at depths d = log(1/h): K = 1 / log((D + ℓ) / (D - d)), or 1 / (d + ℓ) for infinite D.
+
+    D, ``last``, is the depth at which the junction rests; ℓ is the logarithm of the length over which the
+    end holds.
+    """
+    if math.isinf(last):
+        return np.asarray(limit + amount / (depth + shift))
+    return np.asarray(limit + amount / np.log((last + shift) / (last - depth)))
 
 
 def fit(x: Floats, y: Floats) -> tuple[float, float]:

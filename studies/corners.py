@@ -56,7 +56,7 @@ SAMPLE = [[1.5, 6.0, 6.0], [4.0, 4.0, 3.0]]  # of the grid, where its equilibria
 COLORS = dict(
     zip(CATEGORIES, ("#08519C", "#CC79A7", "#F4A582", "#D6604D", "#FFF2AE", "#E6E6E6"), strict=True)
 )
-NO_CASE = "no equilibrium on the first mesh"
+NO_CASE = "no equilibrium in the grid"
 NAMES = {"sliding": "ends fixed", "held": "held", "natural": "ends slide too"}
 BOTTOMS = ("sliding", "held")  # of the walls
 DRAWN = "fig4"
@@ -162,7 +162,7 @@ def _ends(
 ) -> list[dict[str, Any]]:
     """A row for each end: where it is, what meets there, its label and the fits."""
     last = [row for row in rows if row["status"] == "converged"]
-    shared = {"label": label(rows, levels, bottom), "levels": len(last), **loss(rows)}
+    shared = {"label": label(rows, levels, bottom), "levels": len(last)}
     edge = last[-1]["edge_length"] if last else math.nan
     return [
         {
@@ -235,7 +235,7 @@ def table(folder: Folder) -> dict[str, float]:
                 "last_index": known["index"].iloc[-1],
                 "eigenvalue": known.eigenvalue.iloc[0],
                 "last_eigenvalue": known.eigenvalue.iloc[-1],
-                **{key: here[key].iloc[0] for key in ("limit", "limit_margin", "loss", "loss_margin")},
+                **loss(known.to_dict("records"), here.rest.mean()),
                 "c": here.c.mean(),
                 "c_margin": here.c_margin.max(),
                 "theory_c": here.theory_c.mean(),
@@ -245,9 +245,12 @@ def table(folder: Folder) -> dict[str, float]:
         )
     labels = pd.DataFrame(rows)
     folder.write_table("labels", labels)
-    counts = grid.groupby(["bottom", "label"]).size()
-    folder.write_table("grid_counts", counts.rename("cases").reset_index())
-    found = {f"grid_{bottom}_{_short(name)}": float(n) for (bottom, name), n in counts.items()}
+    counts = grid.groupby(["bottom", "label"]).size().rename("cases").reset_index()
+    folder.write_table("grid_counts", counts)
+    found = {
+        f"grid_{row['bottom']}_{_short(row['label'])}": float(row["cases"])
+        for row in counts.to_dict("records")
+    }
     for row in labels.to_dict("records"):
         found[f"{row['case']}_{row['bottom']}_levels"] = float(row["levels"])
         found[f"{row['case']}_{row['bottom']}_limit"] = float(row["limit"])
@@ -263,7 +266,7 @@ def figure(folder: Folder) -> None:
     """The loss of hold with its fits, the crest's rise beside the theory, the grid, a graded mesh."""
     from pcmc.plot import lines
 
-    ladder, at_ends = folder.read_table("ladder"), folder.read_table("ends")
+    ladder = folder.read_table("ladder")
     sizes = {case.name: case.build() for case in CASES if (ladder.case == case.name).any()}
     curves = {}
     for case in CASES:
@@ -285,7 +288,7 @@ def figure(folder: Folder) -> None:
         xscale="log",
         markers=True,
         levels={"saddle below": 0.0},
-        title="Bottoms slide: the ends lose their hold on finer meshes",
+        title="Bottoms slide: the hold of the ends fades",
     )
     lines(
         {name: curve for name, curve in curves.items() if "held" in name},
@@ -296,25 +299,28 @@ def figure(folder: Folder) -> None:
         markers=True,
         title="Bottoms are held: the lowest eigenvalue has a limit",
     )
-    _draw_fits(folder, ladder, at_ends)
+    _draw_fits(folder, ladder)
     _draw_grid(folder)
     _draw_mesh(folder)
 
 
-def _draw_fits(folder: Folder, ladder: pd.DataFrame, at_ends: pd.DataFrame) -> None:
+def _draw_fits(folder: Folder, ladder: pd.DataFrame) -> None:
     """The eigenvalues of sliding bottoms as long as nothing rests, in units of the first; and the law."""
     from pcmc.plot import lines
+
+    labels = folder.read_table("labels")
 
     free = ladder[(ladder.bottom == "sliding") & (ladder.pinched == 0) & (ladder.status == "converged")]
     curves: dict[str, Any] = {}
     for case in CASES:
         mine = free[free.case == case.name]
-        fits = at_ends[(at_ends.case == case.name) & (at_ends.bottom == "sliding")]
+        fits = labels[(labels.case == case.name) & (labels.bottom == "sliding")]
         if not len(fits) or not math.isfinite(fits.limit.iloc[0]):
             continue
         found, unit = fits.iloc[0], abs(mine.eigenvalue.iloc[0])
-        depth = np.linspace(*-np.log(mine.edge_length.iloc[[2, -1]]), 50)
-        fitted = law(depth, found.limit, found.loss, found["shift"])
+        first, last = -np.log(mine.edge_length.to_numpy()[[2, 1 + int(found.fitted)]])
+        depth = np.linspace(first, last, 7)
+        fitted = law(depth, found.limit, found.loss, found["shift"], found["last"])
         curves[case.title] = (mine.edge_length, mine.eigenvalue / unit)
         curves[f"limit {found.limit:.2g} ± {found.limit_margin:.1g}"] = (np.exp(-depth), fitted / unit)
     lines(
@@ -378,7 +384,7 @@ def _near(surface: Surface, place: Floats, reach: float) -> Surface:
     near = roof & (np.linalg.norm(surface.vertices[surface.faces] - place, axis=2).max(axis=1) <= reach)
     used, faces = np.unique(surface.faces[near], return_inverse=True)
     patches, patch = np.unique(surface.patch_of_face[near], return_inverse=True)
-    kept = [surface.patches[k] for k in patches]
+    kept = tuple(surface.patches[k] for k in patches)
     return Surface(surface.vertices[used], faces.reshape(-1, 3), patch, kept, fixed=surface.fixed[used])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO, StringIO
@@ -15,7 +16,7 @@ import pandas as pd
 
 import pcmc
 from pcmc import Surface
-from pcmc.base.errors import FileError
+from pcmc.base.errors import FileError, FreeSurfaceWarning
 from pcmc.base.files import atomic_write
 from pcmc.io import load
 
@@ -67,7 +68,9 @@ class Folder:
     def read_mesh(self, name: str) -> dict[str, Surface]:
         """The stages that ``write_mesh`` wrote under this name."""
         path = self._existing(f"{name}{MESH}")
-        first, positions = pcmc.read(path), load(path).scalars
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FreeSurfaceWarning)  # closed surfaces are free
+            first, positions = pcmc.read(path), load(path).scalars
         stages = dict.fromkeys(key[:-2] for key in positions)
         return {
             stage: first.moved(np.stack([positions[f"{stage} {axis}"] for axis in "xyz"], axis=1))

@@ -9,7 +9,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -23,7 +22,6 @@ from generators import catenoid_fold, lens_circle
 from generators.exact import ExactSolution
 from pcmc import Surface, energy, solve
 from pcmc.base.arrays import Floats
-from pcmc.base.errors import FreeSurfaceWarning
 from pcmc.energy.functional import patch_areas, volume
 
 from . import gallery_changes as changes
@@ -87,7 +85,7 @@ EXAMPLES = (
     Example("lens", "lens, Young's law", "lens", 0.5),
     Example("lens_120", "lens, 120°", "lens", float(np.pi * lens_circle(**DEGREES_120) / 9.0), DEGREES_120),
     Example("tetrahedron", "tetrahedral film", "tetrahedral_film", 0.25),
-    Example("schwarz", "Schwarz's D surface", "skew_quadrilateral", 0.125),
+    Example("schwarz", "Schwarz's D", "skew_quadrilateral", 0.125),
     Example("enneper", "Enneper, R = 0.8", "enneper", 0.194),
     Example("enneper_large", "Enneper, R = 1.3", "enneper", 0.4065, {"radius": 1.3}),
 )
@@ -98,7 +96,7 @@ EXACT = "tetrahedron"  # flat films: no error to draw
 def data(folder: Folder, short: bool) -> None:
     """Solve every example on every mesh; follow the branches on which the index changes."""
     examples = [EXAMPLES[5], EXAMPLES[14], EXAMPLES[16]] if short else EXAMPLES
-    rows = []
+    rows: list[dict[str, Any]] = []
     for example in examples:
         for level in range(3 if short else LEVELS):
             surface = _solved(example, level, rows)
@@ -200,11 +198,13 @@ def figure(folder: Folder) -> None:
     records = folder.read_table("records")
     shown = [example for example in EXAMPLES if (records.example == example.name).any()]
     panel(
-        [_drawn(folder, example.name) for example in shown],
+        [folder.read_mesh(example.name)["at rest"] for example in shown],
         folder.figure("surfaces"),
         titles=[f"{e.title}: index {_index(records, e.name)}" for e in shown],
         columns=4,
         one_scale=False,
+        edges=False,
+        width=1200,
         supports=False,
         views=[e.view for e in shown],
     )
@@ -223,12 +223,6 @@ def figure(folder: Folder) -> None:
         }
     curve_panels(panels, folder.figure("errors"), columns=5, xlabel="edge length / size", ylabel="error")
     changes.figure(folder)
-
-
-def _drawn(folder: Folder, name: str) -> Surface:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FreeSurfaceWarning)  # closed surfaces are free
-        return folder.read_mesh(name)["at rest"]
 
 
 def _index(records: pd.DataFrame, name: str) -> int:

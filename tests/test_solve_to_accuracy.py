@@ -159,7 +159,7 @@ def test_the_lowest_eigenvalue_has_shares(roof, fine_roof):
 def test_equal_shares_lead_to_equal_edges_and_the_number_asked_for():
     cap = generators.spherical_cap(0.5)
     size = size_field(cap, face_areas(cap.vertices[cap.faces]) ** 2, 400)
-    assert size.max() < 1.05 * size.min()
+    assert size.max() < 1.1 * size.min()
     assert 320 < remesh(cap, size).m < 500
     assert size_field(cap, np.zeros(cap.m), 400).min() > 0.0
 
@@ -178,7 +178,7 @@ def test_order_two_is_regained_at_a_re_entrant_corner():
         surface = refine(surface)
     graded = found.history[["triangles", "value"]].to_numpy()
     graded[:, 1] = np.abs(graded[:, 1] - limit)
-    orders = [slope(m**-0.5, e).order for m, e in (np.array(uniform).T, graded.T)]
+    orders = [slope(m[1:] ** -0.5, e[1:]).order for m, e in (np.array(uniform).T, graded.T)]
     assert orders[0] < 1.5
     assert orders[1] > 1.9
     assert graded[-1, 1] < 0.25 * np.interp(graded[-1, 0], *np.array(uniform).T)

@@ -3,7 +3,8 @@
 A round solves the surface, checks its mesh, and shares out the error among the triangles (``estimator``).
 A triangle of edge length h has a share η ∝ h⁴ where the surface is smooth, and the sum of all shares is
 least, for N triangles, where all are equal: h_new = h (η̄ / η)^(1/4) with √η̄ = Σ √η / N. MMG makes the
-mesh, and the next round begins. At a corner where the surface is like r^λ, equal shares lead to edges
+mesh, and the next round begins. Beside a corner a share falls more slowly with h: far above the mean the
+exponent is 1/2. At a corner where the surface is like r^λ, equal shares lead to edges
 h ∝ r^(1 - λ/2), and to an error ∝ 1 / N, as for a smooth surface: order 2 in 1/√N.
 """
 
@@ -40,9 +41,10 @@ TRIANGLES = 50_000  # of the mesh returned, by default at most
 ROUNDS = 12
 PATIENCE = 3  # rounds in turn without a limit in sight
 GROWTH = 1.5  # of neighbouring edges
-FINER, COARSER = 0.25, 3.0  # times the edge length, in one round
+FINER, COARSER = 0.1, 3.0  # times the edge length, in one round
 LEAST, MOST = 1.5, 3.0  # times as many triangles from round to round
 SPARE = 1.3  # times the triangles foreseen, so that fewer rounds are needed
+SINGULAR = 2.0  # times the wanted root of a share: above, the share falls more slowly than h⁴
 FLOOR = 1e-12  # of the largest share: a share below counts as that much
 WORTHWHILE = 0.8  # of the limit of triangles: from here on a further round gains little
 ACCURACY_OF = ("mesh", "limit")
@@ -190,9 +192,9 @@ def size_field(surface: Surface, shares: Floats, triangles: float, growth: float
     """
     F, areas = surface.faces, face_areas(surface.vertices[surface.faces])
     root = np.sqrt(np.maximum(shares, FLOOR * shares.max(initial=0.0)))
-    mean = root.sum() / triangles
-    factor = np.clip(np.sqrt(mean / np.where(root > 0.0, root, mean or 1.0)), FINER, COARSER)
-    length = np.sqrt(areas * 4.0 / math.sqrt(3.0)) * factor
+    excess = root * triangles / root.sum() if root.any() else np.ones(surface.m)
+    factor = excess**-0.5 * np.maximum(1.0, excess / SINGULAR) ** -0.5
+    length = np.sqrt(areas * 4.0 / math.sqrt(3.0)) * np.clip(factor, FINER, COARSER)
     count = np.maximum(np.bincount(F.ravel(), minlength=surface.n), 1)
     wanted = np.exp(np.bincount(F.ravel(), np.repeat(np.log(length), 3), surface.n) / count)
     for _ in range(6):  # limits to growth make edges shorter and triangles more

@@ -281,7 +281,20 @@ def _standing_faces(surface: Surface, walls: Walls, resting: Bools, owner: Ints)
     apart = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
     wall = surface.walls[surface.patch_of_face]
     apart[wall] &= ~_lie_on_plane(walls, resting)[F[wall]].all(axis=1)
+    apart[_folded(F, np.flatnonzero(apart & wall & resting[F].any(axis=1)))] = False
     return F, apart
+
+
+def _folded(F: Ints, chosen: Ints) -> Ints:
+    """Those of the chosen faces that lie on one another, pair by pair.
+
+    A foot that has come to its resting top takes faces beside it to the same three corners. Together they
+    are no part of the wall that stands there, and would pull its next vertex down without end.
+    """
+    if not len(chosen):
+        return chosen
+    _, same, count = np.unique(np.sort(F[chosen], axis=1), axis=0, return_inverse=True, return_counts=True)
+    return np.asarray(chosen[count[same.ravel()] > 1])
 
 
 def _owners(n: int, walls: Walls, resting: Bools) -> Ints:

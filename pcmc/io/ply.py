@@ -145,7 +145,7 @@ def _elements(header: str, kinds: Mapping[str, str]) -> list[_Element]:
         try:
             match line.split():
                 case ["element", name, count]:
-                    if not count.isdecimal():
+                    if not count.isdecimal() or len(count) > 18:
                         raise ValueError
                     elements.append(_Element(name, int(count), []))
                 case ["property", "list", of_count, of_items, name]:

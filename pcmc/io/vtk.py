@@ -43,7 +43,14 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], **_: Any)
     mesh.field_data["pcmc"] = [metadata_text(surface)]
     if path.suffix.lower() == ".vtu":
         mesh = mesh.cast_to_unstructured_grid()
-    mesh.save(path)
+    library = load_library("vtkmodules.vtkIOXML")
+    flat = isinstance(mesh, pyvista.PolyData)
+    writer = library.vtkXMLPolyDataWriter() if flat else library.vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(mesh)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()  # where a disk is full, VTK crashes
+    writer.Write()
+    path.write_text(writer.GetOutputString(), encoding="utf-8", newline="\n")
 
 
 def read(path: Path) -> MeshData:
