@@ -58,7 +58,10 @@ def hall() -> Surface:
 
 
 def roof() -> Surface:
-    """The L-shaped roof of the notebooks, bottoms held, on a coarse mesh."""
+    """The L-shaped roof of the notebooks, bottoms held, on a coarse mesh.
+
+    At this edge length its round courtyard is an octagon, whose vertices turn by 45° and count as corners.
+    """
     outline = [[0, 0], [24, 0], [24, 10], [10, 10], [10, 24], [0, 24]]
     middle, ends = [7.5, 7.5], ([10, 10], [0, 9.5096189432], [9.5096189432, 0])
     return Plan(

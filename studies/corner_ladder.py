@@ -19,8 +19,9 @@ of this, falls like 1/log(1/h), and it is gone at h = exp(-A/c), where the junct
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -183,7 +184,7 @@ def opening(surface: Surface, vertex: int) -> float:
     return float(angles(flat[faces])[faces == vertex].sum())
 
 
-def loss(rows: Sequence[dict[str, Any]], rest: float = 0.0) -> dict[str, float]:
+def loss(rows: Sequence[Mapping[Any, Any]], rest: float = 0.0) -> dict[str, float]:
     """The law λ = λ∞ + B K of the lowest eigenvalue against the edge length h at the end; see ``law``.
 
     ``limit`` λ∞ ± ``limit_margin``, ``loss`` B ± ``loss_margin`` (95 %, of the scatter about the law) and
@@ -200,7 +201,7 @@ def loss(rows: Sequence[dict[str, Any]], rest: float = 0.0) -> dict[str, float]:
     values = np.array([row["eigenvalue"] for row in free])
     span = np.ptp(values) or 1.0
     scaled, covariance = curve_fit(
-        lambda *unknowns: law(*unknowns, last),
+        partial(law, last=last),
         depth,
         (values - values[-1]) / span,
         (0.0, 1.0, 1.0 - depth.min()),

@@ -85,7 +85,7 @@ EXAMPLES = (
     Example("lens", "lens, Young's law", "lens", 0.5),
     Example("lens_120", "lens, 120°", "lens", float(np.pi * lens_circle(**DEGREES_120) / 9.0), DEGREES_120),
     Example("tetrahedron", "tetrahedral film", "tetrahedral_film", 0.25),
-    Example("schwarz", "Schwarz's D surface", "skew_quadrilateral", 0.125),
+    Example("schwarz", "Schwarz's D", "skew_quadrilateral", 0.125),
     Example("enneper", "Enneper, R = 0.8", "enneper", 0.194),
     Example("enneper_large", "Enneper, R = 1.3", "enneper", 0.4065, {"radius": 1.3}),
 )
@@ -96,7 +96,7 @@ EXACT = "tetrahedron"  # flat films: no error to draw
 def data(folder: Folder, short: bool) -> None:
     """Solve every example on every mesh; follow the branches on which the index changes."""
     examples = [EXAMPLES[5], EXAMPLES[14], EXAMPLES[16]] if short else EXAMPLES
-    rows = []
+    rows: list[dict[str, Any]] = []
     for example in examples:
         for level in range(3 if short else LEVELS):
             surface = _solved(example, level, rows)
@@ -204,7 +204,7 @@ def figure(folder: Folder) -> None:
         columns=4,
         one_scale=False,
         edges=False,
-        width=1000,
+        width=1200,
         supports=False,
         views=[e.view for e in shown],
     )

@@ -274,8 +274,8 @@ def _diagram(folder: Folder) -> None:
     for (name, index), (label, color, dash) in looks.items():
         mine = points[(points.branch == name) & (points["index"] == index)]
         left.plot(mine.parameter, mine.middle, color=color, linestyle=dash, linewidth=1.1, label=label)
-        dash = (0, (3, 3)) if name == "other" else dash  # both have one area
-        right.plot(mine.parameter, mine.less, color=color, linestyle=dash, linewidth=1.1)
+        shown = "--" if name == "other" else dash  # both have one area
+        right.plot(mine.parameter, mine.less, color=color, linestyle=shown, linewidth=1.1)
     for axes, label in ((left, "height of the middle"), (right, "area - π (R² + R⁴ + R⁶/3)")):
         axes.axvline(1.0, color=INK, linewidth=0.6, linestyle=":")
         axes.set_xlabel("radius R of the wire", fontsize=TEXT, color=INK)

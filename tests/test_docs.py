@@ -23,6 +23,15 @@ def test_the_project_file_of_the_how_to_is_certified_and_meets_its_target(tmp_pa
     assert abs(outcome.surface.vertices[west, 2].max() - 1.2) < 1e-6
 
 
+def test_the_branches_of_the_explanation_fold_and_split():
+    text = (DOCS / "explanation" / "branches.md").read_text(encoding="utf-8")
+    names = {}
+    for code in re.findall(r"```python\n(.*?)```", text, re.S):
+        exec(compile(code, "branches.md", "exec"), names)
+    assert abs(names["branch"].bifurcations.parameter.iloc[0] - 1.0) < 0.02
+    assert names["one"].points.energy.iloc[-1] < names["branch"].points.energy.iloc[-1]
+
+
 def test_the_page_of_keys_has_every_key_of_every_section():
     parts = reference().split("\n## ")
     for section, part in zip(sections()[1:], parts, strict=True):

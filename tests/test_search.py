@@ -260,6 +260,7 @@ def test_sweeps_search_only_if_asked():
     assert solve_case(**case, inflation=2.0, search=True)["verdict"] == "stable"
 
 
+@pytest.mark.slow
 def test_from_equal_tensions_to_those_asked_for():
     """The pressure cannot be raised from low ones: there the stronger patch pulls the wall away."""
     weak = two_caps(1.2, alpha_large=1.0, alpha_small=1.5, alpha_aux=6.0)

@@ -174,9 +174,10 @@ def check_mesh(
     surfaces, certificates = [first], [certificate]
     finding, order = None, None
     for _ in range(meshes - 1):
-        result = _solved(_refined(surfaces[-1], boundary, sharp), callback)
+        start = _refined(surfaces[-1], boundary, sharp)
+        result = _solved(start, callback)
         if not result.converged or result.certificate.index is None:
-            finding, order = lost(result), -np.inf
+            finding, order = lost(start, result), -np.inf
             break
         surfaces.append(result.surface)
         certificates.append(result.certificate)

@@ -15,7 +15,7 @@ from ..contact.pinching import standing_part
 from ..energy.functional import energy_and_gradient
 from ..energy.motion_space import motion_space
 from ..meshing.quality import triangle_quality
-from ..solvers.result import Result
+from ..solvers.result import Result, Status
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 
@@ -25,6 +25,11 @@ STILL = 1e-8  # of its size: moves up to here are none
 RESTED = 0.1  # of a junction's length: a smaller change of contact is none
 REACH = 0.3  # of a junction's length: this near to it a place belongs to it
 FURTHER = 3  # meshes ahead at which an eigenvalue that only falls is foreseen
+RUNNING_AWAY = {
+    Status.DIVERGED: "it inflates without bound",
+    Status.VANISHED: "it shrinks to nothing",
+    Status.PINCHED: "a neck pinches off",
+}
 POOR = 0.05  # triangle quality that shows where a solve failed
 
 
@@ -46,23 +51,34 @@ class Finding:
     advice: str = ""
 
 
-def lost(result: Result) -> Finding:
-    """The finding where the solver reaches no equilibrium on a finer mesh."""
+def lost(start: Surface, result: Result) -> Finding:
+    """The finding where the solver reaches no equilibrium from the start on a finer mesh.
+
+    The place is that of the start: where the solver ends, a surface may be far away.
+    """
     surface = result.surface
+    part = standing_part(surface)
     quality = triangle_quality(surface.vertices, surface.faces)
-    quality[standing_part(surface).walls.pinchable[surface.patch_of_face]] = np.inf
+    quality[part.walls.pinchable[surface.patch_of_face]] = np.inf
     worst = int(quality.argmin())
-    if quality[worst] < POOR:
-        place = surface.vertices[surface.faces[worst]].mean(axis=0)
-        what = f"its triangles collapse near {_text(place)}"
+    if result.status in RUNNING_AWAY:
+        what = RUNNING_AWAY[result.status]
+        vertices = np.linalg.norm(surface.vertices - start.vertices, axis=1).argmax(keepdims=True)
+    elif quality[worst] < POOR:
+        what, vertices = "its triangles collapse", surface.faces[worst]
     else:
-        part = standing_part(surface)
-        space = motion_space(part.surface, part.classes, surface.vertices)
-        left = np.linalg.norm(space.project(energy_and_gradient(part.surface, surface.vertices)[1]), axis=1)
-        place = surface.vertices[left.argmax()]
-        what = f"its forces do not come to rest near {_text(place)}"
+        forces = energy_and_gradient(part.surface, surface.vertices)[1]
+        left = motion_space(part.surface, part.classes, surface.vertices).project(forces)
+        what, vertices = "its forces do not come to rest", np.linalg.norm(left, axis=1).argmax(keepdims=True)
+    place = start.vertices[vertices].mean(axis=0)
     reason = f"on {surface.m} triangles the solver finds no equilibrium near this one: {what}"
-    return _at(MeshVerdict.HELD_BY_MESH, surface, reason, place)
+    reason += f", most near {_text(place)}" if result.status in RUNNING_AWAY else f" near {_text(place)}"
+    certificate = result.certificate
+    if certificate.load_ratio > 1.0:
+        reason += (
+            f"; the pressure is {certificate.load_ratio:.3f} times what the boundary's tension could carry"
+        )
+    return _at(MeshVerdict.HELD_BY_MESH, start, reason, place)
 
 
 def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -> Finding:
@@ -74,6 +90,8 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
     size = max(float(np.ptp(first.plane.height(first.vertices))), FLAT * first.size)
     moves = [_moves(a, b) for a, b in pairwise(surfaces)]
     for (surface, fine), move in zip(pairwise(surfaces), moves, strict=True):
+        if contact := _other_contact(surface, fine):
+            return contact
         farthest = int(move.argmax())
         if move[farthest] > FAR * size:
             place = surface.vertices[farthest]
@@ -81,8 +99,6 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
                 f"on {fine.m} triangles it is another shape, {move[farthest]:.3g} away near {_text(place)}"
             )
             return _at(MeshVerdict.CHANGES, surface, reason, place)
-        if contact := _other_contact(surface, fine):
-            return contact
     mean = [_mean(move) for move in moves]
     if shape_order(surfaces) < 0.0:
         place = surfaces[-2].vertices[int(moves[-1].argmax())]
@@ -120,7 +136,7 @@ def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate])
     if index != 0 or len(lowest) < max(3, len(surfaces)):
         return Finding(MeshVerdict.PERSISTS, reason)
     step, before = lowest[-1] - lowest[-2], lowest[-2] - lowest[-3]
-    falls = step < 0.0 and step < 0.84 * before  # no limit in sight, as for the error bars
+    falls = before < 0.0 and step < 0.84 * before  # no limit in sight, as for the error bars
     if not falls:
         return Finding(MeshVerdict.PERSISTS, reason)
     values = ", ".join(f"{value:.3g}" for value in lowest)

@@ -22,17 +22,15 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
     from its own end, where only the mesh holds it; or it comes down on the held bottom of its wall,
     which cannot pinch.
     """
-    quality = triangle_quality(surface.vertices, surface.faces)
-    outer = np.where(pinchable[surface.patch_of_face], np.inf, quality)
-    face = int(outer.argmin())
+    face, quality = _worst_face(surface, pinchable)
     patch = int(surface.patch_of_face[face])
     place = surface.vertices[surface.faces[face]].mean(axis=0)
     edge = float(np.median(edge_lengths(surface)))
     worst = (
         f"worst is face {face} of patch {surface.patches[patch].name!r} near"
-        f" {place.round(4).tolist()}, quality {outer[face]:.1e}"
+        f" {place.round(4).tolist()}, quality {quality:.1e}"
     )
-    if surface.walls[patch] and _height(surface, patch) < LOW * edge:
+    if held_wall_down(surface, pinchable):
         return worst + (
             "; the junction there comes down on the held bottom of its wall, so the wall has no height"
             " left: make the wall weaker, or let its bottom slide so that the junction can rest on the plane"
@@ -44,6 +42,23 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
             f" of its wall ({KEY.format('held')})"
         )
     return worst
+
+
+def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
+    """Whether the worst triangle is in a wall whose junction has come down on its held bottom.
+
+    Walls pinch where they slide on Π; for a held bottom there is no contact, so its triangles collapse.
+    """
+    patch = int(surface.patch_of_face[_worst_face(surface, pinchable)[0]])
+    edge = float(np.median(edge_lengths(surface)))
+    return bool(surface.walls[patch]) and _height(surface, patch) < LOW * edge
+
+
+def _worst_face(surface: Surface, pinchable: Bools) -> tuple[int, float]:
+    """The worst triangle outside walls that can pinch, and its quality."""
+    quality = triangle_quality(surface.vertices, surface.faces)
+    outer = np.where(pinchable[surface.patch_of_face], np.inf, quality)
+    return int(outer.argmin()), float(outer.min())
 
 
 def _height(surface: Surface, patch: int) -> float:

@@ -102,7 +102,7 @@ def _cut(surface: Surface, groups: Ints, lengths: Floats, number: int) -> Neck |
     others = (groups >= 0) & ~source & np.isin(topo.components, topo.components[source])
     starts, ends = (np.flatnonzero(mask[surface.faces].sum(axis=1) > 1) for mask in (source, others))
     shorter = float(min(lengths[number], lengths[np.unique(groups[others])].min()))
-    if not np.isfinite(shorter) or len(np.intersect1d(starts, ends)):
+    if not 0.0 < shorter < np.inf or len(np.intersect1d(starts, ends)):
         return None
     inner = np.flatnonzero(topo.valence > 1)
     cut = inner[_minimal_cut(topo.edge_of_face, inner, segment_lengths(X, topo.edges[inner]), starts, ends)]

@@ -12,7 +12,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats
 from ..surface import Surface
 from .balance import coarseness, hardly_balanced, unbalanced, unheld
-from .collapse import where_collapsed
+from .collapse import held_wall_down, where_collapsed
 from .neck import Neck, pinched_neck
 from .proof import Overload, Proof
 from .slipping import describe_saddle
@@ -34,6 +34,7 @@ class Verdict(Enum):
     NO_EQUILIBRIUM = "no equilibrium: tension and pressure cannot balance, as the detail proves"
     RAN_AWAY = "ran away from this start: another start may come to rest; nothing proves that none does"
     UNDECIDED = "undecided: rounding hides whether it is at rest, or stable; the detail says why"
+    WALL_DOWN = "wall down: a junction comes down on the held bottom of its wall, where it cannot rest"
     DEGENERATE = "degenerate mesh: triangles have collapsed; remesh, or start from another shape"
 
 
@@ -211,6 +212,11 @@ RULES = (
         Verdict.RAN_AWAY,
         lambda f: f.moving and (f.evidence in (Evidence.INFLATED, Evidence.VANISHED) or f.neck is not None),
         _ran_away,
+    ),
+    Rule(
+        Verdict.WALL_DOWN,
+        lambda f: f.moving and f.collapsed and held_wall_down(f.surface, f.pinchable),
+        _collapse,
     ),
     Rule(Verdict.DEGENERATE, lambda f: f.collapsed, _collapse),
     Rule(Verdict.UNDECIDED, lambda f: f.moving and f.residual <= NOISE * f.rounding, _hidden_forces),

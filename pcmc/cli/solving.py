@@ -14,6 +14,7 @@ from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
+from ..base.errors import PcmcError
 from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
@@ -88,9 +89,13 @@ def _check_mesh(project: projects.Project, outcome: projects.Outcome, wanted: bo
         print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
         return
     sys.stdout.flush()
-    with working() as say:
-        check = projects.check_of(project, outcome, say)
-    print(f"\n{check.brief()}")
+    try:
+        with working() as say:
+            check = projects.check_of(project, outcome, say)
+    except PcmcError as error:  # the surface and its files are good without it
+        print(f"no mesh check: {error}")
+    else:
+        print(f"\n{check.brief()}")
 
 
 def _report(outcome: projects.Outcome) -> None:

@@ -94,7 +94,7 @@ def _nearest(flat: Floats, vertices: Ints, top_edges: Ints) -> tuple[Ints, Float
     start, side = flat[top_edges[:, 0]], flat[top_edges[:, 1]] - flat[top_edges[:, 0]]
     length = np.einsum("ij,ij->i", side, side)
     few = range(1, 1 + min(4, len(top_edges)))
-    near = cKDTree(start + 0.5 * side).query(flat[vertices], k=few)[1]
+    near = np.asarray(cKDTree(start + 0.5 * side).query(flat[vertices], k=few)[1])
     fraction = np.einsum("wkj,wkj->wk", flat[vertices][:, None] - start[near], side[near])
     fraction = np.clip(fraction / np.where(length > 0.0, length, 1.0)[near], 0.0, 1.0)
     foot = start[near] + fraction[:, :, None] * side[near]

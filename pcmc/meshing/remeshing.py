@@ -19,7 +19,15 @@ from ..surface.geometry import angles, area_vectors, face_areas, segment_lengths
 from .angles import improve_angles
 from .quality import edge_lengths
 from .refinement import Projection, carry_lines, held_midpoints, projected, prolongation, refine
-from .sizes import check_sizes, edges_between, equilateral_area, limit_growth, place_between, triangles_for
+from .sizes import (
+    SizeField,
+    check_sizes,
+    edges_between,
+    equilateral_area,
+    limit_growth,
+    place_between,
+    triangles_for,
+)
 
 CHORD = 0.1  # of the edge length
 MOST = 20_000_000  # triangles; more mean a mistake in the edge length
@@ -81,7 +89,8 @@ def remesh(
     >>> fine.m > 2 * dome.m, fine.patches == dome.patches
     (True, True)
     """
-    check_lengths(edge_length if np.ndim(edge_length) == 0 else 1.0, near_curves, growth, chord)
+    one: Any = edge_length if np.ndim(edge_length) == 0 else 1.0
+    check_lengths(one, near_curves, growth, chord)
     size = _wanted_sizes(surface, edge_length, growth)
     part = standing_part(surface)
     surface = lift(surface, part.walls, part.resting, RAISED)
@@ -131,20 +140,6 @@ def check_lengths(
     validate.number("growth", growth, above=1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class _Background:
-    """Wanted edge lengths at points; elsewhere that of the nearest one holds."""
-
-    points: Floats
-    size: Floats
-
-    def at(self, X: Floats) -> Floats:
-        """(k,) the edge lengths wanted at positions (k,3)."""
-        if self.size.min() == self.size.max():
-            return np.full(len(X), self.size[0])
-        return self.size[cKDTree(self.points).query(X)[1]]
-
-
 def _wanted_sizes(surface: Surface, edge_length: npt.ArrayLike, growth: float) -> Floats:
     """(n,) the edge length wanted at each vertex."""
     if np.ndim(edge_length) == 0:
@@ -168,10 +163,10 @@ def _curve_edges(surface: Surface) -> Bools:
 
 def _cut_curves(
     surface: Surface, size: Floats, along_curves: Floats, project: Projection | None = None
-) -> tuple[_Mesh, _Background]:
+) -> tuple[_Mesh, SizeField]:
     """The mesh with new vertices on its curves, about ``along_curves`` (n,) apart, and its sizes."""
     first = surface.n
-    background = _Background(surface.vertices, size)
+    background = SizeField(surface.vertices, size)
     counts = _pieces(surface, along_curves)
     # 1→4 keeps the triangles' shape, cutting single edges does not
     while len(counts) and np.median(counts) >= 2.0:
@@ -293,7 +288,7 @@ def cut_triangles(
     return np.concatenate(faces), np.concatenate(owner)
 
 
-def _sizes(mesh: _Mesh, wanted: _Background, growth: float) -> Floats:
+def _sizes(mesh: _Mesh, wanted: SizeField, growth: float) -> Floats:
     """(n,) the edge length wanted at each vertex: a curve's own next to it, growing away from it."""
     size = wanted.at(mesh.X)
     if len(mesh.curves):

@@ -3,15 +3,32 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError
 from ..surface.geometry import segment_lengths
+
+
+@dataclass(frozen=True, eq=False)
+class SizeField:
+    """Wanted edge lengths at points; elsewhere that of the nearest one holds."""
+
+    points: Floats
+    size: Floats
+
+    def at(self, X: Floats) -> Floats:
+        """(k,) the edge lengths wanted at positions (k,3)."""
+        if self.size.min() == self.size.max():
+            return np.full(len(X), self.size[0])
+        return self.size[cKDTree(self.points).query(X)[1]]
 
 
 def check_sizes(edge_length: npt.ArrayLike, n: int) -> Floats:
@@ -53,8 +70,8 @@ def limit_growth(X: Floats, edges: Ints, size: Floats, growth: float) -> Floats:
     start = np.concatenate([edges[:, 0], np.full(n, n)])
     end = np.concatenate([edges[:, 1], np.arange(n)])
     weight = np.concatenate([rise, size])
-    graph = coo_array((weight, (start, end)), shape=(n + 1, n + 1)).tocsr()
-    return np.asarray(dijkstra(graph, directed=False, indices=n))[:n]
+    graph: Any = coo_array((weight, (start, end)), shape=(n + 1, n + 1)).tocsr()
+    return np.asarray(dijkstra(graph, directed=False, indices=[n])[0, :n])
 
 
 def edges_between(length: Floats, start: Floats, end: Floats) -> Floats:

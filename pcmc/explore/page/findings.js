@@ -5,7 +5,7 @@ import { digits } from "./panel.js";
 
 const SIGNS = {
   stable: "✓", neutral: "≈", saddle: "⤢", not_converged: "…", no_equilibrium: "✕", ran_away: "↗",
-  undecided: "?", degenerate: "△", opening: "…",
+  undecided: "?", wall_down: "⤓", degenerate: "△", opening: "…",
 };
 
 export const COLOURS = {
