@@ -16,10 +16,12 @@ from generators import (
     two_squares,
 )
 from pcmc import MeshVerdict, Patch, Surface, certify, check_mesh, cli, read, solve
+from pcmc.accuracy.persistence import compared
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.meshing.held_curves import smooth_midpoints
 from pcmc.meshing.refinement import held_midpoints, refine
 from pcmc.project import run
+from pcmc.solvers import solve as solve_once
 from pcmc.sweep import run as run_sweep
 from pcmc.sweep import solve_case
 from pcmc.sweep.projects import project_sweep
@@ -94,7 +96,31 @@ def test_a_junction_that_slips_at_its_end_is_held_by_the_mesh(edge):
     assert "hold the bottom of 'wall'" in found.advice
 
 
-@settings(max_examples=10, deadline=None)
+def test_a_coarse_mesh_may_carry_more_than_its_boundary_can():
+    """Below α = R/2 there is no cap; one of few triangles is at rest a little below it."""
+    found = check_mesh(solve(spherical_cap(0.2, alpha=0.495)))
+    assert found.verdict is MeshVerdict.HELD_BY_MESH
+    assert "the pressure is 1.009 times what the boundary's tension could carry" in found.detail
+    assert np.isnan(found.table.limit).all()
+    assert np.isinf(found.table.error).all()
+
+
+def test_a_surface_that_jumps_to_another_is_another_shape():
+    start = two_caps(1.2, alpha_large=3.5, alpha_small=3.0, alpha_aux=1.0)
+    found = check_mesh(solve_once(start, target="stationary"))
+    assert found.verdict is MeshVerdict.CHANGES
+    assert "it is another shape" in found.detail
+
+
+def test_a_junction_that_comes_down_changes():
+    """A junction that rests all along, and one that stands: as if a finer mesh had lifted it."""
+    resting, standing = (solve(two_squares(4, alpha_aux=wall)) for wall in (3.0, 1.0))
+    found = compared([resting.surface, standing.surface], [resting.certificate, standing.certificate])
+    assert found.verdict is MeshVerdict.CHANGES
+    assert "the junction over 'wall' rests on the plane along 0 of its length 4, here along 4" in found.reason
+
+
+@settings(max_examples=5, deadline=None)
 @given(st.integers(-3, 3), st.integers(-3, 3))
 def test_scales_of_length_and_force_scale_the_table(length, force):
     """q → s q for heights, s² for areas, …; orders stay."""
@@ -262,6 +288,21 @@ def test_ctrl_c_during_the_check_keeps_the_files(hall, capsys, monkeypatch):
     assert cli.main(["solve", "hall.toml"]) == 130
     assert "written: hall.pcmc" in capsys.readouterr().out
     assert certify(read("hall.pcmc")).certified
+
+
+def test_a_check_that_fails_costs_nothing(hall, capsys, monkeypatch):
+    def refuse(*_, **__):
+        raise SurfaceError("too fine", what="vertices")
+
+    monkeypatch.setattr("pcmc.accuracy.mesh_check.refine", refuse)
+    assert cli.main(["solve", "hall.toml"]) == 0
+    assert "no mesh check: too fine" in capsys.readouterr().out
+    case = solve_case("generators:spherical_cap", mesh_check=True, edge_length=0.5)
+    assert (case["verdict"], case["mesh_verdict"], case["mesh_detail"]) == (
+        "stable",
+        "not checked",
+        "too fine",
+    )
 
 
 def test_a_project_may_ask_for_the_check(hall):

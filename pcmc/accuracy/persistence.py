@@ -90,6 +90,8 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
     size = max(float(np.ptp(first.plane.height(first.vertices))), FLAT * first.size)
     moves = [_moves(a, b) for a, b in pairwise(surfaces)]
     for (surface, fine), move in zip(pairwise(surfaces), moves, strict=True):
+        if contact := _other_contact(surface, fine):
+            return contact
         farthest = int(move.argmax())
         if move[farthest] > FAR * size:
             place = surface.vertices[farthest]
@@ -97,8 +99,6 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
                 f"on {fine.m} triangles it is another shape, {move[farthest]:.3g} away near {_text(place)}"
             )
             return _at(MeshVerdict.CHANGES, surface, reason, place)
-        if contact := _other_contact(surface, fine):
-            return contact
     mean = [_mean(move) for move in moves]
     if shape_order(surfaces) < 0.0:
         place = surfaces[-2].vertices[int(moves[-1].argmax())]

@@ -108,7 +108,8 @@ def read(path: Path) -> MeshData:
     pressure, more = _pressures(file, face_ids, known)
     patch_of_face, patches = _patches(header, file["faces"], rest, pressure, known)
     given = re.search(r"^// origin (\S+) (\S+) (\S+)$", header, re.M)
-    origin = _numbers(given.groups(), known, _Section(header, 1), 0) if given else np.zeros(3)
+    place = _Section(header, 1)
+    origin = np.array([_numbers((c,), known, place, 0)[0] for c in given.groups()] if given else np.zeros(3))
     plane = _plane(file["top"], constraint, origin, known)
     return MeshData(X + origin, F, patch_of_face[source], patches, support, plane, notes=(*notes, *more))
 

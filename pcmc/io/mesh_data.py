@@ -76,6 +76,8 @@ def checked(data: MeshData) -> MeshData:
     for name, values in data.scalars.items():
         if np.shape(values) != (m,):
             _numeric(values, f"scalar {name}", "fiub", (n,))
+    for _, along in data.lines:
+        _numeric(along, "on_line", "b", (n,))
     patch = within(patch, "patch_of_face", len(data.patches))
     scalars = {name: np.asarray(values, dtype=np.float64) for name, values in data.scalars.items()}
     return replace(data, vertices=X, faces=F, patch_of_face=patch, support=support, scalars=scalars)

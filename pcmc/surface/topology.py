@@ -147,18 +147,28 @@ class Topology:
         from scipy.sparse.csgraph import depth_first_order
 
         chosen = np.flatnonzero(mask)
+        if not len(chosen):
+            return ()
         split, original = _split_at(self.edges[chosen], stop, self.vertex_count)
-        graph = _adjacency(split, len(original))
-        label = components(split, len(original))
+        count = len(original)
+        label = components(split, count)
         sheets = self._sheets_of_edges(chosen)
-        curves, degree = [], np.bincount(split.ravel(), minlength=len(original))
-        for part, first_edge in zip(*np.unique(label[split[:, 0]], return_index=True), strict=True):
-            members = np.flatnonzero((label == part) & (degree > 0))
-            ends = members[degree[members] == 1]
-            closed = not len(ends)
-            order = depth_first_order(graph, members[0] if closed else ends[0], directed=False)[0]
-            curves.append(Curve(original[order], closed, sheets[first_edge]))
-        return tuple(curves)
+        degree = np.bincount(split.ravel(), minlength=count)
+        members = np.flatnonzero(degree)
+        members = members[np.lexsort((degree[members] != 1, label[members]))]  # part by part, its ends first
+        starts = members[np.unique(label[members], return_index=True)[1]]
+        # one search for all parts, from a vertex more that leads to the start of each
+        links = np.stack([np.full(len(starts), count), starts], axis=1)
+        graph = _adjacency(np.concatenate([split, links]), count + 1)
+        order = depth_first_order(graph, count, directed=False)[0][1:]
+        order = order[np.argsort(label[order], kind="stable")]
+        parts, first_edge = np.unique(label[split[:, 0]], return_index=True)
+        pieces = np.split(original[order], np.searchsorted(label[order], parts)[1:])
+        closed = degree[starts] != 1
+        return tuple(
+            Curve(piece, bool(loop), sheets[edge])
+            for piece, loop, edge in zip(pieces, closed, first_edge, strict=True)
+        )
 
     def _sheets_of_edges(self, chosen: Ints) -> list[tuple[int, ...]]:
         wanted = np.zeros(len(self.edges), dtype=bool)
