@@ -1,6 +1,7 @@
 """Refinement where it pays: size fields, where errors come from, and how a search for an accuracy ends."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,11 +13,11 @@ import pcmc
 from pcmc import Patch, Surface, cli, solve, solve_to_accuracy
 from pcmc.accuracy import adaptive, check_mesh
 from pcmc.accuracy.adaptive import AccuracyStatus, size_field
-from pcmc.accuracy.estimator import _held_vertices, _slope, error_shares
+from pcmc.accuracy.estimator import _FineMesh, _held_vertices, _slope, error_shares
 from pcmc.accuracy.goals import goals_in
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.certificate.balance import held_lengths, reactions
-from pcmc.energy.functional import energy
+from pcmc.energy.functional import energy, volume
 from pcmc.meshing.curve_projection import onto_held_curves
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.meshing.refinement import refine
@@ -144,6 +145,17 @@ def test_the_shares_add_up_to_the_error_and_not_to_much_more(roof, fine_roof, qu
 
 def _value(surface: Surface, quantity: str, of: str) -> float:
     return float(check_mesh(surface, 2).row(quantity, of).value)
+
+
+def test_held_vertices_that_move_outward_change_the_volume_by_their_shares():
+    cap = solve(generators.spherical_cap(0.4, alpha=0.6)).surface
+    fine = solve(refine(cap)).surface
+    new = fine.fixed & (np.arange(fine.n) >= cap.n)
+    outward = np.where(new[:, None], fine.vertices * [1.0, 1.0, 0.0], 0.0)
+    ahead, back = (volume(solve(fine.moved(fine.vertices + s * outward)).surface) for s in (1e-4, -1e-4))
+    mesh = replace(_FineMesh.of(cap, fine), free=np.zeros_like(outward), held=outward)
+    # not exact, as vertices only rest along the normals
+    assert mesh.shares(("volume", "")).sum() == pytest.approx((ahead - back) / 2e-4, rel=5e-3)
 
 
 def test_shares_are_largest_at_the_re_entrant_corner_and_scale_with_the_accuracy(roof, fine_roof):
