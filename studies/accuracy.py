@@ -254,7 +254,7 @@ def _near(surface: Surface, reach: float) -> Surface:
     near = roof & (away[surface.faces].min(axis=1) <= reach)
     used, faces = np.unique(surface.faces[near], return_inverse=True)
     numbers, patch = np.unique(surface.patch_of_face[near], return_inverse=True)
-    kept = [surface.patches[k] for k in numbers]
+    kept = tuple(surface.patches[k] for k in numbers)
     return Surface(surface.vertices[used], faces.reshape(-1, 3), patch, kept, fixed=surface.fixed[used])
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from random_meshes import random_surface
 from shapes import pyramid, tube
 from starts import sphere, spherical_cap, two_caps, two_squares
 
@@ -241,6 +242,14 @@ def test_refinement_goes_on_from_a_further_start():
 def test_a_surface_at_rest_needs_no_proof():
     """One free vertex is at rest down to α = 1/3, where no smooth roof would be."""
     result = solve(pyramid(0.4))
+    assert result.proofs == ()
+    assert result.certificate.verdict is Verdict.STABLE
+
+
+def test_a_coarse_mesh_at_rest_is_not_disproved():
+    """Its junction cannot balance on a smooth surface, but triangles balance along the normals alone."""
+    result = solve(random_surface(30082), target="stationary", iterations=12)
+    assert result.status is Status.ITERATION_LIMIT
     assert result.proofs == ()
     assert result.certificate.verdict is Verdict.STABLE
 

@@ -85,7 +85,12 @@ def test_new_boundary_vertices_lie_on_the_curve_that_is_given():
 
 def test_large_triangles_from_curve_to_curve_are_split():
     hall = solve(generators.bezier_hall(14.0)).surface
-    assert minimum_angle(remesh(hall, 5.0)) > 15.0
+    place = [75.0, 52.0]  # between an arch and the hole
+    fine = remesh(hall, 3.0 + 0.25 * np.linalg.norm(hall.vertices[:, :2] - place, axis=1), growth=1.5)
+    middle = fine.vertices[fine.topology.edges].mean(axis=1)
+    wanted = 3.0 + 0.25 * np.linalg.norm(middle[:, :2] - place, axis=1)
+    assert (edge_lengths(fine) / wanted).max() < 3.5
+    assert minimum_angle(fine) > 15.0
 
 
 @pytest.mark.parametrize("wrong", [[1.0, 2.0], ["fine"], np.full(5, 0.5)])

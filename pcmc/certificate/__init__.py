@@ -4,6 +4,16 @@ Gives ``certify`` to the solvers' callers. Imports ``stability``, ``meshing``, `
 """
 
 from .certificate import Certificate, certify
+from .proof import Fold, Overload, UnbalancedJunction, Unheld
 from .verdict import Evidence, Verdict
 
-__all__ = ["Certificate", "Evidence", "Verdict", "certify"]
+__all__ = [
+    "Certificate",
+    "Evidence",
+    "Fold",
+    "Overload",
+    "UnbalancedJunction",
+    "Unheld",
+    "Verdict",
+    "certify",
+]

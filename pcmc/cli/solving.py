@@ -6,7 +6,7 @@ import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -65,7 +65,7 @@ def solve_(
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
         options["target"] = target
-    given = {"accuracy_of": accuracy_of, "most_triangles": most_triangles}
+    given: dict[str, Any] = {"accuracy_of": accuracy_of, "most_triangles": most_triangles}
     given["accuracy"] = ", ".join(accuracy) if accuracy else None
     goal = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
     wanted = project.mesh_check if mesh_check is None else mesh_check
