@@ -69,7 +69,9 @@ def vtk_arrays(path: str) -> dict[str, Any]:
 def rhino_arrays(path: str) -> dict[str, Any]:
     """Layers and objects of a Rhino file: names and user texts, meshes and point clouds."""
     import numpy as np
-    import rhino3dm as rhino
+    import rhino3dm
+
+    rhino: Any = rhino3dm
 
     def coordinates(points: Any) -> Any:
         return np.array([(p.X, p.Y, p.Z) for p in points], dtype=np.float64).reshape(-1, 3)

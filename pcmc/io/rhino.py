@@ -86,9 +86,9 @@ def read(path: Path) -> MeshData:
     held: dict[int, list[Floats]] = {FIXED: [], SLIDING: []}
     metadata, walls, others, start = Metadata(), None, 0, 0
     for item in arrays["objects"]:
-        layer = (
-            layers[item["layer"]] if 0 <= item["layer"] < len(layers) else {"name": path.stem, "texts": {}}
-        )
+        layer: dict[str, Any] = {"name": path.stem, "texts": {}}
+        if 0 <= item["layer"] < len(layers):
+            layer = layers[item["layer"]]
         name, texts = layer["name"], layer["texts"]
         if texts.get(KEY):
             metadata = parse_metadata(texts[KEY])
