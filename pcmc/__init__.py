@@ -17,11 +17,12 @@ if TYPE_CHECKING:
     from .energy.functional import energy, gradient, hessian
     from .existence import solve
     from .io import read, write
-    from .surface import Line, Patch, Plane, Surface
+    from .surface import Circle, Line, Patch, Plane, Surface
 
 __all__ = [
     "BoundaryMotion",
     "Certificate",
+    "Circle",
     "Design",
     "Direction",
     "Line",
@@ -63,7 +64,7 @@ _NAMES = {
     "energy.functional": ("energy", "gradient", "hessian"),
     "existence": ("solve",),
     "io": ("read", "write"),
-    "surface": ("Line", "Patch", "Plane", "Surface"),
+    "surface": ("Circle", "Line", "Patch", "Plane", "Surface"),
 }
 
 

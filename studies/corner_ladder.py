@@ -28,7 +28,7 @@ import numpy as np
 from scipy.optimize import curve_fit
 from scipy.stats import linregress, t
 
-from pcmc import Certificate, Line, Surface
+from pcmc import Certificate, Circle, Line, Surface
 from pcmc.base.arrays import Floats, Ints
 from pcmc.base.errors import SurfaceError
 from pcmc.meshing.local_refinement import refine_near
@@ -51,6 +51,7 @@ LEAST_FIT = 4  # levels
 NEAR_REST = 0.2  # of log(1/h): closer to where the junction rests the law has no use
 ITERATIONS = 60  # of the solver on a mesh; from the level before it takes 5
 CONFIDENCE = 0.95
+STRAIGHT = 1e-9  # of the size: how far points may be from a line or circle that they lie on
 
 
 def ends(surface: Surface) -> Ints:
@@ -70,23 +71,46 @@ def hold_bottoms(surface: Surface) -> Surface:
 
 
 def free_ends(surface: Surface) -> Surface:
-    """The same surface with its ends sliding along the outline, where that is straight.
+    """The same surface with its ends sliding along the outline, where that is straight or one circle.
 
-    The outline's other vertices on the same straight side slide too, and make room.
+    The outline's other vertices on the same straight side, or on the circle, slide too, and make room.
     """
     topo, X = surface.topology, surface.vertices
     outline = topo.edges[topo.boundary_edge & surface.fixed[topo.edges].all(axis=1)]
+    rim = _circle_through(X[np.unique(outline)])
+    if rim is not None:
+        return replace(surface, on_line={rim: np.unique(outline)})
     lines = []
     for vertex in ends(surface):
         if abs(opening(surface, int(vertex)) - 180.0) > 1e-6:
             continue
         beside = outline[(outline == vertex).any(axis=1)].sum(axis=1) - vertex
         line = Line(tuple(X[vertex]), tuple(X[beside[1]] - X[beside[0]]))
-        side = np.unique(outline[(line.distance(X[outline]) < 1e-9 * surface.size).all(axis=1)])
+        side = np.unique(outline[(line.distance(X[outline]) < STRAIGHT * surface.size).all(axis=1)])
         place = line.place(X[side])
         inner = side[(place > place.min()) & (place < place.max())]
         lines.append((line, np.isin(np.arange(surface.n), inner)))
     return replace(surface, on_line=tuple(lines))
+
+
+def _circle_through(points: Floats) -> Circle | None:
+    """The circle that points (k,3) lie on, if there is one.
+
+    >>> _circle_through(np.array([[2.0, 0, 0], [1, 1, 0], [0, 0, 0], [1, -1, 0]]))
+    Circle(centre=(1.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0), radius=1.0)
+    """
+    a = points[0]
+    b = points[np.linalg.norm(points - a, axis=1).argmax()]
+    normals = np.cross(points - a, b - a)
+    third = int(np.linalg.norm(normals, axis=1).argmax())
+    u, v, normal = b - a, points[third] - a, normals[third]
+    if len(points) < 4 or not np.linalg.norm(normal) > STRAIGHT * (u @ u):
+        return None
+    normal = normal if normal[np.abs(normal).argmax()] > 0.0 else -normal
+    w = np.cross(u, v)
+    centre = a + np.cross(w, (u @ u) * v - (v @ v) * u) / (-2.0 * (w @ w))
+    circle = Circle(tuple(centre.tolist()), tuple(normal.tolist()), float(np.linalg.norm(a - centre)))
+    return circle if circle.distance(points).max() <= STRAIGHT * circle.radius else None
 
 
 SUPPORTS: dict[str, Callable[[Surface], Surface]] = {

@@ -2,9 +2,9 @@
 
 Each example is solved on meshes that are graded towards the ends of its junctions, each with half the edge
 length there of the one before: ten times with the bottoms of its walls sliding on Π, eight times with them
-held; each equilibrium of Fig. 16's grid eight and five times. Where the outline is straight the ends slide
-along it, too: with this natural condition nothing is left for the mesh to hold. ``corner_ladder`` has the
-theory of the hold and how it is fitted.
+held; each equilibrium of Fig. 16's grid eight and five times. Where the outline is straight or a circle the
+ends slide along it, too: with this natural condition nothing is left for the mesh to hold.
+``corner_ladder`` has the theory of the hold and how it is fitted.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from generators import bezier_hall, four_fans, joined_caps, three_patches, two_caps, two_squares
-from pcmc import Surface
+from pcmc import Circle, Surface
 from pcmc.base.arrays import Floats
 from pcmc.solvers import solve
 from pcmc.sweep import Sweep
@@ -60,7 +60,7 @@ NO_CASE = "no equilibrium in the grid"
 NAMES = {"sliding": "ends fixed", "held": "held", "natural": "ends slide too"}
 BOTTOMS = ("sliding", "held")  # of the walls
 DRAWN = "fig4"
-SHIFTS = (0.0, 0.025, 0.05, 0.1, 0.2)  # of the ends, in half widths
+SHIFTS = (0.0, 0.025, 0.05, 0.1, 0.2)  # of the ends, in half widths or radii
 
 
 @dataclass(frozen=True)
@@ -128,23 +128,26 @@ def data(folder: Folder, short: bool) -> None:
 
 
 def _applies(initial: Surface, bottom: str) -> bool:
-    """Whether the bottoms of an example can have this support, and its ends a straight outline."""
+    """Whether the bottoms of an example can have this support, and its ends a straight or round outline."""
     if bottom == "natural":
-        return len(free_ends(initial).on_line) == len(ends(initial))
+        return all(any(along[v] for _, along in free_ends(initial).on_line) for v in ends(initial))
     return bottom == "held" or bool(initial.on_plane.any())
 
 
 def _shifted_ends(case: Case) -> list[dict[str, Any]]:
-    """At rest with the ends fixed at another place of their straight outline: energy, and pull along it.
+    """At rest with ends fixed at another place of their outline: energy, and pull along it.
 
-    The pull is what the surface exerts on its ends, positive away from where they are drawn.
+    The pull is what the surface exerts on these ends, positive away from where they are drawn. They are all
+    ends of a straight outline, and one of a round one.
     """
     initial, rows = case.build(), []
-    X, half = initial.vertices, float(np.abs(initial.vertices[:, 0]).max())
+    guides = free_ends(initial).on_circle
+    chosen = ends(initial)[:1] if guides else ends(initial)
     for shift in SHIFTS:
-        moved = X + np.outer(shift * half * (1.0 - (X[:, 0] / half) ** 2), [1.0, 0.0, 0.0])
+        moved = _turned(initial, chosen[0], guides[0][0], shift) if guides else _pushed(initial, shift)
         result = solve(initial.moved(moved), "newton", target="stationary")
-        forces = result.certificate.reactions[ends(initial), 0]
+        along = guides[0][0].directions(moved[chosen]) if guides else np.array([[1.0, 0.0, 0.0]])
+        forces = (result.certificate.reactions[chosen] * along).sum(axis=1)
         rows.append(
             {
                 "case": case.name,
@@ -155,6 +158,25 @@ def _shifted_ends(case: Case) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def _pushed(initial: Surface, shift: float) -> Floats:
+    """The vertices (n,3) with those at x = 0 moved along x by this share of the half width."""
+    X, half = initial.vertices, float(np.abs(initial.vertices[:, 0]).max())
+    return np.asarray(X + np.outer(shift * half * (1.0 - (X[:, 0] / half) ** 2), [1.0, 0.0, 0.0]))
+
+
+def _turned(initial: Surface, end: int, circle: Circle, shift: float) -> Floats:
+    """The vertices (n,3) with an end moved along the circle by this share of the radius.
+
+    What is near the end turns about the axis with it, what is on the other side not at all.
+    """
+    X, centre, normal = initial.vertices, np.array(circle.centre), np.array(circle.normal)
+    away, out = X - centre, X[end] - centre
+    share = np.maximum(away @ out, 0.0) / circle.radius**2
+    angle = (shift * share**2)[:, None]
+    flat = away - (away @ normal)[:, None] * normal
+    return np.asarray(X - flat + np.cos(angle) * flat + np.sin(angle) * np.cross(normal, flat))
 
 
 def _ends(

@@ -105,3 +105,10 @@ def test_held_bottoms_are_held():
     surface = ladder.hold_bottoms(two_squares(4))
     assert not surface.on_plane.any()
     assert solve(surface, "newton").converged
+
+
+def test_ends_slide_along_a_round_outline():
+    for build, radius in ((four_fans, 20.0), (three_patches, 10.0)):
+        ((circle, along),) = ladder.free_ends(build()).on_line
+        assert circle.radius == pytest.approx(radius, rel=1e-12)
+        assert along[ladder.ends(build())].all()

@@ -135,7 +135,7 @@ def test_files_and_copies_keep_the_lines(tmp_path):
             assert line == same
             np.testing.assert_array_equal(along, before)
             assert not along.flags.writeable
-    with pytest.warns(LostWarning, match="lines that vertices slide along"):
+    with pytest.warns(LostWarning, match="lines or circles that vertices slide along"):
         pcmc.write(tmp_path / "a.obj", surface)
     assert not pcmc.read(tmp_path / "a.obj").on_line
 

@@ -145,7 +145,7 @@ class ParameterLine:
 
     def gradient(self, surface: Surface, X: Floats) -> Floats:
         """∂∇E/∂λ = Σ w_i ∇A_i - Σ u_i ∇V_i (n,3), supports applied."""
-        return apply_supports(surface, weighted(surface, self.tension_rates, self.pressure_rates, X)[2])
+        return apply_supports(surface, weighted(surface, self.tension_rates, self.pressure_rates, X)[2], X)
 
 
 def _rates(surface: Surface, weights: Mapping[str, float]) -> Floats:

@@ -9,7 +9,14 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import excess_pull, place_pinched_walls, place_wall_rows, standing_part
-from ..energy.functional import apply_supports, energy_and_gradient, energy_at, patch_volumes, weighted
+from ..energy.functional import (
+    apply_supports,
+    energy_and_gradient,
+    energy_at,
+    onto_circles,
+    patch_volumes,
+    weighted,
+)
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
@@ -168,7 +175,7 @@ class State:
         """(n,3) gradient of the volume, supports applied unless the boundary moves, length²."""
         surface = self.mesh.surface
         gradient = weighted(surface, 0.0, -self.mesh.loaded, self.X)[2]
-        return gradient if self.carried is not None else apply_supports(surface, gradient)
+        return gradient if self.carried is not None else apply_supports(surface, gradient, self.X)
 
     @cached_property
     def highest_vertex(self) -> int:
@@ -223,4 +230,5 @@ class State:
 
     def moved(self, d: Floats) -> Floats:
         """X + d (n,3), with the rows of walls below their crest."""
-        return place_wall_rows(self.mesh.surface, self.mesh.walls, self.X + d, self.space)
+        X = onto_circles(self.mesh.surface, self.X + d)
+        return place_wall_rows(self.mesh.surface, self.mesh.walls, X, self.space)

@@ -67,7 +67,7 @@ def energy_and_gradient(
     X = surface.vertices if X is None else X
     areas, volumes, gradient = kernels.measure(kernels.energy_mesh(surface), X, workers)
     if supports:
-        apply_supports(surface, gradient)
+        apply_supports(surface, gradient, X)
     return total(surface.tensions, areas, surface.pressures, volumes), gradient
 
 
@@ -89,19 +89,30 @@ def gradient(surface: Surface) -> Floats:
     return energy_and_gradient(surface)[1]
 
 
-def apply_supports(surface: Surface, vectors: Floats) -> Floats:
+def apply_supports(surface: Surface, vectors: Floats, X: Floats | None = None) -> Floats:
     """Leave of vectors (n,3) what the supports allow, in place.
 
-    Nothing at fixed vertices, the part along the line at those that slide along one, and the part along Π
-    at those that slide there.
+    Nothing at fixed vertices, the part along the line or circle at those that slide along one, and the part
+    along Π at those that slide there; with the vertices at X (n,3) or where the surface has them.
     """
-    along = [line.along(vectors[vertices]) for line, vertices in surface.on_line]
+    X = surface.vertices if X is None else X
+    along = [line.along(vectors[vertices], X[vertices]) for line, vertices in surface.on_line]
     vectors[surface.fixed] = 0.0
     for (_, vertices), part in zip(surface.on_line, along, strict=True):
         vectors[vertices] = part
     sliding = surface.on_plane
     vectors[sliding] = surface.plane.along(vectors[sliding])
     return vectors
+
+
+def onto_circles(surface: Surface, X: Floats) -> Floats:
+    """X (n,3) with the vertices that slide along a circle put back on it; X itself without any."""
+    circles = surface.on_circle
+    if circles:
+        X = X.copy()
+    for circle, along in circles:
+        X[along] = circle.nearest(X[along])
+    return X
 
 
 def hessian(surface: Surface) -> csr_array:

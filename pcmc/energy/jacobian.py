@@ -4,11 +4,12 @@ The forces that a P-CMC surface lacks are f = B Bᵀ ∇E, and along a motion d 
 
     Bᵀ Df[d] = Bᵀ (∂²E) d + Bᵀ D(B Bᵀ)[d] ∇E.
 
-The second part vanishes at rest. Newton's method converges quadratically only with it:
+The second part vanishes at rest, but for circles. Newton's method converges quadratically only with it:
 
 - inside a sheet, with the area vector a = |a| n:   (∇E - n n·∇E) · Da / |a|;
 - on a curve, with the chord c = |c| t between its neighbours:   -(t·∇E) Bᵀ Dc / |c|;
-- where a curve slides on Π the same, with the chord's part along Π; where a sheet does, its normal's.
+- where a curve slides on Π the same, with the chord's part along Π; where a sheet does, its normal's;
+- along a circle, with the tangent t:   Dt · ∇E, without supports; see ``turning``.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from ..surface.geometry import (
 from ..surface.topology import SHEET
 from .kernels import Mesh
 from .motion_space import MotionSpace, VertexClasses, curve_chords
+from .turning import circle_turning
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,7 @@ class Linearisation:
     sheet_factor : (n,3) (∇E - n n·∇E) / |a| inside sheets, which Da is multiplied with; zero elsewhere.
     curve_rows, curve_factor : (b,) numbers in ``classes.curve`` of the vertices whose curve may turn,
         and -(t·∇E) / |c| there, which Dc is multiplied with.
+    circle_rows, circle_factor : (k,), (k,3) as ``circle_turning`` gives them.
     """
 
     surface: Surface
@@ -59,6 +62,8 @@ class Linearisation:
     sheet_factor: Floats
     curve_rows: Ints
     curve_factor: Floats
+    circle_rows: Ints
+    circle_factor: Floats
 
     def times(self, d: Floats) -> Floats:
         """Bᵀ Df[d] (size,), for a motion d (n,3) of the vertices."""
@@ -70,6 +75,7 @@ class Linearisation:
         change[classes.curve[self.curve_rows]] += self.curve_factor[:, None] * turned
         out = space.to_coordinates(change)
         out[space.start[self.sheet_rows]] += turn[self.sheet_rows]
+        out[space.start[self.circle_rows]] += (self.circle_factor * d[self.circle_rows]).sum(axis=1)
         return out
 
 
@@ -88,7 +94,10 @@ def linearise(
     square = np.einsum("ij,ij->i", chord, chord)
     along = np.einsum("ij,ij->i", chord, gradient[classes.curve[rows]])
     sheet_rows = np.flatnonzero(single)
-    return Linearisation(surface, classes, space, X, sheet_rows, sheet_factor, rows, -along / square)
+    turning = circle_turning(surface, space, X)
+    return Linearisation(
+        surface, classes, space, X, sheet_rows, sheet_factor, rows, -along / square, *turning
+    )
 
 
 def _sheet_factor(

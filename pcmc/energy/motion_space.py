@@ -4,7 +4,8 @@
 - on a curve where sheets meet or end: the plane perpendicular to the curve;
 - at a point where such curves meet, or which sheets share that have no edge in common there: all
   three directions;
-- always within what the support allows: nothing where fixed, along Π where sliding, or along a line.
+- always within what the support allows: nothing where fixed, along Π where sliding, or along a
+  line or circle.
 
 The remaining directions only slide vertices along the shape and belong to mesh quality. Faces without
 tension and pressure exert no force: they are left out, and a vertex of such faces alone has no motion.
@@ -21,7 +22,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
-from ..surface import Surface
+from ..surface import Circle, Surface
 from ..surface.geometry import (
     accumulate,
     add,
@@ -193,7 +194,12 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     if len(sliding):
         _within_plane(np.array(surface.plane.normal), tangent, sliding, basis, dimension)
     for line, along_line in surface.on_line:
-        _within_line(np.array(line.direction), np.flatnonzero(along_line & moving), basis, dimension)
+        sliding = np.flatnonzero(along_line & moving)
+        if isinstance(line, Circle):
+            basis[_beside_the_same(surface, classes, line, along_line)] = 0.0
+            _within_circle(line.directions(X[sliding]), sliding, basis, dimension)
+        else:
+            _within_line(np.array(line.direction), sliding, basis, dimension)
     return MotionSpace.of(basis, dimension)
 
 
@@ -267,6 +273,23 @@ def _within_line(direction: Floats, sliding: Ints, basis: Floats, dimension: Int
     basis[sliding] = 0.0
     basis[sliding[across], 0] = direction
     dimension[sliding] = across
+
+
+def _within_circle(tangent: Floats, sliding: Ints, basis: Floats, dimension: Ints) -> None:
+    """Leave the circle's tangent (k,3) where moving along it changes the shape, and nothing elsewhere."""
+    across = np.linalg.norm(np.einsum("kij,kj->ki", basis[sliding], tangent), axis=1) > PARALLEL
+    basis[sliding] = 0.0
+    basis[sliding[across], 0] = tangent[across]
+    dimension[sliding] = across
+
+
+def _beside_the_same(surface: Surface, classes: VertexClasses, circle: Circle, along: Bools) -> Ints:
+    """Vertices of a curve that lies along the circle on both sides: there they only slide along it.
+
+    The polygon's chord is not quite along the tangent where its sides differ in length.
+    """
+    near = surface.fixed & (circle.distance(surface.vertices) <= 1e-9 * surface.size)
+    return np.asarray(classes.curve[along[classes.curve] & near[classes.beside].all(axis=1)])
 
 
 @compiled

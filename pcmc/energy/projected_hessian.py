@@ -6,7 +6,8 @@ the corners, the entry of Bᵀ (∂²E) B is
     α (e_i·e_j)/(4A) (b_i·ν)(b_j·ν)  +  (∓½ α ν ± p x_k / 6) · (b_j × b_i)
 
 (upper sign when j follows i; k the third corner, seen from the point of Π), and the stiffness
-Bᵀ (L_α ⊗ I) B, with L_α the cotangent Laplacian, has α (e_i·e_j)/(4A) (b_i·b_j) in its place.
+Bᵀ (L_α ⊗ I) B, with L_α the cotangent Laplacian, has α (e_i·e_j)/(4A) (b_i·b_j) in its place. A vertex that
+slides along a circle adds ⟨κ, ∇E⟩ to its diagonal entry of the former, κ its curvature vector.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from ..surface import Surface
 from ..surface.geometry import cross, divided, dot, norm, point, scaled, sub, vector
 from .kernels import Mesh
 from .motion_space import MotionSpace, VertexClasses
+from .turning import circle_turning
 
 
 class Pattern(NamedTuple):
@@ -74,6 +76,9 @@ def assemble(
     """Values of hessian · Bᵀ(∂²E)B + stiffness · Bᵀ(L_α⊗I)B in the pattern."""
     data = np.zeros(len(pattern.indices))
     _assemble(classes.mesh(surface), X, space, pattern, hessian, stiffness, data)
+    if hessian:
+        rows, factor = circle_turning(surface, space, X)
+        data[pattern.indptr[space.start[rows]]] += hessian * (factor * space.basis[rows, 0]).sum(axis=1)
     return data
 
 

@@ -20,8 +20,13 @@ def rigid_motions(surface: Surface) -> Floats:
     size = surface.size or 1.0  # 0 where all vertices are at one point
     arm = (surface.vertices - surface.vertices.mean(axis=0)) / size
     held, free = surface.fixed, np.eye(6)
+    for _, along in surface.on_circle:
+        held = held & ~along
     if not surface.free.all():
         rows = [_row(arm[held], axis) for axis in np.eye(3)]
+        for circle, along in surface.on_circle:
+            outward = surface.vertices[along] - np.array(circle.centre)
+            rows += [_row(arm[along], np.array(circle.normal)), _row(arm[along], outward / circle.radius)]
         resisted = np.concatenate([*rows, _row(arm[surface.on_plane], np.array(surface.plane.normal))])
         _, s, vt = np.linalg.svd(resisted.T @ resisted)
         free = vt[s <= 1e-10 * s[0]]
@@ -46,5 +51,5 @@ def rigid_modes(space: MotionSpace, motions: Floats, X: Floats) -> Floats:
 
 
 def _row(arm: Floats, axis: Floats) -> Floats:
-    """(k,6): velocity along ``axis`` of points at ``arm`` for unit translations and rotations."""
-    return np.concatenate([np.tile(axis, (len(arm), 1)), np.cross(arm, axis)], axis=1)
+    """(k,6): velocity along ``axis``, (3,) or (k,3), of points at ``arm`` for unit motions."""
+    return np.concatenate([np.broadcast_to(axis, arm.shape), np.cross(arm, axis)], axis=1)

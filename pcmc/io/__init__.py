@@ -39,7 +39,7 @@ class Format:
     shared : whether patches certainly share their vertices, so that reading needs no merging.
     separate : whether it has a mesh per patch, which cannot have triangles without area.
     walls : whether such triangles go with a separate format as text.
-    lines : whether it holds the lines that vertices slide along.
+    lines : whether it holds the lines and circles that vertices slide along.
     loses : what it never holds.
     """
 
@@ -189,7 +189,7 @@ def write(
     if certificate is not None and not form.certificate:
         lost.append("certificate")
     if surface.on_line and not form.lines:
-        lost.append("lines that vertices slide along (they are fixed in it)")
+        lost.append("lines or circles that vertices slide along (they are fixed in it)")
     shown, walls = surface, None
     if form.separate:
         shown = standing_part(surface).surface

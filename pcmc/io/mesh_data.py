@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
 from ..base.validate import choice
-from ..surface import Line, Patch, Plane, Surface, checks
+from ..surface import Guide, Patch, Plane, Surface, checks
 from ..surface.geometry import bounding_size
 from ..surface.topology import topology
 
@@ -56,7 +56,7 @@ class MeshData:
     notes: tuple[str, ...] = ()
     joined: bool = False
     walls: str | None = None
-    lines: tuple[tuple[Line, Bools], ...] = ()
+    lines: tuple[tuple[Guide, Bools], ...] = ()
 
 
 def checked(data: MeshData) -> MeshData:

@@ -1,10 +1,10 @@
 """The native format (.pcmc): everything there is to a surface, to the last bit.
 
 A zip archive of NumPy arrays (an .npz) that ``numpy.load`` opens: ``vertices``, ``faces``,
-``patch_of_face``, ``support``; where vertices slide along lines, ``lines`` and ``on_line``; one
-``scalar <name>`` per scalar, one ``certificate <name>`` per array of the certificate, and ``meta``, a JSON
-text with the format's version, the patches, the plane and the rest of the certificate, its tables as lists
-of rows.
+``patch_of_face``, ``support``; where vertices slide along lines, ``lines`` and ``on_line``, along circles,
+``circles`` and ``on_circle``; one ``scalar <name>`` per scalar, one ``certificate <name>`` per array of the
+certificate, and ``meta``, a JSON text with the format's version, the patches, the plane and the rest of the
+certificate, its tables as lists of rows.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ import pandas as pd
 
 from ..base.arrays import Bools, Floats
 from ..base.errors import FileError
-from ..surface import Line, Surface
+from ..surface import Circle, Guide, Line, Surface
 from .libraries import translated_errors
 from .mesh_data import MeshData, support_of
 from .metadata import metadata_text, parse_metadata
 
-VERSION = 2  # since 2 with lines; a surface without them is written as 1
+VERSION = 3  # since 2 with lines, since 3 with circles; a surface is written as the oldest that can hold it
 FORMAT = "pcmc surface"
 INFLATED = 100  # most bytes for each byte of the file; a flat grid of a million triangles has 7
 ROOM = 64_000_000  # bytes that any file may become
@@ -40,15 +40,19 @@ def write(
     tables = {k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object}
     meta = {
         "format": FORMAT,
-        "version": VERSION if surface.on_line else 1,
+        "version": 3 if surface.on_circle else 2 if surface.on_line else 1,
         "description": metadata_text(surface),
         "certificate": {k: v for k, v in certificate.items() if k not in tables},
     }
     arrays: dict[str, Any] = {f"scalar {name}": value for name, value in scalars.items()}
     arrays |= {f"certificate {name}": value for name, value in tables.items()}
-    if surface.on_line:
-        arrays["lines"] = np.array([[line.point, line.direction] for line, _ in surface.on_line])
-        arrays["on_line"] = np.array([along for _, along in surface.on_line])
+    straight = [(line, along) for line, along in surface.on_line if isinstance(line, Line)]
+    if straight:
+        arrays["lines"] = np.array([[line.point, line.direction] for line, _ in straight])
+        arrays["on_line"] = np.array([along for _, along in straight])
+    if surface.on_circle:
+        arrays["circles"] = np.array([[*c.centre, *c.normal, c.radius] for c, _ in surface.on_circle])
+        arrays["on_circle"] = np.array([along for _, along in surface.on_circle])
     with path.open("wb") as file:
         np.savez_compressed(
             file,
@@ -85,18 +89,29 @@ def read(path: Path) -> MeshData:
             tuple(metadata.patches.values()),
             arrays.pop("support"),
             metadata.plane,
-            lines=_lines(arrays.pop("lines", ()), arrays.pop("on_line", ())),
+            lines=_lines(arrays) + _circles(arrays),
             scalars=_under("scalar ", arrays),
             certificate={**meta["certificate"], **_under("certificate ", arrays)},
         )
 
 
-def _lines(ends: Any, along: Any) -> tuple[tuple[Line, Bools], ...]:
+def _lines(arrays: dict[str, Any]) -> tuple[tuple[Guide, Bools], ...]:
     """The lines (k,2,3) of the file with the masks (k,n) of their vertices."""
+    ends, along = arrays.pop("lines", ()), arrays.pop("on_line", ())
     if len(ends) != len(along) or np.shape(ends)[1:] not in ((), (2, 3)):
         text = f"lines: expected a point and a direction for each of {len(along)} masks"
         raise FileError(text, where="lines", found=np.shape(ends), expected=(len(along), 2, 3))
     return tuple((Line(*one.tolist()), mask) for one, mask in zip(ends, along, strict=True))
+
+
+def _circles(arrays: dict[str, Any]) -> tuple[tuple[Guide, Bools], ...]:
+    """The circles (k,7) of the file, centre, normal and radius, with the masks (k,n) of their vertices."""
+    rows, along = arrays.pop("circles", ()), arrays.pop("on_circle", ())
+    if len(rows) != len(along) or np.shape(rows)[1:] not in ((), (7,)):
+        text = f"circles: expected a centre, a normal and a radius for each of {len(along)} masks"
+        raise FileError(text, where="circles", found=np.shape(rows), expected=(len(along), 7))
+    circles = (Circle(tuple(row[:3]), tuple(row[3:6]), row[6]) for row in np.asarray(rows).tolist())
+    return tuple(zip(circles, along, strict=True))
 
 
 def _check_size(path: Path) -> None:

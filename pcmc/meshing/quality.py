@@ -9,7 +9,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
 from ..contact.pinching import StandingPart, place_wall_rows
-from ..energy.functional import apply_supports
+from ..energy.functional import apply_supports, onto_circles
 from ..energy.motion_space import motion_space
 from ..surface import Surface
 from ..surface.geometry import angles, cross, dot, face_areas, norm, point, segment_lengths, sub
@@ -97,7 +97,7 @@ def towards_star_centres(
     move = np.where(total > 0.0, weighted / np.where(total > 0.0, total, 1.0) - X, 0.0)
     move[kind != SHEET] = 0.0
     move[curve] = 0.5 * (X[beside[:, 0]] + X[beside[:, 1]]) - X[curve]
-    return apply_supports(surface, step * move)
+    return apply_supports(surface, step * move, X)
 
 
 def redistribute(part: StandingPart, X: Floats, aim: float, *, slide: bool) -> tuple[Floats, float]:
@@ -114,7 +114,8 @@ def redistribute(part: StandingPart, X: Floats, aim: float, *, slide: bool) -> t
         if not slide:
             move[part.resting] = 0.0
         space = motion_space(surface, classes, X)
-        X = place_wall_rows(surface, part.walls, X + move - space.project(move), space)
+        moved = onto_circles(surface, X + move - space.project(move))
+        X = place_wall_rows(surface, part.walls, moved, space)
         quality = worst_quality(X, faces)
         if quality > worst:
             best, worst = X, quality

@@ -11,7 +11,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..contact.pinching import midpoints
-from ..surface import Line, Surface, expect_surface
+from ..surface import Circle, Guide, Surface, expect_surface
 
 Projection = Callable[[Floats], Floats]
 
@@ -126,6 +126,7 @@ def new_vertices(
     held, slides = (mask[cut] for mask in held_midpoints(surface))
     if project is not None:
         middle[held] = projected(project, middle[held])
+    middle[held] = onto_round_edges(surface, middle[held])
     return middle, held, slides
 
 
@@ -140,14 +141,21 @@ def _refine_once(surface: Surface, project: Projection | None) -> Surface:
     return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane, lines)
 
 
-def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tuple[tuple[Line, Bools], ...]:
-    """The lines along which vertices X (n,3) of a finer mesh slide; the first ``kept`` are the old ones.
+def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tuple[tuple[Guide, Bools], ...]:
+    """The lines and circles that vertices X (n,3) of a finer mesh slide along; the first ``kept`` are old.
 
     A new vertex slides if it is fixed, on the line, and between vertices of the old mesh of which one slides
     and the other is the next that does not.
     """
-    lines, near = [], 1e-9 * surface.size
+    lines: list[tuple[Guide, Bools]] = []
+    near = 1e-9 * surface.size
     for line, along in surface.on_line:
+        if isinstance(line, Circle):
+            inside = fixed & (line.distance(X) <= near)
+            inside[inside] = _round_edges(surface, line, along, X[inside])[0]
+            inside[:kept] = along[:kept]
+            lines.append((line, inside))
+            continue
         ends = surface.topology.edges[surface.topology.boundary_edge]
         beside = np.unique(ends[along[ends].any(axis=1)])
         beside = beside[line.distance(surface.vertices[beside]) <= near]
@@ -157,3 +165,31 @@ def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tup
         inside[:kept] = along[:kept]
         lines.append((line, inside))
     return tuple(lines)
+
+
+def onto_round_edges(surface: Surface, points: Floats) -> Floats:
+    """New held points (k,3), those on edges beside vertices that slide along a circle put on the circle."""
+    for circle, along in surface.on_circle:
+        between, rise = _round_edges(surface, circle, along, points)
+        between &= circle.distance(points) <= 1.01 * rise + 1e-9 * surface.size
+        points[between] = circle.nearest(points[between])
+    return points
+
+
+def _round_edges(surface: Surface, circle: Circle, along: Bools, points: Floats) -> tuple[Bools, Floats]:
+    """Which points (k,3) are on a sliding vertex, or between two on the circle of which one slides.
+
+    And how high the circle rises there over the edge between the two, (k,) length.
+    """
+    near, X = 1e-9 * surface.size, surface.vertices
+    on_circle = surface.fixed & surface.topology.on_boundary & (circle.distance(X) <= near)
+    corners = np.flatnonzero(on_circle)
+    if not len(corners):
+        return np.zeros(len(points), dtype=bool), np.zeros(len(points))
+    corners = corners[np.argsort(circle.place(X[corners]))]
+    after = np.searchsorted(circle.place(X[corners]), circle.place(points)) % len(corners)
+    ends = corners[np.stack([after - 1, after])]
+    close = np.linalg.norm(points - X[ends], axis=2) <= near
+    slides = np.where(close.any(axis=0), (along[ends] & close).any(axis=0), along[ends].any(axis=0))
+    side = np.linalg.norm(X[ends[1]] - X[ends[0]], axis=1)
+    return slides, circle.radius - np.sqrt(np.maximum(circle.radius**2 - 0.25 * side**2, 0.0))

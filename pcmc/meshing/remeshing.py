@@ -18,7 +18,15 @@ from ..surface import Surface
 from ..surface.geometry import angles, area_vectors, face_areas, segment_lengths
 from .angles import improve_angles
 from .quality import edge_lengths
-from .refinement import Projection, carry_lines, held_midpoints, projected, prolongation, refine
+from .refinement import (
+    Projection,
+    carry_lines,
+    held_midpoints,
+    onto_round_edges,
+    projected,
+    prolongation,
+    refine,
+)
 from .sizes import (
     SizeField,
     check_sizes,
@@ -181,9 +189,11 @@ def _cut_curves(
     while (counts > 1).any():
         mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
     new = mesh.fixed & (np.arange(len(mesh.X)) >= first)
-    if project is not None and new.any():
+    if (project is not None or surface.on_circle) and new.any():
         X = mesh.X.copy()
-        X[new] = projected(project, X[new])
+        if project is not None:
+            X[new] = projected(project, X[new])
+        X[new] = onto_round_edges(surface, X[new])
         mesh = replace(mesh, X=X)
     return mesh, background
 

@@ -19,7 +19,7 @@ from ..contact.pinching import (
     standing_part,
     top_spacing,
 )
-from ..energy.functional import energy_and_gradient, energy_at
+from ..energy.functional import energy_and_gradient, energy_at, onto_circles
 from ..energy.loose_parts import relative_forces, rounding_left
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..meshing.quality import compare, redistribute, worst_quality
@@ -127,7 +127,7 @@ class State:
 
         The rows of a wall follow its junction.
         """
-        X = self.X + d
+        X = onto_circles(self.surface, self.X + d)
         standing = self.walls.top_free & ~self.resting
         if not standing.any():
             return X, standing

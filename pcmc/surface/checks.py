@@ -13,10 +13,11 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..base.errors import SurfaceError
+from .circle import Circle, Guide
 from .geometry import bounding_size, cross, dot, norm, point, sub
-from .line import Line
 from .topology import Topology
 
+GUIDES = "a mapping from Lines or Circles to vertices"
 ZERO_AREA = 1e-14  # of the squared longest edge: below this a triangle has no direction in floats
 MANY = 16  # faces at one edge
 LARGEST = 1e50  # of a coordinate, tension or pressure: the squares of forces stay finite
@@ -202,15 +203,15 @@ def on_plane(height: Floats, sliding: Bools, X: Floats, size: float) -> None:
         _refuse_rows("vertices", X, bad, fault, hint=hint)
 
 
-def on_line(given: Any, X: Floats) -> list[tuple[Line, Bools]]:
-    """The lines that vertices slide along, each with their (n,) mask; no vertex on two."""
+def on_line(given: Any, X: Floats) -> list[tuple[Guide, Bools]]:
+    """The lines and circles that vertices slide along, each with their (n,) mask; no vertex on two."""
     pairs = given.items() if isinstance(given, Mapping) else given
     lines, taken = [], np.zeros(len(X), dtype=bool)
     if not isinstance(pairs, Iterable):
-        validate.refuse("on_line", given, "a mapping from Lines to vertices", error=SurfaceError)
+        validate.refuse("on_line", given, GUIDES, error=SurfaceError)
     for pair in pairs:
-        if not (isinstance(pair, Sequence) and len(pair) == 2 and isinstance(pair[0], Line)):
-            validate.refuse("on_line", given, "a mapping from Lines to vertices", error=SurfaceError)
+        if not (isinstance(pair, Sequence) and len(pair) == 2 and isinstance(pair[0], Guide)):
+            validate.refuse("on_line", given, GUIDES, error=SurfaceError)
         along = mask(pair[1], len(X), "on_line")
         bad = np.flatnonzero(along & taken)
         if len(bad):
@@ -221,15 +222,17 @@ def on_line(given: Any, X: Floats) -> list[tuple[Line, Bools]]:
     return lines
 
 
-def on_lines(lines: Iterable[tuple[Line, Bools]], X: Floats) -> None:
-    """Vertices must lie on the lines they slide along to 1e-9 of the size, or to rounding."""
+def on_lines(lines: Iterable[tuple[Guide, Bools]], X: Floats) -> None:
+    """Vertices must lie on the lines and circles they slide along to 1e-9 of the size, or to rounding."""
     for line, along in lines:
         near = max(1e-9 * bounding_size(X), ROUNDED * float(np.abs(X).max(initial=0.0)))
         distance = line.distance(X)
         bad = np.flatnonzero(along & (distance > near))
         if len(bad):
-            fault = f"slides along the line through {line.point}, but is {distance[bad[0]]:.3g} away from it"
-            hint = "move it onto the line or hold it with fixed="
+            name = "circle" if isinstance(line, Circle) else "line"
+            place = f"around {line.centre}" if isinstance(line, Circle) else f"through {line.point}"
+            fault = f"slides along the {name} {place}, but is {distance[bad[0]]:.3g} away from it"
+            hint = f"move it onto the {name} or hold it with fixed="
             _refuse_rows("vertices", X, bad, fault, hint=hint)
 
 

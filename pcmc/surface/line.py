@@ -52,7 +52,7 @@ class Line:
         away = np.asarray(points, dtype=float) - np.array(self.point)
         return np.asarray(np.linalg.norm(away - self.along(away), axis=-1))
 
-    def along(self, vectors: Floats) -> Floats:
-        """(…,3) the components of vectors (…,3) along the line: ⟨v, t⟩ t."""
+    def along(self, vectors: Floats, points: Floats | None = None) -> Floats:
+        """(…,3) the components of vectors (…,3) along the line, the same at all points: ⟨v, t⟩ t."""
         direction = np.array(self.direction)
         return np.asarray((vectors @ direction)[..., None] * direction)

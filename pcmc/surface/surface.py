@@ -16,8 +16,8 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
 from . import checks
+from .circle import Circle, Guide
 from .geometry import Vector, bounding_size
-from .line import Line
 from .topology import Topology, topology
 
 FIELDS = ("vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane", "on_line")
@@ -165,9 +165,9 @@ class Surface:
     fixed : index array or (n,) bool mask: vertices that do not move.
     on_plane : index array or (n,) bool mask: vertices that slide on ``plane`` (fixed wins).
     plane : Π.
-    on_line : mapping from a Line to an index array or (n,) mask: vertices that slide along that line and
-        are fixed but for that. On a straight boundary the end of a junction can slide so; let the other
-        vertices of the boundary slide too, but for its corners, so that they can make room.
+    on_line : mapping from a Line or a Circle to an index array or (n,) mask: vertices that slide along it
+        and are fixed but for that. On a straight or round boundary the end of a junction can slide so; let
+        the other vertices of the boundary slide too, but for its corners, so that they can make room.
 
     Raises
     ------
@@ -189,7 +189,7 @@ class Surface:
     fixed: Bools = field(default=cast(Bools, ()))
     on_plane: Bools = field(default=cast(Bools, ()))
     plane: Plane = Plane()
-    on_line: tuple[tuple[Line, Bools], ...] = ()
+    on_line: tuple[tuple[Guide, Bools], ...] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.plane, Plane):
@@ -292,6 +292,11 @@ class Surface:
         """(n,) vertices that no support holds at all."""
         return ~(self.fixed | self.on_plane)
 
+    @property
+    def on_circle(self) -> tuple[tuple[Circle, Bools], ...]:
+        """The part of ``on_line`` that is round."""
+        return tuple((line, along) for line, along in self.on_line if isinstance(line, Circle))
+
     def patch_index(self, name: str) -> int:
         """Index of the patch called ``name``."""
         names = [p.name for p in self.patches]
@@ -300,8 +305,8 @@ class Surface:
     def moved(self, vertices: npt.ArrayLike) -> Surface:
         """The same surface with its vertices elsewhere, (n,3); faces, supports, patches are shared.
 
-        Sliding vertices must stay on Π or on their lines. Triangles may collapse; ``solve`` can repair many
-        of them.
+        Sliding vertices must stay on Π or on their lines and circles. Triangles may collapse; ``solve``
+        can repair many of them.
         """
         X = checks.positions(vertices)
         if X.shape != self.vertices.shape:
