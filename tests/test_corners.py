@@ -112,3 +112,18 @@ def test_ends_slide_along_a_round_outline():
         ((circle, along),) = ladder.free_ends(build()).on_line
         assert circle.radius == pytest.approx(radius, rel=1e-12)
         assert along[ladder.ends(build())].all()
+
+
+def test_ends_on_a_round_outline_are_held_by_the_mesh_too():
+    """Fig. 4: sliding ends make the same saddle; fixed ones lose all hold once the junctions rest there."""
+    initial, project = three_patches(7), next(case.project for case in corners.CASES if case.name == "fig4")
+    fixed, natural = (
+        ladder.climb(initial, 9, corners.REACH * initial.size, bottom, project)[0]
+        for bottom in ("sliding", "natural")
+    )
+    for one, other in zip(fixed, natural, strict=True):
+        assert other["energy"] == pytest.approx(one["energy"], rel=1e-12)  # the condition is met by symmetry
+        assert other["eigenvalue"] < one["eigenvalue"] + 1e-9
+    assert (fixed[-1]["pinched"], natural[-1]["pinched"]) == (3, 3)
+    assert (fixed[-1]["index"], natural[-1]["index"]) == (2, 2)
+    assert natural[-1]["eigenvalue"] == pytest.approx(fixed[-1]["eigenvalue"], rel=1e-6)
