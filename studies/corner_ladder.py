@@ -79,7 +79,7 @@ def free_ends(surface: Surface) -> Surface:
     outline = topo.edges[topo.boundary_edge & surface.fixed[topo.edges].all(axis=1)]
     rim = _circle_through(X[np.unique(outline)])
     if rim is not None:
-        return replace(surface, on_line={rim: np.unique(outline)})
+        return replace(surface, on_line=((rim, np.isin(np.arange(surface.n), outline)),))
     lines = []
     for vertex in ends(surface):
         if abs(opening(surface, int(vertex)) - 180.0) > 1e-6:
