@@ -3,7 +3,7 @@
 Level k halves the edges within r 2^-k of the ends; the solver goes on from the level before, and where it
 fails, once more from the initial shape on a mesh of that level. The bottoms of the walls slide on Π
 ("sliding"); they are held where they are drawn ("held"); or they slide, and the ends slide along a straight
-outline, with no force left along it ("natural").
+or round outline, with no force left along it ("natural").
 
 Near an end on a straight boundary the crest's height over Π is, along its length s from the end,
 
