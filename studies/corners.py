@@ -316,9 +316,9 @@ def _draw_fits(folder: Folder, ladder: pd.DataFrame) -> None:
     from pcmc.plot import lines
 
     labels = folder.read_table("labels")
-
     free = ladder[(ladder.bottom == "sliding") & (ladder.pinched == 0) & (ladder.status == "converged")]
     curves: dict[str, Any] = {}
+    fitted: dict[str, Any] = {}
     for case in CASES:
         mine = free[free.case == case.name]
         fits = labels[(labels.case == case.name) & (labels.bottom == "sliding")]
@@ -326,10 +326,11 @@ def _draw_fits(folder: Folder, ladder: pd.DataFrame) -> None:
             continue
         found, unit = fits.iloc[0], abs(mine.eigenvalue.iloc[0])
         first, last = -np.log(mine.edge_length.to_numpy()[[2, 1 + int(found.fitted)]])
-        depth = np.linspace(first, last, 7)
-        fitted = law(depth, found.limit, found.loss, found["shift"], found["last"])
-        curves[case.title] = (mine.edge_length, mine.eigenvalue / unit)
-        curves[f"limit {found.limit:.2g} ± {found.limit_margin:.1g}"] = (np.exp(-depth), fitted / unit)
+        depth = np.linspace(first, last, 50)
+        values = law(depth, found.limit, found.loss, found["shift"], found["last"])
+        title = f"{case.title}: {found.limit:.2g} ± {found.limit_margin:.1g}"
+        curves[title] = (mine.edge_length, mine.eigenvalue / unit)
+        fitted[title] = (np.exp(-depth), values / unit)
     lines(
         curves,
         folder.figure("fits"),
@@ -337,7 +338,8 @@ def _draw_fits(folder: Folder, ladder: pd.DataFrame) -> None:
         y="lowest eigenvalue, first mesh: ±1",
         xscale="log",
         markers=True,
-        title="The logarithmic loss of hold, with 95 % intervals",
+        fits=fitted,
+        title="The logarithmic loss of hold: fitted limits with 95 % intervals",
     )
 
 

@@ -342,6 +342,16 @@ def test_levels_go_across_and_short_logarithmic_axes_have_round_ticks(monkeypatc
     assert len(seen[1].get_xticks(minor=True))
 
 
+def test_a_curve_with_a_fit_is_points_and_the_fit_a_line_of_its_colour(monkeypatch):
+    seen = []
+    monkeypatch.setattr(plot.curves, "add_legend", lambda axes, _: seen.append(axes))
+    plot.lines({"a": ([1, 2], [1, 2])}, markers=True, fits={"a": ([1, 1.5, 2], [1, 1.4, 2])})
+    points, fit = seen[0].lines
+    assert (points.get_linestyle(), fit.get_linestyle()) == ("None", "-")
+    assert points.get_color() == fit.get_color()
+    assert seen[0].get_legend_handles_labels()[1] == ["a"]
+
+
 BAD = [
     (lambda s: plot.draw(s, view="diagnal"), {"what": "view", "found": "diagnal"}),
     (lambda s: plot.draw(s, renderer="povray"), {"what": "renderer", "found": "povray"}),

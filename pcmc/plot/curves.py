@@ -36,6 +36,7 @@ def lines(
     markers: bool = False,
     dashes: bool = False,
     levels: Mapping[str, float] | None = None,
+    fits: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]] | None = None,
     width: int = 900,
     height: int = 560,
 ) -> Image:
@@ -43,7 +44,8 @@ def lines(
 
     On a "log" axis values ≤ 0 leave a gap too. ``x``, ``y`` are the axes' labels. With ``dashes``
     curves that lie on each other all stay visible; ``levels`` are values of y by label, such as
-    bounds, drawn as horizontal lines.
+    bounds, drawn as horizontal lines. A curve whose label is in ``fits`` is drawn as points, and its fit as
+    a line of its colour.
     """
     for scale in (xscale, yscale):
         validate.choice("scale", scale, SCALES)
@@ -52,11 +54,14 @@ def lines(
     axes.set_yscale(yscale)
     for k, (label, (xs, ys)) in enumerate(curves.items()):
         px, py = _curve(label, xs, ys, xscale, yscale)
+        color = CURVES[k % len(CURVES)]
         turn = k // len(CURVES)  # how many times all colours are used already
-        plain = {"linewidth": 1.1, "linestyle": ("-", "--")[turn % 2]}
+        plain = {"linewidth": 1.1, "linestyle": "" if label in (fits or {}) else ("-", "--")[turn % 2]}
         look = overlap_style(k, len(curves)) if dashes else plain
         marker = MARKERS[(k + turn) % len(MARKERS)] if markers else None
-        axes.plot(px, py, color=CURVES[k % len(CURVES)], marker=marker, markersize=2.8, label=label, **look)
+        axes.plot(px, py, color=color, marker=marker, markersize=2.8, label=label, **look)
+        if fits and label in fits:
+            axes.plot(*_curve(label, *fits[label], xscale, yscale), color=color, linewidth=1.1)
     for label, level in (levels or {}).items():
         axes.axhline(level, color=INK, linewidth=0.9, linestyle=(0, (5, 3)), label=label, zorder=1.5)
     if xscale == "log":
