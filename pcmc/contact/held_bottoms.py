@@ -51,8 +51,8 @@ def held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | N
     Both edges (k,2) start from the corners where the wall ends, which are their own feet. The vertices so
     many steps from each corner along the top and along the bottom make a pair.
     """
-    chains = [np.unique(edges) for edges in (top_edges, bottom_edges)]
-    corners = np.intersect1d(*chains)
+    chains = np.unique(top_edges), np.unique(bottom_edges)
+    corners = chains[0][np.isin(chains[0], chains[1])]
     if not len(corners) or len(chains[0]) != len(chains[1]):
         return None
     steps = []

@@ -85,7 +85,8 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
     roof_edge[topo.edge_of_face[roof]] = True
     roof_vertex[surface.faces[roof]] = True
     pinchable = np.zeros(len(surface.patches), dtype=bool)
-    rows, top_edges, wall_below = [], [np.empty((0, 2), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+    rows, wall_below = [], [np.empty(0, dtype=np.int64)]
+    top_edges: list[Ints] = [np.empty((0, 2), dtype=np.int64)]
     low, foot = lying(height, surface.vertices), np.full(n, -1, dtype=np.int64)
     for index, patch in enumerate(surface.patches):
         if not patch.auxiliary:
