@@ -201,11 +201,11 @@ def _resting_lengths(surface: Surface) -> Floats:
 
 def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats) -> Finding:
     """A finding about a place, with advice where it is near a junction that ends over a wall that slides."""
-    X, pinchable = surface.vertices, standing_part(surface).walls.pinchable
+    X, sliding = surface.vertices, standing_part(surface).walls.sliding
     nearest, found = np.inf, None
     for curve in surface.topology.junctions:
         ends = [v for v in curve.vertices[[0, -1]] if surface.fixed[v] and not curve.closed]
-        if not ends or not pinchable[list(curve.sheets)].any():
+        if not ends or not sliding[list(curve.sheets)].any():
             continue
         length = segment_lengths(X, np.stack([curve.vertices[:-1], curve.vertices[1:]], axis=1)).sum()
         distance = np.linalg.norm(X[curve.vertices] - place, axis=1).min() / length
@@ -215,7 +215,7 @@ def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats) -> F
         return Finding(verdict, reason, _tuple(place))
     curve, end = found
     names = " | ".join(surface.patches[k].name for k in curve.sheets)
-    wall = next(surface.patches[k].name for k in curve.sheets if pinchable[k])
+    wall = next(surface.patches[k].name for k in curve.sheets if sliding[k])
     reason += f"; the junction {names} there ends at {_text(end)}, where only the mesh holds it"
     advice = (
         f'hold the bottom of {wall!r}: bottom = "held" under its divider in a plan, or add its lowest'

@@ -20,7 +20,7 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
 
     ``pinchable`` (k,) marks these walls. Two causes are known: a junction slips along a support away
     from its own end, where only the mesh holds it; or it comes down on the held bottom of its wall,
-    which cannot pinch.
+    which cannot pinch (``find_walls``).
     """
     face, quality = _worst_face(surface, pinchable)
     patch = int(surface.patch_of_face[face])
@@ -47,7 +47,7 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
 def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
     """Whether the worst triangle is in a wall whose junction has come down on its held bottom.
 
-    Walls pinch where they slide on Π; for a held bottom there is no contact, so its triangles collapse.
+    Without a bottom vertex below each junction vertex such a wall cannot pinch: its triangles collapse.
     """
     patch = int(surface.patch_of_face[_worst_face(surface, pinchable)[0]])
     edge = float(np.median(edge_lengths(surface)))

@@ -5,6 +5,11 @@ junction rests on Π where the pull of the sheets on it, up or down, is at most 
 more, the junction stands off Π, to the side it is pulled to, and the forces balance there. While it rests,
 the wall below has no area: its vertices coincide with the junction vertex above them (their *owner*), and
 its triangles are left out. So positions alone show which walls are pinched: a surface needs no extra state.
+
+A wall whose bottom is held on Π can pinch where each top vertex has a bottom vertex below it. The junction
+then rests on that curve, not on Π: a resting vertex is fixed on its bottom vertex, as long as the pull of the
+sheets across the curve, to whichever side, is at most α_w per length. No wall with a held bottom pinches
+before a solver has asked for it (``find_walls``): a solver asks where a junction comes down.
 """
 
 from __future__ import annotations
@@ -20,6 +25,7 @@ from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
 from ..surface.topology import topology
+from .held_bottoms import across_bottom, held_walls
 from .wall_rows import WallRows, join_rows, wall_rows
 
 SLACK = 1e-9  # of the capacity: an excess below is rounding
@@ -27,7 +33,7 @@ SLACK = 1e-9  # of the capacity: an excess below is rounding
 
 @dataclass(frozen=True, eq=False)
 class Walls:
-    """The walls that can pinch: those whose lower edge slides on Π. Their top edge is a junction.
+    """The walls that can pinch: their lower edge slides on Π or is held there, their top edge is a junction.
 
     Attributes
     ----------
@@ -35,6 +41,7 @@ class Walls:
     top_edges : (k,2) the top edges.
     wall_below : (k,) the patch of the wall below each of them.
     top_free : (n,) bool, free vertices of top edges: these can come to rest on Π.
+    foot : (n,) for vertices of top edges the vertex below it on a held bottom; -1 elsewhere.
     corner : (n,) bool, fixed vertices of top edges on Π, where a wall ends.
     side : (n,) +1 or -1, the side of Π a vertex is on; on Π, the side the pressure pushes it to.
     pinchable : (patches,) bool, the patches that are such walls.
@@ -47,10 +54,30 @@ class Walls:
     corner: Bools
     side: Floats
     pinchable: Bools
+    foot: Ints
+
+    @property
+    def held(self) -> Bools:
+        """(n,) the junction vertices that come to rest on a held bottom."""
+        return self.top_free & (self.foot >= 0)
+
+    @property
+    def sliding(self) -> Bools:
+        """(patches,) the walls whose bottom slides on Π."""
+        held = np.zeros_like(self.pinchable)
+        held[self.wall_below[(self.foot[self.top_edges] >= 0).all(axis=1)]] = True
+        return self.pinchable & ~held
+
+    def across_bottom(self, vectors: Floats, X: Floats) -> Floats:
+        """The part (n,3) of vectors across the held bottom below each vertex."""
+        return across_bottom(vectors, X, self.top_edges, self.foot)
 
 
-def find_walls(surface: Surface) -> Walls:
-    """The walls of a surface that can pinch, and their rows."""
+def find_walls(surface: Surface, held: bool = False) -> Walls:
+    """The walls of a surface that can pinch, and their rows.
+
+    With ``held``, or where a junction already rests on one, walls with held bottoms are among them.
+    """
     n = surface.n
     height = surface.plane.height(surface.vertices)
     topo, roof = surface.topology, ~surface.walls[surface.patch_of_face]
@@ -58,7 +85,9 @@ def find_walls(surface: Surface) -> Walls:
     roof_edge[topo.edge_of_face[roof]] = True
     roof_vertex[surface.faces[roof]] = True
     pinchable = np.zeros(len(surface.patches), dtype=bool)
-    rows, top_edges, wall_below = [], [np.empty((0, 2), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+    rows, wall_below = [], [np.empty(0, dtype=np.int64)]
+    top_edges: list[Ints] = [np.empty((0, 2), dtype=np.int64)]
+    low, foot = lying(height, surface.vertices), np.full(n, -1, dtype=np.int64)
     for index, patch in enumerate(surface.patches):
         if not patch.auxiliary:
             continue
@@ -71,9 +100,17 @@ def find_walls(surface: Surface) -> Walls:
         rows.append(wall_rows(surface, vertices[~roof_vertex[vertices]], top, edges))
         top_edges.append(top)
         wall_below.append(np.full(len(top), index))
+    for index, edges, top, feet in held_walls(surface, roof_edge, roof_vertex, low, held):
+        vertices = np.unique(edges)
+        if np.isin(top, np.concatenate(top_edges)[(foot[np.concatenate(top_edges)] < 0).all(axis=1)]).any():
+            continue
+        pinchable[index] = True
+        foot = np.where(feet >= 0, feet, foot)
+        rows.append(wall_rows(surface, vertices[~roof_vertex[vertices]], top, edges, feet))
+        top_edges.append(top)
+        wall_below.append(np.full(len(top), index))
     on_top = np.zeros(n, dtype=bool)
     on_top[np.concatenate(top_edges)] = True
-    low = lying(height, surface.vertices)
     return Walls(
         rows=join_rows(rows),
         top_edges=np.concatenate(top_edges),
@@ -82,6 +119,7 @@ def find_walls(surface: Surface) -> Walls:
         corner=on_top & surface.fixed & low,
         side=np.where(np.where(low, _pressure_push(surface, low), height) < 0.0, -1.0, 1.0),
         pinchable=pinchable,
+        foot=foot,
     )
 
 
@@ -100,55 +138,66 @@ def place_wall_rows(surface: Surface, walls: Walls, X: Floats, space: MotionSpac
     return X + change
 
 
-def midpoints(surface: Surface, edges: Ints) -> Floats:
-    """(k,3) the middles of edges (k,2), for a finer mesh.
-
-    A wall's edge may lead from a resting junction to a standing vertex. Its middle is placed in its row
-    below the middle of the top edge: rows that coincide where the junction rests part again beside it.
-    """
-    start, end = edges.T
-    X = surface.vertices
-    middle = 0.5 * (X[start] + X[end])
-    part = standing_part(surface)
-    walls, rows, resting = part.walls, part.walls.rows, part.resting
-    if not resting.any():
-        return middle
-    top, direction = X.copy(), np.zeros_like(X)
-    top[rows.vertices] = rows.top_places(X)
-    direction[rows.vertices] = rows.directions(surface)
-    down = resting.copy()
-    down[rows.vertices] = _under_low(rows, resting | walls.corner)
-    of_wall = resting | walls.top_free
-    of_wall[rows.vertices] = True
-    rising = of_wall[start] & of_wall[end] & (down[start] != down[end])
-    start, end = edges[rising].T
-    place = 0.5 * (top[start] + top[end])
-    height = surface.plane.height(place)[:, None]
-    middle[rising] = place + 0.5 * height * (direction[start] + direction[end])
-    return middle
+def slide_over_feet(walls: Walls, X: Floats, standing: Bools, space: MotionSpace) -> Floats:
+    """X (n,3) with ``standing`` vertices slid along the junction to above their vertices of a held bottom."""
+    held = standing & walls.held
+    if not held.any():
+        return X
+    gap = X - X[walls.foot]
+    change = np.where(held[:, None], walls.across_bottom(gap, X) - gap, 0.0)
+    return X + change - space.project(change)
 
 
 def resting_vertices(surface: Surface, walls: Walls) -> Bools:
     """(n,) junction vertices that rest on Π, by their positions."""
-    return walls.top_free & lying(surface.plane.height(surface.vertices), surface.vertices)
+    X, held = surface.vertices, walls.held
+    gap = surface.plane.height(X)
+    gap[held] = np.linalg.norm(X[held] - X[walls.foot[held]], axis=1)
+    return walls.top_free & lying(gap, X)
+
+
+def put_down(surface: Surface, walls: Walls, X: Floats, down: Bools) -> Floats:
+    """X (n,3) with the vertices ``down`` on Π, or on their vertices of a held bottom."""
+    X, held = X.copy(), down & walls.held
+    X[down] -= surface.plane.height(X[down])[:, None] * np.array(surface.plane.normal)
+    X[held] = X[walls.foot[held]]
+    return X
+
+
+def coming_down(
+    surface: Surface, walls: Walls, standing: Bools, before: Floats, X: Floats, low: Floats | float
+) -> Bools:
+    """(n,) the ``standing`` junction vertices that a move from ``before`` to X (n,3) brings down.
+
+    They reach Π or the curve of a held bottom, pass it, or come nearer to it than ``low``.
+    """
+    above, last = (walls.side * surface.plane.height(Y) for Y in (X, before))
+    down = standing & ((above <= 0.0) | ((above < last) & (above <= low)))
+    held = walls.held
+    if not held.any():
+        return down
+    gap, gap_before = (walls.across_bottom(Y - Y[walls.foot], Y) for Y in (X, before))
+    near, near_before = np.linalg.norm(gap, axis=1), np.linalg.norm(gap_before, axis=1)
+    passes = np.einsum("ij,ij->i", gap, gap_before) <= 0.0
+    return np.where(held, standing & (passes | ((near < near_before) & (near <= low))), down)
 
 
 def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surface:
-    """The surface without the wall below the resting vertices, which slide on Π.
+    """The surface without the wall below the resting vertices, which slide on Π or are held on a bottom.
 
     It has the same vertex array; vertices of the removed wall belong to no face.
     """
     if not resting.any():
         return surface
-    X = surface.vertices.copy()
-    X[resting] -= surface.plane.height(X[resting])[:, None] * np.array(surface.plane.normal)
+    X = put_down(surface, walls, surface.vertices, resting)
     owner = _owners(surface.n, walls, resting)
     F, left = _standing_faces(surface, walls, resting, owner)
     X, F, patch = X[owner], np.ascontiguousarray(F[left]), np.ascontiguousarray(surface.patch_of_face[left])
     F.setflags(write=False)
     patch.setflags(write=False)
-    topo, on_plane = topology(F, patch, surface.n), surface.on_plane | resting
-    return surface._with(vertices=X, faces=F, patch_of_face=patch, topology=topo, on_plane=on_plane)
+    topo, held = topology(F, patch, surface.n), resting & walls.held
+    supports = {"fixed": surface.fixed | held, "on_plane": surface.on_plane | (resting & ~held)}
+    return surface._with(vertices=X, faces=F, patch_of_face=patch, topology=topo, **supports)
 
 
 def resting_links(walls: Walls, resting: Bools) -> Ints:
@@ -216,10 +265,14 @@ def pull_and_capacity(surface: Surface, walls: Walls, resting: Bools) -> tuple[F
     The pull is the force of the sheets away from Π, to the vertex's own side; negative to the other.
     Lifting the vertex by dz to either side makes a wall of area ½ ℓ dz under each top edge there, ℓ
     its length along Π, so the capacity is ½ Σ α_w ℓ; the vertex rests while |pull| ≤ capacity.
+    On a held bottom the pull is the force across its curve, to any side, and ℓ is taken on the bottom.
     """
     force = -energy_and_gradient(surface, supports=False)[1]
     pull = np.where(resting, walls.side * (force @ np.array(surface.plane.normal)), 0.0)
-    start, end = surface.vertices[walls.top_edges.T]
+    held = resting & walls.held
+    pull[held] = np.linalg.norm(walls.across_bottom(force, surface.vertices)[held], axis=1)
+    ends = np.where(walls.foot >= 0, walls.foot, np.arange(surface.n))[walls.top_edges]
+    start, end = surface.vertices[ends.T]
     tension = surface.tensions[walls.wall_below]
     half = 0.5 * tension * np.linalg.norm(surface.plane.along(end - start), axis=1)
     capacity = np.zeros(surface.n)
@@ -247,13 +300,35 @@ def top_spacing(surface: Surface, walls: Walls) -> Floats:
     return spacing
 
 
-def lift(surface: Surface, walls: Walls, vertices: Bools, fraction: float | Floats) -> Surface:
+def pull_directions(surface: Surface, walls: Walls, resting: Bools) -> Floats:
+    """(n,3) the unit direction to lift each vertex of a standing part: off Π, or as a held one is pulled."""
+    direction = walls.side[:, None] * np.array(surface.plane.normal)
+    held = resting & walls.held
+    if held.any():
+        force = -energy_and_gradient(surface, supports=False)[1]
+        across = walls.across_bottom(force, surface.vertices)
+        length = np.linalg.norm(across, axis=1)
+        pulled = held & (length > 0.0)
+        direction[pulled] = across[pulled] / length[pulled, None]
+    return direction
+
+
+def lift(
+    surface: Surface,
+    walls: Walls,
+    vertices: Bools,
+    fraction: float | Floats,
+    directions: Floats | None = None,
+) -> Surface:
     """The whole surface with resting ``vertices`` raised off Π by a fraction of their spacing.
 
-    The fraction may be one for each vertex (n,). The wall rows below are placed anew.
+    The fraction may be one for each vertex (n,), and so may the unit directions (n,3), which else lead off
+    Π. The wall rows below are placed anew.
     """
-    rise = fraction * np.where(vertices, top_spacing(surface, walls), 0.0) * walls.side
-    X = surface.vertices + rise[:, None] * np.array(surface.plane.normal)
+    if directions is None:
+        directions = walls.side[:, None] * np.array(surface.plane.normal)
+    rise = fraction * np.where(vertices, top_spacing(surface, walls), 0.0)
+    X = surface.vertices + rise[:, None] * directions
     rows = walls.rows
     below = rows.vertices[vertices[rows.top_ends].any(axis=1)]
     X[below] = place_wall_rows(surface, walls, X)[below]
@@ -269,7 +344,7 @@ def place_pinched_walls(surface: Surface, walls: Walls, resting: Bools, X: Float
     F, left = _standing_faces(surface, walls, resting, owner)
     stands[F[left]] = True
     rows = walls.rows
-    gone = (resting | walls.corner)[rows.top_ends].all(axis=1) & ~stands[rows.vertices]
+    gone = (resting | walls.corner)[rows.top_ends].all(axis=1) & ~(stands | surface.fixed)[rows.vertices]
     X, places = X.copy(), rows.top_places(X)
     X[rows.vertices[gone]] = places[gone]
     return X[owner]
@@ -303,7 +378,10 @@ def _owners(n: int, walls: Walls, resting: Bools) -> Ints:
     for end, fraction in ((0, 0.0), (1, 1.0)):
         top = walls.rows.top_ends[:, end]
         straight = (walls.rows.fraction == fraction) & resting[top]
+        straight &= (walls.rows.feet[:, 0] < 0) | (walls.rows.relative_height > 0.0)
         owner[walls.rows.vertices[straight]] = top[straight]
+    held = np.flatnonzero(resting & walls.held)
+    owner[walls.foot[held]] = held
     return owner
 
 
@@ -311,11 +389,11 @@ def _lie_on_plane(walls: Walls, resting: Bools) -> Bools:
     """(n,) vertices on Π: resting ones, corners, feet, and wall vertices below such alone."""
     down = resting | walls.corner
     rows = walls.rows
-    down[rows.vertices] = _under_low(rows, down) | (rows.relative_height == 0.0)
+    down[rows.vertices] = under_low(rows, down) | (rows.relative_height == 0.0)
     return down
 
 
-def _under_low(rows: WallRows, low: Bools) -> Bools:
+def under_low(rows: WallRows, low: Bools) -> Bools:
     """(w,) wall vertices whose place on the top edge is on Π: straight below a low end, or between two."""
     i, j = rows.top_ends.T
     return (low[i] | (rows.fraction == 1.0)) & (low[j] | (rows.fraction == 0.0))

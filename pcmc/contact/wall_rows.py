@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface
 
 SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
@@ -25,13 +25,18 @@ class WallRows:
 
         P + z(P) ((ρ - 1) n + o),   P = (1 - λ) X_i + λ X_j
 
+    or, where the bottom of the wall is held, with Q the place between the held vertices below i and j,
+
+        P + (ρ - 1) (P - Q) + |P - Q| o
+
     Attributes
     ----------
     vertices : (w,) their indices.
     top_ends : (w,2) the ends i, j of the top edge above each.
     fraction : (w,) λ, how far P is from i to j.
-    relative_height : (w,) ρ, 0 on Π and 1 at the top.
+    relative_height : (w,) ρ, 0 at the bottom and 1 at the top.
     offset : (w,3) o, how far a leaning or bulging wall is off the line below P, over the height there.
+    feet : (w,2) the held bottom vertices below i and j; -1 where the bottom slides.
     """
 
     vertices: Ints
@@ -39,6 +44,7 @@ class WallRows:
     fraction: Floats
     relative_height: Floats
     offset: Floats
+    feet: Ints
 
     def top_places(self, X: Floats) -> Floats:
         """(w,3) the places P on the top edges, with the surface's vertices at X (n,3)."""
@@ -48,7 +54,20 @@ class WallRows:
     def places(self, surface: Surface, X: Floats) -> Floats:
         """(w,3) where the rows lie, with the top edges at X (n,3)."""
         top = self.top_places(X)
-        return top + surface.plane.height(top)[:, None] * self.directions(surface)
+        places = top + surface.plane.height(top)[:, None] * self.directions(surface)
+        held = self.feet[:, 0] >= 0
+        if held.any():
+            drop = self.drops(X)[held]
+            length = np.linalg.norm(drop, axis=1)[:, None]
+            shift = (self.relative_height[held, None] - 1.0) * drop + length * self.offset[held]
+            places[held] = top[held] + shift
+        return places
+
+    def drops(self, X: Floats) -> Floats:
+        """(w,3) P - Q, from the held bottom up to the top edge; without meaning where the bottom slides."""
+        fraction = self.fraction[:, None]
+        bottom = (1.0 - fraction) * X[self.feet[:, 0]] + fraction * X[self.feet[:, 1]]
+        return self.top_places(X) - bottom
 
     def directions(self, surface: Surface) -> Floats:
         """(w,3) from the place on the top edge to the vertex, over the height there: (ρ - 1) n + o."""
@@ -56,34 +75,51 @@ class WallRows:
         return (self.relative_height[:, None] - 1.0) * normal + self.offset
 
 
-def wall_rows(surface: Surface, vertices: Ints, top_edges: Ints, wall_edges: Ints) -> WallRows:
+def wall_rows(
+    surface: Surface, vertices: Ints, top_edges: Ints, wall_edges: Ints, foot: Ints | None = None
+) -> WallRows:
     """The rows of one wall: its ``vertices`` below the nearest of its ``top_edges`` (k,2), seen along n.
 
-    Where the top edge lies on Π its height shows nothing. There ρ is that of the vertex's row: steps
+    ``foot`` (n,) gives the held bottom vertex below each top vertex, if the bottom is held.
+
+    Where the top edge lies on the bottom its height shows nothing. There ρ is that of the vertex's row: steps
     along ``wall_edges`` from the foot, over those from foot to top.
     """
     X, height = surface.vertices, surface.plane.height(surface.vertices)
     flat = X - height[:, None] * np.array(surface.plane.normal)
     ends, fraction = _nearest(flat, vertices, top_edges)
-    top = (1.0 - fraction) * height[ends[:, 0]] + fraction * height[ends[:, 1]]
+    zero, none = np.zeros(len(vertices)), np.zeros((len(vertices), 3))
+    if foot is None:
+        feet, bottom = np.full_like(ends, -1), surface.on_plane
+        top = (1.0 - fraction) * height[ends[:, 0]] + fraction * height[ends[:, 1]]
+        share, whole = height[vertices], top
+    else:
+        feet, bottom = foot[ends], surface.fixed
+        fraction = np.round(fraction)  # below one top vertex, so that it pinches with this one
+        rows = WallRows(vertices, ends, fraction, zero, none, feet)
+        drop = rows.drops(X)
+        top = np.linalg.norm(drop, axis=1)
+        share = np.einsum("ij,ij->i", X[vertices] - rows.top_places(X) + drop, drop)
+        whole = top**2
     stands = np.abs(top) > FLAT * surface.size
-    relative = np.divide(height[vertices], top, out=np.zeros(len(vertices)), where=stands)
+    relative = np.divide(share, whole, out=zero, where=stands)
     relative = np.clip(relative, 0, 1)
     if not stands.all():
-        relative = np.where(stands, relative, _heights_by_steps(surface, vertices, wall_edges))
-    relative[surface.on_plane[vertices]] = 0.0
-    offset = np.zeros((len(vertices), 3))
-    straight = WallRows(vertices, ends, fraction, relative, offset).places(surface, X)
+        relative = np.where(stands, relative, _heights_by_steps(surface, vertices, wall_edges, bottom))
+    relative[bottom[vertices]] = 0.0
+    offset = none
+    straight = WallRows(vertices, ends, fraction, relative, offset, feet).places(surface, X)
     np.divide(X[vertices] - straight, top[:, None], out=offset, where=stands[:, None])
     offset[np.linalg.norm(offset, axis=1) > MAX_OFFSET] = 0.0
-    return WallRows(vertices, ends, fraction, relative, offset)
+    return WallRows(vertices, ends, fraction, relative, offset, feet)
 
 
 def join_rows(parts: list[WallRows]) -> WallRows:
     """The rows of several walls as one; a vertex that two walls share belongs to the first."""
     if not parts:
         none = np.empty(0, dtype=int)
-        return WallRows(none, np.empty((0, 2), dtype=int), np.empty(0), np.empty(0), np.empty((0, 3)))
+        pairs = np.empty((0, 2), dtype=int)
+        return WallRows(none, pairs, np.empty(0), np.empty(0), np.empty((0, 3)), pairs)
     columns = [np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(WallRows)]
     first = np.unique(columns[0], return_index=True)[1]
     return WallRows(*(values[first] for values in columns))
@@ -105,12 +141,12 @@ def _nearest(flat: Floats, vertices: Ints, top_edges: Ints) -> tuple[Ints, Float
     return top_edges[near[row, best]], fraction
 
 
-def _heights_by_steps(surface: Surface, vertices: Ints, wall_edges: Ints) -> Floats:
+def _heights_by_steps(surface: Surface, vertices: Ints, wall_edges: Ints, bottom: Bools) -> Floats:
     """ρ (w,) by edges (k,2) of the wall: steps to the foot, over those to the foot and to the top."""
     inner = np.zeros(surface.n, dtype=bool)
     inner[vertices] = True
     top = np.unique(wall_edges[~(inner | surface.fixed)[wall_edges]])
-    foot = vertices[surface.on_plane[vertices]]
+    foot = vertices[bottom[vertices]]
     # a corner is foot and top at once: no path may lead through it
     links = wall_edges[(inner | np.isin(np.arange(surface.n), top))[wall_edges].all(axis=1)]
     graph = coo_array((np.ones(len(links)), links.T), shape=(surface.n, surface.n)).tocsr()

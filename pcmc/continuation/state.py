@@ -8,7 +8,14 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..contact.pinching import excess_pull, place_pinched_walls, place_wall_rows, standing_part
+from ..contact.pinching import (
+    coming_down,
+    excess_pull,
+    place_pinched_walls,
+    place_wall_rows,
+    put_down,
+    standing_part,
+)
 from ..energy.functional import (
     apply_supports,
     energy_and_gradient,
@@ -97,15 +104,13 @@ class BranchMesh:
 
     def surface_in_contact(self, X: Floats) -> Surface:
         """The full surface, with the vertices that came down to Π placed on it."""
-        X, down = X.copy(), self.reaches_plane(X)
-        normal = np.array(self.surface.plane.normal)
-        X[down] -= self.surface.plane.height(X[down])[:, None] * normal
+        X = put_down(self.surface, self.walls, X, self.reaches_plane(X))
         return self.full_surface(place_wall_rows(self.surface, self.walls, X))
 
     def reaches_plane(self, X: Floats) -> Bools:
         """(n,) bool, junction vertices that stood off Π and are now on it or beyond."""
         standing_off = self.walls.top_free & ~self.resting
-        return standing_off & (self.walls.side * self.surface.plane.height(X) <= 0.0)
+        return coming_down(self.surface, self.walls, standing_off, self.surface.vertices, X, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -106,6 +106,7 @@ def redistribute(part: StandingPart, X: Floats, aim: float, *, slide: bool) -> t
     Sweeps end where that is at least ``aim``; triangles of walls that can pinch do not count. Each vertex
     moves from X (n,3) towards the middle of its star, without the part in the motion space, which would
     change the shape; walls follow their crest. With ``slide``, junction vertices at rest on Π slide too.
+    Junctions that can come down on a held bottom stay over the vertices of that.
     """
     surface, classes, faces = part.surface, part.classes, part.quality_faces
     best, worst = X, worst_quality(X, faces)
@@ -113,6 +114,7 @@ def redistribute(part: StandingPart, X: Floats, aim: float, *, slide: bool) -> t
         move = towards_star_centres(surface, X, classes.kind, classes.curve, classes.beside)
         if not slide:
             move[part.resting] = 0.0
+        move[part.walls.held] = 0.0  # these stay over their bottom vertices
         space = motion_space(surface, classes, X)
         moved = onto_circles(surface, X + move - space.project(move))
         X = place_wall_rows(surface, part.walls, moved, space)

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
-from ..contact.pinching import midpoints
+from ..contact.midpoints import midpoints
 from ..surface import Circle, Guide, Surface, expect_surface
 
 Projection = Callable[[Floats], Floats]

@@ -100,7 +100,7 @@ class History:
 
 
 class Attempt:
-    """One run of steps on one mesh.
+    """One run of steps on one mesh; with ``held``, walls with held bottoms can pinch.
 
     Attributes
     ----------
@@ -114,10 +114,16 @@ class Attempt:
     """
 
     def __init__(
-        self, surface: Surface, options: NewtonOptions, history: History, level: int, smooth_steps: int = 0
+        self,
+        surface: Surface,
+        options: NewtonOptions,
+        history: History,
+        level: int,
+        smooth_steps: int = 0,
+        held: bool = False,
     ) -> None:
         self.options, self.history, self.level = options, history, level
-        self.state = State(surface, options.min_quality)
+        self.state = State(surface, options.min_quality, held)
         self.stepper = Stepper(self.state, options.target == "minimum", options.backend)
         self.status = Status.ITERATION_LIMIT
         self.first_quality = self.state.quality

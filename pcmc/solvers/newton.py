@@ -18,7 +18,9 @@ from math import inf
 import numpy as np
 
 from ..base.errors import SurfaceError
+from ..certificate.collapse import held_wall_down
 from ..certificate.slipping import describe_saddle, slipping_ends
+from ..contact.pinching import find_walls
 from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import ways_down
@@ -57,8 +59,28 @@ def newton(
 
 
 def _solve_level(surface: Surface, options: NewtonOptions, history: History, level: int) -> Attempt:
+    """Solve on one mesh; where a junction comes down on a held bottom, once more so that it can rest."""
+    end = _attempts(surface, options, history, level)
+    if end.status not in LOST:
+        return end
+    if not held_wall_down(end.state.result_surface(), end.state.walls.pinchable):
+        return end
+    if not find_walls(surface, held=True).held.any():
+        return end
+    rows, note = len(history.rows), history.note
+    again = _attempts(surface, options, history, level, held=True)
+    if again.status in (Status.CONVERGED, Status.SADDLE, Status.STOPPED):
+        return again
+    del history.rows[rows:]
+    history.note = note
+    return end
+
+
+def _attempts(
+    surface: Surface, options: NewtonOptions, history: History, level: int, held: bool = False
+) -> Attempt:
     """Solve on one mesh; where that fails, once more from the same start in another way."""
-    first = Attempt(surface, options, history, level).run()
+    first = Attempt(surface, options, history, level, held=held).run()
     for more in (*CRAWLS[1:], inf):
         if first.status is not Status.SADDLE:
             break
@@ -71,7 +93,7 @@ def _solve_level(surface: Surface, options: NewtonOptions, history: History, lev
         return first
     rows, minimum = len(history.rows), options.target == "minimum"
     other_way = replace(options, target="stationary")
-    second = Attempt(surface, other_way, history, level, 0 if minimum else DESCENTS).run()
+    second = Attempt(surface, other_way, history, level, 0 if minimum else DESCENTS, held).run()
     if second.status is Status.STOPPED:
         if second.state.relative < first.state.relative:
             return second
@@ -91,7 +113,8 @@ def _saddle_near(crawling: Attempt, must_slip: bool) -> Attempt | None:
     """
     history, rows = crawling.history, len(crawling.history.rows)
     other_way = replace(crawling.options, target="stationary")
-    end = Attempt(crawling.surface_uphill(), other_way, history, crawling.level).run()
+    held = crawling.state.held
+    end = Attempt(crawling.surface_uphill(), other_way, history, crawling.level, held=held).run()
     if end.status is Status.STOPPED or _rests(end, must_slip):
         return end
     del history.rows[rows:]

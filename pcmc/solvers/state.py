@@ -10,12 +10,17 @@ from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import (
     StandingPart,
     Walls,
+    coming_down,
     excess_pull,
     find_walls,
     lift,
     place_pinched_walls,
     place_wall_rows,
+    pull_directions,
+    put_down,
     remove_pinched_walls,
+    resting_vertices,
+    slide_over_feet,
     standing_part,
     top_spacing,
 )
@@ -42,6 +47,7 @@ class State:
     full : the whole surface when its walls were last pinched or lifted.
     part, surface, walls, resting, classes : its standing part; see ``StandingPart``.
     quality_faces : (k,3) the faces whose quality counts.
+    held : whether walls with held bottoms can pinch, too.
     size : of the mesh at the start.
     X : (n,3) the positions reached.
     space : the motion space there.
@@ -52,10 +58,14 @@ class State:
     evaluations : passes over the triangles so far: E, ∇E or its derivative along a motion.
     """
 
-    def __init__(self, surface: Surface, min_quality: float) -> None:
+    def __init__(self, surface: Surface, min_quality: float, held: bool = False) -> None:
         self.full = surface
         self.min_quality, self.size = min_quality, surface.size
         part = standing_part(surface)
+        if held:
+            walls = find_walls(surface, held)
+            part = StandingPart.of(surface, walls, resting_vertices(surface, walls))
+        self.held = bool(part.walls.held.any())
         self.spacing = top_spacing(surface, part.walls)
         self.evaluations = 0
         self.version = 0
@@ -131,12 +141,10 @@ class State:
         standing = self.walls.top_free & ~self.resting
         if not standing.any():
             return X, standing
-        height = self.surface.plane.height(X)
-        above = self.walls.side * height
-        sinks = above < self.walls.side * self.surface.plane.height(self.X)
         low = LOW * self._damping * self.spacing
-        down = standing & ((above <= 0.0) | (sinks & (above <= low)))
-        X[down] -= height[down, None] * np.array(self.surface.plane.normal)
+        down = coming_down(self.surface, self.walls, standing, self.X, X, low)
+        X = put_down(self.surface, self.walls, X, down)
+        X = slide_over_feet(self.walls, X, standing & ~down, self.space)
         X = place_wall_rows(self.surface, self.walls, X, self.space)
         return X, down
 
@@ -176,7 +184,7 @@ class State:
         A wall's foot that has come straight below a resting vertex coincides with it from then on.
         """
         full = self.result_surface()
-        walls = replace(find_walls(full), side=self.walls.side)
+        walls = replace(find_walls(full, self.held), side=self.walls.side)
         standing = remove_pinched_walls(full, walls, self.resting).faces
         if np.array_equal(standing, self.surface.faces) or self._releases_left <= 0:
             return False
@@ -193,7 +201,8 @@ class State:
             return False
         self._releases_left -= 1
         walls = replace(self.walls, side=np.where(excess < 0.0, -self.walls.side, self.walls.side))
-        self.full = lift(self.result_surface(), walls, lifted, LIFT * self._damping)
+        directions = pull_directions(self.surface.moved(self.X), walls, self.resting)
+        self.full = lift(self.result_surface(), walls, lifted, LIFT * self._damping, directions)
         self._damping[lifted] *= DAMPING
         self._take(StandingPart.of(self.full, walls, self.resting & ~lifted))
         return True

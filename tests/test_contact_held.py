@@ -1,0 +1,273 @@
+"""Walls with held bottoms that pinch: a junction that comes down rests on the curve of its bottom."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from shapes import rotation
+from starts import four_fans, stationary, two_squares
+
+import pcmc
+from pcmc import Patch, Plane, Surface, Verdict, certify, energy, solve
+from pcmc.contact.pinching import (
+    coming_down,
+    find_walls,
+    lift,
+    place_pinched_walls,
+    pull_and_capacity,
+    pull_directions,
+    remove_pinched_walls,
+    resting_vertices,
+)
+from pcmc.meshing.quality import triangle_quality
+from pcmc.meshing.refinement import refine
+from pcmc.solvers.newton import newton
+
+
+def held(surface):
+    """The same surface with the bottoms of its walls fixed."""
+    return Surface(
+        surface.vertices,
+        surface.faces,
+        surface.patch_of_face,
+        surface.patches,
+        fixed=surface.fixed | surface.on_plane,
+        plane=surface.plane,
+    )
+
+
+def example(n, alpha_aux, right=2.0):
+    """Example 1 with its wall held, and a right patch of another tension."""
+    return held(two_squares(n, alpha_aux=alpha_aux)).retensioned({"right": right})
+
+
+def contact(surface):
+    """Which vertices rest, their pull, and what their wall can take."""
+    walls = find_walls(surface)
+    resting = resting_vertices(surface, walls)
+    return resting, *pull_and_capacity(remove_pinched_walls(surface, walls, resting), walls, resting)
+
+
+def pressed(n=6, count=2, right=2.0):
+    """Example 1, its junction pressed onto the held bottom at the first ``count`` vertices from one end."""
+    surface = example(n, 3.0, right)
+    walls = find_walls(surface, held=True)
+    free = np.flatnonzero(walls.top_free)
+    resting = np.zeros(surface.n, dtype=bool)
+    resting[free[np.argsort(surface.vertices[free, 1])][:count]] = True
+    standing = remove_pinched_walls(surface, walls, resting)
+    full = surface.moved(place_pinched_walls(surface, walls, resting, standing.vertices))
+    return full, find_walls(full), resting, standing
+
+
+def elsewhere(surface, seed=0):
+    """The surface turned and moved, its plane with it."""
+    R, shift = rotation(seed), np.array([3.0, -1.0, 2.0])
+    return Surface(
+        surface.vertices @ R.T + shift,
+        surface.faces,
+        surface.patch_of_face,
+        surface.patches,
+        fixed=surface.fixed,
+        on_plane=surface.on_plane,
+        plane=Plane(R @ surface.plane.point + shift, R @ surface.plane.normal),
+    )
+
+
+def test_a_standing_wall_that_is_held_pinches_only_when_asked():
+    surface = example(6, 1.0)
+    assert not find_walls(surface).pinchable.any()
+    walls = find_walls(surface, held=True)
+    assert walls.pinchable.tolist() == [False, False, True]
+    assert not walls.sliding.any()
+    top = np.flatnonzero(walls.held)
+    assert len(top) == 5
+    np.testing.assert_array_equal(surface.vertices[walls.foot[top], :2], surface.vertices[top, :2])
+    np.testing.assert_array_equal(surface.vertices[walls.foot[top], 2], 0.0)
+    assert (walls.foot[walls.corner] == np.flatnonzero(walls.corner)).all()
+
+
+def test_walls_that_cannot_pair_their_vertices_cannot_pinch():
+    assert not find_walls(held(four_fans(4)), held=True).pinchable.any()  # four walls meet at one vertex
+    line = [[0, -2, 0], [0, -1, 1], [0, 0, 2], [0, 1, 1], [0, 2, 0]]
+    X = np.array([*line, [-2, 0, 0], [2, 0, 0], [0, 0, 0]], dtype=float)
+    left, right = ([[i, i + 1, 5] for i in range(4)], [[i + 1, i, 6] for i in range(4)])
+    wall = [[0, 7, 1], [7, 2, 1], [7, 3, 2], [7, 4, 3]]  # three free vertices over one
+    patches = [Patch("left", 2.0), Patch("right", 2.0), Patch("wall", 1.0, pressure=0.0)]
+    surface = Surface(X, [*left, *right, *wall], [0] * 4 + [1] * 4 + [2] * 4, patches, fixed=[0, 4, 5, 6, 7])
+    assert not find_walls(surface, held=True).pinchable.any()
+
+
+@pytest.mark.parametrize("count", [1, 3, 5])
+def test_what_is_left_when_a_junction_rests_on_a_held_bottom(count):
+    full, walls, resting, standing = pressed(count=count)
+    np.testing.assert_array_equal(resting_vertices(full, walls), resting)
+    np.testing.assert_array_equal(full.vertices[full.fixed], example(6, 3.0).vertices[full.fixed])
+    assert standing.fixed[resting].all()
+    assert triangle_quality(standing.vertices, standing.faces).min() > 0.1
+    assert energy(standing) == pytest.approx(energy(full), rel=1e-13)
+    again = remove_pinched_walls(full, walls, resting)
+    np.testing.assert_array_equal(again.faces, standing.faces)
+    np.testing.assert_array_equal(again.vertices, standing.vertices)
+
+
+@pytest.mark.parametrize("count", [1, 3, 5])
+def test_pull_less_capacity_is_what_a_lift_to_any_side_gains(count):
+    """(E(lifted by t u) - E) / t tends to capacity - f·u, least along f; u across the bottom."""
+    full, walls, resting, standing = pressed(count=count, right=3.0)
+    pull, capacity = pull_and_capacity(standing, walls, resting)
+    along_pull = pull_directions(standing, walls, resting)
+    assert np.abs(along_pull[resting, 0]).min() > 0.05  # it pulls sideways, too
+    step, spacing = 1e-6, 4 / 6
+    for v in np.flatnonzero(resting):
+        one = np.arange(full.n) == v
+        for angle in (0.0, 0.7, -1.1):
+            u = along_pull.copy()
+            c, s = np.cos(angle), np.sin(angle)
+            u[v] = [c * u[v, 0] + s * u[v, 2], 0.0, c * u[v, 2] - s * u[v, 0]]
+            slope = (energy(lift(full, walls, one, step, u)) - energy(full)) / (step * spacing)
+            gain = capacity[v] - c * pull[v]
+            if v in standing.faces[standing.patch_of_face == 2]:
+                assert slope > gain - 2e-5  # the wall that stands beside it folds, which costs more
+            else:
+                assert slope == pytest.approx(gain, abs=2e-5)
+        assert capacity[v] == pytest.approx(3.0 * spacing, rel=1e-12)
+
+
+def test_a_move_past_the_bottom_comes_down_on_it():
+    full = example(6, 3.0)
+    walls = find_walls(full, held=True)
+    top = int(np.flatnonzero(walls.held)[2])
+    height = full.vertices[top, 2]
+    for move, expected in [
+        ([0, 0, -1.01 * height], True),  # through it
+        ([0.05, 0, -0.999 * height], False),  # beside it
+        ([0, 0, -0.999 * height], True),  # nearly onto it
+        ([0, 0, 0.1], False),
+    ]:
+        X = full.vertices.copy()
+        X[top] += move
+        down = coming_down(full, walls, walls.top_free, full.vertices, X, 5e-3)
+        assert down.sum() == down[top] == expected
+
+
+@pytest.mark.parametrize(("n", "alpha_aux", "count"), [(8, 3.0, 7), (16, 2.0, 2)])
+def test_by_symmetry_it_rests_as_where_the_bottom_slides(n, alpha_aux, count):
+    result = solve(example(n, alpha_aux))
+    assert result.converged
+    found = result.certificate
+    assert found.verdict is Verdict.STABLE
+    assert found.residual < 1e-11
+    assert found.curvature_error < 1e-9
+    resting, pull, capacity = contact(result.surface)
+    assert resting.sum() == count
+    np.testing.assert_array_equal(found.pinched, np.flatnonzero(resting))
+    assert (pull <= capacity * (1 + 1e-9)).all()
+    sliding = stationary(partial(two_squares, n, alpha_aux=alpha_aux))
+    assert len(sliding.certificate.pinched) == count
+    assert result.energy == pytest.approx(sliding.energy, rel=1e-4)  # its triangles lie elsewhere
+    same = certify(held(sliding.surface))
+    assert same.verdict is Verdict.STABLE
+    assert same.residual < 1e-10
+    assert same.energy == pytest.approx(sliding.energy, rel=1e-13)
+    np.testing.assert_array_equal(same.pinched, sliding.certificate.pinched)
+
+
+def test_it_stands_just_below_the_tension_that_keeps_it_down():
+    low = solve(example(8, 3.0))
+    resting, pull, capacity = contact(low.surface)
+    limit = 3.0 * float((pull[resting] / capacity[resting]).max())
+    above = solve(low.surface.retensioned({"wall": 1.001 * limit}))
+    below = solve(low.surface.retensioned({"wall": 0.99 * limit}))
+    assert above.certificate.verdict is below.certificate.verdict is Verdict.STABLE
+    assert len(above.certificate.pinched) == 7
+    assert 0 < len(below.certificate.pinched) < 7
+    weak = certify(low.surface.retensioned({"wall": 0.99 * limit}))
+    assert weak.verdict is Verdict.NOT_CONVERGED
+    assert "the sheets pull harder than the wall can hold" in weak.detail
+
+
+def test_a_sideways_pull_takes_the_junction_off():
+    """With patches of 2 and 3 the junction is pulled across; a wall of 2 holds it where one of 0.3 cannot."""
+    start = example(8, 4.0, right=3.0)
+    low = solve(start)
+    assert low.certificate.verdict is Verdict.STABLE
+    resting, walls = contact(low.surface)[0], find_walls(low.surface)
+    assert resting.sum() == 7
+    direction = pull_directions(remove_pinched_walls(low.surface, walls, resting), walls, resting)
+    assert (direction[resting, 0] > 0.2).all()  # towards the stronger patch
+    weak = solve(low.surface.retensioned({"wall": 1.2}))
+    assert weak.certificate.verdict is Verdict.STABLE
+    assert len(weak.certificate.pinched) < 7
+    top = find_walls(weak.surface, held=True).held & ~contact(weak.surface)[0]
+    assert (weak.surface.vertices[top, 0] > 0.0).all()
+
+
+def test_it_rests_along_a_length_that_does_not_depend_on_the_mesh():
+    """Refined from mesh to mesh: the energy converges, and the resting part of the junction too."""
+    result, energies, rests = None, [], []
+    for _ in range(4):
+        result = solve(example(8, 2.4) if result is None else refine(result.surface))
+        assert result.certificate.verdict is Verdict.STABLE
+        energies.append(result.energy)
+        top = find_walls(result.surface, held=True).top_free.sum() + 1
+        rests.append(len(result.certificate.pinched) / top)
+    differences = -np.diff(energies)
+    orders = np.log2(differences[:-1] / differences[1:])
+    assert (orders > 1.3).all()
+    assert abs(rests[-1] - rests[-2]) < 0.05
+    assert 0.1 < rests[-1] < 0.95
+
+
+def test_it_turns_with_the_plane():
+    here, there = solve(example(8, 3.0, right=2.5)), solve(elsewhere(example(8, 3.0, right=2.5)))
+    assert there.certificate.verdict is here.certificate.verdict
+    np.testing.assert_array_equal(there.certificate.pinched, here.certificate.pinched)
+    assert len(here.certificate.pinched)
+    assert there.energy == pytest.approx(here.energy, rel=1e-10)
+
+
+def test_it_hangs_below_the_plane_alike():
+    above = example(8, 3.0)
+    patches = [Patch(p.name, p.tension, -p.pressure) for p in above.patches]
+    below = Surface(above.vertices * [1, 1, -1], above.faces, above.patch_of_face, patches, fixed=above.fixed)
+    one, two = solve(above), solve(below)
+    np.testing.assert_array_equal(two.certificate.pinched, one.certificate.pinched)
+    assert two.energy == pytest.approx(one.energy, rel=1e-12)
+
+
+@pytest.mark.parametrize("suffix", ["pcmc", "fe", "obj", "vtu", "glb", "3dm"])
+@pytest.mark.parametrize(("n", "alpha_aux"), [(8, 3.0), (16, 2.0)])
+def test_files_carry_it(n, alpha_aux, suffix, tmp_path):
+    surface = stationary(partial(example, n, alpha_aux)).surface
+    before = certify(surface)
+    path = tmp_path / f"held.{suffix}"
+    pcmc.write(path, surface)
+    again = pcmc.read(path)
+    after = solve(again).certificate if suffix == "glb" else certify(again)  # single precision in it
+    assert after.verdict is before.verdict is Verdict.STABLE
+    assert len(after.pinched) == len(before.pinched) > 0
+    assert after.energy == pytest.approx(before.energy, rel=1e-6)
+
+
+def test_a_bottom_with_more_vertices_than_the_junction_is_no_place_to_rest():
+    surface = example(8, 3.0)
+    topo, F = surface.topology, surface.faces
+    ends = surface.fixed[topo.edges].all(axis=1) & topo.boundary_edge
+    near = (np.abs(surface.vertices[topo.edges, :2]) < 1.0).all(axis=(1, 2))
+    bottom = np.flatnonzero(ends & near)[0]
+    a, b = topo.edges[bottom]
+    face = int(np.flatnonzero((topo.edge_of_face == bottom).any(axis=1))[0])
+    one, two = F[face].copy(), F[face].copy()
+    one[one == a], two[two == b] = surface.n, surface.n
+    split = Surface(
+        np.vstack([surface.vertices, surface.vertices[[a, b]].mean(axis=0)]),
+        np.vstack([np.delete(F, face, axis=0), one, two]),
+        np.append(np.delete(surface.patch_of_face, face), [2, 2]),
+        surface.patches,
+        fixed=np.append(surface.fixed, True),
+    )
+    assert not find_walls(split, held=True).pinchable.any()
+    found = newton(split).certificate
+    assert found.verdict is Verdict.WALL_DOWN
+    assert "comes down on the held bottom of its wall" in found.detail
