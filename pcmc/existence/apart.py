@@ -8,27 +8,18 @@ from itertools import product
 import numpy as np
 
 from ..base.arrays import Bools, Floats
-from ..base.errors import OptionError, SurfaceError
 from ..certificate.neck import held_groups
 from ..certificate.proof import Fold
 from ..continuation import BoundaryMotion
 from ..surface import Surface
 from .attempts import Attempts
-from .folding import Arrival, way
+from .folding import Arrival, Further, way
 from .starts import low_start
 
 SHARES = (0.5, 0.25, 0.1, 0.03)  # of the distance, at which to begin
 FLAT = 1e-6  # of the size: curves whose middles are nearer to each other are not moved
 STEPS = 80
 SMALLEST = 1e-4
-
-
-@dataclass(frozen=True, eq=False)
-class Apart:
-    """What moving the curves apart has shown: a surface at the full distance, or a fold on the way."""
-
-    surface: Surface | None = None
-    fold: Fold | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +76,7 @@ class Spread:
         return self.surface.moved(X)
 
 
-def move_apart(surface: Surface, attempts: Attempts) -> Apart:
+def move_apart(surface: Surface, attempts: Attempts) -> Further:
     """Follow the film as the distance between the held curves grows to that of the surface.
 
     The branch begins at the largest of a few distances at which a minimum is found, from the given shape or
@@ -93,24 +84,23 @@ def move_apart(surface: Surface, attempts: Attempts) -> Apart:
     """
     spread = Spread.of(surface)
     if spread is None:
-        return Apart()
+        return Further()
     shapes = [start.vertices for start in (surface, low_start(surface)) if start is not None]
     for begin, shape in product(SHARES, shapes):
         result = attempts.solve(spread.at(begin, shape), levels=0, target="minimum")
         if result.converged:
             break
     else:
-        return Apart()
+        return Further()
     motion = BoundaryMotion(spread.boundary, start=begin)
-    try:
-        branch = attempts.follow(result.surface, motion, 1.0, steps=STEPS, smallest=SMALLEST, min_quality=0.3)
-    except (OptionError, SurfaceError):  # no branch: rigid motions are free
-        return Apart()
+    branch = attempts.follow(result.surface, motion, 1.0, steps=STEPS, smallest=SMALLEST)
+    if branch is None:
+        return Further()
     end = way(branch)
     if end.arrival is Arrival.REACHED:
         X = branch.last.vertices.copy()
         X[spread.held] = surface.vertices[spread.held]
-        return Apart(surface=surface.moved(X))
+        return Further(surface.moved(X), "by moving the held curves apart")
     if end.arrival is Arrival.FOLD:
-        return Apart(fold=Fold("distance", end.farthest, begin))
-    return Apart()
+        return Further(fold=Fold("distance", end.farthest, begin))
+    return Further()

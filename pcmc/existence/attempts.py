@@ -7,11 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from .. import solvers
+from ..base.errors import OptionError, SurfaceError
 from ..continuation import BoundaryMotion, Branch, Direction, follow
 from ..energy.functional import gradient
 from ..solvers.result import Callback, Progress, Result, Status
 from ..surface import Surface
 from .folding import until_turned
+
+MIN_QUALITY = 0.3  # of triangles along a branch, below which vertices are redistributed
 
 
 @dataclass
@@ -52,10 +55,11 @@ class Attempts:
         stop: float,
         back: float | None = None,
         **options: Any,
-    ) -> Branch:
+    ) -> Branch | None:
         """Follow a branch until it arrives or turns; StopIteration if that was stopped.
 
-        ``back`` is as in ``way``.
+        None where no branch starts: rigid motions are free, or the parameter moves nothing. ``back`` is as in
+        ``way``.
         """
         interrupted: list[BaseException] = []
 
@@ -69,10 +73,15 @@ class Attempts:
                 interrupted.append(error)
                 raise
 
-        branch = follow(surface, direction, stop, callback=until_turned(count, back), **options)
-        if interrupted:
+        watch = until_turned(count, back)
+        try:
+            branch = follow(surface, direction, stop, callback=watch, min_quality=MIN_QUALITY, **options)
+        except (OptionError, SurfaceError):
+            branch = None
+        if interrupted:  # by the callback, whatever it raised
             raise interrupted[0]
-        self.evaluations += int(branch.points.iterations.sum())
+        if branch is not None:
+            self.evaluations += int(branch.points.iterations.sum())
         return branch
 
     def show(self, surface: Any, row: Mapping[str, Any]) -> None:

@@ -6,8 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from ..certificate.proof import Fold
 from ..continuation import Branch, Ending
 from ..solvers.result import Progress
+from ..surface import Surface
 
 BACK = 0.03  # of the farthest value: how far behind a turn a way down may open, and the branch is followed
 SOUND = 0.2  # triangle quality from which a turn counts as the surface's, not the mesh's
@@ -29,6 +31,15 @@ class Way:
     arrival: Arrival
     farthest: float
     quality: float
+
+
+@dataclass(frozen=True, eq=False)
+class Further:
+    """What a further way has shown: a surface to solve from and ``how`` it was reached, or a fold."""
+
+    surface: Surface | None = None
+    how: str = ""
+    fold: Fold | None = None
 
 
 def until_turned(

@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from ..base.errors import OptionError, SurfaceError
 from ..certificate.balance import load_ratio
 from ..certificate.proof import Fold
 from ..continuation import Direction
 from ..surface import Surface
 from .attempts import Attempts
-from .folding import Arrival, way
+from .folding import Arrival, Further, way
 
 SHARES = (0.5, 0.2, 0.05, 0.01)  # of the pressure, or of what the boundary carries, at which to begin
 STEPS = 80
 SMALLEST = 1e-4
 
 
-@dataclass(frozen=True, eq=False)
-class Raised:
-    """What raising the pressure has shown: a surface at the end of the branch, or a fold on the way."""
-
-    surface: Surface | None = None
-    fold: Fold | None = None
-    start: float = 0.0
-
-
-def raise_pressure(low: Surface, attempts: Attempts) -> Raised:
+def raise_pressure(low: Surface, attempts: Attempts) -> Further:
     """Follow the equilibria from a low pressure, all pressures growing in proportion.
 
     The branch begins at the highest of a few pressures at which a minimum is found from the low start.
@@ -41,19 +29,16 @@ def raise_pressure(low: Surface, attempts: Attempts) -> Raised:
         if result.converged:
             break
     else:
-        return Raised()
+        return Further()
     # λ is the pressure over what the boundary carries, so that a fold is near 1 however weak the patches
     direction = Direction(pressures={name: carried * p for name, p in pressures.items()})
-    try:
-        branch = attempts.follow(
-            result.surface, direction, 1.0 / carried, steps=STEPS, smallest=SMALLEST, min_quality=0.3
-        )
-    except (OptionError, SurfaceError):  # no branch: rigid motions are free, or the pressure moves nothing
-        return Raised(start=begin)
+    branch = attempts.follow(result.surface, direction, 1.0 / carried, steps=STEPS, smallest=SMALLEST)
+    if branch is None:
+        return Further()
     end = way(branch)
     if end.arrival is Arrival.REACHED:
-        last = branch.last
-        return Raised(surface=last.retensioned(None, pressures, walls), start=begin)
+        last = branch.last.retensioned(None, pressures, walls)
+        return Further(last, f"by raising the pressure from {begin:.3g} of it")
     if end.arrival is Arrival.FOLD:
-        return Raised(fold=Fold("pressure", end.farthest * carried, begin), start=begin)
-    return Raised(start=begin)
+        return Further(fold=Fold("pressure", end.farthest * carried, begin))
+    return Further()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
+from ..base.arrays import Bools
 from ..certificate.balance import hardly_balanced, load_ratio, unbalanced, unheld
 from ..certificate.certificate import TOLERANCE
 from ..certificate.neck import pinched_neck
@@ -15,6 +17,7 @@ from ..solvers.result import Callback, Result, Status
 from ..surface import Surface
 from .apart import move_apart
 from .attempts import Attempts
+from .folding import Further
 from .pressure import raise_pressure
 from .starts import low_start
 from .tensions import relax_tensions
@@ -40,42 +43,36 @@ def search(surface: Surface, first: Result, callback: Callback | None, options: 
 
 
 def _search(start: Surface, first: Result, attempts: Attempts) -> Result:
-    """The steps of the search, in the order of their cost."""
+    """The result of the first further way that leads to rest, or the proofs that there is none."""
     minimum = attempts.options.get("target", "minimum") == "minimum"
     pinchable = standing_part(start).walls.pinchable
-    proofs: list[Proof | None] = [
-        unbalanced(start, pinchable),
-        unheld(start, stable=minimum),
-    ]
-    low = None if any(proofs) else low_start(start)
-    if low is not None and low.pressures.any():
-        result = attempts.solve(low)
-        if result.converged:
-            return _found(first, result, attempts, "from a lower start")
-        raised = raise_pressure(low, attempts)
-        if raised.surface is not None:
-            result = attempts.solve(raised.surface)
+    proofs: list[Proof] = []
+    proofs += filter(None, (unbalanced(start, pinchable), unheld(start, stable=minimum)))
+    for way in () if proofs else _further_ways(start, attempts, pinchable):
+        further = way()
+        if further.surface is not None:
+            result = attempts.solve(further.surface)
             if result.converged:
-                how = f"by raising the pressure from {raised.start:.3g} of it"
-                return _found(first, result, attempts, how)
-        proofs.append(raised.fold)
-        if raised.fold is None and not hardly_balanced(start, pinchable):
-            relaxed = relax_tensions(low, attempts)
-            if relaxed.surface is not None:
-                result = attempts.solve(relaxed.surface)
-                if result.converged:
-                    return _found(first, result, attempts, "along the branch from equal tensions")
-            proofs.append(relaxed.fold)
-    if low is not None and not any(proofs):
-        apart = move_apart(start, attempts)
-        if apart.surface is not None:
-            result = attempts.solve(apart.surface)
-            if result.converged:
-                return _found(first, result, attempts, "by moving the held curves apart")
-        proofs.append(apart.fold)
+                return _found(first, result, attempts, further.how)
+        if further.fold is not None:
+            proofs.append(further.fold)
+            break
     if first.status in (Status.DIVERGED, Status.DEGENERATE) and load_ratio(start) > 1.0:
         proofs.insert(0, Overload(load_ratio(start)))
-    return _proved(first, tuple(proof for proof in proofs if proof is not None), attempts)
+    return _proved(first, tuple(proofs), attempts)
+
+
+def _further_ways(start: Surface, attempts: Attempts, pinchable: Bools) -> list[Callable[[], Further]]:
+    """Further ways to an equilibrium, in the order of their cost."""
+    low = low_start(start)
+    if low is None:
+        return []
+    ways: list[Callable[[], Further]] = []
+    if low.pressures.any():
+        ways += [partial(Further, low, "from a lower start"), partial(raise_pressure, low, attempts)]
+        if not hardly_balanced(start, pinchable):
+            ways.append(partial(relax_tensions, low, attempts))
+    return [*ways, partial(move_apart, start, attempts)]
 
 
 def _found(first: Result, result: Result, attempts: Attempts, how: str) -> Result:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
 
-from ..base.errors import OptionError, SurfaceError
 from ..certificate.balance import load_ratio
 from ..certificate.proof import Fold
 from ..continuation import Direction
 from ..surface import Surface
 from .attempts import Attempts
-from .folding import BACK, Arrival, way
+from .folding import BACK, Arrival, Further, way
 
 ROOM = 1.3  # of the load: at least so much the equal tensions could carry
 RAISED = (1.0, 1.6)  # times these tensions, tried in turn
@@ -20,20 +18,12 @@ STEPS = 40
 SMALLEST = 3e-4
 
 
-@dataclass(frozen=True, eq=False)
-class Relaxed:
-    """What changing the tensions has shown: a surface at those asked for, or a fold on the way."""
-
-    surface: Surface | None = None
-    fold: Fold | None = None
-
-
-def relax_tensions(low: Surface, attempts: Attempts) -> Relaxed:
+def relax_tensions(low: Surface, attempts: Attempts) -> Further:
     """Follow the equilibria from equal tensions of all patches under pressure to those of ``low``."""
     asked = {patch.name: patch.tension for patch in low.patches if patch.tension > 0.0}
     pressed = [patch.name for patch in low.patches if not patch.auxiliary]
     if len(pressed) < 2:
-        return Relaxed()
+        return Further()
     strongest = max(asked[name] for name in pressed)
     overload = load_ratio(low.retensioned(dict.fromkeys(pressed, strongest)))
     for raised, most in product(RAISED, WALLS):
@@ -43,19 +33,16 @@ def relax_tensions(low: Surface, attempts: Attempts) -> Relaxed:
         if result.converged:
             break
     else:
-        return Relaxed()
+        return Further()
     change = {name: asked[name] - start[name] for name in asked if asked[name] != start[name]}
     direction = Direction(change, relative=True)
-    try:
-        branch = attempts.follow(
-            result.surface, direction, 1.0, back=BACK, steps=STEPS, smallest=SMALLEST, min_quality=0.3
-        )
-    except (OptionError, SurfaceError):  # no branch: rigid motions are free
-        return Relaxed()
+    branch = attempts.follow(result.surface, direction, 1.0, back=BACK, steps=STEPS, smallest=SMALLEST)
+    if branch is None:
+        return Further()
     end = way(branch, back=BACK)
     if end.arrival is Arrival.REACHED:
-        return Relaxed(surface=branch.last.retensioned(asked))
+        return Further(branch.last.retensioned(asked), "along the branch from equal tensions")
     if end.arrival is Arrival.FOLD:
         at = tuple((name, start[name] + end.farthest * change.get(name, 0.0)) for name in asked)
-        return Relaxed(fold=Fold("tensions", end.farthest, 0.0, at))
-    return Relaxed()
+        return Further(fold=Fold("tensions", end.farthest, 0.0, at))
+    return Further()
