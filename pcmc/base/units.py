@@ -103,6 +103,10 @@ class Units:
         return f"{self.force or 'force'}·{self.length or 'length'}"
 
 
+NO_UNITS = Units()
+"""Those of numbers whose units are not given."""
+
+
 def length_factor(source: str, target: str) -> float:
     """What a length in ``source`` is multiplied by to be in ``target``; 1 where one of them is empty.
 

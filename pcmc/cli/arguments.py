@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,6 +14,7 @@ from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..io import FORMATS, read_bare
+from ..project.output import OnStep
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 
@@ -33,6 +35,10 @@ Pressures = Annotated[
 ]
 ViewName = Annotated[str, option("NAME", "diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")]
 Colour = Annotated[str, option("NAME", "patches, curvature, error or reactions.", "--colour", "--color")]
+START = "The start shape of a project, before it is solved, instead of its designed roof."
+Start = Annotated[bool, typer.Option("--start", help=START)]
+CACHE = "Keep a project's roof and take it from there the next time; --no-cache solves it again."
+Cache = Annotated[bool, typer.Option("--cache/--no-cache", help=CACHE)]
 MANY_FILES = option("FILE", "File to write; may be repeated.", "-o", "--output")
 
 
@@ -53,9 +59,31 @@ def integer(text: str | int) -> int:
 
 
 def surface_in(file: Path) -> Surface:
-    """The surface in a file, or the start surface of a project."""
+    """The surface in a file, or the start shape of a project."""
     check_input(file)
     return projects.build(file) if file.suffix.lower() == TOML else read_bare(file)
+
+
+def design_in(
+    file: Path,
+    say: OnStep,
+    tension: list[str] | None,
+    pressure: list[str] | None,
+    *,
+    start: bool = False,
+    cache: bool = True,
+) -> tuple[Surface, projects.Outcome | None]:
+    """The designed roof of a project and how it was reached; of any other file the surface, and None.
+
+    With ``start`` the start shape of a project, and None.
+    """
+    check_input(file)
+    changed = partial(retensioned, tension=tension, pressure=pressure) if tension or pressure else None
+    if start or file.suffix.lower() != TOML:
+        surface = surface_in(file)
+        return surface if changed is None else changed(surface), None
+    outcome = projects.designed(file, say, changed=changed, use_cache=cache)
+    return outcome.surface, outcome
 
 
 def check_input(file: Path) -> None:

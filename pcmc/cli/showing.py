@@ -13,9 +13,10 @@ from ..base.errors import OptionError, unknown
 from ..base.interrupts import defer_interrupts
 from ..io import load, write
 from ..surface import Surface
-from . import OK, arguments
-from .arguments import TOML, Colour, Input, Pressures, Settings, ViewName, option
+from . import NOT_CERTIFIED, OK, arguments
+from .arguments import TOML, Cache, Colour, Input, Pressures, Settings, Start, ViewName, option
 from .progress import working
+from .reports import report
 
 
 def convert(
@@ -25,16 +26,26 @@ def convert(
     ],
     tension: Settings = None,
     pressure: Pressures = None,
+    start: Start = False,
+    cache: Cache = True,
 ) -> int:
-    """Write a surface in another format: .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf .3dm.
+    """Write a surface or a project's roof as .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf or .3dm.
 
     \b
-    Example:
+    Examples:
       pcmc convert roof.pcmc roof.3dm
+      pcmc convert roof.toml roof.obj
     """
     projects.check_names([output])
     projects.check_outputs([output])
-    surface = arguments.retensioned(arguments.surface_in(file), tension, pressure)
+    with working() as say:
+        surface, outcome = arguments.design_in(file, say, tension, pressure, start=start, cache=cache)
+    if outcome is not None and not _is_good(file, outcome):
+        return NOT_CERTIFIED
+    if outcome is not None:
+        projects.write_all(projects.surface_files(outcome, [output]))
+        print(f"written: {output}")
+        return OK
     data: dict[str, Any] = {}
     if file.suffix.lower() != TOML and not (tension or pressure):
         content = load(file)
@@ -45,23 +56,37 @@ def convert(
     return OK
 
 
+def _is_good(file: Path, outcome: projects.Outcome) -> bool:
+    """Print how the design of a project ended; whether its roof may be shown as the designed one."""
+    report(outcome)
+    if not outcome.good:
+        print(f"nothing written (pcmc explore {file} shows this roof, --start the start shape)")
+    return outcome.good
+
+
 def plot(
     file: Input,
     picture: Annotated[Path, typer.Argument(metavar="PNG")],
     view: ViewName = "diagonal",
     colour: Colour = "patches",
+    start: Start = False,
+    cache: Cache = True,
 ) -> int:
-    """Draw a surface, coloured by patch, mean curvature or curvature error, or with its reactions.
+    """Draw a surface or a project's roof, by patch, mean curvature, curvature error, or with its reactions.
 
     \b
-    Example:
+    Examples:
       pcmc plot roof.pcmc roof.png --colour error
+      pcmc plot roof.toml start.png --start
     """
     projects.check_names([], picture)
     seen = arguments.view_of(view)
     projects.check_picture(seen, colour)
     projects.check_outputs([picture])
-    surface = arguments.surface_in(file)
+    with working() as say:
+        surface, outcome = arguments.design_in(file, say, None, None, start=start, cache=cache)
+    if outcome is not None and not _is_good(file, outcome):
+        return NOT_CERTIFIED
     projects.write_all([(picture, lambda path: projects.paint(surface, path, seen, colour))])
     print(f"written: {picture}")
     return OK
@@ -78,8 +103,10 @@ def explore(
     host: Annotated[str, option("ADDRESS", "Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, option("NUMBER", "Port; 0 for any free one.", parser=arguments.integer)] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
+    start_shape: Start = False,
+    cache: Cache = True,
 ) -> int:
-    """Explore a surface in the browser until Ctrl-C.
+    """Explore a surface, or a project's roof, in the browser until Ctrl-C.
 
     \b
     Examples:
@@ -93,7 +120,10 @@ def explore(
     with working() as say:
         say("building")
         if file is not None:
-            surface, title = arguments.surface_in(file), file.name
+            surface, outcome = arguments.design_in(file, say, None, None, start=start_shape, cache=cache)
+            title = file.name
+            if outcome is not None:
+                report(outcome)
         else:
             values = {name: listed[0] for name, listed in map(arguments.values_of, parameter or ())}
             surface, title = _example(str(example), values), str(example)
