@@ -16,6 +16,8 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         if outcome.design.met:  # otherwise the message has the values
             tables = (outcome.design.targets, outcome.design.parameters)
             print(", with ".join(", ".join(f"{k} {v:.6g}" for k, v in t["value"].items()) for t in tables))
+    if verdict and outcome.units:
+        print(outcome.units.sentence)
     if verdict:
         print(outcome.certificate.verdict.value)
         if outcome.certificate.detail:

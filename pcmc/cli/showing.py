@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -11,10 +12,11 @@ import typer
 from .. import project as projects
 from ..base.errors import OptionError, unknown
 from ..base.interrupts import defer_interrupts
-from ..io import load, write
+from ..base.units import NO_UNITS
+from ..io import write
 from ..surface import Surface
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import TOML, Cache, Colour, Input, Pressures, Settings, Start, ViewName, option
+from .arguments import Cache, Colour, Input, Pressures, Settings, Start, ViewName, option
 from .progress import working
 from .reports import report
 
@@ -39,19 +41,17 @@ def convert(
     projects.check_names([output])
     projects.check_outputs([output])
     with working() as say:
-        surface, outcome = arguments.design_in(file, say, tension, pressure, start=start, cache=cache)
-    if outcome is not None and not _is_good(file, outcome):
-        return NOT_CERTIFIED
-    if outcome is not None:
-        projects.write_all(projects.surface_files(outcome, [output]))
-        print(f"written: {output}")
-        return OK
-    data: dict[str, Any] = {}
-    if file.suffix.lower() != TOML and not (tension or pressure):
-        content = load(file)
-        data = {"scalars": content.scalars, "certificate": content.certificate or None}
-    with defer_interrupts():
-        write(output, surface, **data)
+        shown = arguments.given(file, say, tension, pressure, start=start, cache=cache)
+    if shown.outcome is not None:
+        if not _is_good(file, shown.outcome):
+            return NOT_CERTIFIED
+        projects.write_all(projects.surface_files(shown.outcome, [output]))
+    else:
+        data: dict[str, Any] = {"units": shown.units}
+        if shown.data is not None:
+            data |= {"scalars": shown.data.scalars, "certificate": shown.data.certificate or None}
+        with defer_interrupts():
+            write(output, shown.surface, **data)
     print(f"written: {output}")
     return OK
 
@@ -84,10 +84,11 @@ def plot(
     projects.check_picture(seen, colour)
     projects.check_outputs([picture])
     with working() as say:
-        surface, outcome = arguments.design_in(file, say, None, None, start=start, cache=cache)
-    if outcome is not None and not _is_good(file, outcome):
+        shown = arguments.given(file, say, start=start, cache=cache)
+    if shown.outcome is not None and not _is_good(file, shown.outcome):
         return NOT_CERTIFIED
-    projects.write_all([(picture, lambda path: projects.paint(surface, path, seen, colour))])
+    painting = partial(projects.paint, shown.surface, view=seen, colour=colour, units=shown.units)
+    projects.write_all([(picture, painting)])
     print(f"written: {picture}")
     return OK
 
@@ -120,15 +121,15 @@ def explore(
     with working() as say:
         say("building")
         if file is not None:
-            surface, outcome = arguments.design_in(file, say, None, None, start=start_shape, cache=cache)
-            title = file.name
-            if outcome is not None:
-                report(outcome)
+            shown = arguments.given(file, say, start=start_shape, cache=cache)
+            surface, title, units = shown.surface, file.name, shown.units
+            if shown.outcome is not None:
+                report(shown.outcome)
         else:
             values = {name: listed[0] for name, listed in map(arguments.values_of, parameter or ())}
-            surface, title = _example(str(example), values), str(example)
+            surface, title, units = _example(str(example), values), str(example), NO_UNITS
         say("solving")
-        explorer = start(surface, host, port, title)
+        explorer = start(surface, host, port, title, units)
     open_and_wait(explorer, browser)
     return OK
 

@@ -131,12 +131,13 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as say:
-        surface, outcome = arguments.design_in(file, say, tension, pressure, start=start, cache=cache)
+        shown = arguments.given(file, say, tension, pressure, start=start, cache=cache)
+        surface, outcome = shown.surface, shown.outcome
         say("certifying")
         certificate = certify(surface) if outcome is None else outcome.certificate
     if outcome is not None:
         report(outcome, verdict=False)
-    print(certificate)
+    print(certificate.text(shown.units))
     if meshes is not None and certificate.index is not None:
         sys.stdout.flush()
         with working() as say:
@@ -171,8 +172,10 @@ def remesh_(
     if not solved:
         with working() as say:
             say("remeshing")
-            surface = remesh(arguments.surface_in(file), **stage.options)
-            projects.write_all([(path, partial(write, surface=surface)) for path in output], say)
+            shown = arguments.given(file, say, start=True)
+            surface = remesh(shown.surface, **stage.options)
+            writing = partial(write, surface=surface, units=shown.units)
+            projects.write_all([(path, writing) for path in output], say)
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
     project = replace(_project(file, None, output, None), remeshing=(stage,), picture=None)

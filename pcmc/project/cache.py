@@ -22,9 +22,12 @@ import numpy as np
 import pandas as pd
 
 from .. import io
-from ..base.errors import LostWarning, PcmcError
+from ..base.errors import FileError, LostWarning, PcmcError
+from ..base.files import atomic_write
 from ..io.mesh_data import to_surface
 from ..solvers.result import Result, Status
+from ..surface import Surface
+from ..surface.surface import FIELDS
 from .file import Project
 from .outcome import Outcome
 
@@ -87,9 +90,17 @@ def keep(project: Project, outcome: Outcome) -> None:
     with suppress(OSError, PcmcError, LostWarning), warnings.catch_warnings():
         warnings.simplefilter("error", LostWarning)  # a surface that the file cannot hold is not kept
         path.parent.mkdir(parents=True, exist_ok=True)
-        io.write(path, outcome.surface, certificate=_values(outcome))
+        with atomic_write(path) as temporary:
+            io.write(temporary, outcome.surface, certificate=_values(outcome))
+            if not _same(outcome.surface, to_surface(io.load(temporary))):
+                raise FileError("the file does not hold all of the surface")
         for old in cached_files()[:-MOST]:
             old.unlink(missing_ok=True)
+
+
+def _same(one: Surface, other: Surface) -> bool:
+    """Whether two surfaces are equal to the last bit: the file holds all of it."""
+    return all(b"".join(_pieces(getattr(one, f))) == b"".join(_pieces(getattr(other, f))) for f in FIELDS)
 
 
 def _values(outcome: Outcome) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 from ..surface import Surface
 from . import cache, running
@@ -63,4 +62,4 @@ def designed(
     outcome = running.solve_from_start(project, progress or ignore, changed)
     if use_cache:
         cache.keep(project, outcome)
-    return replace(outcome, units=project.units)
+    return outcome

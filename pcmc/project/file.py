@@ -168,11 +168,17 @@ def build(path: PathLike) -> Surface:
 
 
 def surface_of(project: Project) -> Surface:
-    """The mesh of the project's plan."""
+    """The mesh of the project's plan, or the surface in its file."""
+    return start_of(project)[0]
+
+
+def start_of(project: Project) -> tuple[Surface, Units]:
+    """The mesh of the project's plan, or the surface in its file, and its units."""
     if project.plan is None:
-        return io.read_bare(project.path)
+        surface, data = io.read_bare(project.path)
+        return surface, data.units
     with in_file(project.path):
-        return project.plan.surface()
+        return project.plan.surface(), project.units
 
 
 def project_of(path: Path, data: Mapping[str, Any]) -> Project:

@@ -24,7 +24,7 @@ from ..meshing.remeshing import remesh
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from . import cache
-from .file import Project, in_file, load, surface_of
+from .file import Project, in_file, load, start_of
 from .outcome import Outcome
 from .output import OnStep, PathLike, check_names, check_outputs, fields, ignore, paint, write_all
 
@@ -82,7 +82,6 @@ def run_project(
     the cache, unless it was changed or ``use_cache`` is false; it is solved in any case.
     """
     outcome = _solve_and_write(project, progress or ignore, changed, anyway)
-    outcome = replace(outcome, units=project.units)
     if use_cache and changed is None:
         cache.keep(project, outcome)
     if project.mesh_check and outcome.certificate.index is not None:
@@ -130,7 +129,7 @@ def _solve_and_write(
         return outcome
     works = surface_files(outcome, project.files)
     if project.picture is not None:
-        look = {"view": project.view, "colour": project.colour}
+        look = {"view": project.view, "colour": project.colour, "units": outcome.units}
         works.append((Path(project.picture), partial(paint, outcome.surface, **look)))
     with made(project.folder or Path()):
         return replace(outcome, files=write_all(works, report))
@@ -141,6 +140,7 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike]) -> list[tuple[Pat
     data: dict[str, Any] = {
         "scalars": fields(outcome.surface, outcome.certificate),
         "certificate": outcome.certificate,
+        "units": outcome.units,
     }
     return [(Path(file), partial(io.write, surface=outcome.surface, **data)) for file in files]
 
@@ -150,10 +150,10 @@ def solve_from_start(
 ) -> Outcome:
     """Mesh a project, solve it, remesh it and meet its targets; write nothing."""
     report("reading" if project.plan is None else "meshing the plan")
-    start = surface_of(project)
+    start, units = start_of(project)
     start = start if changed is None else changed(start)
     _check_balance(start)
-    return solve_project(project, start, report)
+    return replace(solve_project(project, start, report), units=units)
 
 
 def _check_balance(surface: Surface) -> None:
