@@ -16,7 +16,8 @@ from ..base.files import atomic_write
 DPI = 200.0
 TEXT, SMALL = 7.0, 6.0  # points
 INK = "#202020"
-LARGE = 145_000  # bytes
+LARGE = 149_000  # bytes
+EFFORT = 6  # of compression; 9 takes six times as long for 2 % fewer bytes
 # Okabe and Ito's scheme, in an order whose first few differ most.
 CURVES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
@@ -62,6 +63,8 @@ def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
         figure.draw_without_rendering()
         boxes = {axes: axes.get_window_extent() for axes in ratios}
         missing = sum(ratio * boxes[axes].width - boxes[axes].height for axes, ratio in ratios.items())
+        if abs(missing) < 0.5:  # pixels
+            break
         figure.set_figheight(round(figure.get_figheight() * DPI + missing) / DPI)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
@@ -95,7 +98,7 @@ def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
     """The figure as an (h,w,3) image, written as a PNG if there is a path.
 
     The file has no date and no program's name: the same figure gives the same bytes.
-    Above 145 kB it has 256 colours only.
+    Above 149 kB it has 256 colours only.
     """
     from PIL import Image as Pillow
 
@@ -108,7 +111,7 @@ def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
         raise FileError(text, what=os.fspath(path), expected=".png")
     picture = Pillow.fromarray(image)
     stream = io.BytesIO()
-    picture.save(stream, format="PNG", optimize=True)
+    picture.save(stream, format="PNG", compress_level=EFFORT)
     if stream.tell() > LARGE:
         stream = io.BytesIO()
         # the palette covers all colours, also those of a few pixels, such as a legend's

@@ -47,7 +47,6 @@ def draw(
     patches: Sequence[str] | None = None,
     title: str = "",
     width: int = 900,
-    renderer: str = "auto",
 ) -> Image:
     """A picture of a surface, in parallel projection.
 
@@ -66,7 +65,6 @@ def draw(
     legend : explain the colours of patches, supports, and places without a value.
     patches : names of those to draw, such as the walls; by default all.
     width : of the picture in pixels.
-    renderer : "pyvista", "matplotlib", or "auto": pyvista where the system has OpenGL.
 
     Returns
     -------
@@ -74,8 +72,8 @@ def draw(
 
     Raises
     ------
-    OptionError : for an unknown view, renderer or colour map, or arrays of a wrong shape.
-    MissingExtra : when pyvista or matplotlib is not installed.
+    OptionError : for an unknown view or colour map, or arrays of a wrong shape.
+    MissingExtra : when matplotlib is not installed.
     """
     return panel(
         [surface],
@@ -93,7 +91,6 @@ def draw(
         legend=legend,
         titles=[title] if title else (),
         width=width,
-        renderer=renderer,
     )
 
 
@@ -116,7 +113,6 @@ def panel(
     patches: Sequence[str] | Sequence[Sequence[str] | None] | None = None,
     one_scale: bool = True,
     width: int = 1200,
-    renderer: str = "auto",
 ) -> Image:
     """Several surfaces in one picture, with one scale of colour.
 
@@ -144,7 +140,7 @@ def panel(
         fill = None if colors is None or drawing.values is None else colors.rgb(drawing.values)
         meshed = edge[k] >= EDGES_FROM if edges is None else edges
         painted = scene(surface, view, fill, supports=dotted[k], edges=meshed, patches=drawing.patches)
-        frames[k].show(axes[k], painted, renderer)
+        frames[k].show(axes[k], painted)
         if drawing.numbers is not None:
             _print_numbers(axes[k], surface, view, drawing.numbers, form)
     return finish(figure, path)
@@ -204,9 +200,9 @@ class Frame:
     low: Floats
     scale: float
 
-    def show(self, axes: Any, painted: Scene, renderer: str) -> None:
+    def show(self, axes: Any, painted: Scene) -> None:
         """Paint a scene on the axes, pixel on pixel."""
-        image = paint(painted, self.low, self.scale, self.size, renderer)
+        image = paint(painted, self.low, self.scale, self.size)
         right, top = self.low + np.array(self.size) / self.scale
         figure, box = axes.figure.bbox, axes.get_window_extent()
         left = round(box.x0) / figure.width
