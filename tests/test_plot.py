@@ -152,7 +152,7 @@ def test_triangles_are_painted_as_matplotlib_paints_them_from_back_to_front(view
     shown = scene(surface, seen, colors, supports=False, edges=False)
     shown = replace(shown, segments=shown.segments[:0], widths=shown.widths[:0], shades=shown.shades[:0])
     low, scale, size = seen.project(surface.vertices).min(axis=0) - 0.5, 60.0, (500, 400)
-    one = raster.paint(shown, low, scale, size).astype(float)
+    one = raster.paint(shown, low, scale, size).image.astype(float)
     two = back_to_front(shown, low, scale, size).astype(float)
     assert (one < 250).any(axis=2).mean() > 0.02
     assert np.abs(one - two).mean() < 3.0  # of 255; corners' colours vary inside a triangle
@@ -167,12 +167,14 @@ def test_strokes_have_their_width_and_lie_before_what_is_behind_them():
     dots = np.array([[0.2, 0.2, 0.0]])
     lines = {"segments": ends, "widths": np.array([10.0, 4.0]), "shades": np.array([red, blue])}
     shown = replace(empty, **lines, dots=dots, dot_colors=np.array([blue]))
-    image = raster.paint(shown, np.zeros(2), 100.0, (100, 100))
+    painted = raster.paint(shown, np.zeros(2), 100.0, (100, 100))
+    image = painted.image
     assert near(image, red)[:, 30].sum() == 10
     assert near(image, blue)[30].sum() == 4
     assert near(image, red)[50, 50]  # the nearer one
     assert near(image, red)[50].sum() == pytest.approx(70, abs=2)  # with round ends
     assert near(image, blue)[75:85, 15:25].sum() == pytest.approx(np.pi * 2.5**2, abs=4)
+    assert painted.dots == pytest.approx([np.pi * 2.5**2], rel=0.1)
 
 
 def test_same_picture_same_bytes(tmp_path):

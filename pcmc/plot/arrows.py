@@ -62,7 +62,7 @@ def vectors(
     if label:
         figure.supxlabel(" ", fontsize=2.0 * SMALL)  # the place of the arrow that tells the scale
     fit_frames(figure, [axes], [frame], 1)
-    frame.show(axes, paint(painted, frame.low, frame.scale, frame.size))
+    frame.show(axes, paint(painted, frame.low, frame.scale, frame.size).image)
     if longest > 0.0:
         chosen = _thinned(at, size, most)
         in_plane = {"angles": "xy", "scale_units": "xy", "scale": 1.0}

@@ -131,19 +131,19 @@ def panel(
         place.set_title(drawing.title, fontsize=TEXT, color=INK, pad=5.0)
     if colors is not None:
         colors.bar(figure, axes, label)
-    images = []
+    shown = []
     for k, drawing in enumerate(drawings):
         fill = None if colors is None or drawing.values is None else colors.rgb(drawing.values)
         meshed = edge[k] >= EDGES_FROM if edges is None else edges
         view, chosen = drawing.view, drawing.patches
-        painted = scene(drawing.surface, view, fill, supports=dotted[k], edges=meshed, patches=chosen)
-        images.append(paint(painted, frames[k].low, frames[k].scale, frames[k].size))
+        parts = scene(drawing.surface, view, fill, supports=dotted[k], edges=meshed, patches=chosen)
+        painted = paint(parts, frames[k].low, frames[k].scale, frames[k].size)
+        shown.append(Shown(drawing.surface, chosen, drawing.values, parts, painted))
     if legend:
-        seen = zip(drawings, dotted, images, strict=True)
-        add_legend(figure, [Shown(d.surface, d.patches, d.values, dots, image) for d, dots, image in seen])
+        add_legend(figure, shown)
     fit_frames(figure, axes, frames, columns)
-    for drawing, frame, image, place in zip(drawings, frames, images, axes, strict=True):
-        frame.show(place, image)
+    for drawing, frame, picture, place in zip(drawings, frames, shown, axes, strict=True):
+        frame.show(place, picture.painted.image)
         if drawing.numbers is not None:
             _print_numbers(place, drawing.surface, drawing.view, drawing.numbers, form)
     return finish(figure, path)
