@@ -5,7 +5,7 @@ Surface from ``lines`` and their ``arrangement``, ``planar`` meshes, ``heights``
 May import ``meshing`` and the rooms below it.
 """
 
-from .curves import Curve, arc, bezier, circle, curve, join, polyline
+from .curves import Curve, arc, bezier, circle, curve, ellipse, join, polyline
 from .labelled import surface_from_labels
 from .parts import Area, Divider, Hole
 from .plan import Plan, plan_from
@@ -22,6 +22,7 @@ __all__ = [
     "bezier",
     "circle",
     "curve",
+    "ellipse",
     "join",
     "plan_from",
     "polyline",

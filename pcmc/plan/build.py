@@ -14,10 +14,11 @@ from ..base.errors import PlanError, PlanWarning, SurfaceError
 from ..meshing.angles import improve_angles
 from ..surface import Patch, Surface
 from .arrangement import Arrangement, arrange, hole_points
-from .curves import Curve, to_local, to_space
+from .curves import Curve
 from .heights import dome, harmonic_heights
 from .lines import SNAP, Kind, Line
 from .parts import EDGES, Area, PlanData
+from .pieces import to_local, to_space
 from .planar import PlanarMesh, locate, signed_areas, triangulate
 from .walls import UpperEdge, WallMesh, build_walls
 

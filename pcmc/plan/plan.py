@@ -12,8 +12,9 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError
 from ..surface import Plane, Surface
-from .curves import Curve, to_local, to_space
+from .curves import Curve
 from .parts import EDGES, PlanData, areas_of, check_keys, curve_of, divider_of, hole_of, support_of
+from .pieces import to_local, to_space
 
 
 @dataclass(frozen=True, eq=False)

@@ -209,6 +209,7 @@ def target_sections() -> tuple[Section, ...]:
     )
 
 
+ELLIPSE = "{centre = [x, y], axes = [[a, b], [c, d]], sweep = degrees}; without sweep the whole ellipse"
 _CURVE = Section(
     "CURVE",
     "Any curve is a list of points, or a table with one of these keys, or a list of such tables, each"
@@ -217,8 +218,10 @@ _CURVE = Section(
         Key("polyline", "a list of points", None, "straight segments from point to point"),
         Key("closed", "true or false", False, "whether a polyline returns to its first point"),
         Key("bezier", "a list of points", None, "the control points of a Bézier curve"),
+        Key("weights", "a value", None, "of the control points of a rational Bézier curve; each > 0"),
         Key("arc", "a list of points", None, "start, a point on the way, and end of a circular arc"),
         Key("circle", "a table", None, "{centre = [x, y], radius = r}"),
+        Key("ellipse", "a table", None, ELLIPSE),
     ),
 )  # its keys are checked where curves are made
 
