@@ -1,10 +1,10 @@
 """The part of the reading process that reads drawings: entities of a .dxf or .3dm as plain values.
 
-``reading_script`` loads this file by its path, so it imports nothing of pcmc. Every reader returns
-a dict with the ``unit``, the ``entities``, and the counts of ``others``, by layer and kind, and of ``hidden``
-ones, by layer. An entity has its ``layer``, ``kind`` and ``handle``, and one of: ``pieces``, the smooth pieces of a curve in
-order; ``point``; ``text`` with its ``point``. A piece is ("bezier", points (k,3)), ("arc", [centre, vector to
-its start, vector a quarter turn on], sweep in radians) or ("nurbs", degree, knots, points, weights).
+``reading_script`` loads this file by its path, so it imports nothing of pcmc. Every reader returns a dict
+with the ``unit``, the ``entities``, and the counts of ``others``, by layer and kind, and of ``hidden`` ones,
+by layer. An entity has its ``layer``, ``kind`` and ``handle``, and one of: ``pieces``, the smooth pieces of a
+curve in order; ``point``; ``text`` with its ``point``. A piece is ("bezier", points (k,3)); ("arc", [centre,
+vector to its start, vector a quarter turn on], sweep in radians); ("nurbs", degree, knots, points, weights).
 """
 
 from __future__ import annotations

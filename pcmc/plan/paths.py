@@ -49,7 +49,8 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> Joined:
 
     >>> from .curves import polyline
     >>> lines = [[[0, 0, 0], [4, 0, 0]], [[0, 3, 0], [0, 0.001, 0]], [[4, 0, 0], [0, 3, 0]]]
-    >>> joined = join_strokes([Stroke("outline", f"LINE {k}", polyline(p)) for k, p in enumerate(lines)], 0.01)
+    >>> strokes = [Stroke("outline", f"LINE {k}", polyline(points)) for k, points in enumerate(lines)]
+    >>> joined = join_strokes(strokes, 0.01)
     >>> joined.paths[0].curve.closed, joined.closed_gaps, joined.largest_gap
     (True, 1, 0.001)
     """
@@ -104,14 +105,15 @@ def _places(curves: Sequence[Curve], ends: Floats, node: Ints) -> Floats:
 
 def _moved(curve: Curve, ends: Floats) -> Curve:
     """The curve with its ends moved to two points."""
-    first = _bent(curve.pieces[0], ends[0] - curve.at([0.0])[0], 0.0 * ends[0])
-    pieces = [first, *curve.pieces[1:]]
-    pieces[-1] = _bent(pieces[-1], 0.0 * ends[1], ends[1] - curve.at([float(len(curve.pieces))])[0])
+    apart = ends - curve.at([0.0, float(len(curve.pieces))])
+    apart[np.linalg.norm(apart, axis=1) <= 1e-12 * curve.length] = 0.0
+    pieces = [bent(curve.pieces[0], apart[0], np.zeros(3)), *curve.pieces[1:]]
+    pieces[-1] = bent(pieces[-1], np.zeros(3), apart[1])
     closed = bool(np.linalg.norm(ends[1] - ends[0]) <= 1e-9 * curve.length)
     return replace(curve, pieces=tuple(pieces), closed=closed)
 
 
-def _bent(piece: Piece, at_start: Floats, at_end: Floats) -> Piece:
+def bent(piece: Piece, at_start: Floats, at_end: Floats) -> Piece:
     """The piece with its ends moved by these vectors; an arc of a circle stays one."""
     if not (at_start.any() or at_end.any()):
         return piece
