@@ -16,7 +16,7 @@ from ..io import FORMATS, read_bare
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 
-TOML = ".toml"
+TOML, DXF = ".toml", ".dxf"
 
 
 def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
@@ -24,7 +24,9 @@ def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, metavar=metavar, help=meaning, **more)
 
 
-Input = Annotated[Path, typer.Argument(metavar="FILE", help="A surface, or a project (.toml).")]
+Input = Annotated[
+    Path, typer.Argument(metavar="FILE", help="A surface, a project (.toml), or a drawing (.dxf, .3dm).")
+]
 _EVERY = "A bare VALUE applies to every patch under pressure"
 Settings = Annotated[list[str] | None, option("NAME=VALUE", f"Tension of a patch. {_EVERY}.", "--tension")]
 Pressures = Annotated[
@@ -55,14 +57,14 @@ def integer(text: str | int) -> int:
 def surface_in(file: Path) -> Surface:
     """The surface in a file, or the start surface of a project."""
     check_input(file)
-    return projects.build(file) if file.suffix.lower() == TOML else read_bare(file)
+    return projects.build(file) if projects.is_project(file) else read_bare(file)
 
 
 def check_input(file: Path) -> None:
-    """Refuse a file whose suffix is neither a project's nor a surface's."""
-    suffix = file.suffix.lower()
-    if suffix not in (TOML, *FORMATS):
-        raise FileError(f"{file}: {unknown('suffix', suffix, [TOML, *FORMATS])}", what=str(file))
+    """Refuse a file whose suffix is neither a project's nor a drawing's nor a surface's."""
+    suffix, known = file.suffix.lower(), (TOML, DXF, *FORMATS)
+    if suffix not in known:
+        raise FileError(f"{file}: {unknown('suffix', suffix, known)}", what=str(file))
 
 
 def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str] | None) -> Surface:

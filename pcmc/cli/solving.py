@@ -19,7 +19,7 @@ from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import MANY_FILES, TOML, Input, Pressures, Settings, number, option
+from .arguments import MANY_FILES, Input, Pressures, Settings, number, option
 from .progress import working
 
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
@@ -120,7 +120,7 @@ def _project(
 ) -> projects.Project:
     """The project, with the output files of the command line if there are any."""
     arguments.check_input(file)
-    if file.suffix.lower() != TOML:
+    if not projects.is_project(file):
         return projects.Project(file, files=output or (), picture=picture, folder=folder)
     project = projects.load(file).in_folder(file.parent if folder is None else folder)
     return replace(project, files=output or project.files, picture=picture or project.picture)

@@ -12,7 +12,7 @@ from ..base.errors import FileError, MissingExtra, OptionError
 from ..io import FORMATS
 from ..project import check_outputs
 from . import INTERRUPTED, NOT_CERTIFIED, OK
-from .arguments import TOML, integer, number, option, values_of
+from .arguments import DXF, TOML, integer, number, option, values_of
 from .progress import sweeping
 
 TABLES = (".csv", ".parquet")
@@ -102,7 +102,7 @@ def _cases(
     from ..sweep import Sweep, solve_case
     from ..sweep.projects import project_sweep
 
-    if Path(what).suffix.lower() in (TOML, *FORMATS):
+    if Path(what).suffix.lower() in (TOML, DXF, *FORMATS):
         return project_sweep(what, grid, fixed, method=method, **wanted)
     if ":" not in what:
         kinds = f"a project (.toml), a surface ({' '.join(FORMATS)}), or a generator"

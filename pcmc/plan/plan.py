@@ -122,7 +122,7 @@ def plan_from(data: Mapping[str, Any]) -> Plan:
     values = dict(data)
     check_keys(values, Plan, "plan")
     if "outline" not in values:
-        raise OptionError("a plan needs an outline", what="outline")
+        raise OptionError("a plan needs an outline, or a drawing that has one", what="outline")
     if isinstance(values.get("plane"), Mapping):
         check_keys(values["plane"], Plane, "plane")
         values["plane"] = Plane(**values["plane"])

@@ -96,8 +96,8 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     """The keys of a plan for a drawing: those ``given``, and values for all others.
 
     ``given`` may have every key of a plan but the outline. Its ``patches`` need no ``at`` where they have the
-    names of the drawing, or those given here. An entry of its ``dividers`` or ``holes`` with the ``name`` of a
-    drawn one and no curve changes that one; others are added.
+    names of the drawing, or those given here. An entry of its ``dividers`` or ``holes`` with the ``name`` of
+    a drawn one and no curve changes that one; others are added.
 
     Raises
     ------

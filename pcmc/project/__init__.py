@@ -25,9 +25,11 @@ Gives ``run`` and ``load`` to sweeps, the page and the command. May import ``plo
     picture = "roof.png"
 """
 
+from .drawn import files_of, is_drawing
 from .file import Project, build, load, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
 from .output import COLOURS, check_names, check_outputs, check_picture, paint, write_all
+from .planning import project_text
 from .remeshing import Remeshing
 from .running import Outcome, check_of, check_project_mesh, run, run_project, solve_project
 from .varied import check_varied, digest, is_project, varied
@@ -48,9 +50,12 @@ __all__ = [
     "check_picture",
     "check_varied",
     "digest",
+    "files_of",
+    "is_drawing",
     "is_project",
     "load",
     "paint",
+    "project_text",
     "reference",
     "run",
     "run_project",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cache
 from inspect import cleandoc
 from typing import Any
@@ -111,6 +111,19 @@ def _of_class(
     )
 
 
+def _plan_keys(kinds: Mapping[str, str]) -> tuple[Key, ...]:
+    """The keys of [plan]: those of a Plan, and the drawing that may stand for its lines."""
+    outline, *others = _of_class(Plan, kinds, {"edge": EDGES})
+    drawing = "a .dxf or .3dm file beside the project: its layers are the lines, instead of ``outline``"
+    gap = "gaps between the lines of the drawing up to this length are closed; by default a thousandth of its size"
+    return (
+        replace(outline, default=None, help=f"{outline.help}; needed without ``drawing``"),
+        Key("drawing", "a text", None, drawing),
+        Key("gap", "a number", None, gap),
+        *others,
+    )
+
+
 @cache
 def main_sections() -> tuple[Section, ...]:
     """The file itself, and all sections but [solve] and [targets]."""
@@ -131,7 +144,7 @@ def main_sections() -> tuple[Section, ...]:
                 Key("output", "a table", None, "the files and the picture to write"),
             ),
         ),
-        Section("plan", "The roof, by the lines of its plan.", _of_class(Plan, plan, {"edge": EDGES})),
+        Section("plan", "The roof, by the lines of its plan.", _plan_keys(plan)),
         Section(
             "plan.patches.NAME", "A patch; NAME is its name.", tuple(k for k in area if k.name != "name")
         ),
