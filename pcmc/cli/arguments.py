@@ -24,9 +24,8 @@ def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, metavar=metavar, help=meaning, **more)
 
 
-Input = Annotated[
-    Path, typer.Argument(metavar="FILE", help="A surface, a project (.toml), or a drawing (.dxf, .3dm).")
-]
+INPUT = "A surface, a project (.toml), or a drawing (.dxf, .3dm)."
+Input = Annotated[Path, typer.Argument(metavar="FILE", help=INPUT)]
 _EVERY = "A bare VALUE applies to every patch under pressure"
 Settings = Annotated[list[str] | None, option("NAME=VALUE", f"Tension of a patch. {_EVERY}.", "--tension")]
 Pressures = Annotated[

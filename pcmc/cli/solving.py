@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,7 +15,7 @@ from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
-from ..base.errors import PcmcError
+from ..base.errors import FileError, PcmcError
 from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
@@ -123,7 +124,18 @@ def _project(
     if not projects.is_project(file):
         return projects.Project(file, files=output or (), picture=picture, folder=folder)
     project = projects.load(file).in_folder(file.parent if folder is None else folder)
+    _keep_drawing(project, output or ())
     return replace(project, files=output or project.files, picture=picture or project.picture)
+
+
+def _keep_drawing(project: projects.Project, outputs: Sequence[Path]) -> None:
+    """Refuse to write a roof over the drawing that it is made from."""
+    if project.drawing is None:
+        return
+    for path in outputs:
+        if path.resolve() == project.drawing.path.resolve():
+            text = f"{path}: this is the drawing; name another file for the roof"
+            raise FileError(text, what=str(path))
 
 
 def certify_(

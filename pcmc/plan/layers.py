@@ -19,7 +19,7 @@ MEANINGS = {
 """The layers that a drawing of a plan may have."""
 
 ROLES = tuple(key.split()[0] for key in MEANINGS)
-_NAME = re.compile(rf"({'|'.join(ROLES)})(?:s|\d+)?(?:[\s_:.=-]+(.*))?", re.I | re.S)
+_NAME = re.compile(rf"({'|'.join(ROLES)})(?:e?s|\d+)?(?:[\s_:.=-]+(.*))?", re.I | re.S)
 
 
 @dataclass(frozen=True)

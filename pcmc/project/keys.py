@@ -115,7 +115,7 @@ def _plan_keys(kinds: Mapping[str, str]) -> tuple[Key, ...]:
     """The keys of [plan]: those of a Plan, and the drawing that may stand for its lines."""
     outline, *others = _of_class(Plan, kinds, {"edge": EDGES})
     drawing = "a .dxf or .3dm file beside the project: its layers are the lines, instead of ``outline``"
-    gap = "gaps between the lines of the drawing up to this length are closed; by default a thousandth of its size"
+    gap = "gaps between its lines up to this length are closed; by default a thousandth of its size"
     return (
         replace(outline, default=None, help=f"{outline.help}; needed without ``drawing``"),
         Key("drawing", "a text", None, drawing),
