@@ -16,6 +16,7 @@ from typing import Any
 
 MOST_ENTITIES = 20_000  # of a drawing, with those of its blocks
 MOST_POINTS = 200_000  # of all its curves
+ROUND = 1e-10  # of its size: a NURBS curve this near to an arc is one
 DEPTH = 8  # of blocks in blocks
 DXF_UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 14: "dm"}
 SOLID = ("3DFACE", "MESH", "3DSOLID", "BODY", "REGION", "SURFACE", "SOLID", "PLANESURFACE", "polyface")
@@ -208,18 +209,26 @@ def _rhino_pieces(rhino: Any, curve: Any) -> Iterator[tuple[Any, ...]]:
     elif isinstance(curve, rhino.LineCurve):
         yield ("bezier", [_xyz(curve.PointAtStart), _xyz(curve.PointAtEnd)])
     elif isinstance(curve, rhino.ArcCurve):
-        arc = curve.Arc
-        centre, start = _xyz(arc.Center), _xyz(curve.PointAtStart)
-        along = curve.TangentAt(curve.Domain.T0)
-        length = math.hypot(*_xyz(along)) or 1.0
-        quarter = [arc.Radius * value / length for value in _xyz(along)]
-        u = [a - b for a, b in zip(start, centre, strict=True)]
-        yield ("arc", [centre, u, quarter], curve.AngleRadians)
+        yield _rhino_arc(curve, curve.Arc)
     else:
         form = curve if isinstance(curve, rhino.NurbsCurve) else curve.ToNurbsCurve()
         homogeneous = [form.Points[k] for k in range(len(form.Points))]
         weights = [p.W for p in homogeneous]
         points = [tuple(value / p.W for value in _xyz(p)) for p in homogeneous]
+        span = max(max(column) - min(column) for column in zip(*points, strict=True))
+        arc = form.TryGetArc(ROUND * span) if form.IsRational else None
+        if arc is not None:  # what Rhino's own lists of objects hold for arcs and circles
+            yield _rhino_arc(form, arc)
+            return
         knots = [form.Knots[k] for k in range(len(form.Knots))]
         knots = [knots[0], *knots, knots[-1]]  # Rhino leaves out the first and the last
         yield ("nurbs", form.Degree, knots, points, weights if form.IsRational else None)
+
+
+def _rhino_arc(curve: Any, arc: Any) -> tuple[Any, ...]:
+    """The piece of an arc or circle, from the start of its curve in the curve's direction."""
+    tangent = curve.TangentAt(curve.Domain.T0)
+    centre, start, along = (_xyz(p) for p in (arc.Center, curve.PointAtStart, tangent))
+    length = math.hypot(*along) or 1.0
+    quarter = [arc.Radius * value / length for value in along]
+    return ("arc", [centre, [a - b for a, b in zip(start, centre, strict=True)], quarter], arc.AngleRadians)

@@ -208,11 +208,17 @@ class _Sorted:
         if not paths:
             raise PlanError(f"{where} has no curve; draw a closed one", what=where)
         open_paths = [path for path in paths if not path.curve.closed]
+        if open_paths and len(open_paths) < len(paths):
+            stray = open_paths[0]
+            ends = f"from {_text(stray.ends[0])} to {_text(stray.ends[1])}"
+            text = f"{where}: {listed(stray.labels)} {ends} is no part of the closed curve there; delete it,"
+            text += " or put it on the layer of what it is"
+            raise PlanError(text, what=where, where=_plain(stray.ends[0]))
         for path in open_paths:
             for end, count in zip(path.ends, path.strokes_at_ends, strict=True):
                 if count > 2:
                     text = f"{where}: {count} curves meet at {_text(end)} ({listed(path.labels)}); a closed"
-                    raise PlanError(f"{text} edge has two at each point", what=where, where=tuple(end[:2]))
+                    raise PlanError(f"{text} edge has two at each point", what=where, where=_plain(end))
         if open_paths:
             raise self._gap_error(where, open_paths)
         return paths
@@ -227,7 +233,7 @@ class _Sorted:
         between = f"between {first} at {_text(one[2])} and {second} at {_text(two[2])}"
         allow = f"draw what is missing, or close it with gap = {_upwards(gap):g}"
         text = f"{where} is not closed: a gap of {gap:.3g} {between}; {allow}"
-        return PlanError(text, what=where, where=(tuple(one[2]), tuple(two[2])), found=gap)
+        return PlanError(text, what=where, where=(_plain(one[2]), _plain(two[2])), found=gap)
 
     def _outline(self) -> Curve:
         layers = self.layers_of("outline")
@@ -294,8 +300,11 @@ class _Sorted:
                     text += (
                         " vertical nor a closed ring; draw a mast as a vertical line, or its top as a point"
                     )
-                    raise PlanError(text, what=where, where=tuple(foot))
+                    raise PlanError(text, what=where, where=_plain(foot))
                 tops.append(top)
+        if tops:
+            text = "a roof held at a point has a peak there as small as the triangles; draw a mast's top as a"
+            self.notes.append(f"layer 'mast': {text} ring, and no mesh changes the roof")
         return tops
 
     def _heights(self) -> Floats:
@@ -367,6 +376,11 @@ def _names(layer: Layer, role: str, count: int, taken: Mapping[str, object]) -> 
 def _projected(curve: Curve) -> Curve:
     """The curve's course in plan."""
     return replace(curve, pieces=tuple(Piece(p.points[:, :2], p.sweep, p.weights) for p in curve.pieces))
+
+
+def _plain(point: Floats) -> tuple[float, ...]:
+    """A point as plain numbers."""
+    return tuple(point.tolist())
 
 
 def _text(point: Floats) -> str:
