@@ -12,7 +12,7 @@ import typer
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
-from ..io import FORMATS, read_bare
+from ..io import FORMATS, READ_ONLY, read_bare
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 
@@ -61,7 +61,7 @@ def surface_in(file: Path) -> Surface:
 
 def check_input(file: Path) -> None:
     """Refuse a file whose suffix is neither a project's nor a drawing's nor a surface's."""
-    suffix, known = file.suffix.lower(), (TOML, DXF, *FORMATS)
+    suffix, known = file.suffix.lower(), (TOML, DXF, *FORMATS, *READ_ONLY)
     if suffix not in known:
         raise FileError(f"{file}: {unknown('suffix', suffix, known)}", what=str(file))
 

@@ -130,6 +130,8 @@ READERS = {
     "rhino": rhino_arrays,
     "dxf drawing": from_file("reading_drawings", "dxf_entities"),
     "3dm drawing": from_file("reading_drawings", "rhino_entities"),
+    "meshlab": from_file("reading_meshes", "meshlab_arrays"),
+    "repair": from_file("reading_meshes", "repaired_arrays"),
 }
 
 
