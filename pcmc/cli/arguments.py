@@ -61,7 +61,7 @@ def surface_in(file: Path) -> Surface:
 
 def check_input(file: Path) -> None:
     """Refuse a file whose suffix is neither a project's nor a drawing's nor a surface's."""
-    suffix, known = file.suffix.lower(), (TOML, DXF, *FORMATS, *READ_ONLY)
+    suffix, known = file.suffix.lower(), (TOML, *FORMATS, *READ_ONLY, DXF)
     if suffix not in known:
         raise FileError(f"{file}: {unknown('suffix', suffix, known)}", what=str(file))
 

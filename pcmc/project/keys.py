@@ -33,6 +33,7 @@ class Key:
     default : the value where the key is left out; ``REQUIRED`` if it must not be, None for none.
     help : what it means.
     choices : the texts that are allowed; empty if any is.
+    unless : the key that stands for a required one; empty if none does.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Key:
     default: Any
     help: str
     choices: tuple[str, ...] = ()
+    unless: str = ""
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,7 @@ def _plan_keys(kinds: Mapping[str, str]) -> tuple[Key, ...]:
     drawing = "a .dxf or .3dm file beside the project: its layers are the lines, instead of ``outline``"
     gap = "gaps between its lines up to this length are closed; by default a thousandth of its size"
     return (
-        replace(outline, default=None, help=f"{outline.help}; needed without ``drawing``"),
+        replace(outline, unless="drawing"),
         Key("drawing", "a text", None, drawing),
         Key("gap", "a number", None, gap),
         *others,
