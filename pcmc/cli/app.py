@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .caching import cache_
 from .planning import plan
 from .repairing import repair_
 from .showing import convert, explore, plot
@@ -53,5 +54,6 @@ for name, command, summary in (
     ("plan", plan, "Write the project file for a drawing."),
     ("sweep", sweep, "Solve every combination of some values; write a table."),
     ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
+    ("cache", cache_, "Show or remove the roofs that are kept."),
 ):
     app.command(name, short_help=summary)(command)

@@ -100,7 +100,7 @@ def digest(path: PathLike) -> str:
         for drawing in files_of(path)[0 if is_drawing(Path(path)) else 1 :]:
             sha.update(drawing.read_bytes())
         return sha.hexdigest()
-    surface = io.read(path)
+    surface = io.read_bare(path)[0]
     sha = hashlib.sha256(repr((surface.patches, surface.plane)).encode())
     for name in ("vertices", "faces", "patch_of_face", "fixed", "on_plane"):
         sha.update(getattr(surface, name).tobytes())
