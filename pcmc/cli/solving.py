@@ -74,6 +74,8 @@ def solve_(
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
     project = replace(project, mesh_check=False)
+    if projects.is_drawing(file) and project.drawing is not None:
+        print(projects.proposal_text(project))
     with working() as say:
         changed = partial(arguments.retensioned, tension=tension, pressure=pressure)
         changed = changed if tension or pressure else None

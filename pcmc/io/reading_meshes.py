@@ -49,7 +49,7 @@ def repaired_arrays(path: str) -> dict[str, Any]:
         new = np.where(first, vertex, 0)
         new[~first] = n + np.arange(np.count_nonzero(~first))  # copies where an edge was split
         points.append(X[vertex[~first]])
-        n += np.count_nonzero(~first)
+        n += int(np.count_nonzero(~first))
         faces.append(new[local])
         owner.append(np.full(len(local), number))
     everything = np.concatenate(faces)
@@ -120,7 +120,7 @@ def _area_vectors(X: Any, F: Any) -> Any:
 def _repaired_patch(X: Any, F: Any, single: Any, holes: int, changes: dict[str, int]) -> tuple[Any, Any]:
     """Triangles (m,3) of a patch, and the vertex of the whole mesh (n,) that each of its vertices is."""
 
-    def add(what: str, number: int) -> None:
+    def add(what: str, number: Any) -> None:
         changes[what] = changes.get(what, 0) + int(number)
 
     used, local = np.unique(F, return_inverse=True)

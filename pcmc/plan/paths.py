@@ -145,7 +145,8 @@ def _walk(curves: Sequence[Curve], labels: Sequence[str], nodes: Ints) -> list[J
         for k in at_node[begin]:
             if k not in left:
                 continue
-            node, pieces, names = begin, [], []
+            node, names = begin, []
+            pieces: list[Piece] = []
             while True:
                 left.discard(k)
                 forward = nodes[k, 0] == node

@@ -158,7 +158,9 @@ def _areas(
         else:
             chosen = [area for area in areas if area["name"] == name]
         if not chosen:
-            problem = unknown("patch of the drawing", name, dict.fromkeys(area["name"] for area in areas))
+            problem = unknown(
+                "patch of the drawing", name, dict.fromkeys(str(area["name"]) for area in areas)
+            )
             raise OptionError(f"{drawing.path}: {problem}", what="patches", where=name)
         for area in chosen:
             area |= {"name": name} | {key: value for key, value in attributes.items() if key != "at"}

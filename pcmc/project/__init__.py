@@ -39,7 +39,7 @@ from .file import Project, build, load, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
 from .outcome import Outcome
 from .output import COLOURS, check_names, check_outputs, check_picture, paint, write_all
-from .planning import project_text
+from .planning import project_text, proposal_text
 from .remeshing import Remeshing
 from .running import check_of, check_project_mesh, run, run_project, solve_project, surface_files
 from .varied import check_varied, digest, is_project, varied
@@ -70,6 +70,7 @@ __all__ = [
     "load",
     "paint",
     "project_text",
+    "proposal_text",
     "reference",
     "run",
     "run_project",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..base.errors import MissingExtra
 from ..plan.curves import Curve
 from .drawn import FALLBACK, LENGTHS, read
+from .file import Project
 
 if TYPE_CHECKING:
     from ..plan.drawing import Drawing
@@ -89,6 +90,30 @@ def project_text(
     output["picture"] = f"{drawing.path.stem}-roof.png"
     document["output"] = output
     return tomlkit.dumps(document), drawing
+
+
+def proposal_text(project: Project) -> str:
+    """What was chosen for a drawing that is solved without a project, in one line.
+
+    >>> from tempfile import mkdtemp
+    >>> import ezdxf
+    >>> from .file import load
+    >>> drawing = ezdxf.new()
+    >>> _ = drawing.modelspace().add_circle((0, 0), 4, dxfattribs={"layer": "outline"})
+    >>> path = Path(mkdtemp()) / "round.dxf"
+    >>> drawing.saveas(path)
+    >>> proposal_text(load(path)).split(";")[0]
+    'proposed: tension 3.2, edges of 0.28'
+    """
+    assert project.plan is not None
+    tensions = sorted({area.tension for area in project.plan.patches})
+    walls = sorted({divider.wall for divider in project.plan.dividers if divider.wall is not None})
+    parts = [f"tension {' or '.join(f'{value:g}' for value in tensions)}"]
+    parts += [f"walls of {' or '.join(f'{value:g}' for value in walls)}"] if walls else []
+    parts.append(f"edges of {project.plan.edge_length:g}")
+    name = project.path.with_suffix(".toml").name
+    change = f"to change them: pcmc plan {project.path.name} -o {name}"
+    return f"proposed: {', '.join(parts)}; {change}"
 
 
 def _targets(tomlkit: Any, drawing: Drawing, names: list[str]) -> Any:
