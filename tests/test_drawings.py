@@ -371,6 +371,20 @@ def test_hostile_drawings_are_refused_in_one_line(tmp_path):
         with pytest.raises((FileError, PlanError)) as caught:
             read_drawing(file)
         assert "\n" not in str(caught.value)
+    far = drawing(tmp_path, ("line", "divider a", (1e300, 0), (5, 6)))
+    with refused(FileError, where="divider a"):
+        read_drawing(far)
+
+
+def test_a_line_far_longer_than_the_plan_is_refused(tmp_path):
+    loaded = project.load(drawing(tmp_path, ("line", "divider a", (5, 0), (5, 5e9))))
+    with refused(PlanError, what="divider 'a'", found=5e9):
+        project.surface_of(loaded)
+
+
+@pytest.mark.slow
+def test_blocks_of_blocks_of_blocks_end(tmp_path):
+    file = tmp_path / "a.dxf"
     document, space = drawn.new()
     inner = document.blocks.new("B0")
     inner.add_line((0, 0), (1, 0))
@@ -383,9 +397,6 @@ def test_hostile_drawings_are_refused_in_one_line(tmp_path):
     with refused(FileError, what=str(file)) as caught:
         read_strokes(file)
     assert "entities" in str(caught.value)
-    far = drawing(tmp_path, ("line", "divider a", (1e300, 0), (5, 6)))
-    with refused(FileError, where="divider a"):
-        read_drawing(far)
 
 
 @pytest.mark.slow
@@ -397,7 +408,7 @@ def test_flipped_bits_of_a_drawing_raise_our_errors_only(tmp_path):
     random = np.random.default_rng(5)
     file = tmp_path / "flipped.dxf"
     outcomes = set()
-    for _ in range(60):
+    for _ in range(25):
         flipped = bytearray(data)
         for place in random.integers(begin, end, 3):
             flipped[place] ^= 1 << int(random.integers(8))
@@ -406,8 +417,7 @@ def test_flipped_bits_of_a_drawing_raise_our_errors_only(tmp_path):
             project.surface_of(project.load(file))
             outcomes.add("read")
         except (FileError, PlanError, OptionError, SurfaceError) as error:
-            assert "\n" not in str(error)
-            outcomes.add("refused")
+            outcomes.add("refused" if "\n" not in str(error) else "in several lines")
     assert outcomes == {"read", "refused"}
 
 
