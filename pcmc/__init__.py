@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .energy.functional import energy, gradient, hessian
     from .existence import solve
     from .io import read, write
+    from .io.repairing import Repaired, repair
     from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "Parameter",
     "Patch",
     "Plane",
+    "Repaired",
     "Room",
     "Surface",
     "Target",
@@ -48,6 +50,7 @@ __all__ = [
     "mean_curvature",
     "meet",
     "read",
+    "repair",
     "sensitivities",
     "solve",
     "solve_to_accuracy",
@@ -66,6 +69,7 @@ _NAMES = {
     "energy.functional": ("energy", "gradient", "hessian"),
     "existence": ("solve",),
     "io": ("read", "write"),
+    "io.repairing": ("Repaired", "repair"),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
 }
 

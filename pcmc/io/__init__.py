@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.arrays import Floats
-from ..base.errors import FileError, FileWarning, LostWarning, MissingExtra, PcmcError, unknown
+from ..base.errors import FileError, FileWarning, LostWarning, MissingExtra, PcmcError, SurfaceError, unknown
 from ..base.files import atomic_write, check_name, check_regular
 from ..base.units import MICROMETRES, Units, length_factor
 from ..base.validate import choice
@@ -74,6 +74,8 @@ FORMATS = {
     ".3dm": Format("rhino", separate=True, walls=True),
 }
 """The formats by suffix."""
+READ_ONLY = {suffix: Format("meshlab") for suffix in (".off", ".3ds", ".dae", ".x3d")}
+"""Formats that are read, by MeshLab, but not written."""
 
 NO_SUPPORTS = (
     "no supports in the file: its boundary is taken as fixed; tensions and pressures are 1 unless given"
@@ -134,7 +136,10 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
     try:
         surface = to_surface(data, *given)
     except PcmcError as error:
-        raise _in_file(path, error, type(error)) from None
+        raised = _in_file(path, error, type(error))
+        if isinstance(error, SurfaceError):
+            raised.args = (f"{raised}; or try: pcmc repair {os.fspath(path)} -o clean.obj",)
+        raise raised from None
     notes = (*data.notes, *import_warnings(data))
     if not given and data.support is None:
         notes = (*notes, NO_SUPPORTS)
@@ -147,7 +152,7 @@ def load(path: str | os.PathLike[str]) -> MeshData:
     """Everything in a file, scalars and certificate too. Errors as in ``read``."""
     path = Path(path)
     check_regular(path)
-    form = _format(path)
+    form = _format(path, {**FORMATS, **READ_ONLY})
     try:
         path.open("rb").close()  # the libraries' errors for a missing file differ
         data = without_unused(checked(import_module(f".{form.module}", __name__).read(path)))
@@ -199,7 +204,7 @@ def write(
     """
     path = Path(path)
     check_name(path)
-    form = _format(path)
+    form = _format(path, FORMATS)
     for patch in surface.patches:
         if "\n" in patch.name or "\r" in patch.name:
             text = f"{path}: the patch name {patch.name!r} contains a line break; rename the patch"
@@ -248,12 +253,13 @@ def _in_file(path: str | os.PathLike[str], error: PcmcError, kind: type[PcmcErro
     return kind(text, what=what, where=error.where, found=error.found, expected=error.expected)
 
 
-def _format(path: Path) -> Format:
+def _format(path: Path, known: Mapping[str, Format]) -> Format:
     suffix = path.suffix.lower()
-    if suffix not in FORMATS:
-        text = f"{path}: {unknown('suffix', suffix, FORMATS)}"
-        raise FileError(text, what=str(path), found=suffix, expected=list(FORMATS))
-    return FORMATS[suffix]
+    if suffix not in known:
+        readable = f"{suffix} files are read only; " if suffix in READ_ONLY else ""
+        text = f"{path}: {readable}{unknown('suffix', suffix, known)}"
+        raise FileError(text, what=str(path), found=suffix, expected=list(known))
+    return known[suffix]
 
 
 def _values(certificate: Any) -> Mapping[str, Any]:

@@ -1,4 +1,4 @@
-"""The script of the process in which VTK and rhino3dm read files: a path in, arrays out.
+"""The script of the process in which libraries read files that could crash them: a path in, arrays out.
 
 ``reading_process`` starts this file as a script. It imports the library that the file needs, and only those
 parts of VTK that read.
@@ -10,7 +10,9 @@ import os
 import pickle
 import re
 import sys
+from collections.abc import Callable
 from contextlib import suppress
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
@@ -106,7 +108,32 @@ def limit_memory(size: int) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (most if hard < 0 else min(most, hard), hard))
 
 
-READERS = {"vtk": vtk_arrays, "rhino": rhino_arrays}
+def from_file(name: str, function: str) -> Callable[[str], dict[str, Any]]:
+    """A reader in another file beside this one, which is loaded when it is first used."""
+
+    def read(path: str) -> dict[str, Any]:
+        module = sys.modules.get(name)
+        if module is None:
+            place = Path(__file__).with_name(f"{name}.py")
+            spec = spec_from_file_location(name, place)
+            assert spec is not None
+            assert spec.loader is not None
+            module = sys.modules[name] = module_from_spec(spec)
+            spec.loader.exec_module(module)
+        arrays: dict[str, Any] = getattr(module, function)(path)
+        return arrays
+
+    return read
+
+
+READERS = {
+    "vtk": vtk_arrays,
+    "rhino": rhino_arrays,
+    "dxf drawing": from_file("reading_drawings", "dxf_entities"),
+    "3dm drawing": from_file("reading_drawings", "rhino_entities"),
+    "meshlab": from_file("reading_meshes", "meshlab_arrays"),
+    "repair": from_file("reading_meshes", "repaired_arrays"),
+}
 
 
 def main() -> None:
