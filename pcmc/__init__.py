@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .energy.functional import energy, gradient, hessian
     from .existence import solve
     from .io import read, write
+    from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
     from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface
 
 __all__ = [
@@ -27,15 +28,20 @@ __all__ = [
     "Design",
     "Direction",
     "Line",
+    "Material",
     "MeshCheck",
     "MeshVerdict",
     "Parameter",
     "Patch",
     "Plane",
     "Room",
+    "SelfWeight",
+    "Snow",
+    "StructuralModel",
     "Surface",
     "Target",
     "Verdict",
+    "Wind",
     "certify",
     "check_mesh",
     "curvature_error",
@@ -48,11 +54,13 @@ __all__ = [
     "mean_curvature",
     "meet",
     "read",
+    "read_results",
     "sensitivities",
     "solve",
     "solve_to_accuracy",
     "target_curvature",
     "write",
+    "write_structure",
 ]
 
 # Each name is imported at its first use. So ``import pcmc`` takes milliseconds, and the command can
@@ -66,6 +74,15 @@ _NAMES = {
     "energy.functional": ("energy", "gradient", "hessian"),
     "existence": ("solve",),
     "io": ("read", "write"),
+    "structure": (
+        "Material",
+        "SelfWeight",
+        "Snow",
+        "StructuralModel",
+        "Wind",
+        "read_results",
+        "write_structure",
+    ),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
 }
 
