@@ -40,7 +40,7 @@ def run_file(path: Path, timeout: float = 600.0) -> str:
 
     One thread: with several, sums of forces differ in their last digits from run to run.
     """
-    threads = {name: "1" for name in ("OMP_NUM_THREADS", "CCX_NPROC_STIFFNESS", "NUMBER_OF_CPUS")}
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "CCX_NPROC_STIFFNESS", "NUMBER_OF_CPUS"), "1")
     try:
         done = subprocess.run(
             [PROGRAM, path.stem],

@@ -26,10 +26,10 @@ INCREMENT = 0.25  # of a step under added loads; it is halved where the equation
 def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> None:
     """Write a structural model as an input file of CalculiX; run it with ``ccx roof`` for ``roof.inp``.
 
-    Vertex i is node i + 1, face f element f + 1: three-node shells (``S3``), which keep
-    uniform membrane stress and give reactions at the supports. Each element starts with the membrane stress
-    α/t in its plane (``*INITIAL CONDITIONS, TYPE=STRESS``). Sets: ``PATCH_k`` (elements), ``NODES_k`` of patch
-    k, ``FIXED``, ``SLIDING`` and ``SUPPORT_k``, the k-th held boundary curve of ``pcmc.certify``.
+    Vertex i is node i + 1, face f element f + 1: three-node shells (``S3``). Each element starts with the
+    membrane stress α/t in its plane (``*INITIAL CONDITIONS, TYPE=STRESS``). Sets: ``PATCH_k`` (elements),
+    ``NODES_k`` of patch k, ``FIXED``, ``SLIDING`` and ``SUPPORT_k``, the k-th held boundary curve of
+    ``pcmc.certify``.
 
     Parameters
     ----------

@@ -109,7 +109,7 @@ def load_steps(surface: Surface, loads: Sequence[Load | Sequence[Load]]) -> tupl
     >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
     ...                  [0, 0], [Patch("roof", 1.0)], fixed=range(4))
     >>> form, both = load_steps(square, [(Snow(0.5), Wind({"roof": 2.0}))])
-    >>> both.name, both.pressures.tolist(), both.forces.sum(axis=0).tolist()
+    >>> both.name, both.pressures.tolist(), both.forces.sum(axis=0).round(9).tolist()
     ('snow and wind', [3.0], [0.0, 0.0, -2.0])
     """
     form = Step("form pressure", surface.pressures, _dead_weight(surface))

@@ -176,7 +176,8 @@ class StructuralModel:
     def axes(self) -> Floats:
         """(n,3,3) rows: the axes in which supports hold a vertex, those of space where none guides it.
 
-        On a plane the first axis is its normal, and held; along a line it is the line, and the others are held.
+        On a plane the first axis is its normal, and held; along a line it is the line, and the others are
+        held.
         """
         axes = np.tile(np.eye(3), (self.surface.n, 1, 1))
         guided = np.flatnonzero(self.held & (self.freedom > 0))
