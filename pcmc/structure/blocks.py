@@ -10,6 +10,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 
+TENSOR = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]  # where a tensor's entries are in xx, yy, zz, xy, xz, yz
 EXPONENT = re.compile(r"(?<=\d)([+-]\d{3})\b")  # Fortran leaves out the E before three digits
 
 
@@ -19,7 +20,7 @@ class Block:
 
     Attributes
     ----------
-    kind : displacements, forces or stresses.
+    kind : displacements, forces, stresses, or cables: the stresses of these.
     time : at the end of the step.
     ids : (k,) numbers of nodes or elements.
     values : (k,3) vectors, or (k,6) stresses xx, yy, zz, xy, xz, yz.
@@ -39,6 +40,17 @@ class Block:
         order = np.argsort(self.ids, kind="stable")
         places = None if self.places is None else self.places[order]
         return replace(self, ids=self.ids[order], values=self.values[order], places=places)
+
+    def means(self, elements: Ints) -> Floats:
+        """(k,c) the mean over the integration points of each of the elements (k,), ascending numbers."""
+        chosen = np.isin(self.ids, elements)
+        place = np.searchsorted(elements, self.ids[chosen])
+        count = np.bincount(place, minlength=len(elements))
+        columns = self.values[chosen].T
+        return (
+            np.stack([np.bincount(place, column, len(elements)) for column in columns], axis=1)
+            / count[:, None]
+        )
 
 
 def numbers(words: list[str], columns: int, what: str, line: int) -> Floats:

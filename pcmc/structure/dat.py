@@ -31,5 +31,7 @@ def read(text: str) -> list[dict[str, Block]]:
         body = re.sub(r"[^\S\n]_\S+", "", text[head.end() : end])  # names of local axes
         rows = numbers(body.split(), keys + values, kind, line)
         time = numbers([head[4]], 1, "time", line)[0, 0]
+        if head[3] == "CABLES":
+            kind = "cables"
         blocks.append(Block(kind, float(time), rows[:, 0].astype(int), rows[:, keys:], keys == 1))
     return by_step(blocks)

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
 from ..base.files import atomic_write, check_name
 from ..io.text import format_rows
 from ..surface.geometry import area_vectors
+from . import cables
 from .loads import Step
-from .model import StructuralModel
+from .model import Material, StructuralModel
 
 PER_LINE = 12  # numbers of a set on a line; at most 16 are read
 POINTS = 2  # integration points of an S3 element, one above the other
@@ -86,9 +87,20 @@ def _elements(model: StructuralModel) -> Iterator[str]:
         yield _set(f"NODES_{k}", np.unique(corners))
         yield f"*SHELL SECTION, ELSET=PATCH_{k}, MATERIAL=MEMBRANE\n{thickness!r}\n"
     yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k},\n" for k in present)
-    yield f"*MATERIAL, NAME=MEMBRANE\n*ELASTIC\n{material.young!r},{material.poisson!r}\n"
-    if material.density > 0.0:
-        yield f"*DENSITY\n{material.density!r}\n"
+    yield _material("MEMBRANE", material)
+    if surface.cables:
+        yield from cables.cable_elements(surface, model.cable_areas, first_cable(model))
+        yield _material("CABLE", model.cable_material or material)
+
+
+def first_cable(model: StructuralModel) -> int:
+    """The number of the first cable element."""
+    return model.surface.m + 1
+
+
+def _material(name: str, material: Material) -> str:
+    text = f"*MATERIAL, NAME={name}\n*ELASTIC\n{material.young!r},{material.poisson!r}\n"
+    return text + (f"*DENSITY\n{material.density!r}\n" if material.density > 0.0 else "")
 
 
 def _supports(model: StructuralModel) -> Iterator[str]:
@@ -122,12 +134,18 @@ def _prestress(model: StructuralModel) -> Iterator[str]:
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     stress = np.eye(3) - normals[:, :, None] * normals[:, None, :]
     stress *= model.prestress[surface.patch_of_face[elements], None, None]
+    yield "*INITIAL CONDITIONS, TYPE=STRESS\n" + _stresses(model.faces + 1, stress, POINTS)
+    if surface.cables:
+        stress = cables.cable_stress(surface, model.cable_areas)
+        yield _stresses(first_cable(model) + np.arange(len(stress)), stress, cables.POINTS)
+
+
+def _stresses(elements: Ints, stress: Floats, points: int) -> str:
+    """A line for each integration point of elements (k,) with stress tensors (k,3,3)."""
     rows, columns = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
-    values = np.repeat(stress[:, rows, columns], POINTS, axis=0)
-    element = np.repeat(model.faces + 1, POINTS)
-    point = np.tile(np.arange(1, POINTS + 1), len(elements))
-    yield "*INITIAL CONDITIONS, TYPE=STRESS\n"
-    yield format_rows("%d,%d" + f",{FIELD}" * 6 + "\n", element, point, *values.T)
+    values = np.repeat(stress[:, rows, columns], points, axis=0)
+    point = np.tile(np.arange(1, points + 1), len(elements))
+    return format_rows("%d,%d" + f",{FIELD}" * 6 + "\n", np.repeat(elements, points), point, *values.T)
 
 
 def _step(model: StructuralModel, step: Step, form: bool) -> Iterator[str]:
@@ -137,7 +155,8 @@ def _step(model: StructuralModel, step: Step, form: bool) -> Iterator[str]:
     rows = [f"PATCH_{k + 1},P,{float(step.pressures[k])!r}\n" for k in patches if step.pressures[k] != 0.0]
     if step.gravity:
         down = ",".join(repr(-c) for c in model.standing.plane.normal)
-        rows.append(f"EALL,GRAV,{step.gravity!r},{down}\n")
+        sets = ("EALL", "CABLES") if model.standing.cables else ("EALL",)
+        rows += [f"{name},GRAV,{step.gravity!r},{down}\n" for name in sets]
     if rows:
         yield "*DLOAD, OP=NEW\n" + "".join(rows)
     forces = np.einsum("nij,nj->ni", model.axes, step.forces)
@@ -151,6 +170,8 @@ def _step(model: StructuralModel, step: Step, form: bool) -> Iterator[str]:
     if model.held.any():
         yield "*NODE PRINT, NSET=HELD, GLOBAL=YES, FREQUENCY=1000\nRF\n"
     yield "*EL PRINT, ELSET=EALL, GLOBAL=YES, FREQUENCY=1000\nS\n"
+    if model.standing.cables:
+        yield "*EL PRINT, ELSET=CABLES, GLOBAL=YES, FREQUENCY=1000\nS\n"
     yield "*NODE FILE, OUTPUT=2D, GLOBAL=YES, FREQUENCY=1000\nU,RF\n*EL FILE, OUTPUT=2D, GLOBAL=YES\nS\n"
     yield "*END STEP\n"
 

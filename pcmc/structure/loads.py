@@ -140,7 +140,10 @@ def _added(step: Step, load: Load, surface: Surface) -> Step:
 def _snow(surface: Surface, snow: Snow) -> Floats:
     """(n,3) a third of each triangle's load at each of its corners; triangles below others carry none."""
     named = [surface.patch_index(name) for name in snow.patches]
-    carrying = named or np.flatnonzero(~surface.walls)
+    carrying = named or np.flatnonzero(~surface.walls).tolist()
+    if not carrying:
+        hint = "all patches are walls; name those that carry snow"
+        validate.refuse("Snow.patches", snow.patches, "names of patches", hint=hint)
     normal = np.array(surface.plane.normal)
     plan = area_vectors(surface.vertices[surface.faces]) @ normal
     side = np.sign(np.bincount(surface.patch_of_face, plan, len(surface.patches)))

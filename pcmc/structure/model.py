@@ -17,7 +17,8 @@ from ..contact.pinching import standing_faces, standing_part
 from ..energy.functional import apply_supports
 from ..solvers.result import Result
 from ..surface import Surface, expect_surface
-from ..surface.geometry import area_vectors, face_areas, vertex_sums
+from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
+from .cables import checked_areas
 from .loads import Load, SelfWeight, Step, check_loads, load_steps
 
 
@@ -59,6 +60,8 @@ class StructuralModel:
     loads : a step of the analysis for each; a tuple of loads acts in one step. The form-finding pressure is
         the first step and acts in all others, too, as self-weight does once it has come.
     anyway : take a surface that is not certified, too; the file's heading tells it.
+    cable_area : length², of the sections of the surface's cables, or one for each, by name.
+    cable_material : of the cables; by default that of the patches.
 
     Raises
     ------
@@ -81,6 +84,8 @@ class StructuralModel:
     thickness: float | Mapping[str, float]
     loads: tuple[Load | tuple[Load, ...], ...] = ()
     anyway: bool = False
+    cable_area: float | Mapping[str, float] | None = None
+    cable_material: Material | None = None
     verdict: str = field(init=False, repr=False)
     certified: bool = field(init=False, repr=False)
 
@@ -93,6 +98,9 @@ class StructuralModel:
             hint = "give Material(young=..., poisson=...)"
             validate.refuse("material", self.material, "a Material", hint=hint)
         object.__setattr__(self, "thickness", self._checked_thickness())
+        checked_areas(self.cable_area, self.surface)
+        if not isinstance(self.cable_material, Material | None):
+            validate.refuse("cable_material", self.cable_material, "a Material or None")
         object.__setattr__(self, "loads", check_loads(self.loads, self.surface))
         if self.material.density == 0.0 and any(
             isinstance(load, SelfWeight) for load in self._single_loads()
@@ -134,6 +142,11 @@ class StructuralModel:
         return self.surface.tensions / self.thicknesses
 
     @cached_property
+    def cable_areas(self) -> tuple[float, ...]:
+        """The area of each cable's section, length²."""
+        return checked_areas(self.cable_area, self.surface)
+
+    @cached_property
     def standing(self) -> Surface:
         """The surface without pinched walls: its vertices, and the faces that are elements."""
         return standing_part(self.surface).surface
@@ -154,6 +167,8 @@ class StructuralModel:
         """(n,) the vertices of elements."""
         used = np.zeros(self.surface.n, dtype=bool)
         used[self.standing.faces[self.elements]] = True
+        for cable in self.standing.cables:
+            used[cable.edges] = True
         return used
 
     @cached_array
@@ -207,4 +222,14 @@ class StructuralModel:
         mass = self.material.density * self.thicknesses[s.patch_of_face] * face_areas(s.vertices[s.faces])
         per_face -= step.gravity * mass[:, None] * np.array(s.plane.normal)
         shares = per_face[self.elements] / 3.0
-        return step.forces + vertex_sums(shares, s.faces[self.elements], s.n)
+        return step.forces + vertex_sums(shares, s.faces[self.elements], s.n) + self._cable_weights(step)
+
+    def _cable_weights(self, step: Step) -> Floats:
+        """(n,3) half of each cable edge's weight at each of its ends."""
+        surface, forces = self.standing, np.zeros((self.surface.n, 3))
+        density = (self.cable_material or self.material).density
+        for cable, area in zip(surface.cables, self.cable_areas, strict=True):
+            half = 0.5 * density * area * step.gravity * segment_lengths(surface.vertices, cable.edges)
+            at_vertex = np.bincount(cable.edges.ravel(), np.repeat(half, 2), surface.n)
+            forces -= at_vertex[:, None] * np.array(surface.plane.normal)
+        return forces

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +16,9 @@ from ..base.errors import FileError, unknown
 from ..base.files import check_regular
 from ..surface.geometry import area_vectors
 from . import dat, frd
-from .blocks import Block
+from .blocks import TENSOR, Block
+from .cables import directions
+from .inp import first_cable
 from .model import StructuralModel
 
 READERS = {".dat": dat.read, ".frd": frd.read}
@@ -35,6 +38,7 @@ class StepResults:
     stresses : (m,3,3) stress tensors in the axes of space, force/area, the mean over the thickness. From an
         .frd file they are the mean of a triangle's corners, where all elements around have been averaged,
         those of other patches too.
+    cable_tensions : the tension (k,) of the edges of each cable, force, by its name; from a .dat file alone.
     """
 
     name: str
@@ -42,6 +46,7 @@ class StepResults:
     displacements: Floats
     reactions: Floats
     stresses: Floats
+    cable_tensions: Mapping[str, Floats]
 
     @cached_array
     def deflections(self) -> Floats:
@@ -121,7 +126,21 @@ def _results(model: StructuralModel, k: int, blocks: dict[str, Block]) -> StepRe
         reactions -= model.nodal_loads(step, np.nan_to_num(displacements))
         reactions[~model.held] = 0.0
         reactions -= np.einsum("nij,nj->ni", model.allowed, reactions)
-    return StepResults(step.name, model, displacements, reactions, _on_faces(model, blocks["stresses"]))
+    tensions = _cable_tensions(model, blocks["cables"]) if "cables" in blocks else {}
+    stresses = _on_faces(model, blocks["stresses"])
+    return StepResults(step.name, model, displacements, reactions, stresses, tensions)
+
+
+def _cable_tensions(model: StructuralModel, stress: Block) -> dict[str, Floats]:
+    """The stress along each edge of a cable times its section, the mean over the section; by name."""
+    surface, first, tensions = model.standing, first_cable(model), {}
+    for cable, area in zip(surface.cables, model.cable_areas, strict=True):
+        numbers = first + np.arange(len(cable.edges))
+        mine = stress.means(numbers)[:, TENSOR]
+        along = directions(surface, cable.edges)
+        tensions[cable.name] = area * np.einsum("ki,kij,kj->k", along, mine, along)
+        first += len(cable.edges)
+    return tensions
 
 
 def _on_faces(model: StructuralModel, stress: Block) -> Floats:
@@ -132,12 +151,9 @@ def _on_faces(model: StructuralModel, stress: Block) -> Floats:
         at_vertex[stress.ids - 1] = stress.values
         values = at_vertex[surface.faces[model.elements]].mean(axis=1)
     else:
-        place = np.searchsorted(faces, stress.ids - 1)
-        count = np.bincount(place, minlength=len(faces))
-        values = np.stack([np.bincount(place, column, len(faces)) for column in stress.values.T], axis=1)
-        values /= count[:, None]
+        values = stress.means(faces + 1)
     tensors = np.full((model.surface.m, 3, 3), np.nan)
-    tensors[faces] = values[:, [[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
+    tensors[faces] = values[:, TENSOR]
     return tensors
 
 
@@ -156,6 +172,9 @@ def _check(steps: list[dict[str, Block]], model: StructuralModel) -> None:
             _same("nodes with stresses", stress.ids, nodes)
         else:
             _same("elements", np.unique(stress.ids), model.faces + 1)
+        if "cables" in blocks:
+            edges = sum(len(cable.edges) for cable in model.standing.cables)
+            _same("cable elements", np.unique(blocks["cables"].ids), first_cable(model) + np.arange(edges))
         if "forces" in blocks:
             held = np.flatnonzero(model.held) + 1
             _same("held nodes", np.intersect1d(blocks["forces"].ids, held), held)
