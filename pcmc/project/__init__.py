@@ -30,6 +30,7 @@ from .keys import REQUIRED, Key, Section, reference, sections
 from .output import COLOURS, check_names, check_outputs, check_picture, paint, write_all
 from .remeshing import Remeshing
 from .running import Outcome, check_of, check_project_mesh, run, run_project, solve_project
+from .structure import Structure
 from .varied import check_varied, digest, is_project, varied
 
 __all__ = [
@@ -40,6 +41,7 @@ __all__ = [
     "Project",
     "Remeshing",
     "Section",
+    "Structure",
     "build",
     "check_names",
     "check_of",
