@@ -12,12 +12,13 @@ import tempfile
 from pathlib import Path
 
 import pcmc
+from pcmc.base.errors import PcmcError
 from pcmc.structure import StepResults, StructuralModel
 
 PROGRAM = "ccx"
 
 
-class CalculixError(RuntimeError):
+class CalculixError(PcmcError):
     """The program is absent, took too long, or did not come to an end."""
 
 
