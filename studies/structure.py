@@ -52,7 +52,7 @@ MESHES = ("coarse", "middle", "fine")
 
 
 def data(folder: Folder, short: bool) -> None:
-    """``records``, ``patches`` and ``supports``; the finest meshes with their deflection under snow."""
+    """``records``, ``patches`` and ``supports``; the middle meshes with their deflection under snow."""
     if not calculix.available():
         raise calculix.CalculixError(f"{calculix.PROGRAM} is not installed (Debian: calculix-ccx)")
     records, patches, supports = [], [], []
@@ -65,8 +65,9 @@ def data(folder: Folder, short: bool) -> None:
             records.append(about | compared(model, form, snow))
             patches += [about | row for row in by_patch(model, form)]
             supports += [about | row for row in by_support(model, form)]
-        sunk = surface.vertices + snow.displacements
-        folder.write_mesh(name, {"form": surface, "snow": model.standing._with(vertices=sunk)})
+            if mesh == (MESHES[0] if short else MESHES[1]):
+                sunk = surface.moved(surface.vertices + np.nan_to_num(snow.displacements))
+                folder.write_mesh(name, {"form": surface, "snow": sunk})
     folder.write_table("records", rounded(records))
     folder.write_table("patches", rounded(patches))
     folder.write_table("supports", rounded(supports))

@@ -86,5 +86,6 @@ def _thickness(surface: Surface, given: list[str] | None) -> float | dict[str, f
     if not given:
         return None
     values = arguments.by_name([patch.name for patch in surface.patches], given, "--thickness")
-    numbers = set(values.values())
-    return numbers.pop() if len(numbers) == 1 and len(values) == len(surface.patches) else values
+    names = {patch.name for patch in surface.patches}
+    same = len(set(values.values())) == 1 and set(values) == names
+    return next(iter(values.values())) if same else values

@@ -15,6 +15,15 @@ from ..surface.geometry import segment_lengths
 POINTS = 8  # integration points of a B31 element
 
 
+def short(value: float) -> str:
+    """A number in at most 20 characters, the field of an input file.
+
+    >>> short(-1e-5 / 3)
+    '-3.33333333333e-06'
+    """
+    return f"{value:.12g}"
+
+
 def checked_areas(given: object, surface: Surface) -> tuple[float, ...]:
     """The area of each cable's section, from one number or one by name."""
     names = [cable.name for cable in surface.cables]
@@ -52,7 +61,11 @@ def cable_elements(surface: Surface, areas: tuple[float, ...], first: int) -> It
             yield f"*ELEMENT, TYPE=B31, ELSET={name}\n"
             yield format_rows("%d,%d,%d\n", numbers[mine], *(cable.edges[mine].T + 1))
             yield f"*BEAM SECTION, ELSET={name}, MATERIAL=CABLE, SECTION=RECT\n"
-            yield f"{area**0.5!r},{area**0.5!r}\n" + ",".join(f"{c:.1f}" for c in np.eye(3)[axis]) + "\n"
+            yield (
+                f"{short(area**0.5)},{short(area**0.5)}\n"
+                + ",".join(f"{c:.1f}" for c in np.eye(3)[axis])
+                + "\n"
+            )
     yield "*ELSET, ELSET=CABLES\n" + "".join(f"{name},\n" for name in sets)
 
 

@@ -15,12 +15,14 @@ from ..base.files import atomic_write, check_name
 from ..io.text import format_rows
 from ..surface.geometry import area_vectors
 from . import cables
+from .cables import short
 from .loads import Step
 from .model import Material, StructuralModel
 
 PER_LINE = 12  # numbers of a set on a line; at most 16 are read
 POINTS = 2  # integration points of an S3 element, one above the other
 FIELD = "%.12e"  # the longest number that fits into a field of 20 characters
+LONGEST = 200  # characters of a comment
 INCREMENT = 0.25  # of a step under added loads; it is halved where the equations do not converge
 
 
@@ -85,7 +87,7 @@ def _elements(model: StructuralModel) -> Iterator[str]:
         yield f"*ELEMENT, TYPE=S3, ELSET=PATCH_{k}\n"
         yield format_rows("%d,%d,%d,%d\n", model.faces[mine] + 1, *(corners.T + 1))
         yield _set(f"NODES_{k}", np.unique(corners))
-        yield f"*SHELL SECTION, ELSET=PATCH_{k}, MATERIAL=MEMBRANE\n{thickness!r}\n"
+        yield f"*SHELL SECTION, ELSET=PATCH_{k}, MATERIAL=MEMBRANE\n{short(thickness)}\n"
     yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k},\n" for k in present)
     yield _material("MEMBRANE", material)
     if surface.cables:
@@ -99,8 +101,8 @@ def first_cable(model: StructuralModel) -> int:
 
 
 def _material(name: str, material: Material) -> str:
-    text = f"*MATERIAL, NAME={name}\n*ELASTIC\n{material.young!r},{material.poisson!r}\n"
-    return text + (f"*DENSITY\n{material.density!r}\n" if material.density > 0.0 else "")
+    text = f"*MATERIAL, NAME={name}\n*ELASTIC\n{short(material.young)},{short(material.poisson)}\n"
+    return text + (f"*DENSITY\n{short(material.density)}\n" if material.density > 0.0 else "")
 
 
 def _supports(model: StructuralModel) -> Iterator[str]:
@@ -152,11 +154,11 @@ def _step(model: StructuralModel, step: Step, form: bool) -> Iterator[str]:
     """A step of the analysis, with all loads that act at its end."""
     yield f"** {_line(step.name)}\n*STEP, NLGEOM, INC=1000\n*STATIC\n{1.0 if form else INCREMENT},1.\n"
     patches = np.unique(model.standing.patch_of_face[model.elements])
-    rows = [f"PATCH_{k + 1},P,{float(step.pressures[k])!r}\n" for k in patches if step.pressures[k] != 0.0]
+    rows = [f"PATCH_{k + 1},P,{short(step.pressures[k])}\n" for k in patches if step.pressures[k] != 0.0]
     if step.gravity:
-        down = ",".join(repr(-c) for c in model.standing.plane.normal)
+        down = ",".join(short(-c) for c in model.standing.plane.normal)
         sets = ("EALL", "CABLES") if model.standing.cables else ("EALL",)
-        rows += [f"{name},GRAV,{step.gravity!r},{down}\n" for name in sets]
+        rows += [f"{name},GRAV,{short(step.gravity)},{down}\n" for name in sets]
     if rows:
         yield "*DLOAD, OP=NEW\n" + "".join(rows)
     forces = np.einsum("nij,nj->ni", model.axes, step.forces)
@@ -186,5 +188,5 @@ def _set(name: str, vertices: Ints) -> str:
 
 
 def _line(text: str) -> str:
-    """The text in one line."""
-    return " ".join(text.split())
+    """The text in one line of at most LONGEST characters."""
+    return " ".join(text.split())[:LONGEST]
