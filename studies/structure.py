@@ -3,7 +3,7 @@
 Under the form-finding load the model must stay where it is, with the stress α/t in every element and our
 reactions at its supports. Then snow comes, which the shape was not found for, and the roof goes down.
 
-Each shape has three meshes. Its shell is as stiff as the two numbers below say: displacements under the
+Each shape has three meshes. Its membrane is as stiff as two numbers below say: displacements under the
 form-finding load are the forces that a mesh leaves along the surface over the stiffness E t.
 """
 

@@ -79,7 +79,7 @@ def frd_text(model: StructuralModel, seed: int = 0) -> tuple[str, list[dict[str,
     text = "    1C\n    1UPGM               CalculiX\n"
     text += f"    2C{len(nodes):30d}{1:38d}\n" + rows(model.standing.vertices[nodes - 1])
     text += f"    3C{len(model.faces):30d}{1:38d}\n"
-    for k, corners in enumerate(model.standing.faces[model.elements] + 1, 1):
+    for k, corners in enumerate(model.standing.faces[model.active] + 1, 1):
         text += f" -1{k:10d}    7    0    1\n -2" + "".join(f"{v:10d}" for v in corners) + "\n"
     text += " -3\n"
     for number in range(1, len(model.steps) + 1):

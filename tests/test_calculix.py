@@ -57,11 +57,11 @@ def test_the_deflection_of_a_tense_film_is_that_of_poisson():
     """α Δu = s over the square: u = 0.0736714 s / α in the middle, to the second order in the edge."""
     errors = []
     for n in (4, 8, 16):
-        model = model_of(square(n), loads=[Snow(1e-3, patches=["film"])], anyway=True, thickness=1e-4)
+        model = model_of(square(n), loads=[Snow(1e-3, patches=["film"])], anyway=True)
         depth = -np.nanmin(calculix.run(model)[1].deflections)
         errors.append(abs(depth / (0.0736714 * 1e-3 / 2.0) - 1.0))
     order = np.polyfit(np.log([4, 8, 16]), -np.log(errors), 1)[0]
-    assert order == pytest.approx(2.0, abs=0.35)
+    assert order == pytest.approx(2.0, abs=0.1)
     assert errors[-1] < 0.01
 
 
@@ -109,7 +109,7 @@ def test_every_support_and_wall_is_at_rest_there(make):
     form, snow = calculix.run(model)
     compared = structure.compared(model, form, snow)
     assert compared["displacement"] < 1e-5
-    assert compared["stress_rms"] < 0.01
+    assert compared["stress_rms"] < 0.015
     assert compared["reaction_rms"] < 0.02
     assert all(abs(row["mean"] - 1.0) < 0.02 for row in structure.by_patch(model, form))
     assert compared["support_theirs"] == pytest.approx(compared["support_ours"], rel=0.01)
@@ -135,7 +135,7 @@ def test_a_turned_surface_has_turned_results():
 
 
 def test_the_file_for_viewers_has_the_same_displacements_and_reactions():
-    model = model_of(pyramid(), loads=[Snow(0.2)])
+    model = model_of(pyramid(), loads=[Snow(0.2)], thickness=0.01)
     for printed, shown in zip(calculix.run(model), calculix.run(model, suffix=".frd"), strict=True):
         np.testing.assert_allclose(shown.displacements, printed.displacements, rtol=1e-4, atol=1e-12)
         np.testing.assert_allclose(shown.reactions, printed.reactions, rtol=1e-4, atol=1e-5)
@@ -162,7 +162,8 @@ def test_self_weight_is_that_of_the_elements():
 
 def test_the_program_absent_slow_or_failing_is_an_error_in_one_line(monkeypatch, tmp_path):
     path = tmp_path / "model.inp"
-    path.write_text("*NODE\n1,0.,0.,nonsense\n")
+    pcmc.write_structure(path, model_of(pyramid()))
+    path.write_text(path.read_text().replace("*STATIC", "*STATICALLY").replace("FIXED,1,3", "FIXED,one"))
     with pytest.raises(CalculixError, match="ERROR"):
         calculix.run_file(path)
     with pytest.raises(CalculixError, match="within"):
@@ -174,3 +175,16 @@ def test_the_program_absent_slow_or_failing_is_an_error_in_one_line(monkeypatch,
     with refused(CalculixError) as caught:
         structure.data(None, True)
     assert "\n" not in str(caught.value)
+
+
+def test_shells_carry_the_same_load_and_bend_less():
+    """Shells of three nodes lock: their deflection is less than that of membranes, and nears it."""
+    depths = []
+    for n in (8, 16):
+        given = {"loads": [Snow(1e-3, patches=["film"])], "anyway": True, "thickness": 1e-4}
+        for elements in ("membrane", "shell"):
+            form, snow = calculix.run(model_of(square(n), elements=elements, **given))
+            np.testing.assert_allclose(form.principal_stresses, 2e4, rtol=1e-4)
+            depths.append(-np.nanmin(snow.deflections))
+    assert depths[1] < 0.9 * depths[0]
+    assert depths[1] / depths[0] < depths[3] / depths[2] < 1.0

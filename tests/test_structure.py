@@ -45,7 +45,7 @@ def test_nodes_and_elements_are_the_vertices_and_faces(tmp_path):
     found = written(tmp_path, model_of(surface, material=material, thickness=1e-5 / 3))
     nodes = np.array(found["*NODE, NSET=NALL"], dtype=float)
     np.testing.assert_allclose(nodes[:, 1:], surface.vertices, rtol=1e-12)
-    elements = np.array(found["*ELEMENT, TYPE=S3, ELSET=PATCH_1"], dtype=int)
+    elements = np.array(found["*ELEMENT, TYPE=M3D3, ELSET=PATCH_1"], dtype=int)
     np.testing.assert_array_equal(elements - 1, np.column_stack([range(4), surface.faces]))
     assert found["*BOUNDARY"] == [["FIXED", "1", "3"]]
     assert found["*NSET, NSET=FIXED"] == [["1", "2", "3", "4"]]
@@ -143,7 +143,7 @@ def test_pinched_walls_are_left_out(tmp_path):
     resting = pcmc.certify(surface).pinched
     assert model.held[resting].all()
     assert not model.nodes[np.setdiff1d(surface.faces[wall], surface.faces[~wall])].any()
-    assert "*ELEMENT, TYPE=S3, ELSET=PATCH_3" not in written(tmp_path, model)
+    assert "*ELEMENT, TYPE=M3D3, ELSET=PATCH_3" not in written(tmp_path, model)
 
 
 def test_cables_have_their_tension_and_need_an_area(tmp_path):
@@ -340,7 +340,7 @@ def test_the_command_writes_a_model(tmp_path, monkeypatch, capsys):
         == 0
     )
     assert "form pressure, self-weight, snow, wind" in capsys.readouterr().out
-    assert ["PATCH_1", "P", "0.8"] in sections(tmp_path / "roof.inp")["*DLOAD, OP=NEW"]
+    assert ["PATCH_1", "P1", "0.8"] in sections(tmp_path / "roof.inp")["*DLOAD, OP=NEW"]
     (tmp_path / "roof.inp").unlink()
     for more in ([], ["--thickness", "0"], ["--thickness", "rof=1"], ["--thickness", "1", "--wind", "rof=1"]):
         assert cli.main([*given, *more]) == 2
@@ -372,7 +372,7 @@ def test_a_project_is_solved_and_has_the_values(tmp_path, monkeypatch, capsys):
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp", "--poisson", "0.1"]) == 0
     found = sections(tmp_path / "roof.inp")
     assert found["*ELASTIC"] == [["1000000", "0.1"]]
-    assert ["PATCH_1", "P", "1.5"] in found["*DLOAD, OP=NEW"]
+    assert ["PATCH_1", "P1", "1.5"] in found["*DLOAD, OP=NEW"]
     (tmp_path / "roof.toml").write_text(PROJECT.replace("young", "yung"))
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
     assert "young" in capsys.readouterr().err

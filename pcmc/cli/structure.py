@@ -39,7 +39,7 @@ def structure(
     cable_area: Annotated[float | None, option("VALUE", "Section of the cables.", parser=number)] = None,
     anyway: Annotated[bool, typer.Option("--anyway", help="Write it even if not certified.")] = False,
 ) -> int:
-    """Write a structural model for CalculiX: prestressed shells, supports, loads.
+    """Write a structural model for CalculiX: prestressed membranes, supports, loads.
 
     A project is solved first; its [structure] has the values that no option gives.
 

@@ -1,4 +1,4 @@
-"""Structural models: a surface as prestressed shells with loads, and a finite-element program's answer.
+"""Structural models: a surface as prestressed membranes with loads, and a finite-element program's answer.
 
 Gives ``StructuralModel``, ``Material``, the loads, ``write_structure`` and ``read_results``. Imports
 ``solvers``, ``certificate``, ``contact`` and the rooms below.

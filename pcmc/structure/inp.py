@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,19 +21,31 @@ from .loads import Step
 from .model import Material, StructuralModel
 
 PER_LINE = 12  # numbers of a set on a line; at most 16 are read
-POINTS = 2  # integration points of an S3 element, one above the other
+POINTS = 2  # integration points of an element, one above the other
 FIELD = "%.12e"  # the longest number that fits into a field of 20 characters
 LONGEST = 200  # characters of a comment
 INCREMENT = 0.25  # of a step under added loads; it is halved where the equations do not converge
 
 
+@dataclass(frozen=True)
+class Kind:
+    """Elements by the words of the file: their type, their section, a pressure along their normal."""
+
+    name: str
+    section: str
+    pressure: str
+
+
+KINDS = {"membrane": Kind("M3D3", "MEMBRANE", "P1"), "shell": Kind("S3", "SHELL", "P")}
+
+
 def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> None:
     """Write a structural model as an input file of CalculiX; run it with ``ccx roof`` for ``roof.inp``.
 
-    Vertex i is node i + 1, face f element f + 1: three-node shells (``S3``). Each element starts with the
-    membrane stress α/t in its plane (``*INITIAL CONDITIONS, TYPE=STRESS``). Sets: ``PATCH_k`` (elements),
-    ``NODES_k`` of patch k, ``FIXED``, ``SLIDING`` and ``SUPPORT_k``, the k-th held boundary curve of
-    ``pcmc.certify``.
+    Vertex i is node i + 1, face f element f + 1: membranes of three nodes (``M3D3``) or shells (``S3``). Each
+    starts with the stress α/t in its plane (``*INITIAL CONDITIONS, TYPE=STRESS``). Sets: ``PATCH_k``
+    (elements), ``NODES_k`` of patch k, ``FIXED``, ``SLIDING`` and ``SUPPORT_k``, the k-th held boundary curve
+    of ``pcmc.certify``.
 
     Parameters
     ----------
@@ -76,18 +89,18 @@ def _sections(model: StructuralModel) -> Iterator[str]:
 
 def _elements(model: StructuralModel) -> Iterator[str]:
     """Elements, node sets and sections by patch, and the material."""
-    surface, material = model.standing, model.material
+    surface, material, kind = model.standing, model.material, KINDS[model.elements]
     present = []
     for k, thickness in enumerate(model.thicknesses.tolist(), 1):
-        mine = surface.patch_of_face[model.elements] == k - 1
+        mine = surface.patch_of_face[model.active] == k - 1
         if not mine.any():
             continue
-        corners = surface.faces[model.elements[mine]]
+        corners = surface.faces[model.active[mine]]
         present.append(k)
-        yield f"*ELEMENT, TYPE=S3, ELSET=PATCH_{k}\n"
+        yield f"*ELEMENT, TYPE={kind.name}, ELSET=PATCH_{k}\n"
         yield format_rows("%d,%d,%d,%d\n", model.faces[mine] + 1, *(corners.T + 1))
         yield _set(f"NODES_{k}", np.unique(corners))
-        yield f"*SHELL SECTION, ELSET=PATCH_{k}, MATERIAL=MEMBRANE\n{short(thickness)}\n"
+        yield f"*{kind.section} SECTION, ELSET=PATCH_{k}, MATERIAL=MEMBRANE\n{short(thickness)}\n"
     yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k},\n" for k in present)
     yield _material("MEMBRANE", material)
     if surface.cables:
@@ -131,7 +144,7 @@ def _supports(model: StructuralModel) -> Iterator[str]:
 
 def _prestress(model: StructuralModel) -> Iterator[str]:
     """σ = α/t (I - ν ν) in each element, ν its normal: uniform tension in its plane."""
-    surface, elements = model.standing, model.elements
+    surface, elements = model.standing, model.active
     normals = area_vectors(surface.vertices[surface.faces[elements]])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     stress = np.eye(3) - normals[:, :, None] * normals[:, None, :]
@@ -153,8 +166,11 @@ def _stresses(elements: Ints, stress: Floats, points: int) -> str:
 def _step(model: StructuralModel, step: Step, form: bool) -> Iterator[str]:
     """A step of the analysis, with all loads that act at its end."""
     yield f"** {_line(step.name)}\n*STEP, NLGEOM, INC=1000\n*STATIC\n{1.0 if form else INCREMENT},1.\n"
-    patches = np.unique(model.standing.patch_of_face[model.elements])
-    rows = [f"PATCH_{k + 1},P,{short(step.pressures[k])}\n" for k in patches if step.pressures[k] != 0.0]
+    patches = np.unique(model.standing.patch_of_face[model.active])
+    label = KINDS[model.elements].pressure
+    rows = [
+        f"PATCH_{k + 1},{label},{short(step.pressures[k])}\n" for k in patches if step.pressures[k] != 0.0
+    ]
     if step.gravity:
         down = ",".join(short(-c) for c in model.standing.plane.normal)
         sets = ("EALL", "CABLES") if model.standing.cables else ("EALL",)

@@ -50,7 +50,7 @@ class Material:
 
 @dataclass(frozen=True, eq=False)
 class StructuralModel:
-    """A surface at rest as a shell: each patch prestressed with α/t, which balances its pressure.
+    """A surface at rest as a membrane: each patch prestressed with α/t, which balances its pressure.
 
     Parameters
     ----------
@@ -60,6 +60,8 @@ class StructuralModel:
     loads : a step of the analysis for each; a tuple of loads acts in one step. The form-finding pressure is
         the first step and acts in all others, too, as self-weight does once it has come.
     anyway : take a surface that is not certified, too; the file's heading tells it.
+    elements : "membrane", without bending stiffness, or "shell". CalculiX's shells of three nodes are too
+        stiff in bending where triangles are much wider than thick: their deflections are too small.
     cable_area : length², of the sections of the surface's cables, or one for each, by name.
     cable_material : of the cables; by default that of the patches.
 
@@ -84,6 +86,7 @@ class StructuralModel:
     thickness: float | Mapping[str, float]
     loads: tuple[Load | tuple[Load, ...], ...] = ()
     anyway: bool = False
+    elements: str = "membrane"
     cable_area: float | Mapping[str, float] | None = None
     cable_material: Material | None = None
     verdict: str = field(init=False, repr=False)
@@ -98,6 +101,7 @@ class StructuralModel:
             hint = "give Material(young=..., poisson=...)"
             validate.refuse("material", self.material, "a Material", hint=hint)
         object.__setattr__(self, "thickness", self._checked_thickness())
+        validate.choice("elements", self.elements, ("membrane", "shell"))
         checked_areas(self.cable_area, self.surface)
         if not isinstance(self.cable_material, Material | None):
             validate.refuse("cable_material", self.cable_material, "a Material or None")
@@ -152,7 +156,7 @@ class StructuralModel:
         return standing_part(self.surface).surface
 
     @cached_array
-    def elements(self) -> Ints:
+    def active(self) -> Ints:
         """(e,) the faces of the standing surface with a tension or a pressure: the others carry nothing."""
         pulls = (self.surface.tensions != 0.0) | (self.surface.pressures != 0.0)
         return np.flatnonzero(pulls[self.standing.patch_of_face])
@@ -160,13 +164,13 @@ class StructuralModel:
     @cached_array
     def faces(self) -> Ints:
         """(e,) the face of the surface that each element is; the element's number is one more."""
-        return standing_faces(standing_part(self.surface), self.surface)[self.elements]
+        return standing_faces(standing_part(self.surface), self.surface)[self.active]
 
     @cached_array
     def nodes(self) -> Bools:
         """(n,) the vertices of elements."""
         used = np.zeros(self.surface.n, dtype=bool)
-        used[self.standing.faces[self.elements]] = True
+        used[self.standing.faces[self.active]] = True
         for cable in self.standing.cables:
             used[cable.edges] = True
         return used
@@ -221,8 +225,8 @@ class StructuralModel:
         per_face = step.pressures[s.patch_of_face, None] * area_vectors(X[s.faces])
         mass = self.material.density * self.thicknesses[s.patch_of_face] * face_areas(s.vertices[s.faces])
         per_face -= step.gravity * mass[:, None] * np.array(s.plane.normal)
-        shares = per_face[self.elements] / 3.0
-        return step.forces + vertex_sums(shares, s.faces[self.elements], s.n) + self._cable_weights(step)
+        shares = per_face[self.active] / 3.0
+        return step.forces + vertex_sums(shares, s.faces[self.active], s.n) + self._cable_weights(step)
 
     def _cable_weights(self, step: Step) -> Floats:
         """(n,3) half of each cable edge's weight at each of its ends."""

@@ -149,7 +149,7 @@ def _on_faces(model: StructuralModel, stress: Block) -> Floats:
     if stress.by_node:
         at_vertex = np.full((surface.n, 6), np.nan)
         at_vertex[stress.ids - 1] = stress.values
-        values = at_vertex[surface.faces[model.elements]].mean(axis=1)
+        values = at_vertex[surface.faces[model.active]].mean(axis=1)
     else:
         values = stress.means(faces + 1)
     tensors = np.full((model.surface.m, 3, 3), np.nan)
