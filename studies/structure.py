@@ -9,7 +9,7 @@ form-finding load are the forces that a mesh leaves along the surface over the s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,6 +27,7 @@ from . import calculix
 from .folder import Folder
 from .study import Study
 
+Row = dict[str, float | str]
 ROOF = Path(__file__).parent.parent / "notebooks" / "roof.toml"
 THICKNESS = 2e-4  # of the size
 STRAIN = 5e-4  # α / (E t) of the patch of largest tension
@@ -55,13 +56,15 @@ def data(folder: Folder, short: bool) -> None:
     """``records``, ``patches`` and ``supports``; the middle meshes with their deflection under snow."""
     if not calculix.available():
         raise calculix.CalculixError(f"{calculix.PROGRAM} is not installed (Debian: calculix-ccx)")
-    records, patches, supports = [], [], []
+    records: list[Row] = []
+    patches: list[Row] = []
+    supports: list[Row] = []
     for name, (build, edges) in SHAPES.items():
         for mesh, edge in zip(MESHES, edges[: 1 if short else None], strict=False):
             surface = solve(build(edge), target="stationary").surface
             model = structural_model(surface)
             form, snow = calculix.run(model)
-            about = {"shape": name, "mesh": mesh, "edge_length": edge, "triangles": surface.m}
+            about: Row = {"shape": name, "mesh": mesh, "edge_length": edge, "triangles": surface.m}
             records.append(about | compared(model, form, snow))
             patches += [about | row for row in by_patch(model, form)]
             supports += [about | row for row in by_support(model, form)]
@@ -81,7 +84,7 @@ def structural_model(surface: Surface) -> StructuralModel:
     return StructuralModel(surface, Material(young), thickness, [Snow(load)], anyway=True)
 
 
-def compared(model: StructuralModel, form: StepResults, snow: StepResults) -> dict[str, float | str]:
+def compared(model: StructuralModel, form: StepResults, snow: StepResults) -> Row:
     """Theirs against ours, relative: displacement, stress, reactions; and the deflection under snow."""
     surface = model.surface
     ours = certify(surface, modes=0).reactions
@@ -110,11 +113,11 @@ def stress_errors(model: StructuralModel, form: StepResults) -> Floats:
     return np.asarray(form.principal_stresses[model.faces] / expected[:, None] - 1.0)
 
 
-def by_patch(model: StructuralModel, form: StepResults) -> list[dict[str, float | str]]:
+def by_patch(model: StructuralModel, form: StepResults) -> list[Row]:
     """Stress over α/t in each patch: its mean over the area, and the least and largest."""
     surface, ratio = model.surface, 1.0 + stress_errors(model, form)
     area = face_areas(surface.vertices[surface.faces[model.faces]])
-    rows: list[dict[str, float | str]] = []
+    rows: list[Row] = []
     for k, patch in enumerate(surface.patches):
         mine = surface.patch_of_face[model.faces] == k
         if mine.any():
@@ -124,16 +127,16 @@ def by_patch(model: StructuralModel, form: StepResults) -> list[dict[str, float 
     return rows
 
 
-def by_support(model: StructuralModel, form: StepResults) -> list[dict[str, float | str]]:
+def by_support(model: StructuralModel, form: StepResults) -> list[Row]:
     """The force of each held boundary curve, ours and theirs, and their difference over the larger side."""
     axes = ["reaction_x", "reaction_y", "reaction_z"]
     tables = [
         boundary_table(model.standing, f) for f in (certify(model.surface, modes=0).reactions, form.reactions)
     ]
-    rows: list[dict[str, float | str]] = []
+    rows: list[Row] = []
     for (_, our), (_, their) in zip(*(table.iterrows() for table in tables), strict=True):
         a, b = our[axes].to_numpy(dtype=float), their[axes].to_numpy(dtype=float)
-        row: dict[str, float | str] = {"boundary": our["boundary"]}
+        row: Row = {"boundary": our["boundary"]}
         row |= {
             f"{side}_{axis}": v
             for side, f in (("ours", a), ("theirs", b))
@@ -143,7 +146,7 @@ def by_support(model: StructuralModel, form: StepResults) -> list[dict[str, floa
     return rows
 
 
-def rounded(rows: list[dict[str, float | str]]) -> pd.DataFrame:
+def rounded(rows: list[Row]) -> pd.DataFrame:
     """Numbers to as many digits as every computer gives alike; forces that are rounding are 0."""
 
     def few(value: object) -> object:
@@ -158,14 +161,15 @@ def table(folder: Folder) -> dict[str, float]:
     """``orders``: of the convergence of each comparison as triangles get smaller; and the finest numbers."""
     records = folder.read_table("records")
     keys = ("displacement", "stress_rms", "reaction_rms")
-    rows, measured = [], {}
+    rows: list[Row] = []
+    measured: dict[str, float] = {}
     for name, given in records.groupby("shape", sort=False):
         h = np.log(given.edge_length)
         slopes = {k: float(np.polyfit(h, np.log(given[k]), 1)[0]) if len(given) > 1 else np.nan for k in keys}
-        rows.append({"shape": name, **{k: round(v, 2) for k, v in slopes.items()}})
-        finest: Mapping[str, float] = given.iloc[-1].to_dict()
+        rows.append({"shape": str(name), **{k: round(v, 2) for k, v in slopes.items()}})
+        finest = given.iloc[-1]
         short = str(name).replace(" ", "_")
-        measured |= {f"{k}_{short}": finest[k] for k in (*keys, "stress_within", "snow_deflection")}
+        measured |= {f"{k}_{short}": float(finest[k]) for k in (*keys, "stress_within", "snow_deflection")}
     folder.write_table("orders", pd.DataFrame(rows))
     return measured
 
@@ -193,9 +197,9 @@ def figure(folder: Folder) -> None:
     )
     records = folder.read_table("records")
     curves = {}
-    for name, given in records.groupby("shape", sort=False):
+    for shape, given in records.groupby("shape", sort=False):
         h = given.edge_length / given.edge_length.max()
-        curves[str(name)] = (h, given.stress_rms)
+        curves[str(shape)] = (h, given.stress_rms)
     convergence(
         curves,
         folder.figure("convergence"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import cast
 
 from ..base.errors import OptionError
 from ..solvers.result import Result
@@ -64,7 +65,7 @@ class Structure:
 
     def model(self, surface: Surface | Result, anyway: bool = False) -> StructuralModel:
         """The structural model of a surface at rest. Errors as in ``pcmc.StructuralModel``."""
-        thickness = 0.0 if self.thickness is None else self.thickness
+        thickness, given = 0.0 if self.thickness is None else self.thickness, cast("Surface", surface)
         return StructuralModel(
-            surface, self.material, thickness, self.loads, anyway=anyway, cable_area=self.cable_area
+            given, self.material, thickness, self.loads, anyway=anyway, cable_area=self.cable_area
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -84,7 +84,7 @@ class StructuralModel:
     surface: Surface
     material: Material
     thickness: float | Mapping[str, float]
-    loads: tuple[Load | tuple[Load, ...], ...] = ()
+    loads: Sequence[Load | tuple[Load, ...]] = ()
     anyway: bool = False
     elements: str = "membrane"
     cable_area: float | Mapping[str, float] | None = None
