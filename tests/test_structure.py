@@ -1,6 +1,9 @@
 """Structural models as files: what is written, what is read back, what is refused."""
 
+import re
+import tomllib
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -373,6 +376,8 @@ def test_a_project_is_solved_and_has_the_values(tmp_path, monkeypatch, capsys):
     found = sections(tmp_path / "roof.inp")
     assert found["*ELASTIC"] == [["1000000", "0.1"]]
     assert ["PATCH_1", "P1", "1.5"] in found["*DLOAD, OP=NEW"]
+    monkeypatch.setattr("pcmc.project.running.solve", None)  # what follows is refused before solving
+    assert cli.main(["structure", "roof.toml", "-o", "roof.inp", "--wind", "rof=1"]) == 2
     (tmp_path / "roof.toml").write_text(PROJECT.replace("young", "yung"))
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
     assert "young" in capsys.readouterr().err
@@ -395,3 +400,18 @@ def test_reactions_of_an_exact_answer_are_ours(tmp_path):
     (tmp_path / "model.dat").write_text(text)
     (result,) = pcmc.read_results(tmp_path / "model.dat", model)
     np.testing.assert_allclose(result.reactions, ours, atol=1e-6)
+
+
+def test_the_how_to_page_has_the_keys_of_the_section():
+    page = (Path(__file__).resolve().parent.parent / "docs/how-to/structural-model.md").read_text(
+        encoding="utf-8"
+    )
+    text = re.search(r"```toml\n(.*?)```", page, re.S)[1]
+    wanted = Structure(**tomllib.loads(text)["structure"])
+    assert [load.name for load in wanted.loads] == ["self-weight", "snow", "wind"]
+    example = re.search(r"```python\n(.*?)pcmc.write_structure", page, re.S)[1]
+    named = pyramid().retensioned()
+    surface = Surface(named.vertices, named.faces, [0] * 4, [Patch("north", 1.0)], fixed=range(4))
+    names = {"result": pcmc.solve(surface)}
+    exec(compile(example, "structural-model.md", "exec"), names)
+    assert len(names["model"].steps) == 4

@@ -67,6 +67,7 @@ def structure(
         }
         values = asdict(project.structure) if project is not None and project.structure is not None else {}
         wanted = projects.Structure(**values | {k: v for k, v in given.items() if v is not None})
+        wanted.check(start)
         solved: Surface | Result = start
         if project is not None:
             solved = projects.run_project(

@@ -9,7 +9,9 @@ from typing import cast
 from ..base.errors import OptionError
 from ..solvers.result import Result
 from ..structure import Material, SelfWeight, Snow, StructuralModel, Wind
-from ..structure.loads import Load
+from ..structure.cables import checked_areas
+from ..structure.loads import Load, check_loads
+from ..structure.model import checked_thickness
 from ..surface import Surface
 
 
@@ -62,6 +64,12 @@ class Structure:
         if self.wind:
             loads.append(Wind(self.wind))
         return tuple(loads)
+
+    def check(self, surface: Surface) -> None:
+        """Refuse values that name no patch or cable of the surface, before it is solved."""
+        checked_thickness(self.thickness, surface)
+        check_loads(self.loads, surface)
+        checked_areas(self.cable_area, surface)
 
     def model(self, surface: Surface | Result, anyway: bool = False) -> StructuralModel:
         """The structural model of a surface at rest. Errors as in ``pcmc.StructuralModel``."""

@@ -100,7 +100,7 @@ class StructuralModel:
         if not isinstance(self.material, Material):
             hint = "give Material(young=..., poisson=...)"
             validate.refuse("material", self.material, "a Material", hint=hint)
-        object.__setattr__(self, "thickness", self._checked_thickness())
+        object.__setattr__(self, "thickness", checked_thickness(self.thickness, self.surface))
         validate.choice("elements", self.elements, ("membrane", "shell"))
         checked_areas(self.cable_area, self.surface)
         if not isinstance(self.cable_material, Material | None):
@@ -120,18 +120,6 @@ class StructuralModel:
 
     def _single_loads(self) -> list[Load]:
         return [load for entry in self.loads for load in (entry if isinstance(entry, tuple) else (entry,))]
-
-    def _checked_thickness(self) -> float | dict[str, float]:
-        """A number > 0, or one for each patch."""
-        given = self.thickness
-        if not isinstance(given, Mapping):
-            return validate.positive("thickness", given)
-        for name in given:
-            self.surface.patch_index(name)
-        return {
-            patch.name: validate.number("thickness", given.get(patch.name), above=0.0, where=patch.name)
-            for patch in self.surface.patches
-        }
 
     @cached_array
     def thicknesses(self) -> Floats:
@@ -237,3 +225,15 @@ class StructuralModel:
             at_vertex = np.bincount(cable.edges.ravel(), np.repeat(half, 2), surface.n)
             forces -= at_vertex[:, None] * np.array(surface.plane.normal)
         return forces
+
+
+def checked_thickness(given: object, surface: Surface) -> float | dict[str, float]:
+    """A number > 0, or one for each patch of the surface."""
+    if not isinstance(given, Mapping):
+        return validate.positive("thickness", given)
+    for name in given:
+        surface.patch_index(name)
+    return {
+        patch.name: validate.number("thickness", given.get(patch.name), above=0.0, where=patch.name)
+        for patch in surface.patches
+    }
