@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .existence import solve
     from .io import read, write
     from .io.repairing import Repaired, repair
+    from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
     from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "Design",
     "Direction",
     "Line",
+    "Material",
     "MeshCheck",
     "MeshVerdict",
     "Parameter",
@@ -35,9 +37,13 @@ __all__ = [
     "Plane",
     "Repaired",
     "Room",
+    "SelfWeight",
+    "Snow",
+    "StructuralModel",
     "Surface",
     "Target",
     "Verdict",
+    "Wind",
     "certify",
     "check_mesh",
     "curvature_error",
@@ -51,11 +57,13 @@ __all__ = [
     "meet",
     "read",
     "repair",
+    "read_results",
     "sensitivities",
     "solve",
     "solve_to_accuracy",
     "target_curvature",
     "write",
+    "write_structure",
 ]
 
 # Each name is imported at its first use. So ``import pcmc`` takes milliseconds, and the command can
@@ -70,6 +78,15 @@ _NAMES = {
     "existence": ("solve",),
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),
+    "structure": (
+        "Material",
+        "SelfWeight",
+        "Snow",
+        "StructuralModel",
+        "Wind",
+        "read_results",
+        "write_structure",
+    ),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
 }
 

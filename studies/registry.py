@@ -24,6 +24,7 @@ from . import (
     refinement,
     solvers,
     stability,
+    structure,
 )
 from .study import Study
 
@@ -45,6 +46,7 @@ MODULES = (
     mesh_check,
     accuracy,
     gallery,
+    structure,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out

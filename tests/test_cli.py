@@ -24,7 +24,19 @@ from pcmc.project import running
 from tests.test_project import SMALL
 
 HOME = Path(__file__).resolve().parent.parent
-COMMANDS = ["solve", "certify", "remesh", "convert", "plot", "sweep", "explore", "cache"]
+COMMANDS = [
+    "solve",
+    "certify",
+    "remesh",
+    "convert",
+    "plot",
+    "repair",
+    "plan",
+    "structure",
+    "sweep",
+    "explore",
+    "cache",
+]
 
 
 @pytest.fixture

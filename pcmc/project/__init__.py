@@ -42,6 +42,7 @@ from .output import COLOURS, check_names, check_outputs, check_picture, paint, w
 from .planning import project_text, proposal_text
 from .remeshing import Remeshing
 from .running import check_of, check_project_mesh, run, run_project, solve_project, surface_files
+from .structure import Structure
 from .varied import check_varied, digest, is_project, varied
 
 __all__ = [
@@ -52,6 +53,7 @@ __all__ = [
     "Project",
     "Remeshing",
     "Section",
+    "Structure",
     "build",
     "cache_folder",
     "cached_files",
