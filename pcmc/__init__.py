@@ -17,10 +17,11 @@ if TYPE_CHECKING:
     from .energy.functional import energy, gradient, hessian
     from .existence import solve
     from .io import read, write
-    from .surface import Circle, Line, Patch, Plane, Surface
+    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface
 
 __all__ = [
     "BoundaryMotion",
+    "Cable",
     "Certificate",
     "Circle",
     "Design",
@@ -31,6 +32,7 @@ __all__ = [
     "Parameter",
     "Patch",
     "Plane",
+    "Room",
     "Surface",
     "Target",
     "Verdict",
@@ -64,7 +66,7 @@ _NAMES = {
     "energy.functional": ("energy", "gradient", "hessian"),
     "existence": ("solve",),
     "io": ("read", "write"),
-    "surface": ("Circle", "Line", "Patch", "Plane", "Surface"),
+    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
 }
 
 
