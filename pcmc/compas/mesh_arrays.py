@@ -1,7 +1,9 @@
-"""What COMPAS meshes hold, checked, as arrays and values. Every error names the mesh."""
+"""The meshes themselves as arrays: vertices, faces and cables. Every error names the mesh."""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
 from itertools import chain
@@ -14,12 +16,13 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, MissingExtra, OptionError, SurfaceError, unknown
 from ..io.mesh_data import FIXED, FREE, SLIDING, coincident
 from ..io.polygons import triangulate
-from ..surface import Circle, Guide, Line, Patch, Plane
+from ..surface import Cable, Patch
 
-KEY = "pcmc"  # attribute of one mesh, the first in general: what belongs to the whole surface
-GUIDES: dict[str, type[Guide]] = {"line": Line, "circle": Circle}
 HELD = ("is_support", "is_anchor", "is_fixed")  # names that COMPAS packages use for a held vertex
-SLIDES, GUIDE = "is_sliding", "guide"
+SLIDES, GUIDE, PLANES = "is_sliding", "guide", "planes"  # further attributes of vertices
+CABLE, TENSION = "cable", "tension"  # attributes of edges
+
+Places = Mapping[str, Mapping[int, int]]  # by mesh name and key, the index of the vertex
 
 
 def mesh_class() -> Any:
@@ -29,26 +32,6 @@ def mesh_class() -> Any:
     except ImportError:
         raise MissingExtra("compas", "compas") from None
     return Mesh
-
-
-@dataclass(frozen=True, eq=False)
-class Vertices:
-    """The vertices of all meshes, one after the other.
-
-    Attributes
-    ----------
-    X : (v,3) coordinates.
-    keys : (v,) their keys.
-    start : (k+1,) where each mesh begins.
-    support : (v,) FREE, SLIDING or FIXED; None if no mesh has an attribute for it.
-    guide : (v,) number of the line or circle along which the vertex slides, or -1.
-    """
-
-    X: Floats
-    keys: Ints
-    start: Ints
-    support: Ints | None
-    guide: Ints
 
 
 def named_meshes(meshes: Any) -> dict[str, Any]:
@@ -82,132 +65,143 @@ def read_patches(named: Mapping[str, Any], tensions: Any, pressures: Any) -> lis
         known = {f.name: f.default for f in fields(Patch) if f.name != "name"}
         values = {key: mesh.attributes[key] for key in known if key in mesh.attributes} | given.get(name, {})
         for key in [key for key, default in known.items() if default is MISSING and key not in values]:
-            text = f"mesh {name!r} has no {key}; set mesh.attributes[{key!r}], or pass {key}s="
-            raise SurfaceError(text, what=key, where=name)
+            refuse(key, name, f"it has no {key}; set mesh.attributes[{key!r}], or pass {key}s=")
         patches.append(Patch(name, **values))
     return patches
 
 
+@dataclass(frozen=True, eq=False)
+class Vertices:
+    """The vertices of all meshes that faces use, one mesh after the other.
+
+    Attributes
+    ----------
+    X : (v,3) coordinates.
+    keys : (v,) their keys.
+    start : (k+1,) where each mesh begins.
+    support : (v,) FREE, SLIDING or FIXED; None if no mesh has an attribute for it.
+    guide : (v,) number of the line or circle along which the vertex slides, or -1.
+    planes : (v,) the numbers of the planes besides Π that the vertex slides on.
+    unused : how many more vertices there are.
+    """
+
+    X: Floats
+    keys: Ints
+    start: Ints
+    support: Ints | None
+    guide: Ints
+    planes: list[Sequence[int]]
+    unused: int
+
+
 def read_vertices(named: Mapping[str, Any]) -> Vertices:
     """The vertices of all meshes."""
-    start = np.cumsum([0, *(len(mesh.vertex) for mesh in named.values())])
-    X, support, guide = np.empty((start[-1], 3)), np.full(start[-1], FREE), np.full(start[-1], -1)
-    marked = False
-    for name, mesh, first in zip(named, named.values(), start[:-1], strict=True):
-        default, rows = mesh.default_vertex_attributes, list(mesh.vertex.values())
-        here = slice(first, first + len(rows))
-        names = set(default).union(*rows)
+    keys: list[int] = []
+    rows: list[tuple[list[float], int, int, Sequence[int]]] = []
+    start, unused, marked = [0], 0, False
+    for name, mesh in named.items():
+        used = set(chain.from_iterable(mesh.face.values()))
+        lost = used - set(mesh.vertex)
+        if lost:
+            refuse("faces", name, f"a face names vertex {min(lost)}, which the mesh does not have")
+        mine = [key for key in mesh.vertex if key in used]
+        unused += len(mesh.vertex) - len(mine)
+        for key in mine:
+            row = mesh.default_vertex_attributes | mesh.vertex[key]
+            held = any(row.get(mark) for mark in HELD)
+            support = FIXED if held else SLIDING if row.get(SLIDES) else FREE
+            guide, planes = row.get(GUIDE), row.get(PLANES) or ()
+            if not (guide is None or (isinstance(guide, int) and guide >= 0)):
+                refuse(GUIDE, name, f"vertex {key}: {GUIDE!r} must be the number of a line or circle")
+            if not (isinstance(planes, Sequence) and all(isinstance(one, int) for one in planes)):
+                refuse(PLANES, name, f"vertex {key}: {PLANES!r} must be a list of numbers of planes")
+            rows.append((_position(row, name, key), support, -1 if guide is None else guide, planes))
+            marked |= any(mark in row for mark in (SLIDES, *HELD))
+        keys += mine
+        start.append(len(keys))
+    if not keys:
+        validate.refuse("meshes", list(named), "meshes with faces", error=SurfaceError)
+    X, supports, guides, planes_of = zip(*rows, strict=True)
+    held_by = np.array(supports) if marked else None
+    return Vertices(
+        np.array(X), np.array(keys), np.array(start), held_by, np.array(guides), list(planes_of), unused
+    )
 
-        def column(key: str, rows: list[Any] = rows, default: Any = default) -> list[Any]:
-            return [row.get(key, default.get(key)) for row in rows]
 
-        try:
-            X[here] = np.array([column(axis) for axis in "xyz"], dtype=np.float64).T
-        except (TypeError, ValueError):
-            _refuse("vertices", name, "a coordinate is no number; set x, y and z of each vertex")
-        bad = np.flatnonzero(~np.isfinite(X[here]).all(axis=1))
-        if len(bad):
-            key = list(mesh.vertex)[bad[0]]
-            _refuse("vertices", name, f"vertex {key} is at {X[here][bad[0]].tolist()}, which is not finite")
-        for key in filter(names.__contains__, (SLIDES, *HELD)):
-            marks = np.array([bool(value) for value in column(key)], dtype=bool)
-            support[here][marks] = SLIDING if key == SLIDES else FIXED
-            marked = True
-        if GUIDE in names:
-            numbers = column(GUIDE)
-            if not all(one is None or (isinstance(one, int) and one >= 0) for one in numbers):
-                text = f"the vertex attribute {GUIDE!r} must be the number of a line or circle, or None"
-                _refuse(GUIDE, name, text)
-            guide[here] = [-1 if one is None else one for one in numbers]
-    keys = np.array(list(chain.from_iterable(mesh.vertex for mesh in named.values())), dtype=np.int64)
-    return Vertices(X, keys, start, support if marked else None, guide)
-
-
-def shared_vertices(vertices: Vertices, names: Sequence[str], weld: bool) -> tuple[Ints, Ints]:
-    """Which vertices to keep, and the index among them of every vertex.
+def shared_vertices(vertices: Vertices, named: Mapping[str, Any], weld: bool) -> tuple[Ints, Places]:
+    """Which vertices to keep, and the index among them of every key of each mesh.
 
     Vertices of one key are one, and must lie at one place; with ``weld``, vertices at one place are one.
     """
+    names, X, start = list(named), vertices.X, vertices.start
     if weld:
-        return coincident(vertices.X)
-    _, keep, place = np.unique(vertices.keys, return_index=True, return_inverse=True)
-    apart = np.flatnonzero((vertices.X[keep][place] != vertices.X).any(axis=1))
-    if len(apart):
-        one, two = int(keep[place[apart[0]]]), int(apart[0])
-        owner = np.searchsorted(vertices.start, [one, two], side="right") - 1
-        name = names[owner[1]]
-        text = (
-            f"vertex {vertices.keys[two]} is at {vertices.X[one].tolist()} in mesh {names[owner[0]]!r} and at"
-            f" {vertices.X[two].tolist()} in mesh {name!r}: the meshes do not share their keys; give the same"
-            " key to a common vertex only, or pass weld=True"
-        )
-        raise SurfaceError(text, what="vertices", where=name, found=int(vertices.keys[two]))
-    return keep, place
+        keep, place = coincident(X)
+    else:
+        _, keep, place = np.unique(vertices.keys, return_index=True, return_inverse=True)
+        apart = np.flatnonzero((X[keep][place] != X).any(axis=1))
+        if len(apart):
+            one, two = int(keep[place[apart[0]]]), int(apart[0])
+            owner, other = (names[k] for k in np.searchsorted(start, [one, two], side="right") - 1)
+            text = f"vertex {vertices.keys[two]} is at {X[two].tolist()}, and in mesh {owner!r} at"
+            text = f"{text} {X[one].tolist()}; give a key to a common vertex only, or pass weld=True"
+            refuse("vertices", other, text)
+    pairs = list(zip(vertices.keys.tolist(), place.tolist(), strict=True))
+    return keep, {name: dict(pairs[start[k] : start[k + 1]]) for k, name in enumerate(names)}
 
 
-def read_faces(
-    named: Mapping[str, Any], vertices: Vertices, place: Ints
-) -> tuple[Ints, Ints, tuple[str, ...]]:
-    """Triangles (m,3) of the kept vertices, the mesh of each, and a note if polygons were cut.
+def read_faces(named: Mapping[str, Any], X: Floats, places: Places) -> tuple[Ints, Ints, tuple[str, ...]]:
+    """Triangles (m,3) of the vertices X (n,3), the mesh of each, and a note if polygons were cut.
 
     They are in the order of the faces' keys; if two meshes use a key, mesh by mesh.
     """
-    keys: list[int] = list(chain.from_iterable(mesh.face for mesh in named.values()))
-    polygons: list[Any] = list(chain.from_iterable(mesh.face.values() for mesh in named.values()))
-    if not polygons:
-        validate.refuse("meshes", list(named), "meshes with faces", error=SurfaceError)
-    mesh = np.repeat(np.arange(len(named)), [len(one.face) for one in named.values()])
-    counts = np.array([len(polygon) for polygon in polygons])
-    corners = np.array(list(chain.from_iterable(polygons)), dtype=np.int64)
-    owner = np.repeat(mesh, counts)
-    index = np.empty(len(corners), dtype=np.int64)
-    for number, name in enumerate(named):
-        mine, here = owner == number, slice(*vertices.start[number : number + 2])
-        order = np.argsort(vertices.keys[here])
-        sorted_keys = vertices.keys[here][order]
-        at = np.minimum(np.searchsorted(sorted_keys, corners[mine]), len(sorted_keys) - 1)
-        lost = np.flatnonzero(sorted_keys[at] != corners[mine]) if len(sorted_keys) else np.arange(mine.sum())
-        if len(lost):
-            _refuse("faces", name, f"a face names vertex {corners[mine][lost[0]]}, which it does not have")
-        index[mine] = place[vertices.start[number] + order[at]]
-    if len(set(keys)) == len(keys):
-        order = np.argsort(keys)
-        begin = np.cumsum(counts) - counts
-        index = np.concatenate([index[begin[k] : begin[k] + counts[k]] for k in order])
-        counts, mesh = counts[order], mesh[order]
-    X = np.empty((place.max() + 1, 3))
-    X[place] = vertices.X
+    faces = [
+        (key, number, [places[name][v] for v in face])
+        for number, (name, mesh) in enumerate(named.items())
+        for key, face in mesh.face.items()
+    ]
+    if len({key for key, _, _ in faces}) == len(faces):
+        faces.sort(key=lambda face: face[0])
+    mesh_of_face = np.array([number for _, number, _ in faces])
+    corners = np.array(list(chain.from_iterable(face for _, _, face in faces)), dtype=np.int64)
     try:
-        F, polygon, notes = triangulate(X, index, counts)
+        F, source, notes = triangulate(X, corners, np.array([len(face) for _, _, face in faces]))
     except FileError as error:
-        name = list(named)[mesh[error.where]] if isinstance(error.where, int) else None
-        raise SurfaceError(f"mesh {name!r}: {error}", what="faces", where=name, found=error.found) from None
-    return F, mesh[polygon], notes
+        at = int(str(error.where))
+        text = str(error).replace(f"face {at}", f"face {faces[at][0]}", 1)
+        refuse("faces", list(named)[mesh_of_face[at]], text)
+    return F, mesh_of_face[source], notes
 
 
-def read_whole(named: Mapping[str, Any]) -> tuple[Plane, list[Guide]]:
-    """The plane Π, and the lines and circles, of the one mesh that has them; without it z = 0 and none."""
-    owners = [name for name, mesh in named.items() if KEY in mesh.attributes]
-    if not owners:
-        return Plane(), []
-    name = owners[0]
-    if len(owners) > 1 and any(named[one].attributes[KEY] != named[name].attributes[KEY] for one in owners):
-        _refuse(KEY, owners[1], f"it is of another surface than mesh {name!r}: attributes[{KEY!r}] differ")
-    try:
-        values = named[name].attributes[KEY]
-        plane = Plane(tuple(values["plane"]["point"]), tuple(values["plane"]["normal"]))
-        guides = [_guide(*one) for one in values["guides"]]
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
-        _refuse(KEY, name, f"attributes[{KEY!r}] is damaged ({reason}); without it Π is z = 0")
-    return plane, guides
+def read_cables(named: Mapping[str, Any], places: Places, names: Sequence[str]) -> tuple[Cable, ...]:
+    """A cable for each value of the edges' attribute ``cable``; their attribute ``tension`` is its force.
+
+    ``names`` lists cables that come first.
+    """
+    edges: dict[str, set[tuple[int, int]]] = {name: set() for name in names}
+    tensions: dict[str, float] = {}
+    for name, mesh in named.items():
+        for ends, values in mesh.edgedata.items():
+            cable, tension = values.get(CABLE), values.get(TENSION)
+            if cable is None:
+                continue
+            one, two = sorted(places[name].get(int(key), -1) for key in re.findall(r"\d+", ends))
+            if one < 0:
+                refuse(CABLE, name, f"the cable {cable!r} has the edge {ends}, which the mesh does not have")
+            if tension is None or tensions.setdefault(cable, tension) != tension:
+                text = f"the edges of the cable {cable!r} need one and the same edge attribute {TENSION!r}"
+                refuse(CABLE, name, f"{text}; that of edge {ends} is {tension}")
+            edges.setdefault(cable, set()).add((one, two))
+    return tuple(Cable(name, tensions[name], np.array(sorted(ends))) for name, ends in edges.items() if ends)
 
 
-def _guide(kind: str, *values: Any) -> Guide:
-    """The line or circle of its values."""
-    return GUIDES[kind](*(tuple(one) if isinstance(one, Sequence) else one for one in values))
-
-
-def _refuse(what: str, name: str, problem: str) -> NoReturn:
+def refuse(what: str, name: str, problem: str) -> NoReturn:
     """Raise the error about a mesh."""
     raise SurfaceError(f"mesh {name!r}: {problem}", what=what, where=name)
+
+
+def _position(row: Mapping[str, Any], name: str, key: int) -> list[float]:
+    """The coordinates in the attributes of a vertex."""
+    point = [row.get(axis) for axis in "xyz"]
+    if not all(isinstance(x, int | float) and math.isfinite(x) for x in point):
+        refuse("vertices", name, f"vertex {key} is at {point}; set its x, y and z to finite numbers")
+    return [float(x) for x in point if x is not None]

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import astuple, fields
+from dataclasses import fields
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -20,14 +21,16 @@ from ..contact.pinching import standing_part
 from ..energy.curvature import mean_curvature
 from ..io.import_warnings import import_warnings
 from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of
-from ..surface import Line, Surface, expect_surface
+from ..surface import Surface, expect_surface
 from ..surface.topology import topology
 from . import mesh_arrays
-from .mesh_arrays import GUIDE, KEY, SLIDES
+from .mesh_arrays import CABLE, GUIDE, PLANES, SLIDES, TENSION
+from .whole import KEY, Whole, read_whole
 
-MARKS = {"is_support": False, SLIDES: False, GUIDE: None}
+MARKS = {"is_support": False, SLIDES: False, GUIDE: None, PLANES: []}
 QUANTITIES = dict.fromkeys(("mean_curvature", "rx", "ry", "rz"))
 CARRIED = {"vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane", "on_line"}
+CARRIED |= {"on_planes", "cables", "rooms"}
 
 
 def to_meshes(surface: Surface) -> list[Any]:
@@ -53,6 +56,7 @@ def to_meshes(surface: Surface) -> list[Any]:
 
     Examples
     --------
+    >>> from pcmc import Patch, Surface
     >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
     ...                  [0, 0], [Patch("floor", 2.0)], fixed=range(4))
     >>> mesh, = to_meshes(square)
@@ -73,12 +77,11 @@ def to_meshes(surface: Surface) -> list[Any]:
         for key, face in zip(mine.tolist(), surface.faces[mine].tolist(), strict=True):
             mesh.add_face(face, fkey=key)
         meshes.append(mesh)
-    meshes[0].attributes[KEY] = {
-        "plane": {"point": list(surface.plane.point), "normal": list(surface.plane.normal)},
-        "guides": [
-            ["line" if isinstance(guide, Line) else "circle", *astuple(guide)] for guide, _ in surface.on_line
-        ],
-    }
+    for cable in surface.cables:
+        for edge in map(tuple, cable.edges.tolist()):
+            for mesh in (mesh for mesh in meshes if mesh.has_edge(edge)):
+                mesh.edge_attributes(edge, [CABLE, TENSION], [cable.name, cable.tension])
+    meshes[0].attributes[KEY] = Whole.of(surface).plain()
     return meshes
 
 
@@ -115,40 +118,57 @@ def from_meshes(
 
     Examples
     --------
+    >>> from pcmc import Patch, Surface
     >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
     ...                  [0, 0], [Patch("floor", 2.0)], fixed=range(4))
     >>> from_meshes(to_meshes(square)).patches
     (Patch(name='floor', tension=2.0, pressure=1.0),)
     """
     named = mesh_arrays.named_meshes(meshes)
-    patches = mesh_arrays.read_patches(named, tensions, pressures)
-    plane, guides = mesh_arrays.read_whole(named)
-    vertices = mesh_arrays.read_vertices(named)
-    keep, place = mesh_arrays.shared_vertices(vertices, list(named), weld)
-    F, patch, notes = mesh_arrays.read_faces(named, vertices, place)
-    support, guide = np.zeros(len(keep), dtype=np.int8), np.full(len(keep), -1)
+    patches = tuple(mesh_arrays.read_patches(named, tensions, pressures))
+    whole, vertices = read_whole(named), mesh_arrays.read_vertices(named)
+    keep, places = mesh_arrays.shared_vertices(vertices, named, weld)
+    X, n = vertices.X[keep], len(keep)
+    F, patch, notes = mesh_arrays.read_faces(named, X, places)
+    if vertices.unused:
+        notes = (*notes, f"{vertices.unused} vertices that no face uses were left out")
+    place = np.array([k for of_mesh in places.values() for k in of_mesh.values()])
+    support, guide = np.zeros(n, dtype=np.int8), np.full(n, -1)
     np.maximum.at(guide, place, vertices.guide)
+    on_planes = [np.zeros(n, dtype=bool) for _ in whole.planes]
+    for name, numbers in ((GUIDE, vertices.guide), (PLANES, list(chain(*vertices.planes)))):
+        listed = len(whole.guides if name == GUIDE else whole.planes)
+        if max(numbers, default=-1) >= listed:
+            text = f"a vertex has the {name} {max(numbers)}, but attributes[{KEY!r}] lists {listed} of them"
+            text = f"{text}; keep the first mesh with it, or remove the vertex attribute {name!r}"
+            raise SurfaceError(text, what=name, found=int(max(numbers)), expected=listed)
+    for vertex, numbers in zip(place.tolist(), vertices.planes, strict=True):
+        for number in numbers:
+            on_planes[number][vertex] = True
+    held = None
     if vertices.support is not None:
         np.maximum.at(support, place, vertices.support)
-    used, F = np.unique(F, return_inverse=True)
-    F = F.reshape(-1, 3)
-    if len(used) < len(keep):
-        notes = (*notes, f"{len(keep) - len(used)} vertices that no face uses were left out")
-        keep, support, guide = keep[used], support[used], guide[used]
-    if vertices.support is None:
-        support = np.where(topology(F, patch, len(used)).on_boundary, FIXED, support)
+        held = support
+    else:
+        support = np.where(topology(F, patch, n).on_boundary, FIXED, support)
         notes = (*notes, "no vertex has the attribute is_support, so the boundary is taken as fixed")
-    if guide.max() >= len(guides):
-        text = f"a vertex has the guide {guide.max()}, but attributes[{KEY!r}] has {len(guides)} lines and"
-        text = f"{text} circles; keep the first mesh, or set the vertex attribute {GUIDE!r} to None"
-        raise SurfaceError(text, what=GUIDE, found=int(guide.max()), expected=len(guides))
-    X = vertices.X[keep]
-    held = None if vertices.support is None else support
-    notes = (*notes, *import_warnings(MeshData(X, F, patch, tuple(patches), held)))
+    notes = (*notes, *import_warnings(MeshData(X, F, patch, patches, held)))
     if notes:
         warnings.warn(f"meshes: {'; '.join(notes)}", FileWarning, stacklevel=2)
-    along = tuple((one, guide == number) for number, one in enumerate(guides))
-    return Surface(X, F, patch, tuple(patches), support == FIXED, support == SLIDING, plane, along)
+    along = tuple((one, guide == number) for number, one in enumerate(whole.guides))
+    return Surface(
+        X,
+        F,
+        patch,
+        patches,
+        support == FIXED,
+        support == SLIDING,
+        whole.plane,
+        along,
+        tuple(zip(whole.planes, on_planes, strict=True)),
+        mesh_arrays.read_cables(named, places, whole.cables),
+        whole.rooms,
+    )
 
 
 def _check_carried(surface: Surface) -> None:
@@ -167,11 +187,16 @@ def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
     guide = np.full(surface.n, None)
     for number, (_, along) in enumerate(surface.on_line):
         guide[along] = number
+    planes: list[list[int]] = [[] for _ in range(surface.n)]
+    for number, (_, mask) in enumerate(surface.on_planes):
+        for vertex in np.flatnonzero(mask):
+            planes[vertex].append(number)
     columns: dict[str, list[Any]] = {
         **dict(zip("xyz", surface.vertices.T.tolist(), strict=True)),
         "is_support": (support == FIXED).tolist(),
         SLIDES: (support == SLIDING).tolist(),
         GUIDE: guide.tolist(),
+        PLANES: planes,
         "mean_curvature": _none_for_nan(mean_curvature(standing, "variational")),
         **dict(zip(("rx", "ry", "rz"), reactions(standing).T.tolist(), strict=True)),
     }

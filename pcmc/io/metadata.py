@@ -42,7 +42,7 @@ def parse_metadata(text: str | None) -> Metadata:
     try:
         values = json.loads(text)
         patches = [Patch(*p) for p in values["patches"]]
-        plane = Plane(*(tuple(v) for v in values["plane"]))
+        plane = Plane(*(tuple(v) if isinstance(v, list) else v for v in values["plane"]))
         counts = (int(values["counts"][0]), int(values["counts"][1]))
     except (ValueError, KeyError, TypeError, IndexError):
         message = f"the pcmc metadata in it are damaged: {text[:60]!r}"
