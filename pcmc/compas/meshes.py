@@ -9,7 +9,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import fields
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from . import mesh_arrays
 from .mesh_arrays import CABLE, GUIDE, PLANES, SLIDES, TENSION
 from .whole import KEY, Whole, read_whole
 
-MARKS = {"is_support": False, SLIDES: False, GUIDE: None, PLANES: []}
+MARKS: dict[str, Any] = {"is_support": False, SLIDES: False, GUIDE: None, PLANES: []}
 QUANTITIES = dict.fromkeys(("mean_curvature", "rx", "ry", "rz"))
 CARRIED = {"vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane", "on_line"}
 CARRIED |= {"on_planes", "cables", "rooms"}
@@ -136,12 +135,8 @@ def from_meshes(
     support, guide = np.zeros(n, dtype=np.int8), np.full(n, -1)
     np.maximum.at(guide, place, vertices.guide)
     on_planes = [np.zeros(n, dtype=bool) for _ in whole.planes]
-    for name, numbers in ((GUIDE, vertices.guide), (PLANES, list(chain(*vertices.planes)))):
-        listed = len(whole.guides if name == GUIDE else whole.planes)
-        if max(numbers, default=-1) >= listed:
-            text = f"a vertex has the {name} {max(numbers)}, but attributes[{KEY!r}] lists {listed} of them"
-            text = f"{text}; keep the first mesh with it, or remove the vertex attribute {name!r}"
-            raise SurfaceError(text, what=name, found=int(max(numbers)), expected=listed)
+    _check_numbers(GUIDE, vertices.guide.tolist(), len(whole.guides))
+    _check_numbers(PLANES, [number for numbers in vertices.planes for number in numbers], len(whole.planes))
     for vertex, numbers in zip(place.tolist(), vertices.planes, strict=True):
         for number in numbers:
             on_planes[number][vertex] = True
@@ -179,6 +174,15 @@ def _check_carried(surface: Surface) -> None:
         if field.name not in CARRIED and not empty:
             text = f"surface.{field.name}: COMPAS meshes do not carry it; write the surface as .pcmc"
             raise SurfaceError(text, what=field.name, found=value)
+
+
+def _check_numbers(name: str, numbers: list[int], listed: int) -> None:
+    """Refuse a vertex attribute that names a line or plane beyond those listed."""
+    largest = max(numbers, default=-1)
+    if largest >= listed:
+        text = f"a vertex has {name!r} {largest}, but attributes[{KEY!r}] lists only {listed} of them"
+        text = f"{text}; keep the mesh that has this attribute, or remove {name!r} from the vertices"
+        raise SurfaceError(text, what=name, found=largest, expected=listed)
 
 
 def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
