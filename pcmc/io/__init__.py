@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -19,12 +19,26 @@ import numpy.typing as npt
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, MissingExtra, PcmcError, unknown
 from ..base.files import atomic_write, check_name, check_regular
+from ..base.units import Units
+from ..base.validate import choice
 from ..contact.pinching import standing_part
-from ..surface import Plane, Surface
+from ..surface import Plane, Surface, expect_surface
 from .flat_walls import encode_walls, restore_walls
 from .import_warnings import import_warnings
 from .libraries import unreadable
 from .mesh_data import MeshData, checked, merged, to_surface, without_unused
+
+
+class Solved(Protocol):
+    """The result of a solver."""
+
+    @property
+    def surface(self) -> Surface:
+        """The surface reached."""
+
+    @property
+    def certificate(self) -> object:
+        """Its certificate."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +50,7 @@ class Format:
     module : the module here that reads and writes it.
     scalars : "" for none, "vertices", or "both" vertices and faces.
     certificate : whether it holds the certificate.
+    colours : whether it holds colours of vertices.
     shared : whether patches certainly share their vertices, so that reading needs no merging.
     separate : whether it has a mesh per patch, which cannot have triangles without area.
     walls : whether such triangles go with a separate format as text.
@@ -46,6 +61,7 @@ class Format:
     module: str
     scalars: str = ""
     certificate: bool = False
+    colours: bool = False
     shared: bool = False
     separate: bool = False
     walls: bool = False
@@ -62,9 +78,10 @@ FORMATS = {
     ".stl": Format("stl", separate=True, loses=("supports", "tensions", "pressures")),
     ".vtp": Format("vtk", scalars="both"),
     ".vtu": Format("vtk", scalars="both"),
-    ".glb": Format("gltf", scalars="vertices", separate=True, walls=True),
-    ".gltf": Format("gltf", scalars="vertices", separate=True, walls=True),
+    ".glb": Format("gltf", scalars="vertices", colours=True, separate=True, walls=True),
+    ".gltf": Format("gltf", scalars="vertices", colours=True, separate=True, walls=True),
     ".3dm": Format("rhino", separate=True, walls=True),
+    ".ifc": Format("ifc", certificate=True, separate=True, walls=True),
 }
 """The formats by suffix."""
 
@@ -154,10 +171,12 @@ def load(path: str | os.PathLike[str]) -> MeshData:
 
 def write(
     path: str | os.PathLike[str],
-    surface: Surface,
+    surface: Surface | Solved,
     *,
     scalars: Mapping[str, Floats] | None = None,
     certificate: object | None = None,
+    colour: str = "",
+    units: Units | str | None = None,
 ) -> None:
     """Write a surface as the suffix says; the file appears whole or not at all.
 
@@ -168,8 +187,13 @@ def write(
     Parameters
     ----------
     path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
+    surface : a Surface, or the result of a solver; formats that hold a certificate then get the result's.
     scalars : (n,) or (m,) arrays by name (curvature, error, ...), for formats that hold them.
-    certificate : a Certificate, or values by name, for the format that holds it (.pcmc).
+    certificate : a Certificate, or values by name, for the formats that hold it (.pcmc, .ifc).
+    colour : the name in ``scalars`` of an (n,) array that colours the vertices, for formats that hold
+        colours (.glb, .gltf). Without it each patch has a colour.
+    units : of the surface's numbers: a unit of length, or ``Units``. An .ifc file is in these units, a
+        .glb or .gltf file in metres; without units, their numbers are metres.
 
     Warns
     -----
@@ -179,6 +203,7 @@ def write(
     path = Path(path)
     check_name(path)
     form = _format(path)
+    surface, certificate = _unpacked(surface, certificate, form)
     for patch in surface.patches:
         if "\n" in patch.name or "\r" in patch.name:
             text = f"{path}: the patch name {patch.name!r} contains a line break; rename the patch"
@@ -186,6 +211,10 @@ def write(
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
     sizes = {"": (), "vertices": (surface.n,), "both": (surface.n, surface.m)}[form.scalars]
     lost = [name for name, scalar in scalars.items() if len(scalar) not in sizes]
+    if colour:
+        choice("colour", colour, [name for name, scalar in scalars.items() if len(scalar) == surface.n])
+        if not form.colours:
+            lost.append(f"colours of {colour!r}")
     if certificate is not None and not form.certificate:
         lost.append("certificate")
     if surface.on_line and not form.lines:
@@ -198,10 +227,12 @@ def write(
         elif shown.m < surface.m:
             lost.append(f"{surface.m - shown.m} triangles of walls without height")
     values = _values(certificate)
+    units = units if isinstance(units, Units) else Units(units or "")
     try:
         module = import_module(f".{form.module}", __name__)
         with atomic_write(path) as temporary:
-            note = module.write(temporary, shown, scalars=scalars, certificate=values, walls=walls)
+            given = {"scalars": scalars, "certificate": values, "walls": walls, "units": units}
+            note = module.write(temporary, shown, colour=colour, **given)
     except OSError as error:
         raise FileError(f"{path}: cannot be written ({error.strerror or error})", what=str(path)) from None
     except PcmcError as error:
@@ -211,6 +242,15 @@ def write(
         warnings.warn(text, LostWarning, stacklevel=2)
     if note:
         warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
+
+
+def _unpacked(given: Surface | Solved, certificate: object, form: Format) -> tuple[Surface, object]:
+    """The surface, and the certificate of a solver's result if the format holds it and none is given."""
+    surface: Any = given if isinstance(given, Surface) else getattr(given, "surface", given)
+    expect_surface(surface)
+    if surface is not given and form.certificate and certificate is None:
+        certificate = getattr(given, "certificate", None)
+    return surface, certificate
 
 
 def _in_file(path: str | os.PathLike[str], error: PcmcError, kind: type[PcmcError]) -> PcmcError:

@@ -1,9 +1,11 @@
 """glTF 2.0 (.glb, .gltf in one file): a mesh per patch, in single precision.
 
-In glTF y is up, in pcmc z: writer and reader rotate the coordinates. Single precision keeps seven digits
-only, so a surface far from the origin, as in a survey's coordinates, is written about its middle, and the
-nodes place it. Supports and scalars at vertices are attributes of the vertices; tensions, pressures, plane
-and walls without height are metadata of the scene.
+In glTF y is up, in pcmc z: writer and reader rotate the coordinates. Lengths are metres. Single precision
+keeps seven digits only, so a surface far from the origin, as in a survey's coordinates, is written about its
+middle, and the nodes place it. Each patch has a material of its name, in its colour. With ``colour`` the
+materials are white, and the vertices have the colours of a scalar; the metadata note its limits.
+Supports and scalars at vertices are attributes of the vertices; tensions, pressures, plane and walls without
+height are metadata of the scene.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from ..base.arrays import Floats
 from ..base.errors import FileError
 from ..base.files import check_regular
 from ..surface import Surface
-from ..surface.colours import patch_colors
+from ..surface.colours import linear, patch_colors, scalar_colors
 from ..surface.surface import FAR
 from .flat_walls import KEY
 from .libraries import load_library, translated_errors
@@ -34,7 +36,14 @@ SUPPORT = "_SUPPORT"
 ITEMS = 4  # of arrays, for each byte of a file; arrays may share their bytes
 
 
-def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], walls: str | None, **_: Any) -> None:
+def write(
+    path: Path,
+    surface: Surface,
+    scalars: Mapping[str, Floats],
+    walls: str | None,
+    colour: str,
+    **_: Any,
+) -> None:
     """One file, with its buffers inside."""
     trimesh = load_library("trimesh")
     data = {SUPPORT: support_of(surface).astype(np.float32)}
@@ -48,6 +57,10 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], walls: st
         place[:3, 3] = np.round(middle)
         turned = turned - place[:3, 3]
     scene = trimesh.Scene()
+    shades = None
+    if colour:
+        shades, least, most = scalar_colors(scalars[colour])
+        scene.metadata["pcmc colours"] = {"scalar": colour, "least": least, "most": most}
     for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
         faces = surface.faces[surface.patch_of_face == k]
         if not len(faces):
@@ -56,8 +69,12 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], walls: st
         mesh = trimesh.Trimesh(turned[used], local.reshape(-1, 3), process=False)
         mesh.vertex_attributes.update({key: values[used] for key, values in data.items()})
         shine = {"metallicFactor": 0.0, "roughnessFactor": 0.9, "doubleSided": True}
-        material = trimesh.visual.material.PBRMaterial(patch.name, baseColorFactor=[*color, 1.0], **shine)
+        base = [1.0] * 4 if shades is not None else [*linear(color), 1.0]
+        material = trimesh.visual.material.PBRMaterial(patch.name, baseColorFactor=base, **shine)
         mesh.visual = trimesh.visual.TextureVisuals(material=material)
+        if shades is not None:
+            rgba = np.column_stack([linear(shades[used]), np.ones(len(used))])
+            mesh.visual.vertex_attributes["color"] = np.round(255.0 * rgba).astype(np.uint8)
         scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name, transform=place)
     scene.metadata["pcmc"] = metadata_text(surface)
     if walls is not None:

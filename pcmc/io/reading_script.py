@@ -1,4 +1,4 @@
-"""The script of the process in which VTK and rhino3dm read files: a path in, arrays out.
+"""The script of the process in which VTK, rhino3dm and IfcOpenShell read files: a path in, arrays out.
 
 ``reading_process`` starts this file as a script. It imports the library that the file needs, and only those
 parts of VTK that read.
@@ -94,6 +94,36 @@ def rhino_arrays(path: str) -> dict[str, Any]:
     return {"layers": layers, "objects": objects}
 
 
+def ifc_arrays(path: str) -> dict[str, Any]:
+    """The face sets of a roof that pcmc wrote, their names and supports, and pcmc's texts."""
+    import ifcopenshell
+    import numpy as np
+    from ifcopenshell.util import element, placement
+
+    get_pset, get_local_placement = element.get_pset, placement.get_local_placement
+    model: Any = ifcopenshell.open(path)
+    found: dict[str, Any] = {"text": None, "walls": None, "parts": []}
+    for roof in model.by_type("IfcRoof"):
+        texts = get_pset(roof, "Pcmc_Surface")
+        if not texts:
+            continue
+        found["text"], found["walls"] = texts["Description"], texts.get("Walls")
+        for part in (part for whole in roof.IsDecomposedBy for part in whole.RelatedObjects):
+            item = part.Representation.Representations[0].Items[0]
+            points = np.array(item.Coordinates.CoordList, dtype=np.float64).reshape(-1, 3)
+            place = get_local_placement(part.ObjectPlacement)
+            found["parts"].append(
+                {
+                    "name": part.Name,
+                    "points": points @ place[:3, :3].T + place[:3, 3],
+                    "faces": np.array(item.CoordIndex, dtype=np.int64).reshape(-1, 3) - 1,
+                    "supports": get_pset(part, "Pcmc_Patch", "Supports"),
+                }
+            )
+        break
+    return found
+
+
 def limit_memory(size: int) -> None:
     """On Linux, refuse memory beyond what a sound file of this size needs."""
     if sys.platform == "linux":
@@ -105,7 +135,7 @@ def limit_memory(size: int) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (most if hard < 0 else min(most, hard), hard))
 
 
-READERS = {"vtk": vtk_arrays, "rhino": rhino_arrays}
+READERS = {"vtk": vtk_arrays, "rhino": rhino_arrays, "ifc": ifc_arrays}
 
 
 def main() -> None:
