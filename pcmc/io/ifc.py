@@ -236,9 +236,12 @@ def read(path: Path) -> MeshData:
         support.append(np.array(list(map(int, part["supports"])), dtype=np.int8))
         names.append(part["name"])
         start += len(part["points"])
+    faces = np.concatenate(F)
+    if metadata.counts is not None:  # a vertex of two patches is in both, so vertices count for nothing
+        metadata.check_counts(metadata.counts[0], len(faces))
     return MeshData(
         np.concatenate(X),
-        np.concatenate(F),
+        faces,
         np.concatenate(patch),
         metadata.named(names),
         np.concatenate(support),
