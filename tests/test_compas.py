@@ -6,6 +6,8 @@ import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -298,3 +300,46 @@ def test_a_server_solves_what_rhino_sends(server, capsys):
             proxy.solve(meshes, tensions={"lef": 4.0})
     finally:
         proxy._server("close")()
+
+
+@pytest.mark.slow
+def test_the_lines_for_rhino(server, monkeypatch, capsys):
+    """With a mesh drawn here in place of Rhino's, and the port of this server."""
+    import compas.rpc
+
+    drawn = rooms.to_meshes(two_squares(4, alpha_aux=1.0))
+    for mesh, name in zip(drawn, ("west", "east", "wall"), strict=True):
+        mesh.name = name
+
+    def bare(mesh):
+        """As Rhino has it: places and faces, each mesh with its own keys."""
+        keys = list(mesh.vertices())
+        faces = [[keys.index(v) for v in mesh.face_vertices(f)] for f in mesh.faces()]
+        return Mesh.from_vertices_and_faces([mesh.vertex_coordinates(key) for key in keys], faces)
+
+    rhino = SimpleNamespace(
+        filter=SimpleNamespace(mesh=32),
+        GetObjects=lambda message, kind: drawn,
+        ObjectName=lambda mesh: mesh.name,
+        coercemesh=bare,
+    )
+    monkeypatch.setitem(sys.modules, "rhinoscriptsyntax", rhino)
+    monkeypatch.setitem(sys.modules, "compas_rhino", SimpleNamespace())
+    conversions = SimpleNamespace(mesh_to_compas=lambda mesh: mesh)
+    monkeypatch.setitem(sys.modules, "compas_rhino.conversions", conversions)
+    monkeypatch.setattr("compas.scene.Scene.draw", lambda scene: None)  # it needs a program to draw in
+    proxy = compas.rpc.Proxy
+    monkeypatch.setattr(compas.rpc, "Proxy", lambda *a, **k: proxy(*a, port=server, max_conn_attempts=1, **k))
+    page = Path(__file__).parent.parent / "docs" / "how-to" / "compas.md"
+    names = {}
+    code = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+    try:
+        exec(compile(code, "compas.md", "exec"), names)
+    finally:
+        names["pcmc"]._server("close")()
+    assert names["answer"]["converged"]
+    assert [mesh.name for mesh in names["answer"]["meshes"]] == ["west", "east", "wall"]
+    assert names["answer"]["certificate"]["certified"]
+    assert [item.item.name for item in names["scene"].objects] == ["west", "east", "wall"]
+    assert len(names["answer"]["warnings"]) == 1
+    assert "is_support" in names["answer"]["warnings"][0]
