@@ -62,6 +62,16 @@ def test_height_is_y_and_nothing_is_mirrored(tmp_path):
     assert scene.extents == pytest.approx(np.ptp(surface.vertices, axis=0)[[0, 2, 1]], rel=1e-6)
 
 
+def test_lengths_are_metres(tmp_path):
+    surface = tent(tilted=False)
+    pcmc.write(tmp_path / "a.glb", surface, units="mm")
+    x, y, z = attributes(tmp_path / "a.glb", "east")[0]["POSITION"].T
+    used = 0.001 * surface.vertices[of_patch(surface, 1)]
+    assert np.column_stack([x, -z, y]) == pytest.approx(used, rel=1e-6, abs=1e-9)
+    again = pcmc.read(tmp_path / "a.glb", units="mm")
+    assert again.tensions == pytest.approx(surface.tensions, rel=1e-14)
+
+
 def test_each_patch_has_a_material_of_its_name(tmp_path):
     pcmc.write(tmp_path / "a.glb", tent())
     header, _ = contents(tmp_path / "a.glb")

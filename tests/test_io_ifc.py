@@ -120,6 +120,9 @@ def test_units_are_those_of_the_surface(tmp_path, length):
     assert calculate_unit_scale(model) == pytest.approx(METRES[length], rel=1e-15)
     assert get_project_unit(model, "FORCEUNIT") is None
     area = get_psets(parts["east"])["Pcmc_Patch"]["Area"]  # always in m²
+    again = pcmc.read(path, units=length)
+    assert np.abs(np.sort(again.vertices, axis=0) - np.sort(surface.vertices, axis=0)).max() == 0.0
+    assert again.tensions.tolist() == surface.tensions.tolist()
     assert area == pytest.approx(METRES[length] ** 2 * patch_areas(surface)[1], rel=1e-14)
 
 

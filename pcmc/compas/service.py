@@ -93,12 +93,12 @@ def read(path: str | os.PathLike[str], **options: Any) -> list[Any]:
     return to_meshes(surface)
 
 
-def write(path: str | os.PathLike[str], meshes: Any, weld: bool = False) -> None:
-    """Write the surface of COMPAS meshes to a file, as its suffix says; whole or not at all.
+def write(path: str | os.PathLike[str], meshes: Any, weld: bool = False, **options: Any) -> None:
+    """Write the surface of COMPAS meshes to a file, as its suffix says; options as in ``pcmc.write``.
 
     Over RPC the path is one of the server's.
     """
-    io.write(path, from_meshes(meshes, weld=weld))
+    io.write(path, from_meshes(meshes, weld=weld), **options)
 
 
 def _plain_certificate(found: Certificate) -> dict[str, Any]:

@@ -23,6 +23,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import FileError
 from ..base.files import check_regular
+from ..base.units import Units
 from ..surface import Surface
 from ..surface.colours import linear, patch_colors, scalar_colors
 from ..surface.surface import FAR
@@ -40,6 +41,7 @@ def write(
     path: Path,
     surface: Surface,
     scalars: Mapping[str, Floats],
+    units: Units,
     walls: str | None,
     colour: str,
     **_: Any,
@@ -76,7 +78,7 @@ def write(
             rgba = np.column_stack([linear(shades[used]), np.ones(len(used))])
             mesh.visual.vertex_attributes["color"] = np.round(255.0 * rgba).astype(np.uint8)
         scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name, transform=place)
-    scene.metadata["pcmc"] = metadata_text(surface)
+    scene.metadata["pcmc"] = metadata_text(surface, units)
     if walls is not None:
         scene.metadata[KEY] = walls
     if path.suffix.lower() == ".glb":

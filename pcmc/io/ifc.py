@@ -61,11 +61,11 @@ class _Model:
     def __init__(self, surface: Surface, units: Units) -> None:
         import ifcopenshell
 
-        self.surface, self.units = surface, units or Units("m")
+        self.surface, self.given, self.units = surface, units, units or Units("m")
         self.file: Any = ifcopenshell.file(schema="IFC4")
         self.add = self.file.create_entity
         content = (surface.vertices, surface.faces, surface.patch_of_face, support_of(surface))
-        digest = hashlib.sha256(metadata_text(surface).encode())
+        digest = hashlib.sha256(metadata_text(surface, units).encode())
         for array in content:
             digest.update(np.ascontiguousarray(array).tobytes())
         self.digest = digest.hexdigest()
@@ -128,7 +128,7 @@ class _Model:
         )
         if certificate:
             self.add_properties("Pcmc_Certificate", roof, self._findings(certificate))
-        texts = {"Description": self._text(metadata_text(self.surface))}
+        texts = {"Description": self._text(metadata_text(self.surface, self.given))}
         if walls is not None:
             texts["Walls"] = self._text(walls)
         self.add_properties("Pcmc_Surface", roof, texts)
@@ -247,4 +247,5 @@ def read(path: Path) -> MeshData:
         np.concatenate(support),
         metadata.plane,
         walls=arrays["walls"],
+        units=metadata.units,
     )
