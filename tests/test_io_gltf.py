@@ -12,7 +12,7 @@ from tents import tent
 
 import pcmc
 from generators import two_squares
-from pcmc.base.errors import LostWarning, OptionError
+from pcmc.base.errors import FileWarning, LostWarning, OptionError
 
 NAMES = ("west side", "east", "wall")
 
@@ -68,7 +68,8 @@ def test_lengths_are_metres(tmp_path):
     x, y, z = attributes(tmp_path / "a.glb", "east")[0]["POSITION"].T
     used = 0.001 * surface.vertices[of_patch(surface, 1)]
     assert np.column_stack([x, -z, y]) == pytest.approx(used, rel=1e-6, abs=1e-9)
-    again = pcmc.read(tmp_path / "a.glb", units="mm")
+    with pytest.warns(FileWarning, match="converted from m to mm"):
+        again = pcmc.read(tmp_path / "a.glb", units="mm")
     assert again.tensions == pytest.approx(surface.tensions, rel=1e-14)
 
 

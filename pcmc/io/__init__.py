@@ -251,7 +251,7 @@ def write(
     values = _values(certificate)
     try:
         module = import_module(f".{form.module}", __name__)
-        content = {"scalars": scalars, "colour": colour, "certificate": values}
+        content: dict[str, Any] = {"scalars": scalars, "colour": colour, "certificate": values}
         content |= {"walls": walls, "units": units}
         with atomic_write(path) as temporary:
             note = module.write(temporary, shown, **content)
