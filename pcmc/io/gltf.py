@@ -34,6 +34,7 @@ from .metadata import metadata_text, parse_metadata
 from .trimesh_scene import from_meshes
 
 SUPPORT = "_SUPPORT"
+NO_VALUE = float(np.finfo(np.float32).min)  # in place of NaN, which glTF does not allow
 ITEMS = 4  # of arrays, for each byte of a file; arrays may share their bytes
 
 
@@ -51,7 +52,8 @@ def write(
     data = {SUPPORT: support_of(surface).astype(np.float32)}
     for name, values in scalars.items():
         if len(values) == surface.n:
-            data["_" + re.sub(r"\W+", "_", name)] = values.astype(np.float32)
+            finite = np.isfinite(values) & (np.abs(values) < -NO_VALUE)
+            data["_" + re.sub(r"\W+", "_", name)] = np.where(finite, values, NO_VALUE).astype(np.float32)
     turned = surface.vertices[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
     place = np.eye(4)
     middle = turned.mean(axis=0)
@@ -100,7 +102,8 @@ def read(path: Path) -> MeshData:
             raise FileError(text, where=str(error)) from None
     mesh = from_meshes(scene, path.stem, parse_metadata(scene.metadata.get("pcmc")))
     X = mesh.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
-    scalars = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_") and k != SUPPORT}
+    named = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_") and k != SUPPORT}
+    scalars = {k: np.where(v == NO_VALUE, np.nan, v) for k, v in named.items()}
     support = mesh.scalars.get(SUPPORT)
     held = None if support is None else support_kinds(support)
     return replace(mesh, vertices=X, scalars=scalars, support=held, walls=scene.metadata.get(KEY))
