@@ -31,10 +31,13 @@ def convert(
     start: Start = False,
     cache: Cache = True,
     colour: Annotated[
-        str, option("NAME", "Scalar of the file that colours the vertices of a .glb.", "--colour", "--color")
+        str,
+        option(
+            "NAME", "Scalar of the file that colours the vertices of a .glb or .usda.", "--colour", "--color"
+        ),
     ] = "",
 ) -> int:
-    """Write a surface or a project's roof as .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf .3dm or .ifc.
+    """Write a surface or a project's roof as .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf .3dm .ifc .usda.
 
     \b
     Examples:

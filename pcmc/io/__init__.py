@@ -57,6 +57,7 @@ class Format:
     walls : whether such triangles go with a separate format as text.
     lines : whether it holds the lines and circles that vertices slide along.
     loses : what it never holds.
+    reads : whether pcmc reads it, too.
     unit : the unit of length that the format prescribes; empty if a file may have any, or says none.
     units : whether a file says its units.
     """
@@ -70,6 +71,7 @@ class Format:
     walls: bool = False
     lines: bool = False
     loses: tuple[str, ...] = ()
+    reads: bool = True
     unit: str = ""
     units: bool = True
 
@@ -85,6 +87,7 @@ FORMATS = {
     ".vtu": Format("vtk", scalars="both"),
     ".glb": Format("gltf", scalars="vertices", colours=True, separate=True, walls=True, unit="m"),
     ".gltf": Format("gltf", scalars="vertices", colours=True, separate=True, walls=True, unit="m"),
+    ".usda": Format("usd", scalars="vertices", colours=True, separate=True, walls=True, reads=False),
     ".3dm": Format("rhino", separate=True, walls=True),
     ".ifc": Format("ifc", certificate=True, separate=True, walls=True),
 }
@@ -163,6 +166,11 @@ def load(path: str | os.PathLike[str]) -> MeshData:
     path = Path(path)
     check_regular(path)
     form = _format(path)
+    if not form.reads:
+        text = (
+            f"{path}: pcmc writes {path.suffix} files and does not read them; read the surface's .pcmc file"
+        )
+        raise FileError(text, what=str(path), found=path.suffix)
     try:
         path.open("rb").close()  # the libraries' errors for a missing file differ
         data = without_unused(checked(import_module(f".{form.module}", __name__).read(path)))
@@ -196,7 +204,7 @@ def write(
     """Write a surface as the suffix says; the file appears whole or not at all.
 
     A wall below a junction on Π has triangles without area. Formats with a mesh per patch (.stl, .glb,
-    .gltf, .3dm) leave them out; .glb, .gltf and .3dm hold these walls as text, and ``read`` puts them
+    .gltf, .3dm, .ifc, .usda) leave them out; all but .stl hold these walls as text, and ``read`` puts them
     back. From .stl, and if another program changed the surface, the junction comes back sliding on Π.
 
     Parameters
@@ -206,10 +214,10 @@ def write(
     scalars : (n,) or (m,) arrays by name (curvature, error, ...), for formats that hold them.
     certificate : a Certificate, or values by name, for the formats that hold it (.pcmc, .ifc).
     colour : the name in ``scalars`` of an (n,) array that colours the vertices, for formats that hold
-        colours (.glb, .gltf). Without it each patch has a colour.
+        colours (.glb, .gltf, .usda). Without it each patch has a colour.
     units : of the surface: a unit of length such as "mm", or ``pcmc.base.units.Units`` with that of forces.
         The file says them. .glb and .gltf are in metres, as glTF prescribes: the surface is converted
-        (scalars are not). Without a unit the numbers are written as they are, in .3dm and .ifc as metres.
+        (scalars are not). Without a unit the numbers stay, and .3dm, .ifc and .usda files are in metres.
 
     Warns
     -----
