@@ -6,12 +6,14 @@ import socket
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from refusals import refused
+from starts import stationary
 from tents import tent
 
 import pcmc
@@ -107,6 +109,16 @@ def test_round_trip_through_json_is_exact(surface):
     meshes = through_json(rooms.to_meshes(surface))
     assert [type(mesh) for mesh in meshes] == [Mesh] * len(surface.patches)
     assert_same(rooms.from_meshes(meshes), surface)
+
+
+def test_walls_without_height_stay():
+    """Their triangles have no area, and their vertices lie on those of the junction."""
+    surface = stationary(partial(two_squares, 8, alpha_aux=3.0)).surface
+    again = rooms.from_meshes(through_json(rooms.to_meshes(surface)))
+    assert_same(again, surface)
+    pinched = pcmc.certify(again).pinched
+    assert len(pinched) > 0
+    np.testing.assert_array_equal(pinched, pcmc.certify(surface).pinched)
 
 
 def test_meshes_carry_what_the_surface_is():
