@@ -195,6 +195,7 @@ def changed(change):
 
 BAD = {
     "planes": (lambda m: m[0].vertex[2].update(planes=[1]), "planes", None),
+    "planes' sign": (lambda m: m[0].vertex[2].update(planes=[-1]), "planes", "west side"),
     "planes' kind": (lambda m: m[0].vertex[2].update(planes=1), "planes", "west side"),
     "no such edge": (lambda m: m[1].edgedata.update({"(4, 99)": {"cable": "c"}}), "cable", "east"),
     "loose cable": (lambda m: m[1].edge_attribute((2, 3), "cable", "c"), "cable", "east"),

@@ -111,9 +111,9 @@ def read_vertices(named: Mapping[str, Any]) -> Vertices:
             held = any(row.get(mark) for mark in HELD)
             support = FIXED if held else SLIDING if row.get(SLIDES) else FREE
             guide, planes = row.get(GUIDE), row.get(PLANES) or ()
-            if not (guide is None or (isinstance(guide, int) and guide >= 0)):
+            if not (guide is None or _is_index(guide)):
                 refuse(GUIDE, name, f"vertex {key}: {GUIDE!r} must be the number of a line or circle")
-            if not (isinstance(planes, Sequence) and all(isinstance(one, int) for one in planes)):
+            if not (isinstance(planes, Sequence) and all(map(_is_index, planes))):
                 refuse(PLANES, name, f"vertex {key}: {PLANES!r} must be a list of numbers of planes")
             rows.append((_position(row, name, key), support, -1 if guide is None else guide, planes))
             marked |= any(mark in row for mark in (SLIDES, *HELD))
@@ -199,9 +199,14 @@ def refuse(what: str, name: str, problem: str) -> NoReturn:
     raise SurfaceError(f"mesh {name!r}: {problem}", what=what, where=name)
 
 
+def _is_index(value: Any) -> bool:
+    """Whether it is a whole number ≥ 0."""
+    return isinstance(value, int | np.integer) and int(value) >= 0
+
+
 def _position(row: Mapping[str, Any], name: str, key: int) -> list[float]:
     """The coordinates in the attributes of a vertex."""
     point = [row.get(axis) for axis in "xyz"]
-    if not all(isinstance(x, int | float) and math.isfinite(x) for x in point):
+    if not all(isinstance(x, int | float | np.number) and math.isfinite(x) for x in point):
         refuse("vertices", name, f"vertex {key} is at {point}; set its x, y and z to finite numbers")
     return [float(x) for x in point if x is not None]

@@ -26,7 +26,7 @@ from . import mesh_arrays
 from .mesh_arrays import CABLE, GUIDE, PLANES, SLIDES, TENSION
 from .whole import KEY, Whole, read_whole
 
-MARKS: dict[str, Any] = {"is_support": False, SLIDES: False, GUIDE: None, PLANES: []}
+MARKS: dict[str, Any] = {"is_support": False, SLIDES: False, GUIDE: None, PLANES: None}
 QUANTITIES = dict.fromkeys(("mean_curvature", "rx", "ry", "rz"))
 CARRIED = {"vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane", "on_line"}
 CARRIED |= {"on_planes", "cables", "rooms"}
@@ -112,7 +112,8 @@ def from_meshes(
 
     Raises
     ------
-    SurfaceError : for anything that is not such a mesh; ``where`` is the mesh's name.
+    SurfaceError : for anything that is not such a mesh, or if the meshes form no surface; ``where`` is the
+        mesh's name, or the number of the vertex or face in the surface.
     MissingExtra : without COMPAS.
 
     Examples
