@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .energy.functional import energy, gradient, hessian
     from .existence import solve
     from .io import read, write
+    from .panels import Panels, panels
     from .surface import Circle, Line, Patch, Plane, Surface
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "Line",
     "MeshCheck",
     "MeshVerdict",
+    "Panels",
     "Parameter",
     "Patch",
     "Plane",
@@ -45,6 +47,7 @@ __all__ = [
     "hessian",
     "mean_curvature",
     "meet",
+    "panels",
     "read",
     "sensitivities",
     "solve",
@@ -64,15 +67,17 @@ _NAMES = {
     "energy.functional": ("energy", "gradient", "hessian"),
     "existence": ("solve",),
     "io": ("read", "write"),
+    "panels": ("Panels", "panels"),
     "surface": ("Circle", "Line", "Patch", "Plane", "Surface"),
 }
 
 
 class _Package(ModuleType):
-    """``pcmc.energy`` is the function, although a folder has the same name."""
+    """``pcmc.energy`` and ``pcmc.panels`` are functions, although folders have the same names."""
 
     def __setattr__(self, name: str, value: object) -> None:
-        if name != "energy" or not isinstance(value, ModuleType):  # the import sets the folder
+        folder = isinstance(value, ModuleType)  # set by its import
+        if not (folder and name in ("energy", "panels")):
             super().__setattr__(name, value)
 
 
