@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .energy.functional import energy, gradient, hessian
     from .existence import solve
     from .io import read, write
-    from .panels import Panels, panels
+    from .panels import FewerFamilies, Panels, fewer_families, panels
     from .surface import Circle, Line, Patch, Plane, Surface
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     "Circle",
     "Design",
     "Direction",
+    "FewerFamilies",
     "Line",
     "MeshCheck",
     "MeshVerdict",
@@ -42,6 +43,7 @@ __all__ = [
     "energy",
     "errors",
     "explore",
+    "fewer_families",
     "follow",
     "gradient",
     "hessian",
@@ -67,7 +69,7 @@ _NAMES = {
     "energy.functional": ("energy", "gradient", "hessian"),
     "existence": ("solve",),
     "io": ("read", "write"),
-    "panels": ("Panels", "panels"),
+    "panels": ("FewerFamilies", "Panels", "fewer_families", "panels"),
     "surface": ("Circle", "Line", "Patch", "Plane", "Surface"),
 }
 

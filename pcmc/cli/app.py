@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .building import panels_
 from .showing import convert, explore, plot
 from .solving import certify_, remesh_, solve_
 from .sweeping import sweep
@@ -47,6 +48,7 @@ for name, command, summary in (
     ("remesh", remesh_, "Change the triangle size, solve and certify again."),
     ("convert", convert, "Write a surface in another format."),
     ("plot", plot, "Draw a surface."),
+    ("panels", panels_, "Sort the panels of a roof into families; write a schedule."),
     ("sweep", sweep, "Solve every combination of some values; write a table."),
     ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
 ):

@@ -4,6 +4,7 @@ Gives ``panels``, ``fewer_families`` and their values to drawings, pictures and 
 ``accuracy`` and the rooms below it.
 """
 
+from .fewer import FewerFamilies, fewer_families
 from .schedule import Panels, panels
 
-__all__ = ["Panels", "panels"]
+__all__ = ["FewerFamilies", "Panels", "fewer_families", "panels"]

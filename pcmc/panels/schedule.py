@@ -193,7 +193,8 @@ def certified(surface: Surface, anyway: bool) -> Certificate:
     certificate = certify(surface)
     if not (certificate.certified or anyway):
         verdict = certificate.verdict
-        text = f"surface: not certified ({verdict.value}); solve it first, or accept it with anyway=True"
+        text = f"surface: not certified ({verdict.value}); solve it first, or accept it with"
+        text += " anyway=True (--anyway)"
         raise SurfaceError(text, what="surface", found=verdict, expected="a certified surface")
     return certificate
 

@@ -27,7 +27,7 @@ Gives ``run`` and ``load`` to sweeps, the page and the command. May import ``plo
 
 from .file import Project, build, load, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
-from .output import COLOURS, check_names, check_outputs, check_picture, paint, write_all
+from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
 from .remeshing import Remeshing
 from .running import Outcome, check_of, check_project_mesh, run, run_project, solve_project
 from .varied import check_varied, digest, is_project, varied
@@ -36,6 +36,7 @@ __all__ = [
     "COLOURS",
     "REQUIRED",
     "Key",
+    "OnStep",
     "Outcome",
     "Project",
     "Remeshing",
