@@ -18,10 +18,11 @@ if TYPE_CHECKING:
     from .existence import solve
     from .io import read, write
     from .panels import FewerFamilies, Panels, fewer_families, panels
-    from .surface import Circle, Line, Patch, Plane, Surface
+    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface
 
 __all__ = [
     "BoundaryMotion",
+    "Cable",
     "Certificate",
     "Circle",
     "Design",
@@ -34,6 +35,7 @@ __all__ = [
     "Parameter",
     "Patch",
     "Plane",
+    "Room",
     "Surface",
     "Target",
     "Verdict",
@@ -70,7 +72,7 @@ _NAMES = {
     "existence": ("solve",),
     "io": ("read", "write"),
     "panels": ("FewerFamilies", "Panels", "fewer_families", "panels"),
-    "surface": ("Circle", "Line", "Patch", "Plane", "Surface"),
+    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
 }
 
 

@@ -21,6 +21,7 @@ from . import (
     gallery,
     mesh_check,
     mesh_search,
+    panel_families,
     refinement,
     solvers,
     stability,
@@ -44,6 +45,7 @@ MODULES = (
     existence,
     mesh_check,
     accuracy,
+    panel_families,
     gallery,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}

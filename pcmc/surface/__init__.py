@@ -1,10 +1,15 @@
-"""The surface itself: patches, plane, mesh, their checks, topology, and the geometry of triangles.
+"""The surface itself: patches, planes, cables, rooms, mesh, their checks, topology, and triangle geometry.
 
-Gives ``Patch``, ``Plane``, ``Line``, ``Circle`` and ``Surface`` to all other rooms. Imports only ``base``.
+Gives ``Patch``, ``Plane``, ``Line``, ``Circle``, ``Cable``, ``Room`` and ``Surface`` to all other rooms.
+Imports only ``base``.
 """
 
+from .cable import Cable
 from .circle import Circle, Guide
 from .line import Line
-from .surface import Patch, Plane, Surface, expect_surface
+from .patch import Patch
+from .plane import Plane
+from .room import Room
+from .surface import Surface, expect_surface
 
-__all__ = ["Circle", "Guide", "Line", "Patch", "Plane", "Surface", "expect_surface"]
+__all__ = ["Cable", "Circle", "Guide", "Line", "Patch", "Plane", "Room", "Surface", "expect_surface"]

@@ -35,10 +35,10 @@ def positions(vertices: Any) -> Floats:
     if not reachable(X):
         bad = np.flatnonzero(~np.isfinite(X).all(axis=1))
         if len(bad):
-            _refuse_rows("vertices", X, bad, "is not finite", hint="replace or remove it")
+            refuse_rows("vertices", X, bad, "is not finite", hint="replace or remove it")
         bad = np.flatnonzero((np.abs(X) > LARGEST).any(axis=1))
         hint = "use a larger unit of length"
-        _refuse_rows("vertices", X, bad, f"is farther out than {LARGEST:g}", hint=hint)
+        refuse_rows("vertices", X, bad, f"is farther out than {LARGEST:g}", hint=hint)
     return X
 
 
@@ -67,26 +67,23 @@ def face_array(faces: Any, n: int) -> Ints:
         refuse_shape("faces", F, "(m, 3) with m > 0")
     bad = np.flatnonzero(((F < 0) | (n <= F)).any(axis=1))
     if len(bad):
-        _refuse_rows("faces", F, bad, "names a vertex outside the range", f"0..{n - 1}")
+        refuse_rows("faces", F, bad, "names a vertex outside the range", f"0..{n - 1}")
     bad = np.flatnonzero((F[:, [1, 2, 0]] == F).any(axis=1))
     if len(bad):
-        _refuse_rows("faces", F, bad, "has a vertex twice", hint="remove the face")
+        refuse_rows("faces", F, bad, "has a vertex twice", hint="remove the face")
     return F.astype(np.int32)
 
 
 def patch_array(patch_of_face: Any, m: int, patches: Sequence[Any]) -> Ints:
     """(m,) int32 indices into ``patches``, every patch used, names unique."""
     names = [p.name for p in patches]
-    double = [name for name, times in Counter(names).items() if times > 1]
-    if double:
-        message = f"patches: the name {double[0]!r} is used twice; names must be unique"
-        raise SurfaceError(message, what="patches", found=double[0])
+    unique_names("patches", names)
     P = _integers(patch_of_face, "patch_of_face")
     if P.shape != (m,):
         refuse_shape("patch_of_face", P, f"({m},), one entry per face")
     bad = np.flatnonzero((P < 0) | (len(names) <= P))
     if len(bad):
-        _refuse_rows("patch_of_face", P, bad, "names a patch outside the range", f"0..{len(names) - 1}")
+        refuse_rows("patch_of_face", P, bad, "names a patch outside the range", f"0..{len(names) - 1}")
     empty = np.flatnonzero(np.bincount(P, minlength=len(names)) == 0)
     if len(empty):
         message = f"patch {names[empty[0]]!r} (index {empty[0]}) has no faces; remove it"
@@ -106,9 +103,31 @@ def mask(chosen: Any, n: int, what: str) -> Bools:
         indices = _integers(given, what).ravel()
         bad = np.flatnonzero((indices < 0) | (indices >= n))
         if len(bad):
-            _refuse_rows(what, indices, bad, "names a vertex outside the range", f"0..{n - 1}")
+            refuse_rows(what, indices, bad, "names a vertex outside the range", f"0..{n - 1}")
         result[indices] = True
     return result
+
+
+def edge_array(edges: Any, what: str) -> Ints:
+    """(k,2) int32 pairs of vertices, the smaller first, in ascending order, none twice."""
+    E = _integers(edges, what)
+    if E.ndim != 2 or E.shape[1] != 2 or not len(E):
+        refuse_shape(what, E, "(k, 2) with k > 0")
+    E = np.sort(E, axis=1)
+    order = np.lexsort((E[:, 1], E[:, 0]))
+    E = E[order]
+    bad = np.flatnonzero((E[1:] == E[:-1]).all(axis=1))
+    if len(bad):
+        refuse_rows(what, E, bad, "is given twice", hint="remove one")
+    return E.astype(np.int32)
+
+
+def unique_names(what: str, names: Iterable[str]) -> None:
+    """Refuse the first name that is used twice."""
+    double = [name for name, times in Counter(names).items() if times > 1]
+    if double:
+        message = f"{what}: the name {double[0]!r} is used twice; names must be unique"
+        raise SurfaceError(message, what=what, found=double[0])
 
 
 def mesh(
@@ -118,14 +137,14 @@ def mesh(
     names = [p.name for p in patches]
     unused = np.flatnonzero(np.bincount(F.ravel(), minlength=len(X)) == 0)
     if len(unused):
-        _refuse_rows("vertices", X, unused, "belongs to no face", hint="remove it and renumber the faces")
+        refuse_rows("vertices", X, unused, "belongs to no face", hint="remove it and renumber the faces")
     flat = _flat(X, F)
     if flat.any():
         flat &= ~_vanished(F, patch, patches, held, lying(height, X))
     bad = np.flatnonzero(flat)
     if len(bad):
         fault = f"of patch {names[patch[bad[0]]]!r} has zero area"
-        _refuse_rows("faces", F, bad, fault, hint="merge its vertices or remesh")
+        refuse_rows("faces", F, bad, fault, hint="merge its vertices or remesh")
     if not _perhaps_at_fault(F, patch, topo.edge_of_face, len(topo.edges)):
         return
     pair = np.sort(topo.edge_of_face, axis=1).astype(np.int64)  # two edges make a triangle
@@ -193,14 +212,14 @@ def lying(height: Floats, X: Floats) -> Bools:
     return np.abs(height) <= max(RESTING * bounding_size(X), ROUNDED * float(np.abs(X).max(initial=0.0)))
 
 
-def on_plane(height: Floats, sliding: Bools, X: Floats, size: float) -> None:
-    """Sliding vertices must lie on Π to 1e-9 of the size, or to rounding of their coordinates."""
+def on_plane(height: Floats, sliding: Bools, X: Floats, size: float, name: str = "plane") -> None:
+    """Sliding vertices must lie on their plane to 1e-9 of the size, or to rounding of their coordinates."""
     near = max(1e-9 * size, ROUNDED * float(np.abs(X).max(initial=0.0)))
     bad = np.flatnonzero(sliding & (np.abs(height) > near))
     if len(bad):
-        fault = f"slides on the plane, but is {height[bad[0]]:.3g} away from it"
+        fault = f"slides on the {name}, but is {height[bad[0]]:.3g} away from it"
         hint = "move it onto the plane or hold it with fixed="
-        _refuse_rows("vertices", X, bad, fault, hint=hint)
+        refuse_rows("vertices", X, bad, fault, hint=hint)
 
 
 def on_line(given: Any, X: Floats) -> list[tuple[Guide, Bools]]:
@@ -215,7 +234,7 @@ def on_line(given: Any, X: Floats) -> list[tuple[Guide, Bools]]:
         along = mask(pair[1], len(X), "on_line")
         bad = np.flatnonzero(along & taken)
         if len(bad):
-            _refuse_rows("vertices", X, bad, "slides along two lines", hint="hold it with fixed= instead")
+            refuse_rows("vertices", X, bad, "slides along two lines", hint="hold it with fixed= instead")
         taken |= along
         lines.append((pair[0], along))
     on_lines(lines, X)
@@ -233,7 +252,7 @@ def on_lines(lines: Iterable[tuple[Guide, Bools]], X: Floats) -> None:
             place = f"around {line.centre}" if isinstance(line, Circle) else f"through {line.point}"
             fault = f"slides along the {name} {place}, but is {distance[bad[0]]:.3g} away from it"
             hint = f"move it onto the {name} or hold it with fixed="
-            _refuse_rows("vertices", X, bad, fault, hint=hint)
+            refuse_rows("vertices", X, bad, fault, hint=hint)
 
 
 def _oriented(F: Ints, patch: Ints, topo: Topology, names: Sequence[str]) -> None:
@@ -306,7 +325,7 @@ def refuse_shape(what: str, array: Any, expected: object) -> NoReturn:
     raise SurfaceError(message, what=what, found=array.shape, expected=expected)
 
 
-def _refuse_rows(
+def refuse_rows(
     what: str, rows: Any, bad: Ints, fault: str, expected: str | None = None, hint: str = ""
 ) -> NoReturn:
     """Refuse the first of the bad rows, with their number."""

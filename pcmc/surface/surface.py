@@ -1,8 +1,7 @@
-"""Patch, Plane and Surface: frozen values, checked once on the way in."""
+"""Surface: a frozen value, checked once on the way in."""
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,129 +14,30 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
-from . import checks
+from . import checks, supports
+from .cable import Cable, checked_cables
 from .circle import Circle, Guide
-from .geometry import Vector, bounding_size
+from .geometry import bounding_size
+from .patch import Patch
+from .plane import Plane
+from .room import Room, checked_rooms, room_signs
 from .topology import Topology, topology
 
-FIELDS = ("vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane", "on_line")
+FIELDS = (
+    "vertices",
+    "faces",
+    "patch_of_face",
+    "patches",
+    "fixed",
+    "on_plane",
+    "plane",
+    "on_line",
+    "on_planes",
+    "cables",
+    "rooms",
+)
+GROUND = Plane()
 FAR = 30.0  # sizes from the point of Π: farther, volumes seen from it lose over three digits
-
-
-@dataclass(frozen=True)
-class Patch:
-    """A part of the surface with one tension and one pressure.
-
-    Parameters
-    ----------
-    name : str, unique in its surface.
-    tension : α ≥ 0, force per length. At rest the patch has mean curvature pressure / (2 α).
-    pressure : p, force per area along the positive normal: the pressure below the patch minus the one
-        above it. A wall between rooms of pressures p_1 and p_2 has pressure p_1 - p_2, its normal
-        pointing from room 1 to room 2; ``pcmc.energy`` describes E for other wall pressures.
-    wall : whether the patch is a wall between rooms: its cone is not part of the volume, and it may
-        pinch. A patch without pressure is always a wall.
-
-    >>> Patch("roof", tension=2.0).target_curvature
-    0.25
-    """
-
-    name: str
-    tension: float
-    pressure: float = 1.0
-    wall: bool = field(default=False, repr=False)
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.name, str):
-            validate.refuse("Patch.name", self.name, "a text", error=SurfaceError)
-        object.__setattr__(self, "name", str(self.name))
-        if not isinstance(self.wall, bool | np.bool_):
-            validate.refuse("wall", self.wall, "True or False", self.name, error=SurfaceError)
-        object.__setattr__(self, "wall", bool(self.wall))
-        tension = self._number("tension", least=0.0, hint="0 makes a wall that does not pull")
-        pressure = self._number("pressure")
-        if tension == 0.0 and pressure != 0.0:
-            hint = f"a patch under pressure {pressure:g} must pull; a wall (pressure=0) may have tension 0"
-            validate.refuse("tension", 0.0, "> 0", self.name, hint, SurfaceError)
-        if 0.0 < tension < checks.SMALLEST:
-            hint = "use a smaller unit of force"
-            validate.refuse("tension", tension, f"0 or ≥ {checks.SMALLEST:g}", self.name, hint, SurfaceError)
-
-    def _number(self, key: str, least: float | None = None, hint: str = "") -> float:
-        value, where, most = getattr(self, key), self.name, checks.LARGEST
-        number = validate.number(key, value, least=least, where=where, hint=hint, error=SurfaceError)
-        hint = "use a larger unit of force"
-        validate.number(key, number, least=-most, most=most, where=where, hint=hint, error=SurfaceError)
-        object.__setattr__(self, key, number)
-        return number
-
-    @property
-    def auxiliary(self) -> bool:
-        """Whether the patch is a wall: declared as one, or without pressure."""
-        return self.wall or self.pressure == 0.0
-
-    @property
-    def target_curvature(self) -> float:
-        """H̄ = p / (2 α), 1/length; NaN for a wall without tension, whose shape is arbitrary."""
-        return self.pressure / (2.0 * self.tension) if self.tension > 0.0 else math.nan
-
-
-@dataclass(frozen=True)
-class Plane:
-    """The plane Π through ``point`` with unit ``normal`` (normalised on the way in).
-
-    Volumes are measured from its point, so with the boundary on Π the volume is the one enclosed
-    between surface and Π.
-
-    >>> Plane(normal=(0, 0, 2)).normal
-    (0.0, 0.0, 1.0)
-    """
-
-    point: Vector = (0.0, 0.0, 0.0)
-    normal: Vector = (0.0, 0.0, 1.0)
-
-    def __post_init__(self) -> None:
-        for key in ("point", "normal"):
-            vector = validate.vector(f"Plane.{key}", getattr(self, key), error=SurfaceError)
-            object.__setattr__(self, key, vector)
-        if max(map(abs, self.point)) > checks.LARGEST:
-            limit = f"coordinates up to {checks.LARGEST:g}"
-            validate.refuse("Plane.point", self.point, limit, error=SurfaceError)
-        _, exponent = math.frexp(max(map(abs, self.normal)))
-        scaled = [math.ldexp(c, -exponent) for c in self.normal]  # so that no square is too large or small
-        length = math.sqrt(sum(c * c for c in scaled))
-        if length == 0.0:
-            validate.refuse("Plane.normal", self.normal, "a vector of positive length", error=SurfaceError)
-        object.__setattr__(self, "normal", tuple(c / length for c in scaled))
-
-    @cached_array
-    def axes(self) -> Floats:
-        """(3,3) rows: two unit vectors along the plane and its normal; the identity for z = 0."""
-        normal = np.array(self.normal)
-        axis = np.eye(3)[1 if abs(normal[0]) > 0.9 else 0]
-        first = axis - (axis @ normal) * normal
-        first /= np.linalg.norm(first)
-        return np.stack([first, np.cross(normal, first), normal])
-
-    def __getstate__(self) -> dict[str, object]:
-        return {"point": self.point, "normal": self.normal}
-
-    def to_local(self, points: npt.ArrayLike) -> Floats:
-        """(…,3) two coordinates on the plane and the height above it, of points (…,3).
-
-        >>> Plane(point=(1, 2, 3)).to_local([1, 3, 5]).tolist()
-        [0.0, 1.0, 2.0]
-        """
-        return (np.asarray(points, dtype=float) - np.array(self.point)) @ self.axes.T
-
-    def height(self, points: npt.ArrayLike) -> Floats:
-        """(…) signed distance of points (…,3) from the plane, positive along the normal."""
-        return (np.asarray(points, dtype=float) - np.array(self.point)) @ np.array(self.normal)
-
-    def along(self, vectors: Floats) -> Floats:
-        """(…,3) the components of vectors (…,3) parallel to the plane: v - ⟨v, n⟩ n, Eq. (19)."""
-        normal = np.array(self.normal)
-        return vectors - (vectors @ normal)[..., None] * normal
 
 
 def expect_surface(value: object) -> None:
@@ -168,6 +68,11 @@ class Surface:
     on_line : mapping from a Line or a Circle to an index array or (n,) mask: vertices that slide along it
         and are fixed but for that. On a straight or round boundary the end of a junction can slide so; let
         the other vertices of the boundary slide too, but for its corners, so that they can make room.
+    on_planes : mapping from a Plane to an index array or (n,) mask: vertices that slide on a plane other than
+        Π. Those on two planes slide along the line where these meet; those on three are fixed. At a plane
+        with ``mirror=True`` the surface goes on as its mirror image.
+    cables : sequence of Cable, names unique: edges with a line tension.
+    rooms : sequence of Room, names unique: volumes that are prescribed instead of pressures.
 
     Raises
     ------
@@ -188,8 +93,11 @@ class Surface:
     patches: tuple[Patch, ...]
     fixed: Bools = field(default=cast(Bools, ()))
     on_plane: Bools = field(default=cast(Bools, ()))
-    plane: Plane = Plane()
+    plane: Plane = field(default=GROUND)
     on_line: tuple[tuple[Guide, Bools], ...] = ()
+    on_planes: tuple[tuple[Plane, Bools], ...] = ()
+    cables: tuple[Cable, ...] = ()
+    rooms: tuple[Room, ...] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.plane, Plane):
@@ -203,18 +111,27 @@ class Surface:
         patch = checks.patch_array(self.patch_of_face, len(F), patches)
         fixed = checks.mask(self.fixed, len(X), "fixed")
         on_line = checks.on_line(self.on_line, X)
+        on_plane = checks.mask(self.on_plane, len(X), "on_plane")
+        on_planes = supports.plane_masks(self.on_planes, len(X))
+        if on_planes:
+            both = [(self.plane, on_plane), *on_planes]
+            on_line, points = supports.guides_and_points(both, fixed, on_line)
+            fixed |= points
         for _, along in on_line:
             fixed |= along
         object.__setattr__(self, "on_line", tuple((line, read_only(along)) for line, along in on_line))
-        sliding = checks.mask(self.on_plane, len(X), "on_plane") & ~fixed
+        sliding = on_plane & ~fixed
+        object.__setattr__(self, "on_planes", tuple((plane, read_only(mask)) for plane, mask in on_planes))
         arrays = {"vertices": X, "faces": F, "patch_of_face": patch, "fixed": fixed}
         for key, value in (arrays | {"on_plane": sliding}).items():
             object.__setattr__(self, key, read_only(value))
         object.__setattr__(self, "patches", patches)
+        object.__setattr__(self, "cables", checked_cables(self.cables, self.topology.edges, len(X)))
+        object.__setattr__(self, "rooms", checked_rooms(self.rooms, [p.name for p in patches]))
         height = self.plane.height(X)
-        checks.mesh(X, F, patch, self.topology, self.patches, fixed | sliding, height)
-        checks.on_plane(height, sliding, X, self.size)
-        if not (fixed.any() or sliding.any()):
+        checks.mesh(X, F, patch, self.topology, self.patches, self.held, height)
+        self._check_planes(X)
+        if not self.held.any():
             message = "no vertex is fixed or on the plane: translations are free, so only closed surfaces"
             message += " have an equilibrium; pass fixed= or on_plane= to hold it"
             warnings.warn(message, FreeSurfaceWarning, stacklevel=3)
@@ -249,7 +166,7 @@ class Surface:
         topo = self.topology
         pressure = self.pressures[self.patch_of_face, None] * topo.sense
         left = np.bincount(topo.edge_of_face.ravel(), pressure.ravel(), len(topo.edges))
-        held = (self.fixed | self.on_plane)[topo.edges].all(axis=1)
+        held = self.held[topo.edges].all(axis=1)
         rounding = 1e-12 * np.abs(self.pressures).max(initial=0.0)
         return np.where(held | (np.abs(left) <= rounding), 0.0, left)
 
@@ -287,10 +204,29 @@ class Surface:
         """(k,) pressure p of each patch."""
         return np.array([p.pressure for p in self.patches])
 
+    @cached_property
+    def sliding(self) -> tuple[tuple[Plane, Bools], ...]:
+        """The planes that vertices slide on, Π first, each with the (n,) mask of those on it alone."""
+        others = ((plane, read_only(mask & ~self.fixed)) for plane, mask in self.on_planes)
+        return tuple((p, mask) for p, mask in ((self.plane, self.on_plane), *others) if mask.any())
+
+    @cached_array
+    def held(self) -> Bools:
+        """(n,) vertices that some support holds: fixed, or sliding on a plane, line or circle."""
+        held = self.fixed | self.on_plane
+        for _, mask in self.on_planes:
+            held = held | mask
+        return held
+
     @property
     def free(self) -> Bools:
         """(n,) vertices that no support holds at all."""
-        return ~(self.fixed | self.on_plane)
+        return ~self.held
+
+    @cached_array
+    def room_signs(self) -> Floats:
+        """(r,k) 1 or -1 where a patch bounds a room, by the sense of its normal; 0 elsewhere."""
+        return room_signs(self.rooms, [patch.name for patch in self.patches])
 
     @property
     def on_circle(self) -> tuple[tuple[Circle, Bools], ...]:
@@ -311,7 +247,7 @@ class Surface:
         X = checks.positions(vertices)
         if X.shape != self.vertices.shape:
             checks.refuse_shape("vertices", X, self.vertices.shape)
-        checks.on_plane(self.plane.height(X), self.on_plane, X, self.size)
+        self._check_planes(X)
         checks.on_lines(self.on_line, X)
         return self._with(vertices=read_only(X))
 
@@ -320,24 +256,33 @@ class Surface:
         tensions: Mapping[str, float] | None = None,
         pressures: Mapping[str, float] | None = None,
         walls: Iterable[str] = (),
+        *,
+        weights: Mapping[str, float] | None = None,
+        cables: Mapping[str, float] | None = None,
+        volumes: Mapping[str, float] | None = None,
     ) -> Surface:
-        """The same surface with other tensions or pressures, given by patch name.
+        """The same surface with other tensions, pressures or weights, given by patch name.
 
-        ``walls`` names patches that are walls whatever their pressure.
+        ``walls`` names patches that are walls whatever their pressure; ``cables`` gives tensions by the name
+        of the cable, ``volumes`` volumes by the name of the room.
         """
-        for key, given in (("tensions", tensions), ("pressures", pressures)):
+        by_patch = {"tension": tensions, "pressure": pressures, "weight": weights}
+        for key, given in (by_patch | {"cable": cables, "volume": volumes}).items():
             if not isinstance(given or {}, Mapping):
-                validate.refuse(key, given, "a mapping from patch names to numbers", error=SurfaceError)
+                validate.refuse(f"{key}s", given, "a mapping from names to numbers", error=SurfaceError)
         if isinstance(walls, str) or not isinstance(walls, Iterable):
             validate.refuse("walls", walls, "a sequence of patch names", error=SurfaceError)
         patches = list(self.patches)
         changes: dict[int, dict[str, Any]] = {self.patch_index(name): {"wall": True} for name in walls}
-        for key, given in (("tension", tensions), ("pressure", pressures)):
+        for key, given in by_patch.items():
             for name, value in (given or {}).items():
                 changes.setdefault(self.patch_index(name), {})[key] = value
         for index, both in changes.items():
             patches[index] = replace(patches[index], **both)
-        return self._with(patches=tuple(patches))
+        pulling = _renewed("cable", self.cables, "tension", cables)
+        return self._with(
+            patches=tuple(patches), cables=pulling, rooms=_renewed("room", self.rooms, "volume", volumes)
+        )
 
     def __copy__(self) -> Surface:
         """The surface itself: it never changes."""
@@ -354,12 +299,18 @@ class Surface:
     def __setstate__(self, state: dict[str, object]) -> None:
         for name, value in state.items():
             vars(self)[name] = read_only(value) if isinstance(value, np.ndarray) else value
-        for _, along in self.on_line:
+        for _, along in (*self.on_line, *self.on_planes):
             read_only(along)
 
     def patch_faces(self, patches: Sequence[int]) -> Bools:
         """(m,) mask of the triangles of the given patches."""
         return np.isin(self.patch_of_face, patches)
+
+    def _check_planes(self, X: Floats) -> None:
+        """Sliding vertices must lie on their planes."""
+        checks.on_plane(self.plane.height(X), self.on_plane, X, self.size)
+        for plane, mask in self.on_planes:
+            checks.on_plane(plane.height(X), mask, X, self.size, str(plane))
 
     def _with(self, **changes: object) -> Surface:
         """A copy that skips the checks already made; the topology travels along."""
@@ -369,3 +320,14 @@ class Surface:
         if "patches" not in changes:  # seen from one point all along a solver's way
             other.__dict__["origin"] = self.origin
         return other
+
+
+def _renewed(
+    kind: str, parts: tuple[Any, ...], key: str, values: Mapping[str, float] | None
+) -> tuple[Any, ...]:
+    """Cables or rooms with other values of a field, given by name."""
+    names, new = [part.name for part in parts], list(parts)
+    for name, value in (values or {}).items():
+        index = names.index(validate.choice(kind, name, names))
+        new[index] = replace(new[index], **{key: value})
+    return tuple(new)

@@ -1,0 +1,80 @@
+"""A cable: edges of a surface that carry a line tension."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base import validate
+from ..base.arrays import Ints, read_only
+from ..base.errors import SurfaceError
+from . import checks
+
+
+@dataclass(frozen=True, eq=False)
+class Cable:
+    """A curve of edges with one line tension: E gains τ · length.
+
+    Parameters
+    ----------
+    name : str, unique in its surface.
+    tension : τ ≥ 0, force. A free edge of a flat membrane with tension α is at rest on arcs of radius τ/α.
+    edges : (k,2) int, the vertices that each edge joins, in any order.
+
+    >>> Cable("east", 2.0, [[4, 3], [4, 5]]).edges.tolist()
+    [[3, 4], [4, 5]]
+    """
+
+    name: str
+    tension: float
+    edges: Ints
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            validate.refuse("Cable.name", self.name, "a text", error=SurfaceError)
+        number = validate.number(
+            "tension", self.tension, least=0.0, most=checks.LARGEST, where=self.name, error=SurfaceError
+        )
+        object.__setattr__(self, "tension", number)
+        edges = checks.edge_array(self.edges, f"cable {self.name!r}")
+        object.__setattr__(self, "edges", read_only(edges))
+
+    @classmethod
+    def along(cls, name: str, tension: float, vertices: npt.ArrayLike, closed: bool = False) -> Cable:
+        """The cable through a sequence of vertices (k,), each joined to the next.
+
+        >>> Cable.along("ring", 1.0, [2, 0, 1], closed=True).edges.tolist()
+        [[0, 1], [0, 2], [1, 2]]
+        """
+        chain: Sequence[int] = np.asarray(vertices).tolist()
+        following = [*chain[1:], chain[0]] if closed else chain[1:]
+        return cls(name, tension, np.array(list(zip(chain, following, strict=False))))
+
+
+def checked_cables(given: Any, edges: Ints, n: int) -> tuple[Cable, ...]:
+    """Cables of unique names on edges (e,2) of a mesh with n vertices, no edge in two of them."""
+    parts = tuple(given) if isinstance(given, Iterable) else (None,)
+    if not all(isinstance(part, Cable) for part in parts):
+        validate.refuse("cables", given, "a sequence of Cable", error=SurfaceError)
+    checks.unique_names("cables", [cable.name for cable in parts])
+    there = np.sort(edges.astype(np.int64) @ np.array([n, 1]))
+    taken = np.empty(0, dtype=np.int64)
+    for cable in parts:
+        keys = cable.edges.astype(np.int64) @ np.array([n, 1])
+        bad = np.flatnonzero(
+            ~np.isin(keys, there) | (cable.edges < 0).any(axis=1) | (cable.edges >= n).any(axis=1)
+        )
+        what = f"cable {cable.name!r}: edges"
+        if len(bad):
+            fault = "joins vertices that no edge of the mesh joins"
+            checks.refuse_rows(what, cable.edges, bad, fault, hint="name the two ends of an edge")
+        bad = np.flatnonzero(np.isin(keys, taken))
+        if len(bad):
+            hint = "make it one cable with the sum of their tensions"
+            checks.refuse_rows(what, cable.edges, bad, "carries another cable, too", hint=hint)
+        taken = np.append(taken, keys)
+    return parts
