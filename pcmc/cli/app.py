@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .building import panels_
+from .building import draw_, panels_
 from .showing import convert, explore, plot
 from .solving import certify_, remesh_, solve_
 from .sweeping import sweep
@@ -49,6 +49,7 @@ for name, command, summary in (
     ("convert", convert, "Write a surface in another format."),
     ("plot", plot, "Draw a surface."),
     ("panels", panels_, "Sort the panels of a roof into families; write a schedule."),
+    ("draw", draw_, "Draw plan, elevations, sections and panels for those who build."),
     ("sweep", sweep, "Solve every combination of some values; write a table."),
     ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
 ):

@@ -11,6 +11,8 @@ import typer
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError
+from ..drawings import drawing_set
+from ..drawings.drawing_set import check_name
 from ..io import FORMATS, write
 from ..panels import Panels, fewer_families, panels
 from ..panels.schedule import MIRROR_IMAGES
@@ -22,6 +24,9 @@ from .progress import working
 CSV = ".csv"
 CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."
 ANYWAY = "Accept a surface that is not certified."
+MARKED = "Draw a surface that is not certified; every sheet is marked."
+TOLERANCE = "Largest difference of edges within a family of panels; adds the schedule."
+TRUE_SIZE = "Draw every panel at true size; needs --tolerance."
 Anyway = Annotated[bool, typer.Option("--anyway", help=ANYWAY)]
 
 
@@ -80,6 +85,64 @@ def panels_(
     if written:
         print(f"written: {', '.join(map(str, written))}")
     return OK if schedule.certificate.certified else NOT_CERTIFIED
+
+
+def draw_(
+    file: Input,
+    output: Annotated[list[Path], MANY_FILES],
+    units: Annotated[str | None, option("NAME", "Unit of the lengths: m, cm, mm, ft or in.")] = None,
+    sheet: Annotated[str, option("NAME", "Format of the sheets: A4, A3, A2, A1 or A0.")] = "A1",
+    scale: Annotated[
+        int | None, option("NUMBER", "1 to this; by default it fits.", parser=arguments.integer)
+    ] = None,
+    height: Annotated[
+        list[str] | None, option("Z", "Section at this height; may be repeated.", "--height")
+    ] = None,
+    line: Annotated[list[str] | None, option("X,Y,X,Y", "Section along this line; may be repeated.")] = None,
+    tolerance: Annotated[float | None, option("LENGTH", TOLERANCE, parser=number)] = None,
+    panel_sheets: Annotated[bool, typer.Option("--panel-sheets", help=TRUE_SIZE)] = False,
+    anyway: Annotated[bool, typer.Option("--anyway", help=MARKED)] = False,
+) -> int:
+    """Draw a roof: plan, elevations, sections, setting-out points, panels; in .dxf, .pdf or .svg.
+
+    \b
+    Examples:
+      pcmc draw roof.toml --units m -o roof.dxf -o roof.pdf
+      pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
+    """
+    for path in output:
+        check_name(path)
+    projects.check_outputs(output)
+    heights = None if height is None else [number(text) for text in height]
+    lines = None if line is None else [_ends(text) for text in line]
+    arguments.check_input(file)
+    with working() as say:
+        surface = settled(file, say)
+        say("drawing")
+        drawings = drawing_set(
+            surface,
+            units or "",
+            sheet=sheet,
+            scale=scale,
+            heights=heights,
+            lines=lines,
+            tolerance=tolerance,
+            panel_sheets=panel_sheets,
+            name=file.stem,
+            anyway=anyway,
+        )
+        written = projects.write_all(drawings.files(*output), say)
+    print(f"{len(drawings.sheets)} sheets {sheet}; written: {', '.join(map(str, written))}")
+    return OK if drawings.certificate.certified else NOT_CERTIFIED
+
+
+def _ends(text: str) -> Any:
+    """Two points from X,Y,X,Y."""
+    try:
+        a, b, c, d = (float(part) for part in text.split(","))
+    except ValueError:
+        validate.refuse("--line", text, "four numbers X,Y,X,Y")
+    return (a, b), (c, d)
 
 
 def settled(file: Path, say: projects.OnStep) -> Surface:

@@ -139,8 +139,10 @@ def drawing_set(
     >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
     ...                [Patch("roof", 1.0)], fixed=range(4))
     >>> drawings = drawing_set(roof, "m", sheet="A3")
-    >>> [(sheet.title, sheet.scale) for sheet in drawings.sheets]
-    [('Plan', '1:10'), ('Elevations', '1:20'), ('Sections', '1:20'), ('Setting-out points', '')]
+    >>> [sheet.title for sheet in drawings.sheets]
+    ['Plan', 'Elevations', 'Sections at heights', 'Sections along lines', 'Setting-out points']
+    >>> drawings.sheets[0].scale
+    '1:10'
     """
     expect_surface(surface)
     millimetres = _millimetres(units)
@@ -160,12 +162,16 @@ def drawing_set(
     named = [(str(row.point), np.array([row.x, row.y, row.z])) for row in points.itertuples()]
     levels = _levels(surface, heights)
     profiles = _profiles(surface, lines)
-    size = {"name": sheet, "millimetres": millimetres, "scale": scale}
-    cuts = [views.contours(surface, curves, levels), *(view for view, _ in profiles)]
+    size: dict[str, Any] = {"name": sheet, "millimetres": millimetres, "scale": scale}
     sheets = [
         views.placed([views.plan(surface, curves, named)], "Plan", **size),
-        views.placed(views.elevations(surface, curves), "Elevations", **size, columns=2),
-        views.placed(cuts, "Sections", **size, columns=2),
+        views.placed(views.elevations(surface, curves), "Elevations", **size),
+    ]
+    if levels:
+        sheets.append(views.placed([views.contours(surface, curves, levels)], "Sections at heights", **size))
+    if profiles:
+        sheets.append(views.placed([view for view, _ in profiles], "Sections along lines", **size))
+    sheets += [
         *table_sheets("Setting-out points", *_point_rows(points, DECIMALS[units]), sheet),
     ]
     if schedule is not None:

@@ -9,9 +9,10 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..panels import Panels
-from .sheet import WIDTH, Line, Sheet, Text, corner, room, smallest_format
+from .sheet import FORMATS, WIDTH, Line, Sheet, Text, corner, room
 
 SPACE = 6.0  # mm between panels
+TURNS = np.radians(np.arange(180.0))  # in which a panel is tried that does not fit as it lies
 
 
 def panel_sheets(schedule: Panels, name: str, millimetres: float) -> list[Sheet]:
@@ -21,28 +22,65 @@ def panel_sheets(schedule: Panels, name: str, millimetres: float) -> list[Sheet]
     ------
     OptionError : a panel does not fit a sheet at true size; the message names the smallest format.
     """
-    flat = schedule.flat * millimetres
-    flat = _turned_to_fit(flat, name)
-    sizes = np.ptp(flat, axis=1)
     labels = _labels(schedule)
     wide, high = room(name)
     sheets: list[Sheet] = []
-    x = y = row = 0.0
+    row: list[Floats] = []  # the panels of the row being filled
+    y = depth = 0.0  # the row's top below the sheet's, and its height
     first = 0
-    for k, size in enumerate(sizes):
-        if x > 0.0 and x + size[0] > wide:
-            x, y, row = 0.0, y + row + SPACE, 0.0
-        if not sheets or y + size[1] > high:
-            if sheets:
-                _name(sheets[-1], first, k)
-            sheets.append(Sheet("", name, "1:1"))
-            x = y = row = 0.0
-            first = k
-        place = corner() + np.array([x, high - y - size[1]]) - flat[k].min(axis=0)
-        _add_panel(sheets[-1], flat[k] + place, k, schedule, labels[k])
-        x, row = x + size[0] + SPACE, max(row, float(size[1]))
-    _name(sheets[-1], first, len(sizes))
+    for k, panel in enumerate(_turned_to_fit(schedule.flat * millimetres, name)):
+        size = np.ptp(panel, axis=0)
+        placed = _beside(row, panel)
+        if not sheets or placed[:, 0].max() > wide or y + size[1] > high:
+            y, depth, row = y + depth + SPACE, 0.0, []
+            if not sheets or y + size[1] > high:
+                if sheets:
+                    _name(sheets[-1], first, k)
+                sheets.append(Sheet("", name, "1:1"))
+                y, first = 0.0, k
+            placed = _beside(row, panel)
+        row.append(placed)
+        depth = max(depth, float(size[1]))
+        place = corner() + np.array([0.0, high - y - size[1]])
+        _add_panel(sheets[-1], placed + place, k, schedule, labels[k])
+    _name(sheets[-1], first, len(schedule.panels))
     return sheets
+
+
+def _beside(row: list[Floats], panel: Floats) -> Floats:
+    """The panel (3,2) to the right of those of a row, one side up or the other, as far left as possible.
+
+    Its lowest point has y = 0, at the left end of a row its leftmost one x = 0.
+    """
+    ways = []
+    for way in (panel, -panel):
+        at = way - way.min(axis=0)
+        shift = max((_gap(other, at) + SPACE for other in row[-3:]), default=0.0)
+        ways.append(at + np.array([max(shift, 0.0), 0.0]))
+    return min(ways, key=lambda way: float(way[:, 0].max()))
+
+
+def _gap(left: Floats, right: Floats) -> float:
+    """How far the right triangle must move along x until it only touches the left one.
+
+    Both sides are convex, so a corner of one of the two touches.
+    """
+    low, high = max(left[:, 1].min(), right[:, 1].min()), min(left[:, 1].max(), right[:, 1].max())
+    levels = np.clip(np.append(left[:, 1], right[:, 1]), low, high)
+    return float((_reach(left, levels).max(axis=0) - _reach(right, levels).min(axis=0)).max())
+
+
+def _reach(triangle: Floats, levels: Floats) -> Floats:
+    """(2,k) the least and the largest x of a triangle at each level y."""
+    x = []
+    for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+        low, high = sorted((a, b), key=lambda point: float(point[1]))
+        inside = (levels >= low[1]) & (levels <= high[1])
+        rise = high[1] - low[1]
+        share = (levels - low[1]) / rise if rise > 0.0 else np.zeros_like(levels)
+        at = low[0] + share * (high[0] - low[0])
+        x += [np.where(inside, at, np.nan), np.where(inside & (rise == 0.0), high[0], np.nan)]
+    return np.stack([np.nanmin(x, axis=0), np.nanmax(x, axis=0)])
 
 
 def _name(sheet: Sheet, first: int, end: int) -> None:
@@ -50,19 +88,31 @@ def _name(sheet: Sheet, first: int, end: int) -> None:
 
 
 def _turned_to_fit(flat: Floats, name: str) -> Floats:
-    """(k,3,2) the panels, turned by 90 degrees where only so they fit."""
-    sizes, limit = np.ptp(flat, axis=1), np.array(room(name)) + 1e-9
-    lying, standing = (sizes <= limit).all(axis=1), (sizes[:, ::-1] <= limit).all(axis=1)
-    wrong = np.flatnonzero(~(lying | standing))
-    if len(wrong):
-        worst = wrong[sizes[wrong].max(axis=1).argmax()]
-        size = sizes[worst]
-        better = smallest_format(size) or smallest_format(size[::-1])
-        hint = f"use sheet {better!r}" if better else "no format holds it: leave the panel sheets out"
-        text = f"sheet: panel {worst + 1} is {size[0]:.0f} × {size[1]:.0f} mm at true size, more than"
-        raise OptionError(f"{text} {name} has; {hint}", what="sheet", found=name, expected=better or None)
-    turned = np.stack([-flat[..., 1], flat[..., 0]], axis=-1)
-    return np.where(lying[:, None, None], flat, turned)
+    """(k,3,2) the panels; those that do not fit as they lie are turned until they do."""
+    wrong = np.flatnonzero((np.ptp(flat, axis=1) > np.array(room(name)) + 1e-9).any(axis=1))
+    flat = flat.copy()
+    for k in wrong:
+        turned = _turned(flat[k], name)
+        if turned is None:
+            better = next((f for f in FORMATS if _turned(flat[k], f) is not None), None)
+            wide, high = np.ptp(flat[k], axis=0)
+            text = (
+                f"sheet: panel {k + 1} is {wide:.0f} × {high:.0f} mm at true size, which {name} cannot hold; "
+            )
+            text += f"use sheet {better!r}" if better else " hold; no format can: leave the panel sheets out"
+            raise OptionError(text, what="sheet", found=name, expected=better)
+        flat[k] = turned
+    return flat
+
+
+def _turned(corners: Floats, name: str) -> Floats | None:
+    """A triangle (3,2) turned so that it fits a format, as low as possible; None if it fits in no way."""
+    cosine, sine = np.cos(TURNS), np.sin(TURNS)
+    turn = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
+    ways = corners @ turn.transpose(0, 2, 1)
+    sizes = np.ptp(ways, axis=1)
+    fit = np.flatnonzero((sizes <= np.array(room(name)) + 1e-9).all(axis=1))
+    return ways[fit[sizes[fit, 1].argmin()]] if len(fit) else None
 
 
 def _labels(schedule: Panels) -> list[list[str]]:

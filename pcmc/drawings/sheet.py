@@ -113,17 +113,12 @@ def add_frames(sheets: list[Sheet], name: str, units: str, mark: str) -> None:
             sheet.texts.append(Text((0.5 * width, top - 4.0), mark, fits, "PCMC-MARK", "C"))
 
 
-def smallest_format(size: Floats) -> str:
-    """The smallest format that holds a drawing of this size (2,) in mm; empty for none.
-
-    >>> smallest_format(np.array([500.0, 300.0])), smallest_format(np.array([2000.0, 10.0]))
-    ('A2', '')
-    """
-    return next((name for name in FORMATS if fits(size, name)), "")
-
-
 def fits(size: Floats, name: str) -> bool:
-    """Whether a drawing of this size (2,) in mm fits a format."""
+    """Whether a drawing of this size (2,) in mm fits a format.
+
+    >>> fits(np.array([500.0, 300.0]), "A2"), fits(np.array([500.0, 300.0]), "A3")
+    (True, False)
+    """
     return bool((np.asarray(size) <= np.array(room(name)) + 1e-9).all())
 
 

@@ -13,9 +13,10 @@ from ..base.errors import OptionError
 from ..surface import Surface
 from ..surface.geometry import area_vectors
 from .sections import Polyline
-from .sheet import GAP, SCALES, SMALL, Line, Sheet, Text, corner, fits, room, smallest_format
+from .sheet import FORMATS, SCALES, SMALL, Line, Sheet, Text, corner, fits, room
 
-CAPTION = 3.0 * SMALL  # mm below a view
+CAPTION = 13.0  # mm below a view, for its size and its title
+BESIDE = np.array([CAPTION, CAPTION + 3.0])  # mm to the left of a view and below it
 ELEVATIONS = {  # to the right, and towards the viewer
     "front, seen along y": ((1.0, 0.0), (0.0, -1.0)),
     "right, seen against x": ((0.0, 1.0), (1.0, 0.0)),
@@ -115,51 +116,49 @@ def section_layer(surface: Surface, line: Polyline) -> str:
     return "PCMC-SECTION-WALL" if surface.walls[line.patch] else "PCMC-SECTION"
 
 
-def placed(
-    views: Sequence[View], title: str, name: str, millimetres: float, scale: int | None, columns: int = 1
-) -> Sheet:
+def placed(views: Sequence[View], title: str, name: str, millimetres: float, scale: int | None) -> Sheet:
     """The views on one sheet, in a grid, at one scale: the one given, or the largest that fits.
 
     Raises
     ------
     OptionError : they do not fit at the scale given; the message names the smallest format that holds them.
     """
-    columns = min(columns, len(views))
-    rows = math.ceil(len(views) / columns)
     boxes = [view.box for view in views]
     extent = np.max([high - low for low, high in boxes], axis=0)
-    gaps = np.array([(columns - 1) * 2.0 * GAP + 12.0, (rows - 1) * GAP + rows * CAPTION + 12.0])
-    times = np.array([columns, rows])
-    scale = _scale(extent * times * millimetres, gaps, name, scale, title)
+    scale, columns = _scale(extent * millimetres, len(views), name, scale, title)
+    rows = math.ceil(len(views) / columns)
     sheet = Sheet(title, name, f"1:{scale}")
     factor = millimetres / scale
-    cell = extent * factor + np.array([2.0 * GAP, GAP + CAPTION])
-    origin = corner() + 0.5 * (np.array(room(name)) - times * extent * factor - gaps) + 6.0
+    cell = extent * factor + BESIDE
+    origin = corner() + 0.5 * (np.array(room(name)) - np.array([columns, rows]) * cell) + BESIDE
     for k, (view, (low, high)) in enumerate(zip(views, boxes, strict=True)):
-        place = origin + np.array([k % columns, rows - 1 - k // columns]) * cell + [0.0, CAPTION]
-        shift = place - factor * (0.5 * (low + high) - 0.5 * extent * np.array([1.0, 0.0]))
-        shift[1] = place[1] - factor * low[1]
+        place = origin + np.array([k % columns, rows - 1 - k // columns]) * cell
+        spare = np.array([0.5 * factor * (extent - (high - low))[0], 0.0])
+        shift = place + spare - factor * low
         _add(sheet, view, factor, shift)
         _add_size(sheet, factor * low + shift, factor * high + shift, high - low)
-        under = float(place[1] - CAPTION)
         if len(views) > 1:
-            at = float(0.5 * factor * (low[0] + high[0]) + shift[0])
-            sheet.texts.append(Text((at, under), view.title, align="C"))
+            at = float(0.5 * factor * (low + high)[0] + shift[0]), float(place[1]) - CAPTION + SMALL
+            sheet.texts.append(Text(at, view.title, align="C"))
     return sheet
 
 
-def _scale(size: Floats, gaps: Floats, name: str, scale: int | None, title: str) -> int:
-    """The scale, 1 to this, at which ``size`` (2,) mm fits a format: as given, or the largest."""
+def _scale(size: Floats, count: int, name: str, scale: int | None, title: str) -> tuple[int, int]:
+    """The scale, 1 to this, and the columns with which views of ``size`` (2,) mm fit a format."""
+    grids = [(columns, math.ceil(count / columns)) for columns in range(1, count + 1)]
     for one in SCALES if scale is None else (scale,):
-        if fits(size / one + gaps, name):
-            return one
-    needed = size / (scale or SCALES[-1]) + gaps
-    better = smallest_format(needed)
+        for grid in grids:
+            if fits(np.array(grid) * (size / one + BESIDE), name):
+                return one, grid[0]
+    one = scale or SCALES[-1]
+    needed = [np.array(grid) * (size / one + BESIDE) for grid in grids]
+    better = next((f for f in FORMATS if any(fits(each, f) for each in needed)), None)
+    least = min(needed, key=lambda each: float(each.max()))
     text = (
-        f"scale: {title.lower()} at 1:{scale or SCALES[-1]} needs {needed[0]:.0f} × {needed[1]:.0f} mm, more"
+        f"scale: {title.lower()} at 1:{one} needs {least[0]:.0f} × {least[1]:.0f} mm, more than {name} has;"
     )
-    text += f" than {name} has; use " + (f"sheet {better!r}" if better else "a smaller scale")
-    raise OptionError(text, what="scale", found=scale, expected=better or None)
+    text += f" use sheet {better!r}" if better else " use a smaller scale"
+    raise OptionError(text, what="scale", found=scale, expected=better)
 
 
 def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
