@@ -41,7 +41,7 @@ def panel_sheets(schedule: Panels, name: str, millimetres: float) -> list[Sheet]
             placed = _beside(row, panel)
         row.append(placed)
         depth = max(depth, float(size[1]))
-        place = corner() + np.array([0.0, high - y - size[1]])
+        place = corner() + np.array([0.0, high - y])
         _add_panel(sheets[-1], placed + place, k, schedule, labels[k])
     _name(sheets[-1], first, len(schedule.panels))
     return sheets
@@ -50,11 +50,11 @@ def panel_sheets(schedule: Panels, name: str, millimetres: float) -> list[Sheet]
 def _beside(row: list[Floats], panel: Floats) -> Floats:
     """The panel (3,2) to the right of those of a row, one side up or the other, as far left as possible.
 
-    Its lowest point has y = 0, at the left end of a row its leftmost one x = 0.
+    Its highest point has y = 0, at the left end of a row its leftmost one x = 0.
     """
     ways = []
     for way in (panel, -panel):
-        at = way - way.min(axis=0)
+        at = way - np.array([way[:, 0].min(), way[:, 1].max()])
         shift = max((_gap(other, at) + SPACE for other in row[-3:]), default=0.0)
         ways.append(at + np.array([max(shift, 0.0), 0.0]))
     return min(ways, key=lambda way: float(way[:, 0].max()))
@@ -96,10 +96,8 @@ def _turned_to_fit(flat: Floats, name: str) -> Floats:
         if turned is None:
             better = next((f for f in FORMATS if _turned(flat[k], f) is not None), None)
             wide, high = np.ptp(flat[k], axis=0)
-            text = (
-                f"sheet: panel {k + 1} is {wide:.0f} × {high:.0f} mm at true size, which {name} cannot hold; "
-            )
-            text += f"use sheet {better!r}" if better else " hold; no format can: leave the panel sheets out"
+            text = f"sheet: panel {k + 1}, {wide:.0f} × {high:.0f} mm at true size, does not fit {name}; "
+            text += f"use sheet {better!r}" if better else "nor any format: leave the panel sheets out"
             raise OptionError(text, what="sheet", found=name, expected=better)
         flat[k] = turned
     return flat

@@ -11,6 +11,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..surface import Surface
+from ..surface.curve_kinds import curves_by_kind
 from ..surface.geometry import area_vectors
 from .sections import Polyline
 from .sheet import FORMATS, SCALES, SMALL, Line, Sheet, Text, corner, fits, room
@@ -53,14 +54,10 @@ class View:
 
 def model_curves(surface: Surface) -> list[Curve]:
     """Ridges, where two sheets of the roof meet; rims, where one ends; and lines of walls alone."""
-    topo, walls = surface.topology, surface.walls
-    curves = []
-    for curve in (*topo.junctions, *topo.boundary_loops):
-        roofs = sum(not walls[k] for k in curve.sheets)
-        layer = "PCMC-RIDGE" if roofs > 1 else "PCMC-RIM" if roofs == 1 else "PCMC-WALL"
-        vertices = tuple(map(int, curve.vertices))
-        curves.append(Curve(layer, surface.vertices[curve.vertices], curve.closed, vertices))
-    return curves
+    return [
+        Curve(f"PCMC-{kind}", surface.vertices[curve.vertices], curve.closed, tuple(map(int, curve.vertices)))
+        for kind, curve in curves_by_kind(surface)
+    ]
 
 
 def plan(surface: Surface, curves: Sequence[Curve], points: Sequence[tuple[str, Floats]]) -> View:
