@@ -261,23 +261,18 @@ def _cut(surface: Surface, point: Sequence[float], normal: Sequence[float]) -> l
 
 
 def _point_rows(points: pd.DataFrame, decimals: int) -> tuple[list[str], list[list[str]]]:
+    head = ["point", "x", "y", "z", "on"]
     rows = [
-        [row.point, *(f"{c:.{decimals}f}" for c in (row.x, row.y, row.z)), row.on]
-        for row in points.itertuples()
+        [point, *(f"{c:.{decimals}f}" for c in at), on]
+        for point, *at, on in points[head].to_numpy(dtype=object).tolist()
     ]
-    return ["point", "x", "y", "z", "on"], rows
+    return head, rows
 
 
 def _family_rows(schedule: Panels, decimals: int) -> tuple[list[str], list[list[str]]]:
-    head = ["family", "panels", "turned over", "a", "b", "c", "area"]
+    keys = ["family", "count", "mirrored", "a", "b", "c", "area"]
     rows = [
-        [
-            f"F{row.family}",
-            str(row.count_),
-            str(row.mirrored),
-            *(f"{length:.{decimals}f}" for length in (row.a, row.b, row.c)),
-            f"{row.area:.4g}",
-        ]
-        for row in schedule.families.rename(columns={"count": "count_"}).itertuples()
+        [f"F{family}", str(count), str(mirrored), *(f"{x:.{decimals}f}" for x in sides), f"{area:.4g}"]
+        for family, count, mirrored, *sides, area in schedule.families[keys].to_numpy(dtype=object).tolist()
     ]
-    return head, rows
+    return ["family", "panels", "turned over", "a", "b", "c", "area"], rows

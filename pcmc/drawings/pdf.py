@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from .sheet import LAYERS, Sheet
 INCH = 25.4  # mm
 POINT = INCH / 72.0  # mm
 CAPITAL = 0.73  # height of a capital in the size of its font
+ALIGN: dict[str, Any] = {"L": "left", "C": "center", "R": "right"}
 COLORS = {1: "#D00000", 3: "#008000", 5: "#0040C0", 6: "#A000A0", 7: "#000000", 8: "#808080"}
 
 
@@ -47,7 +49,7 @@ def write_pdf(sheets: Sequence[Sheet], path: Path) -> None:
                         transform=axes.transData,
                         color=COLORS[LAYERS[text.layer].color],
                         fontsize=text.height / CAPITAL / POINT,
-                        horizontalalignment={"L": "left", "C": "center", "R": "right"}[text.align],
+                        horizontalalignment=ALIGN[text.align],
                         verticalalignment="center_baseline",
                         rotation=text.turn,
                         rotation_mode="anchor",

@@ -111,8 +111,8 @@ def _improved(
     family, way = cover
     count = int(family.max()) + 1
     placed = points[np.arange(len(points)), way]
-    centre = np.stack([np.bincount(family, column) for column in placed.T], axis=1)
-    centre /= np.bincount(family)[:, None]
+    total = np.stack([np.bincount(family, column) for column in placed.T], axis=1)
+    centre = total / np.bincount(family)[:, None]
     middle = centre[random.integers(count)]
     distance = np.abs(centre - middle).max(axis=1)
     away = distance > np.sort(distance)[max(1, int(SHARE * random.random() * count))]

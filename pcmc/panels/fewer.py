@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
@@ -117,7 +118,7 @@ def fewer_families(
     change = validate.positive("change", change)
     validate.flag("at_rest", at_rest)
     validate.integer("rounds", rounds, least=1)
-    options = {"mirror_images": mirror_images, "walls": walls}
+    options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
     before = panels(surface, tolerance, anyway=anyway, **options)
     search = _Search(before, change, at_rest)
     made = search.run(rounds, callback)

@@ -84,12 +84,12 @@ class Panels:
     @property
     def largest(self) -> pd.Series:
         """The row of the panel with the largest area."""
-        return self.panels.loc[self.panels["area"].idxmax()]
+        return self.panels.iloc[int(self.panels["area"].to_numpy().argmax())]
 
     @property
     def smallest(self) -> pd.Series:
         """The row of the panel with the smallest area."""
-        return self.panels.loc[self.panels["area"].idxmin()]
+        return self.panels.iloc[int(self.panels["area"].to_numpy().argmin())]
 
     @property
     def edge_totals(self) -> pd.DataFrame:

@@ -30,7 +30,7 @@ def families(schedule: Panels, path: Path | None = None, **options: Any) -> Imag
     200
     """
     label = f"family of {schedule.count}, the largest first; within {schedule.tolerance:g}"
-    look = {"label": label, "cmap": "turbo", "edges": True, "supports": False} | options
+    look: dict[str, Any] = {"label": label, "cmap": "turbo", "edges": True, "supports": False} | options
     if schedule.count > 1:
         look.setdefault("limits", (1.0, float(schedule.count)))
     names = sorted(set(schedule.panels["patch"]))
