@@ -111,7 +111,7 @@ def figure(folder: Folder) -> None:
     """Families against tolerance; the roof's panels in the colours of their families."""
     from pcmc.plot import panel
 
-    from .panels import curve_panels
+    from .figure_panels import curve_panels
 
     records = folder.read_table("families")
     records = records[records["at_rest"]]

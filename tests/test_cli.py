@@ -23,7 +23,7 @@ from pcmc.project import running
 from tests.test_project import SMALL
 
 HOME = Path(__file__).resolve().parent.parent
-COMMANDS = ["solve", "certify", "remesh", "convert", "plot", "sweep", "explore"]
+COMMANDS = ["solve", "certify", "remesh", "convert", "plot", "panels", "draw", "sweep", "explore"]
 
 
 @pytest.fixture

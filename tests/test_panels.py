@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
+import pandas as pd
 import pytest
 from refusals import refused
 
@@ -16,6 +17,8 @@ from pcmc.cli import main
 from pcmc.panels.distance import distances
 from pcmc.panels.families import families
 from pcmc.surface.geometry import edge_vectors, face_areas
+from studies import panel_families
+from studies.study import perform
 
 TURNS = [[0, 1, 2], [1, 2, 0], [2, 0, 1]]
 TURNED_OVER = [[2, 1, 0], [1, 0, 2], [0, 2, 1]]
@@ -268,3 +271,11 @@ def test_the_command_refuses_bad_input_in_one_line(tmp_path, capsys, options):
     assert main(["panels", str(start), *(text.format(tmp_path) for text in options)]) == 2
     assert capsys.readouterr().err.strip().count("\n") == 0
     assert {path.name for path in tmp_path.iterdir()} == {"start.pcmc"}
+
+
+def test_the_study_compares_families_before_and_after(tmp_path):
+    perform(panel_families.STUDY, tmp_path, short=True)
+    records = pd.read_csv(tmp_path / "panels" / "families.csv")
+    assert (records["after"] < records["before"]).all()
+    assert records["verdict_after"].tolist() == ["stable", "not_converged"]
+    assert {path.name for path in (tmp_path / "panels").glob("*.png")} == {"families.png", "example-1.png"}

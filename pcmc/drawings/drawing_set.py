@@ -41,7 +41,7 @@ class DrawingSet:
     certificate : of the surface.
     curves : ridges, rims and wall lines, with their layers.
     sections : the lines in which each plane cuts the roof.
-    points : setting-out points, a row each: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim or wall).
+    points : setting-out points: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim, wall or cable).
     schedule : the panels, if a tolerance was given; else None.
     sheets : the sheets of paper, in order.
     """
@@ -203,7 +203,8 @@ def _millimetres(units: object) -> float:
 def _setting_out(curves: Sequence[views.Curve]) -> pd.DataFrame:
     """Vertices of the curves, each once: the ends of curves first, then along them."""
     order: dict[int, tuple[Floats, str]] = {}
-    ends = [(c, k) for c in curves if not c.closed for k in (0, -1)]
+    open_ended = [c for c in curves if not (c.closed or c.layer == "PCMC-CABLE")]
+    ends = [(c, k) for c in open_ended for k in (0, -1)]
     along = [(c, k) for c in curves for k in range(len(c.vertices))]
     for curve, k in [*ends, *along]:
         order.setdefault(curve.vertices[k], (curve.points[k], curve.layer.removeprefix("PCMC-").lower()))

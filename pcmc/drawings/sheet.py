@@ -34,6 +34,7 @@ LAYERS = {
     "PCMC-RIDGE": Layer(1, 50, "junctions of the roof: ridges and valleys"),
     "PCMC-RIM": Layer(7, 50, "rims of the roof"),
     "PCMC-WALL": Layer(3, 35, "bottoms and ends of walls"),
+    "PCMC-CABLE": Layer(6, 70, "cables"),
     "PCMC-PANEL": Layer(8, 13, "edges of panels"),
     "PCMC-SECTION": Layer(5, 50, "sections of the roof"),
     "PCMC-SECTION-WALL": Layer(3, 35, "sections of walls"),

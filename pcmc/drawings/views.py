@@ -28,7 +28,7 @@ ELEVATIONS = {  # to the right, and towards the viewer
 
 @dataclass(frozen=True)
 class Curve:
-    """A ridge, a rim or a wall line: its layer, points (k,3), and whether it is closed."""
+    """A ridge, a rim, a wall line or a cable's edge: its layer, points (k,3), and whether it is closed."""
 
     layer: str
     points: Floats
@@ -53,11 +53,13 @@ class View:
 
 
 def model_curves(surface: Surface) -> list[Curve]:
-    """Ridges, where two sheets of the roof meet; rims, where one ends; and lines of walls alone."""
-    return [
+    """Ridges, where two sheets of the roof meet; rims, where one ends; lines of walls alone; cables."""
+    curves = [
         Curve(f"PCMC-{kind}", surface.vertices[curve.vertices], curve.closed, tuple(map(int, curve.vertices)))
         for kind, curve in curves_by_kind(surface)
     ]
+    edges = [edge for cable in surface.cables for edge in cable.edges]  # cables may branch
+    return curves + [Curve("PCMC-CABLE", surface.vertices[e], False, tuple(map(int, e))) for e in edges]
 
 
 def plan(surface: Surface, curves: Sequence[Curve], points: Sequence[tuple[str, Floats]]) -> View:
