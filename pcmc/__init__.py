@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .existence import solve
     from .io import read, write
     from .io.repairing import Repaired, repair
+    from .panels import FewerFamilies, Panels, fewer_families, panels
     from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
     from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface
 
@@ -28,10 +29,12 @@ __all__ = [
     "Circle",
     "Design",
     "Direction",
+    "FewerFamilies",
     "Line",
     "Material",
     "MeshCheck",
     "MeshVerdict",
+    "Panels",
     "Parameter",
     "Patch",
     "Plane",
@@ -50,11 +53,13 @@ __all__ = [
     "energy",
     "errors",
     "explore",
+    "fewer_families",
     "follow",
     "gradient",
     "hessian",
     "mean_curvature",
     "meet",
+    "panels",
     "read",
     "repair",
     "read_results",
@@ -87,15 +92,17 @@ _NAMES = {
         "read_results",
         "write_structure",
     ),
+    "panels": ("FewerFamilies", "Panels", "fewer_families", "panels"),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
 }
 
 
 class _Package(ModuleType):
-    """``pcmc.energy`` is the function, although a folder has the same name."""
+    """``pcmc.energy`` and ``pcmc.panels`` are functions, although folders have the same names."""
 
     def __setattr__(self, name: str, value: object) -> None:
-        if name != "energy" or not isinstance(value, ModuleType):  # the import sets the folder
+        folder = isinstance(value, ModuleType)  # set by its import
+        if not (folder and name in ("energy", "panels")):
             super().__setattr__(name, value)
 
 

@@ -33,6 +33,8 @@ COMMANDS = [
     "repair",
     "plan",
     "structure",
+    "panels",
+    "draw",
     "sweep",
     "explore",
     "cache",

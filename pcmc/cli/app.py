@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .building import draw_, panels_
 from .caching import cache_
 from .planning import plan
 from .repairing import repair_
@@ -54,6 +55,8 @@ for name, command, summary in (
     ("repair", repair_, "Repair a dirty mesh."),
     ("plan", plan, "Write the project file for a drawing."),
     ("structure", structure, "Write a structural model for CalculiX."),
+    ("panels", panels_, "Sort the panels of a roof into families; write a schedule."),
+    ("draw", draw_, "Draw plan, elevations, sections and panels for those who build."),
     ("sweep", sweep, "Solve every combination of some values; write a table."),
     ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
     ("cache", cache_, "Show or remove the roofs that are kept."),

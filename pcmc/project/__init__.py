@@ -38,7 +38,7 @@ from .drawn import files_of, is_drawing
 from .file import Project, build, load, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
 from .outcome import Outcome
-from .output import COLOURS, check_names, check_outputs, check_picture, paint, write_all
+from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
 from .planning import project_text, proposal_text
 from .remeshing import Remeshing
 from .running import check_of, check_project_mesh, run, run_project, solve_project, surface_files
@@ -49,6 +49,7 @@ __all__ = [
     "COLOURS",
     "REQUIRED",
     "Key",
+    "OnStep",
     "Outcome",
     "Project",
     "Remeshing",
