@@ -224,8 +224,8 @@ def _refuse_open(surface: Surface, room: Room, edges: Iterable[int]) -> None:
     raise SurfaceError(
         f"room {room.name!r} does not close: its patches end along {len(numbers)} edges that are neither held"
         f" on the plane nor fixed, the first from vertex {ends[0]} to {ends[1]} near {place}; name the"
-        " patches that are missing, with 1 where the normal points out of the room and -1 where it points into"
-        " it, or hold that edge",
+        " patches that are missing, with 1 where the normal points out of the room and -1 where it points in,"
+        " or hold that edge",
         what="rooms",
         where=room.name,
         found=ends.tolist(),
