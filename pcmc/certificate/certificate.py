@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from ..energy.functional import energy_and_gradient, patch_areas, volume
 from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
 from ..energy.motion_space import VertexClasses, force_scale, motion_space
 from ..energy.rigid_motions import rigid_modes, rigid_motions
+from ..energy.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest, stiffness
@@ -41,10 +42,12 @@ class Certificate:
     ----------
     verdict, detail : the verdict, and its reason (which mode, patch or place).
     residual : ‖Bᵀ∇E‖ over ``scale``: the forces left in the motion space, with the pull on pinched
-        vertices beyond what their wall can take, relative. Of several loose parts, that of the worst.
+        vertices beyond what their wall can take, relative. Of several loose parts, that of the worst. The
+        relative differences of prescribed volumes are added to it (as squares).
     scale : norm of the single triangles' tension forces, force.
     energy, volume : E (force·length) and the volume under the roof (length³).
-    index : Morse index; None where the surface is not at rest. Rigid motions are not counted.
+    index : Morse index; None where the surface is not at rest. Rigid motions are not counted, nor motions
+        that change a prescribed volume.
     eigenvalues : lowest second variations per unit area and displacement, force/length³, ascending.
     modes : (k,n,3) their displacement fields, unit mass.
     curvature_error : largest |H - H̄|/H̄ by the variational definition.
@@ -54,6 +57,8 @@ class Certificate:
         left and Σ α n, force/length.
     boundaries : one row per held boundary curve: length, middle, reaction, largest reaction per
         length. A corner's reaction is shared equally by its curves; per length it counts in full.
+    rooms : one row per room of prescribed volume: the volume it has, the one prescribed, the difference
+        over the latter, and the room's pressure.
     load, support : forces along Π's normal, of the pressure and of all supports; their sum is what
         the mesh leaves along the sheets.
     reactions : (n,3) force of each support on the surface.
@@ -85,6 +90,7 @@ class Certificate:
     pinched: Ints
     load_ratio: float
     proofs: tuple[Proof, ...] = ()
+    rooms: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     @property
     def certified(self) -> bool:
@@ -126,7 +132,7 @@ class Certificate:
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
         tables = [
             frame.to_string(index=False, float_format=lambda x: f"{x:.4g}")
-            for frame in (self.patches, self.junctions, self.boundaries)
+            for frame in (self.patches, self.rooms, self.junctions, self.boundaries)
             if len(frame)
         ]
         return "\n\n".join([head, *tables])
@@ -177,6 +183,9 @@ def certify(
     left = space.to_vectors(in_motion_space)
     lacking = np.column_stack([left, unheld])
     residual = relative_forces(standing, classes, X, lacking)
+    rooms = room_table(surface)
+    if len(rooms):
+        residual = float(np.hypot(residual, np.linalg.norm(rooms["difference"])))
 
     qualities = triangle_quality(X, standing.faces)
     in_wall = part.walls.pinchable[standing.patch_of_face]
@@ -207,6 +216,7 @@ def certify(
         evidence=evidence,
         given=proofs,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
+        rigid=rigid.shape[1] if surface.rooms else 0,
     )
     verdict, reason = judge(findings)
     return Certificate(
@@ -231,6 +241,7 @@ def certify(
         pinched=np.flatnonzero(part.resting),
         load_ratio=ratio,
         proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),
+        rooms=rooms,
     )
 
 
@@ -295,6 +306,22 @@ def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Fl
         row["quality"] = float(quality[faces].min(initial=1.0))
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def room_table(surface: Surface) -> pd.DataFrame:
+    """A row per room of prescribed volume; see ``Certificate.rooms``."""
+    if not surface.rooms:
+        return pd.DataFrame()
+    wanted, reached = prescribed_volumes(surface), room_volumes(surface)
+    return pd.DataFrame(
+        {
+            "room": [room.name for room in surface.rooms],
+            "volume": reached,
+            "prescribed": wanted,
+            "difference": (reached - wanted) / np.abs(wanted),
+            "pressure": room_pressures(surface),
+        }
+    )
 
 
 def _largest(values: pd.Series) -> float:

@@ -27,6 +27,7 @@ from . import kernels
 from .functional import apply_supports
 from .motion_space import MotionSpace
 
+ROUNDING = 1e-13  # of the largest pressure: a wall between rooms of one pressure has none
 ON_PLANE = 1e-9  # of the size: a vertex as high as this over Π is on it
 
 
@@ -103,6 +104,18 @@ def prescribed_volumes(surface: Surface) -> Floats:
     return np.array([room.volume for room in surface.rooms])
 
 
+def room_pressures(surface: Surface) -> Floats:
+    """(r,) the pressure of each room, force/length²: that which fits the patches around it best.
+
+    >>> from pcmc import Patch
+    >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 3.0, 2.0)],
+    ...                fixed=[0, 1, 2], rooms=[Room("all", {"a": -1}, 1.0)])
+    >>> room_pressures(flat).round(12).tolist()
+    [-2.0]
+    """
+    return np.asarray(np.linalg.lstsq(surface.room_signs.T, surface.pressures)[0])
+
+
 def with_room_pressures(surface: Surface, change: Floats) -> Surface:
     """The surface with the pressure of each room changed by ``change`` (r,); walls stay walls.
 
@@ -113,6 +126,7 @@ def with_room_pressures(surface: Surface, change: Floats) -> Surface:
     [1.5]
     """
     pressures = surface.pressures + change @ surface.room_signs
+    pressures[surface.walls & (np.abs(pressures) <= ROUNDING * np.abs(pressures).max())] = 0.0
     touched = np.flatnonzero(surface.room_signs.any(axis=0))
     names = [patch.name for patch in surface.patches]
     new = {names[k]: float(pressures[k]) for k in touched}

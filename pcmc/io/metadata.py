@@ -12,7 +12,7 @@ from ..surface import Patch, Plane, Surface
 
 def metadata_text(surface: Surface) -> str:
     """Patches, plane and counts as JSON, for the comment or metadata of a format."""
-    patches, plane = [astuple(p) for p in surface.patches], astuple(surface.plane)
+    patches, plane = [astuple(p) for p in surface.patches], (surface.plane.point, surface.plane.normal)
     return json.dumps({"patches": patches, "plane": plane, "counts": [surface.n, surface.m]})
 
 

@@ -395,7 +395,8 @@ def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Sur
     fixed = np.concatenate([mesh.fixed for mesh in meshes])[used]
     sliding = np.concatenate([mesh.sliding for mesh in meshes])[used]
     lines = carry_lines(surface, X, fixed)
-    return Surface(X, F, patch_of_face, surface.patches, fixed, sliding, surface.plane, lines)
+    supports = fixed, sliding, surface.plane, lines
+    return Surface(X, F, patch_of_face, surface.patches, *supports, rooms=surface.rooms)
 
 
 def _patch_angles(mesh: _Mesh, count: int) -> Floats:

@@ -22,7 +22,7 @@ from ..certificate.collapse import held_wall_down
 from ..certificate.slipping import describe_saddle, slipping_ends
 from ..contact.pinching import find_walls
 from ..energy.functional import energy
-from ..energy.rooms import check_rooms
+from ..energy.rooms import check_rooms, room_pressures
 from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import ways_down
@@ -43,7 +43,7 @@ def newton(
     _refuse_loose_parts(surface)
     check_rooms(surface)
     refinable("levels", options.levels, surface.m)
-    history = History(callback)
+    history, first = History(callback), surface
     for level in range(options.levels + 1):
         end = _solve_level(surface, options, history, level)
         if end.status is not Status.CONVERGED or level == options.levels:
@@ -59,6 +59,7 @@ def newton(
         evaluations=history.evaluations,
         rows=history.rows,
         note=history.note,
+        room_changes=tuple((room_pressures(reached) - room_pressures(first)).tolist()),
     )
 
 
