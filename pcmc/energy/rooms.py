@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
-from ..base.errors import SurfaceError
+from ..base.errors import OptionError, SurfaceError
 from ..surface import Line, Surface, expect_surface
 from ..surface.geometry import accumulate, cross, point, scaled, sub, vector
 from ..surface.room import Room
@@ -135,6 +135,17 @@ def with_room_pressures(surface: Surface, change: Floats) -> Surface:
         if kept in vars(surface):
             vars(other)[kept] = vars(surface)[kept]
     return other
+
+
+def refuse_varied_pressure(surface: Surface, patches: Iterable[int]) -> None:
+    """Refuse to vary the pressure of any of these patches if it is the result of a prescribed volume."""
+    for k in patches:
+        for room in np.flatnonzero(surface.room_signs[:, k]):
+            name, patch = surface.rooms[room].name, surface.patches[k].name
+            message = f"the pressure of {patch!r} follows from the volume of room {name!r}"
+            raise OptionError(
+                f"{message}: vary that volume, or remove the room", what="parameter", where=patch
+            )
 
 
 def check_rooms(surface: Surface) -> None:

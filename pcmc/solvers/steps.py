@@ -14,6 +14,7 @@ from ..energy.motion_space import MotionSpace
 from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import edge_lengths
+from ..stability.bordered import BorderedFactor
 from ..stability.factorisation import Factor, Factoriser, SingularMatrix, factoriser
 from ..stability.modes import (
     SOFT,
@@ -71,7 +72,7 @@ class Stepper:
         self._factoriser: Factoriser | None = None
         self._factor: Factor | None = None
         self._added: csr_array | None = None  # stiffness of a singular matrix
-        self._bordered: _Bordered | None = None  # by the gradients of the rooms' volumes
+        self._bordered: BorderedFactor | None = None  # by the gradients of the rooms' volumes
         self._smoother: Smoother | None = None
         self._extension: HarmonicExtension | None = None
         self._smoother_age = REFRESH
@@ -252,7 +253,7 @@ class Stepper:
             self._factor, self._shift, self._factor_space = factor, shift, state.space
             self._added, self._bordered = None, None
             if len(state.pressures):
-                self._bordered = _Bordered(factor, state.volume_columns())
+                self._bordered = BorderedFactor(factor, state.volume_columns())
             if weight != shift:
                 soft = assemble(state.surface, state.classes, state.space, self._pattern, state.X, 0.0, SOFT)
                 self._added = full_matrix(self._pattern, soft)
@@ -271,11 +272,11 @@ class Stepper:
         if self._bordered is None:
             assert self._factor is not None
             return self._in_factor_basis(self._factor.solve, right)
-        now, then = self.state.space, self._factor_space
-        count = len(self.state.pressures)
-        forces = right[:-count] if now is then else then.from_other(now, right[:-count])
-        s, pressures = self._bordered.solve(forces, right[-count:])
-        return np.append(s if now is then else now.from_other(then, s), pressures)
+        now, then, size = self.state.space, self._factor_space, self.state.space.size
+        if now is then:
+            return self._bordered.solve(right)
+        z = self._bordered.solve(np.append(then.from_other(now, right[:size]), right[size:]))
+        return np.append(now.from_other(then, z[:size]), z[size:])
 
     def _direction(self) -> tuple[Floats, Floats]:
         """-B J⁻¹ r with J the derivative of r itself, by GMRES preconditioned with the factor.
@@ -369,18 +370,3 @@ class Stepper:
             self._residual_raised = True
             return True
         return self.minimum and self.state.energy <= energy + 1e-2 * t * slope and slope < 0.0
-
-
-class _Bordered:
-    """The inverse of [[A, -C], [Cᵀ, 0]] by a factor of A and the Schur complement of C (N,r)."""
-
-    def __init__(self, factor: Factor, columns: Floats) -> None:
-        self._factor, self._columns = factor, columns
-        self._behind = factor.solve(columns)
-        self._schur = np.linalg.pinv(columns.T @ self._behind)
-
-    def solve(self, forces: Floats, last: Floats) -> tuple[Floats, Floats]:
-        """s (N,) and μ (r,) with A s - C μ = forces and Cᵀ s = last."""
-        s = self._factor.solve(forces)
-        multipliers = self._schur @ (last - self._columns.T @ s)
-        return s + self._behind @ multipliers, multipliers

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array, triu
@@ -49,6 +50,17 @@ class Stiffness:
     factor: Factor
     excluded: Floats
     negative: int
+
+    @cached_property
+    def _behind(self) -> Floats:
+        return self.factor.solve(self.excluded)
+
+    def solve(self, right: Floats) -> Floats:
+        """The inverse (N,) among the motions that count: with none of the excluded ones."""
+        y, Q = self.factor.solve(right), self.excluded
+        if Q.shape[1]:
+            y = y - self._behind @ np.linalg.solve(Q.T @ self._behind, Q.T @ y)
+        return y
 
 
 def strength_units(surface: Surface, classes: VertexClasses, space: MotionSpace) -> Floats | None:
@@ -190,14 +202,9 @@ def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
     size = len(system.mass)
     k = min(max(count, system.negative + 2), size - 1)
     root = np.sqrt(system.mass)
-    Q = system.excluded
-    bordered = system.factor.solve(Q) if Q.shape[1] else Q
 
     def inverse(x: Floats) -> Floats:
-        y = system.factor.solve(root * x)
-        if Q.shape[1]:
-            y = y - bordered @ np.linalg.solve(Q.T @ bordered, Q.T @ y)
-        return root * y
+        return root * system.solve(root * x)
 
     scaled = diags_array(1.0 / root) @ system.matrix @ diags_array(1.0 / root)
     operator = LinearOperator((size, size), inverse, dtype=float)
