@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh, null_space
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
-from ..stability.modes import Stiffness, lowest
+from ..stability.modes import Stiffness, all_modes, lowest
 from .correction import BorderedMatrix
 from .state import BranchMesh, State
 
@@ -96,7 +95,7 @@ def soft_modes(at: State, count: int) -> tuple[Floats, Floats]:
     values, factor = at.mesh.hessian(at.surface, at.space, at.X)
     stiffness = at.mesh.stiffness(at.space, at.X, values, factor)
     if len(stiffness.mass) < DENSE:
-        every, vectors = _all_modes(stiffness)
+        every, vectors = all_modes(stiffness)
         fields = np.array([at.space.to_vectors(column) for column in vectors.T])
     else:
         every, fields = lowest(stiffness, stiffness.negative + count + 1)
@@ -112,19 +111,12 @@ def along_branch(at: BranchPoint, count: int) -> float:
     return float(np.linalg.norm(np.einsum("vi,kvi->k", tangent.row, modes) / np.sqrt(squares)))
 
 
-def _all_modes(stiffness: Stiffness) -> tuple[Floats, Floats]:
-    """All eigenvalues (k,), ascending, and their modes (N,k), among the motions that count."""
-    across = null_space(stiffness.excluded.T) if stiffness.excluded.shape[1] else np.eye(len(stiffness.mass))
-    H, M = stiffness.matrix.toarray(), np.diag(stiffness.mass)
-    values, vectors = eigh(across.T @ H @ across, across.T @ M @ across)
-    return values, across @ vectors
-
-
 def _eigenvalues(stiffness: Stiffness) -> Floats:
     """All negative eigenvalues and at least one more, ascending."""
     size = len(stiffness.mass)
     if size < DENSE:
-        return _all_modes(stiffness)[0]
+        values = all_modes(stiffness)[0]
+        return values if len(values) else np.array([np.inf])  # nothing moves at these volumes
     count = stiffness.negative + 2
     while True:
         values = lowest(stiffness, min(count, size - 1))[0]

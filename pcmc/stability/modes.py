@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import eigh, null_space
 from scipy.sparse import csr_array, diags_array, triu
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
@@ -193,6 +194,18 @@ def second_variation(surface: Surface) -> Stiffness:
     return stiffness(part.surface, part.classes, space, rigid)
 
 
+def all_modes(system: Stiffness) -> tuple[Floats, Floats]:
+    """All eigenvalues (k,), ascending, and their modes (N,k) of unit mass; for a few unknowns."""
+    across = np.eye(len(system.mass))
+    if system.excluded.shape[1]:
+        across = null_space(system.excluded.T)
+    if not across.shape[1]:
+        return np.empty(0), across
+    H, M = system.matrix.toarray(), np.diag(system.mass)
+    values, vectors = eigh(across.T @ H @ across, across.T @ M @ across)
+    return values, across @ vectors
+
+
 def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, ascending, and their modes (k,n,3).
 
@@ -202,6 +215,10 @@ def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
     size = len(system.mass)
     k = min(max(count, system.negative + 2), size - 1)
     root = np.sqrt(system.mass)
+    if size - system.excluded.shape[1] <= k < size:  # no more motions count than are wanted
+        values, columns = (part[..., :count] for part in all_modes(system))
+        fields = [system.space.to_vectors(column) for column in columns.T]
+        return values, np.array(fields).reshape(len(values), len(system.space.dimension), 3)
 
     def inverse(x: Floats) -> Floats:
         return root * system.solve(root * x)
