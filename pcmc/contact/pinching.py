@@ -197,7 +197,8 @@ def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surf
     patch.setflags(write=False)
     topo, held = topology(F, patch, surface.n), resting & walls.held
     supports = {"fixed": surface.fixed | held, "on_plane": surface.on_plane | (resting & ~held)}
-    return surface._with(vertices=X, faces=F, patch_of_face=patch, topology=topo, **supports)
+    cables = tuple(filter(None, (cable.carried(owner) for cable in surface.cables)))
+    return surface._with(vertices=X, faces=F, patch_of_face=patch, topology=topo, cables=cables, **supports)
 
 
 def resting_links(walls: Walls, resting: Bools) -> Ints:

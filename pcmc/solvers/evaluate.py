@@ -10,7 +10,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats
 from ..base.compiled import blocks, compiled, threads
 from ..energy import kernels
-from ..energy.functional import total
+from ..energy.functional import add_cables_and_weights, total
 from ..energy.motion_space import tension_forces
 from ..surface import Surface
 from ..surface.checks import reachable
@@ -68,6 +68,7 @@ class Evaluator:
     def __init__(self, surface: Surface) -> None:
         self.count = 0
         self._mesh = kernels.energy_mesh(surface)
+        self._surface = surface if surface.cables or surface.weights.any() else None
         self._supports = surface.fixed, surface.on_plane, np.array(surface.plane.normal)
         self._single = len(blocks(surface.m, threads())) == 1
 
@@ -81,9 +82,10 @@ class Evaluator:
             kernels.measure_block(self._mesh, X, 0, m, area, volume, G)
         else:
             area, volume, G = kernels.measure(self._mesh, X)
+        further = 0.0 if self._surface is None else add_cables_and_weights(self._surface, X, G)
         squared = _apply_supports(G, *self._supports)
         with np.errstate(all="ignore"):
-            return Point(X, total(tension, area, pressure, volume), G, squared)
+            return Point(X, total(tension, area, pressure, volume) + further, G, squared)
 
 
 @compiled

@@ -15,7 +15,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
 from . import checks, supports
-from .cable import Cable, checked_cables
+from .cable import Cable, CableEdges, cable_edges, checked_cables
 from .circle import Circle, Guide
 from .geometry import bounding_size
 from .patch import Patch
@@ -203,6 +203,16 @@ class Surface:
     def pressures(self) -> Floats:
         """(k,) pressure p of each patch."""
         return np.array([p.pressure for p in self.patches])
+
+    @cached_array
+    def weights(self) -> Floats:
+        """(k,) weight w of each patch, force/area."""
+        return np.array([p.weight for p in self.patches])
+
+    @cached_property
+    def cable_edges(self) -> CableEdges:
+        """The edges that carry a line tension, and how much."""
+        return cable_edges(self.cables)
 
     @cached_property
     def sliding(self) -> tuple[tuple[Plane, Bools], ...]:
