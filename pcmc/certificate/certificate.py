@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..contact.pinching import excess_pull, standing_part
-from ..energy.curvature import METHODS, curvature_error, mean_curvature
+from ..energy.curvature import METHODS, curvature_error, mean_curvature, target_curvature
 from ..energy.functional import energy_and_gradient, patch_areas, volume
 from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
 from ..energy.motion_space import VertexClasses, force_scale, motion_space
@@ -27,6 +27,7 @@ from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
 from .balance import boundary_table, junction_table, load, load_ratio, pressures_left_over, reactions
+from .cables import cable_end_table, cable_table
 from .proof import Proof
 from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
 
@@ -54,11 +55,14 @@ class Certificate:
         left and Σ α n, force/length.
     boundaries : one row per held boundary curve: length, middle, reaction, largest reaction per
         length. A corner's reaction is shared equally by its curves; per length it counts in full.
-    load, support : forces along Π's normal, of the pressure and of all supports; their sum is what
-        the mesh leaves along the sheets.
+    cables : one row per cable, cut at supports and branches: force, length, middle, the pull of the
+        sheets and of the cable across it, force left; see ``pcmc.certificate.cables.cable_table``.
+    cable_ends : one row per end of these: vertex, place, whether held, the force of a support there.
+    load, support : forces along Π's normal, of pressure and weight and of all supports; their sum is
+        what the mesh leaves along the sheets.
     reactions : (n,3) force of each support on the surface.
     pinched : (k,) vertices where a junction rests on Π and its wall has no height.
-    load_ratio : pressure along Π's normal over the most that the boundary's tension could carry; see
+    load_ratio : pressure and weight along Π's normal over the most that the supports could carry; see
         the function ``load_ratio``.
     proofs : why there is no equilibrium, if that is the verdict: ``Overload``, ``UnbalancedJunction``,
         ``Fold`` or ``Unheld``.
@@ -85,6 +89,8 @@ class Certificate:
     pinched: Ints
     load_ratio: float
     proofs: tuple[Proof, ...] = ()
+    cables: pd.DataFrame = field(default_factory=pd.DataFrame)
+    cable_ends: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     @property
     def certified(self) -> bool:
@@ -126,7 +132,7 @@ class Certificate:
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
         tables = [
             frame.to_string(index=False, float_format=lambda x: f"{x:.4g}")
-            for frame in (self.patches, self.junctions, self.boundaries)
+            for frame in (self.patches, self.junctions, self.boundaries, self.cables, self.cable_ends)
             if len(frame)
         ]
         return "\n\n".join([head, *tables])
@@ -231,6 +237,8 @@ def certify(
         pinched=np.flatnonzero(part.resting),
         load_ratio=ratio,
         proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),
+        cables=cable_table(standing, left),
+        cable_ends=cable_end_table(standing),
     )
 
 
@@ -273,7 +281,7 @@ def _pulled_off(excess: Floats) -> str:
 
 def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Floats) -> pd.DataFrame:
     errors = {method: np.abs(curvature_error(standing, method)) for method in METHODS}
-    curvature = mean_curvature(standing, "variational")
+    curvature, target = mean_curvature(standing, "variational"), target_curvature(standing)
     rows = []
     for index, patch in enumerate(surface.patches):
         faces = standing.patch_of_face == index
@@ -284,7 +292,9 @@ def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Fl
             "patch": patch.name,
             "tension": patch.tension,
             "pressure": patch.pressure,
-            "target": patch.target_curvature,
+            "target": float(target[inside].mean())
+            if patch.weight and inside.any()
+            else patch.target_curvature,
             "area": float(areas[index]),
             "mean_H": float(curvature[inside].mean()) if inside.any() else np.nan,
         }

@@ -120,7 +120,8 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
     X = np.concatenate([surface.vertices, middle])
     fixed, sliding = np.concatenate([surface.fixed, held]), np.concatenate([surface.on_plane, slides])
     lines = carry_lines(surface, X, fixed, surface.n)
-    return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane, lines)
+    cables = [cable.cut(ends, number) for cable in surface.cables]
+    return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane, lines, cables=cables)
 
 
 def _face_mask(surface: Surface, chosen: Bools | Ints) -> Bools:

@@ -138,7 +138,9 @@ def _refine_once(surface: Surface, project: Projection | None) -> Surface:
     F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
     fixed, sliding = np.concatenate([surface.fixed, held]), np.concatenate([surface.on_plane, slides])
     lines = carry_lines(surface, X, fixed, surface.n)
-    return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane, lines)
+    edges = surface.topology.edges
+    cables = [cable.cut(edges, surface.n + np.arange(len(edges))) for cable in surface.cables]
+    return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane, lines, cables=cables)
 
 
 def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tuple[tuple[Guide, Bools], ...]:

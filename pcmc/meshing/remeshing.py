@@ -120,7 +120,8 @@ def remesh(
 class _Mesh:
     """Vertices, faces with a patch each, the edges (c,2) of curves, and supports.
 
-    ``source`` (n,): the number of each vertex in the mesh before MMG, or -1.
+    ``source`` (n,): the number of each vertex in the mesh before MMG, or -1. ``cable`` (c,): the number of
+    the cable on each of ``curves``, or -1.
     """
 
     X: Floats
@@ -130,6 +131,7 @@ class _Mesh:
     fixed: Bools
     sliding: Bools
     source: Ints
+    cable: Ints
 
 
 def check_lengths(
@@ -164,9 +166,17 @@ def _wanted_sizes(surface: Surface, edge_length: npt.ArrayLike, growth: float) -
 
 
 def _curve_edges(surface: Surface) -> Bools:
-    """(e,) the edges that must stay: curves, and edges held inside a patch."""
+    """(e,) the edges that must stay: curves, cables, and edges held inside a patch."""
     fixed, sliding = held_midpoints(surface)
-    return surface.topology.curve_edge | fixed | sliding
+    return surface.topology.curve_edge | fixed | sliding | (_cable_of_edge(surface) >= 0)
+
+
+def _cable_of_edge(surface: Surface) -> Ints:
+    """(e,) the number of the cable on each edge; -1 for none."""
+    out = np.full(len(surface.topology.edges), -1)
+    for index, cable in enumerate(surface.cables):
+        out[surface.topology.edge_numbers(cable.edges)] = index
+    return out
 
 
 def _cut_curves(
@@ -184,7 +194,8 @@ def _cut_curves(
     topo, stay = surface.topology, _curve_edges(surface)
     fixed_edge, sliding_edge = held_midpoints(surface)
     X, F, patch, number = surface.vertices, surface.faces, surface.patch_of_face, np.arange(surface.n)
-    mesh = _Mesh(X, F, patch, topo.edges[stay], surface.fixed, surface.on_plane, number)
+    cable = _cable_of_edge(surface)[stay]
+    mesh = _Mesh(X, F, patch, topo.edges[stay], surface.fixed, surface.on_plane, number, cable)
     support = np.stack([fixed_edge[stay], sliding_edge[stay]], axis=1)
     while (counts > 1).any():
         mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
@@ -254,7 +265,8 @@ def _cut_once(mesh: _Mesh, size: Floats, counts: Ints, support: Bools) -> tuple[
     curves = np.concatenate([mesh.curves[~cut], *halves])
     fixed = np.concatenate([mesh.fixed, support[cut, 0]])
     sliding = np.concatenate([mesh.sliding, support[cut, 1]])
-    new = _Mesh(X, F, patch, curves, fixed, sliding, np.arange(len(X)))
+    cable = np.concatenate([mesh.cable[~cut], mesh.cable[cut], mesh.cable[cut]])
+    new = _Mesh(X, F, patch, curves, fixed, sliding, np.arange(len(X)), cable)
     counts = np.concatenate([counts[~cut], first, pieces - first])
     return new, size, counts, np.concatenate([support[~cut], support[cut], support[cut]])
 
@@ -346,7 +358,7 @@ def _remesh_with_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> 
     _check_curves(mesh, curves, F, len(X))
     source = np.where(known, mesh.source[place], -1)
     fixed, sliding = known & mesh.fixed[place], known & mesh.sliding[place]
-    return _Mesh(X, F.astype(np.int64), patch - 1, curves, fixed, sliding, source)
+    return _Mesh(X, F.astype(np.int64), patch - 1, curves, fixed, sliding, source, mesh.cable)
 
 
 def _corners_to_keep(mesh: _Mesh, size: Floats) -> Ints:
@@ -395,7 +407,9 @@ def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Sur
     fixed = np.concatenate([mesh.fixed for mesh in meshes])[used]
     sliding = np.concatenate([mesh.sliding for mesh in meshes])[used]
     lines = carry_lines(surface, X, fixed)
-    return Surface(X, F, patch_of_face, surface.patches, fixed, sliding, surface.plane, lines)
+    ends = np.searchsorted(used, old.curves)
+    cables = [replace(c, edges=ends[old.cable == index]) for index, c in enumerate(surface.cables)]
+    return Surface(X, F, patch_of_face, surface.patches, fixed, sliding, surface.plane, lines, cables=cables)
 
 
 def _patch_angles(mesh: _Mesh, count: int) -> Floats:

@@ -64,6 +64,21 @@ class Cable:
         ends = np.unique(np.sort(ends[ends[:, 0] != ends[:, 1]], axis=1), axis=0)
         return Cable(self.name, self.tension, ends) if len(ends) else None
 
+    def cut(self, ends: Ints, number: Ints) -> Cable:
+        """The cable with the vertices ``number`` (k,) on those of its edges that are among ``ends`` (k,2).
+
+        >>> Cable("a", 1.0, [[0, 1], [1, 2]]).cut(np.array([[0, 1]]), np.array([7])).edges.tolist()
+        [[0, 7], [1, 2], [1, 7]]
+        """
+        weights = np.array([1 + max(int(ends.max(initial=0)), int(self.edges.max())), 1])
+        keys, own = np.sort(ends, axis=1).astype(np.int64) @ weights, self.edges.astype(np.int64) @ weights
+        order = np.argsort(keys)
+        place = np.minimum(np.searchsorted(keys, own, sorter=order), len(keys) - 1)
+        cut = keys[order[place]] == own if len(keys) else np.zeros(len(own), dtype=bool)
+        middle, old = number[order[place[cut]]], self.edges[cut]
+        halves = [np.stack([old[:, k], middle], axis=1) for k in (0, 1)]
+        return Cable(self.name, self.tension, np.concatenate([self.edges[~cut], *halves]))
+
 
 class CableEdges(NamedTuple):
     """The edges of a surface that pull: ``ends`` (c,2) int, and the ``tension`` (c,) of each, force."""
