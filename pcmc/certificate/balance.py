@@ -140,6 +140,8 @@ def _carries_cable(surface: Surface, curve: Curve) -> bool:
 def unheld(surface: Surface, stable: bool) -> Unheld | None:
     """A part that no vertex fixes and that so has no equilibrium, or no ``stable`` one; or None.
 
+    A part around a room of prescribed volume can neither grow nor shrink: it may well be at rest.
+
     >>> from pcmc import Patch
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
     >>> tent = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
@@ -150,7 +152,9 @@ def unheld(surface: Surface, stable: bool) -> Unheld | None:
     parts, used = surface.topology.components, surface.faces[:, 0]
     loaded = (surface.pressures != 0.0) | (surface.weights != 0.0)
     pressed = np.unique(parts[used[loaded[surface.patch_of_face]]])
-    for part in np.setdiff1d(parts[used], parts[surface.fixed]):
+    held = surface.fixed.copy()
+    held[surface.faces[surface.room_signs.any(axis=0)[surface.patch_of_face]]] = True
+    for part in np.setdiff1d(parts[used], parts[held]):
         if stable or part not in pressed:
             return Unheld(int(np.flatnonzero(parts == part)[0]), bool(part in pressed))
     return None

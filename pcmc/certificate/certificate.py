@@ -20,6 +20,7 @@ from ..energy.functional import energy_and_gradient, patch_areas, volume
 from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
 from ..energy.motion_space import VertexClasses, force_scale, motion_space
 from ..energy.rigid_motions import rigid_modes, rigid_motions
+from ..energy.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest, stiffness
@@ -42,10 +43,12 @@ class Certificate:
     ----------
     verdict, detail : the verdict, and its reason (which mode, patch or place).
     residual : ‖Bᵀ∇E‖ over ``scale``: the forces left in the motion space, with the pull on pinched
-        vertices beyond what their wall can take, relative. Of several loose parts, that of the worst.
+        vertices beyond what their wall can take, relative. Of several loose parts, that of the worst. The
+        relative differences of prescribed volumes are added to it (as squares).
     scale : norm of the single triangles' tension forces, force.
     energy, volume : E (force·length) and the volume under the roof (length³).
-    index : Morse index; None where the surface is not at rest. Rigid motions are not counted.
+    index : Morse index; None where the surface is not at rest. Rigid motions are not counted, nor motions
+        that change a prescribed volume.
     eigenvalues : lowest second variations per unit area and displacement, force/length³, ascending.
     modes : (k,n,3) their displacement fields, unit mass.
     curvature_error : largest |H - H̄|/H̄ by the variational definition.
@@ -55,6 +58,8 @@ class Certificate:
         left and Σ α n, force/length.
     boundaries : one row per held boundary curve: length, middle, reaction, largest reaction per
         length. A corner's reaction is shared equally by its curves; per length it counts in full.
+    rooms : one row per room of prescribed volume: the volume it has, the one prescribed, the difference
+        over the latter, and the room's pressure.
     cables : one row per cable, cut at supports and branches: force, length, middle, the pull of the
         sheets and of the cable across it, force left; see ``pcmc.certificate.cables.cable_table``.
     cable_ends : one row per end of these: vertex, place, whether held, the force of a support there.
@@ -91,6 +96,7 @@ class Certificate:
     proofs: tuple[Proof, ...] = ()
     cables: pd.DataFrame = field(default_factory=pd.DataFrame)
     cable_ends: pd.DataFrame = field(default_factory=pd.DataFrame)
+    rooms: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     @property
     def certified(self) -> bool:
@@ -130,12 +136,11 @@ class Certificate:
             ("load, reactions", f"{self.load:.6g}, {self.support:.6g} along the plane's normal"),
         ]
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
-        tables = [
-            frame.to_string(index=False, float_format=lambda x: f"{x:.4g}")
-            for frame in (self.patches, self.junctions, self.boundaries, self.cables, self.cable_ends)
-            if len(frame)
+        tables = self.patches, self.rooms, self.junctions, self.boundaries, self.cables, self.cable_ends
+        shown = [
+            frame.to_string(index=False, float_format=lambda x: f"{x:.4g}") for frame in tables if len(frame)
         ]
-        return "\n\n".join([head, *tables])
+        return "\n\n".join([head, *shown])
 
 
 def certify(
@@ -183,6 +188,9 @@ def certify(
     left = space.to_vectors(in_motion_space)
     lacking = np.column_stack([left, unheld])
     residual = relative_forces(standing, classes, X, lacking)
+    rooms = room_table(surface)
+    if len(rooms):
+        residual = float(np.hypot(residual, np.linalg.norm(rooms["difference"])))
 
     qualities = triangle_quality(X, standing.faces)
     in_wall = part.walls.pinchable[standing.patch_of_face]
@@ -213,6 +221,7 @@ def certify(
         evidence=evidence,
         given=proofs,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
+        rigid=rigid.shape[1] if surface.rooms else 0,
     )
     verdict, reason = judge(findings)
     return Certificate(
@@ -239,6 +248,7 @@ def certify(
         proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),
         cables=cable_table(standing, left),
         cable_ends=cable_end_table(standing),
+        rooms=rooms,
     )
 
 
@@ -305,6 +315,22 @@ def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Fl
         row["quality"] = float(quality[faces].min(initial=1.0))
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def room_table(surface: Surface) -> pd.DataFrame:
+    """A row per room of prescribed volume; see ``Certificate.rooms``."""
+    if not surface.rooms:
+        return pd.DataFrame()
+    wanted, reached = prescribed_volumes(surface), room_volumes(surface)
+    return pd.DataFrame(
+        {
+            "room": [room.name for room in surface.rooms],
+            "volume": reached,
+            "prescribed": wanted,
+            "difference": (reached - wanted) / np.abs(wanted),
+            "pressure": room_pressures(surface),
+        }
+    )
 
 
 def _largest(values: pd.Series) -> float:

@@ -65,6 +65,7 @@ class Findings:
     evidence : what happened on the way, if a solver was there to see it.
     given : proofs that there is no equilibrium, which a solver brought.
     mode : (n,3) displacements of the lowest mode; empty where none is known.
+    rigid : number of rigid motions that nothing resists, where rooms prescribe volumes.
     """
 
     surface: Surface
@@ -80,6 +81,7 @@ class Findings:
     evidence: Evidence | None = None
     given: tuple[Proof, ...] = ()
     mode: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    rigid: int = 0
 
     @property
     def moving(self) -> bool:
@@ -109,8 +111,11 @@ class Findings:
     def overloaded(self) -> bool:
         """Whether the pressure is more than the boundary can carry, beyond what the mesh leaves open.
 
-        Where a solver saw the surface inflate or collapse, the mesh leaves nothing open.
+        Where a solver saw the surface inflate or collapse, the mesh leaves nothing open. Where rooms
+        prescribe volumes, the pressure is not given, and proves nothing.
         """
+        if self.surface.rooms:
+            return False
         settled = self.evidence in (Evidence.INFLATED, Evidence.COLLAPSED)
         return self.load_ratio > 1.0 + (0.0 if settled else coarseness(self.surface))
 
@@ -243,6 +248,11 @@ RULES = (
     Rule(Verdict.SADDLE, lambda f: bool(compressed(f.surface).any()), _compressed),
     Rule(Verdict.UNDECIDED, lambda f: f.index is None, _hidden_stability),
     Rule(Verdict.SADDLE, lambda f: f.index != 0, _ways_down),
+    Rule(
+        Verdict.NEUTRAL,
+        lambda f: f.rigid > 0,
+        lambda f: f"nothing resists {f.rigid} rigid motions; every change of shape at these volumes raises E",
+    ),
     Rule(
         Verdict.NEUTRAL,
         lambda f: abs(f.softest) < NEUTRAL,

@@ -59,6 +59,12 @@ class BoundaryMotion:
         if not surface.fixed.any():
             message = "BoundaryMotion: the surface has no fixed vertex that could move"
             raise OptionError(message, what="parameter", found=0)
+        if surface.rooms:
+            message = (
+                f"BoundaryMotion: room {surface.rooms[0].name!r} prescribes a volume, which is not followed"
+            )
+            hint = "as the boundary moves; remove the room, and give its pressure"
+            raise OptionError(f"{message} {hint}", what="parameter", found=surface.rooms[0].name)
         line = BoundaryLine(self.start, self.positions, int(surface.fixed.sum()))
         off = np.linalg.norm(line.boundary(self.start) - surface.vertices[surface.fixed], axis=1)
         if off.max() > SAME_PLACE * surface.size:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eigh, null_space
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
@@ -60,13 +60,15 @@ class Tangent:
 class BranchPoint:
     """A point of the branch; ``index`` is the number of its negative eigenvalues.
 
-    ``eigenvalues`` are all negative ones and at least one more, ascending, force/length³.
+    ``eigenvalues`` are all negative ones and at least one more, ascending, force/length³; ``room_rates`` (r,)
+    the derivatives of the rooms' pressures by arclength.
     """
 
     state: State
     tangent: Tangent
     eigenvalues: Floats
     index: int
+    room_rates: Floats
 
 
 def branch_point(at: State, before: Tangent | float) -> BranchPoint:
@@ -79,12 +81,14 @@ def branch_point(at: State, before: Tangent | float) -> BranchPoint:
         matrix, sense = BorderedMatrix(at, before.row, before.rate), 1.0
     else:
         matrix, sense = BorderedMatrix(at, np.zeros_like(at.X), 1.0 / scale**2), before
-    s, slope = matrix.solve(np.zeros(at.space.size), sense, TANGENT_ACCURACY)
-    direction, weights = at.motion(s, slope), at.area_weights
+    s, slope = matrix.solve(np.zeros(len(at.left)), sense, TANGENT_ACCURACY)
+    size = at.space.size
+    direction, weights = at.motion(s[:size], slope), at.area_weights
     length = Tangent(direction, slope, weights, scale).length(direction, slope)
     tangent = Tangent(direction / length, slope / length, weights, scale)
     stiffness = at.mesh.stiffness(at.space, at.X, matrix.values, matrix.factor)
-    return BranchPoint(at, tangent, _eigenvalues(stiffness), stiffness.negative)
+    rates = at.volume_units * s[size:] / length
+    return BranchPoint(at, tangent, _eigenvalues(stiffness), stiffness.negative, rates)
 
 
 def soft_modes(at: State, count: int) -> tuple[Floats, Floats]:
@@ -92,7 +96,7 @@ def soft_modes(at: State, count: int) -> tuple[Floats, Floats]:
     values, factor = at.mesh.hessian(at.surface, at.space, at.X)
     stiffness = at.mesh.stiffness(at.space, at.X, values, factor)
     if len(stiffness.mass) < DENSE:
-        every, vectors = eigh(stiffness.matrix.toarray(), np.diag(stiffness.mass))
+        every, vectors = _all_modes(stiffness)
         fields = np.array([at.space.to_vectors(column) for column in vectors.T])
     else:
         every, fields = lowest(stiffness, stiffness.negative + count + 1)
@@ -108,12 +112,19 @@ def along_branch(at: BranchPoint, count: int) -> float:
     return float(np.linalg.norm(np.einsum("vi,kvi->k", tangent.row, modes) / np.sqrt(squares)))
 
 
+def _all_modes(stiffness: Stiffness) -> tuple[Floats, Floats]:
+    """All eigenvalues (k,), ascending, and their modes (N,k), among the motions that count."""
+    across = null_space(stiffness.excluded.T) if stiffness.excluded.shape[1] else np.eye(len(stiffness.mass))
+    H, M = stiffness.matrix.toarray(), np.diag(stiffness.mass)
+    values, vectors = eigh(across.T @ H @ across, across.T @ M @ across)
+    return values, across @ vectors
+
+
 def _eigenvalues(stiffness: Stiffness) -> Floats:
     """All negative eigenvalues and at least one more, ascending."""
     size = len(stiffness.mass)
     if size < DENSE:
-        mass = np.diag(stiffness.mass)
-        return np.asarray(eigh(stiffness.matrix.toarray(), mass, eigvals_only=True))
+        return _all_modes(stiffness)[0]
     count = stiffness.negative + 2
     while True:
         values = lowest(stiffness, min(count, size - 1))[0]

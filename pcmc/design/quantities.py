@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..certificate.balance import held_lengths, reactions
@@ -110,6 +111,18 @@ def _curvature(surface: Surface, of: str) -> Measurement:
     return Measurement(float(p / (2.0 * alpha)), np.zeros_like(surface.vertices), by_tension, by_pressure)
 
 
+def _pressure(surface: Surface, of: str) -> Measurement:
+    """The pressure of a room of prescribed volume, force/length²."""
+    row = np.linalg.pinv(surface.room_signs.T)[room_index(surface, of)]
+    return Measurement(float(row @ surface.pressures), np.zeros_like(surface.vertices), by_pressure=row)
+
+
+def room_index(surface: Surface, name: str) -> int:
+    """Index of the room called ``name``."""
+    names = [room.name for room in surface.rooms]
+    return names.index(validate.choice("room", name, names))
+
+
 def _reaction(surface: Surface, of: str | None) -> Measurement:
     """max |f_v| / ℓ_v over the patch's held boundary, ℓ_v half the length of the held edges at v.
 
@@ -191,5 +204,6 @@ QUANTITIES = {
     "volume": Quantity(_volume, lambda surface: surface.size**3),
     "area": Quantity(_area, lambda surface: surface.size**2),
     "curvature": Quantity(_curvature, lambda surface: 1.0 / surface.size),
+    "pressure": Quantity(_pressure, lambda surface: float(surface.tensions.max()) / surface.size),
     "reaction": Quantity(_reaction, lambda surface: float(surface.tensions.max())),
 }

@@ -100,6 +100,8 @@ def meet(
         if not target.limits:
             raise OptionError(f"{target.label}: give value, at_most or at_least", what=target.label)
         measure(surface, target)
+    for parameter in parameters:
+        parameter.check(surface)
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a row")
     validate.positive("tolerance", tolerance)
@@ -211,7 +213,7 @@ class Search:
         None where no equilibrium is found, or where it is at a fold and has no derivatives.
         """
         surface = self.with_unknowns(start, x)
-        if load_ratio(surface) > 1.0 + coarseness(surface):
+        if not surface.rooms and load_ratio(surface) > 1.0 + coarseness(surface):
             self.record(x, OVERLOADED)
             return None
         result = solve(surface, "newton", **{**quality, **self.options})
@@ -226,10 +228,11 @@ class Search:
 
     def with_unknowns(self, surface: Surface, x: Floats) -> Surface:
         """The surface with the tensions and pressures that the unknowns stand for."""
-        values: dict[str, dict[str, float]] = {"tension": {}, "pressure": {}}
+        values: dict[str, dict[str, float]] = {"tension": {}, "pressure": {}, "volume": {}}
         for parameter, value in zip(self.parameters, self.converted(x).tolist(), strict=True):
             values[parameter.kind][parameter.patch] = value
-        return with_pressures(surface, values["tension"], values["pressure"])
+        changed = with_pressures(surface, values["tension"], values["pressure"])
+        return changed.retensioned(volumes=values["volume"]) if values["volume"] else changed
 
     def trial(self, x: Floats, result: Result) -> Trial:
         """The quantities and misfits of a solve."""

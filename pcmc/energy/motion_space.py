@@ -137,20 +137,21 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     smooth sheet: their common curve can slide along it freely and carries no motion of its own.
     Without pressure they are so whichever way their faces run; a Möbius band keeps a curve across.
     """
-    pulls = (surface.tensions != 0.0) | (surface.pressures != 0.0)
+    in_room = surface.room_signs.any(axis=0)  # the pressure of a room may take any value
+    pulls = (surface.tensions != 0.0) | (surface.pressures != 0.0) | in_room
     active = pulls[surface.patch_of_face]
     faces, patch = surface.faces, surface.patch_of_face
     if not active.all():
         faces, patch = np.ascontiguousarray(faces[active]), np.ascontiguousarray(patch[active])
-    of_patch = np.stack([surface.tensions, surface.pressures, surface.weights])
-    kinds = np.unique(of_patch, axis=1, return_inverse=True)
+    laws = np.vstack([surface.tensions, surface.pressures, surface.weights, surface.room_signs])
+    kinds = np.unique(laws, axis=1, return_inverse=True)
     alike = np.asarray(kinds[1]).ravel()[patch].astype(np.int32)
     if active.all():
         topo = replace(surface.topology, patch_of_face=alike)
     else:
         topo = topology(faces, alike, surface.n)
     if (topo.one_way_edge & ~topo.seam_edge).any():
-        turned = _against_the_others(topo) & (surface.pressures[patch] == 0.0)
+        turned = _against_the_others(topo) & ((surface.pressures == 0.0) & ~in_room)[patch]
         faces = np.where(turned[:, None], faces[:, ::-1], faces)
         topo = topology(faces, alike, surface.n)
     faces.setflags(write=False)  # compiled loops then see one type of array

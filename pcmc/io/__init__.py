@@ -40,6 +40,7 @@ class Format:
     separate : whether it has a mesh per patch, which cannot have triangles without area.
     walls : whether such triangles go with a separate format as text.
     lines : whether it holds the lines and circles that vertices slide along.
+    rooms : whether it holds the volumes that rooms prescribe.
     loses : what it never holds.
     """
 
@@ -50,13 +51,14 @@ class Format:
     separate: bool = False
     walls: bool = False
     lines: bool = False
+    rooms: bool = False
     loses: tuple[str, ...] = ()
 
 
 FORMATS = {
-    ".pcmc": Format("native", scalars="both", certificate=True, shared=True, lines=True),
-    ".fe": Format("evolver", shared=True),
-    ".dmp": Format("evolver", shared=True),
+    ".pcmc": Format("native", scalars="both", certificate=True, shared=True, lines=True, rooms=True),
+    ".fe": Format("evolver", shared=True, rooms=True),
+    ".dmp": Format("evolver", shared=True, rooms=True),
     ".obj": Format("obj"),
     ".ply": Format("ply", scalars="both"),
     ".stl": Format("stl", separate=True, loses=("supports", "tensions", "pressures")),
@@ -190,6 +192,8 @@ def write(
         lost.append("certificate")
     if surface.on_line and not form.lines:
         lost.append("lines or circles that vertices slide along (they are fixed in it)")
+    if surface.rooms and not form.rooms:
+        lost.append("volumes of rooms (it has the pressures reached)")
     shown, walls = surface, None
     if form.separate:
         shown = standing_part(surface).surface

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
 from ..base.validate import choice
-from ..surface import Guide, Patch, Plane, Surface, checks
+from ..surface import Guide, Patch, Plane, Room, Surface, checks
 from ..surface.geometry import bounding_size
 from ..surface.topology import topology
 
@@ -42,7 +42,7 @@ class MeshData:
         vertices at one place stay two: those of a wall without height below a junction on Π.
     walls : the text of ``flat_walls.encode_walls``, where patches are separate meshes and a wall has
         no height.
-    lines : as ``on_line`` in Surface.
+    lines, rooms : as ``on_line`` and ``rooms`` in Surface.
     """
 
     vertices: Floats
@@ -57,6 +57,7 @@ class MeshData:
     joined: bool = False
     walls: str | None = None
     lines: tuple[tuple[Guide, Bools], ...] = ()
+    rooms: tuple[Room, ...] = ()
 
 
 def checked(data: MeshData) -> MeshData:
@@ -204,7 +205,8 @@ def to_surface(
     if rounded.any():  # back onto the plane
         X = X - np.where(rounded, height, 0.0)[:, None] * np.array(plane.normal)
     lines = data.lines if fixed is None else ()
-    return Surface(X, data.faces, data.patch_of_face, patches, held, sliding, plane, lines)
+    supports = held, sliding, plane, lines
+    return Surface(X, data.faces, data.patch_of_face, patches, *supports, rooms=data.rooms)
 
 
 def _changed(

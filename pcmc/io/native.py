@@ -3,8 +3,8 @@
 A zip archive of NumPy arrays (an .npz) that ``numpy.load`` opens: ``vertices``, ``faces``,
 ``patch_of_face``, ``support``; where vertices slide along lines, ``lines`` and ``on_line``, along circles,
 ``circles`` and ``on_circle``; one ``scalar <name>`` per scalar, one ``certificate <name>`` per array of the
-certificate, and ``meta``, a JSON text with the format's version, the patches, the plane and the rest of the
-certificate, its tables as lists of rows.
+certificate, and ``meta``, a JSON text with the format's version, the patches, the plane, the rooms of
+prescribed volume and the rest of the certificate, its tables as lists of rows.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ import pandas as pd
 
 from ..base.arrays import Bools, Floats
 from ..base.errors import FileError
-from ..surface import Circle, Guide, Line, Surface
+from ..surface import Circle, Guide, Line, Room, Surface
 from .libraries import translated_errors
 from .mesh_data import MeshData, support_of
 from .metadata import metadata_text, parse_metadata
 
-VERSION = 3  # since 2 with lines, since 3 with circles; a surface is written as the oldest that can hold it
+VERSION = 4  # since 2 lines, 3 circles, 4 rooms; a surface is written as the oldest version that can hold it
 FORMAT = "pcmc surface"
 INFLATED = 100  # most bytes for each byte of the file; a flat grid of a million triangles has 7
 ROOM = 64_000_000  # bytes that any file may become
@@ -40,10 +40,12 @@ def write(
     tables = {k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object}
     meta = {
         "format": FORMAT,
-        "version": 3 if surface.on_circle else 2 if surface.on_line else 1,
+        "version": _version(surface),
         "description": metadata_text(surface),
         "certificate": {k: v for k, v in certificate.items() if k not in tables},
     }
+    if surface.rooms:
+        meta["rooms"] = [[room.name, room.patches, room.volume] for room in surface.rooms]
     arrays: dict[str, Any] = {f"scalar {name}": value for name, value in scalars.items()}
     arrays |= {f"certificate {name}": value for name, value in tables.items()}
     straight = [(line, along) for line, along in surface.on_line if isinstance(line, Line)]
@@ -90,9 +92,26 @@ def read(path: Path) -> MeshData:
             arrays.pop("support"),
             metadata.plane,
             lines=_lines(arrays) + _circles(arrays),
+            rooms=_rooms(meta),
             scalars=_under("scalar ", arrays),
             certificate={**meta["certificate"], **_under("certificate ", arrays)},
         )
+
+
+def _version(surface: Surface) -> int:
+    """The oldest version of the format that can hold a surface."""
+    if surface.rooms:
+        return 4
+    return 3 if surface.on_circle else 2 if surface.on_line else 1
+
+
+def _rooms(meta: Mapping[str, Any]) -> tuple[Room, ...]:
+    """The rooms of prescribed volume in the description."""
+    rows = meta.get("rooms", [])
+    if not all(isinstance(row, list) and len(row) == 3 for row in rows):
+        text = "rooms: expected a name, signs by patch and a volume for each"
+        raise FileError(text, where="rooms", found=str(rows)[:60])
+    return tuple(Room(*row) for row in rows)
 
 
 def _lines(arrays: dict[str, Any]) -> tuple[tuple[Guide, Bools], ...]:

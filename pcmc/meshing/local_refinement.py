@@ -121,7 +121,8 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
     fixed, sliding = np.concatenate([surface.fixed, held]), np.concatenate([surface.on_plane, slides])
     lines = carry_lines(surface, X, fixed, surface.n)
     cables = [cable.cut(ends, number) for cable in surface.cables]
-    return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane, lines, cables=cables)
+    supports = fixed, sliding, surface.plane, lines
+    return Surface(X, F, patch, surface.patches, *supports, cables=cables, rooms=surface.rooms)
 
 
 def _face_mask(surface: Surface, chosen: Bools | Ints) -> Bools:

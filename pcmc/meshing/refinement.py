@@ -140,7 +140,8 @@ def _refine_once(surface: Surface, project: Projection | None) -> Surface:
     lines = carry_lines(surface, X, fixed, surface.n)
     edges = surface.topology.edges
     cables = [cable.cut(edges, surface.n + np.arange(len(edges))) for cable in surface.cables]
-    return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane, lines, cables=cables)
+    supports = fixed, sliding, surface.plane, lines
+    return Surface(X, F, patch, surface.patches, *supports, cables=cables, rooms=surface.rooms)
 
 
 def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tuple[tuple[Guide, Bools], ...]:

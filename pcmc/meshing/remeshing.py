@@ -409,7 +409,8 @@ def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Sur
     lines = carry_lines(surface, X, fixed)
     ends = np.searchsorted(used, old.curves)
     cables = [replace(c, edges=ends[old.cable == index]) for index, c in enumerate(surface.cables)]
-    return Surface(X, F, patch_of_face, surface.patches, fixed, sliding, surface.plane, lines, cables=cables)
+    supports = fixed, sliding, surface.plane, lines
+    return Surface(X, F, patch_of_face, surface.patches, *supports, cables=cables, rooms=surface.rooms)
 
 
 def _patch_angles(mesh: _Mesh, count: int) -> Floats:

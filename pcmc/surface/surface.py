@@ -131,7 +131,7 @@ class Surface:
         height = self.plane.height(X)
         checks.mesh(X, F, patch, self.topology, self.patches, self.held, height)
         self._check_planes(X)
-        if not self.held.any():
+        if not (self.held.any() or self.rooms):
             message = "no vertex is fixed or on the plane: translations are free, so only closed surfaces"
             message += " have an equilibrium; pass fixed= or on_plane= to hold it"
             warnings.warn(message, FreeSurfaceWarning, stacklevel=3)
