@@ -4,8 +4,8 @@
 - on a curve where sheets meet or end: the plane perpendicular to the curve;
 - at a point where such curves meet, or which sheets share that have no edge in common there: all
   three directions;
-- always within what the support allows: nothing where fixed, along Π where sliding, or along a
-  line or circle.
+- always within what the support allows: nothing where fixed, along the plane where sliding, or along a
+  line or circle. In a mirror plane the sheet goes on: its boundary there is no curve.
 
 The remaining directions only slide vertices along the shape and belong to mesh quality. Faces without
 tension and pressure exert no force: they are left out, and a vertex of such faces alone has no motion.
@@ -35,6 +35,7 @@ from ..surface.geometry import (
     vector,
     vertex_area_vectors,
 )
+from ..surface.supports import mirror_edges
 from ..surface.topology import (
     CURVE,
     POINT,
@@ -151,7 +152,10 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
         topo = topology(faces, alike, surface.n)
     faces.setflags(write=False)  # compiled loops then see one type of array
     patch.setflags(write=False)
-    edges = topo.edges[topo.curve_edge | topo.one_way_edge]
+    ends = topo.curve_edge | topo.one_way_edge
+    if surface.on_planes:
+        ends = ends & ~mirror_edges(surface.on_planes, topo)
+    edges = topo.edges[ends]
     links = np.concatenate([edges, edges[:, ::-1]])
     if crest is not None and len(crest):
         links = np.concatenate([links[~np.isin(links[:, 0], crest[:, 0])], crest])
@@ -190,9 +194,10 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     point = np.concatenate([np.flatnonzero(moving & (classes.kind == POINT)), curve[~straight]])
     basis[point], dimension[point] = np.eye(3), 3
 
-    sliding = np.flatnonzero(moving & surface.on_plane)
-    if len(sliding):
-        _within_plane(np.array(surface.plane.normal), tangent, sliding, basis, dimension)
+    for plane, mask in surface.sliding:
+        sliding = np.flatnonzero(moving & mask)
+        if len(sliding):
+            _within_plane(np.array(plane.normal), tangent, sliding, basis, dimension)
     for line, along_line in surface.on_line:
         sliding = np.flatnonzero(along_line & moving)
         if isinstance(line, Circle):
@@ -244,7 +249,7 @@ def _against_the_others(topo: Topology) -> Bools:
 
 
 def _within_plane(normal: Floats, tangent: Floats, sliding: Ints, basis: Floats, dimension: Ints) -> None:
-    """Cut the basis at sliding vertices down to directions along Π, in place."""
+    """Cut the basis at sliding vertices down to directions along their plane, in place."""
     first, second = perpendicular(normal[None])
     for size in (1, 2, 3):
         chosen = sliding[dimension[sliding] == size]

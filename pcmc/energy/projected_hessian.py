@@ -23,6 +23,7 @@ from ..surface import Surface
 from ..surface.geometry import cross, divided, dot, norm, point, scaled, sub, vector
 from .kernels import Mesh
 from .motion_space import MotionSpace, VertexClasses
+from .plane_pieces import add_plane_hessian
 from .turning import circle_turning
 
 
@@ -77,6 +78,7 @@ def assemble(
     data = np.zeros(len(pattern.indices))
     _assemble(classes.mesh(surface), X, space, pattern, hessian, stiffness, data)
     if hessian:
+        add_plane_hessian(surface, classes, space, pattern, hessian, data)
         rows, factor = circle_turning(surface, space, X)
         data[pattern.indptr[space.start[rows]]] += hessian * (factor * space.basis[rows, 0]).sum(axis=1)
     return data
