@@ -95,3 +95,37 @@ def test_volumes_are_enclosed(case):
     area_vector = vertex_area_vectors(X, surface.faces)[0] / 3.0
     moving = weighted(surface, 0.0, -1.0)[2]
     assert abs(float(((moving - area_vector) * d).sum())) < 1e-12 * np.abs(d).sum()
+
+
+def dense(space):
+    """B as a matrix (3n, unknowns)."""
+    return np.stack([space.to_vectors(row).ravel() for row in np.eye(space.size)], axis=1)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_assembled_hessian(case):
+    surface = CASES[case]()
+    classes = vertex_classes(surface)
+    space = motion_space(surface, classes, surface.vertices)
+    pattern = hessian_pattern(classes, space)
+    data = assemble(surface, classes, space, pattern, surface.vertices)
+    B = dense(space)
+    assert np.abs(full_matrix(pattern, data).toarray() - B.T @ (hessian(surface) @ B)).max() < 1e-13
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_linearised_forces(case):
+    """Bᵀ Df[d] is the derivative of the forces f = B Bᵀ ∇E, sliding boundaries included."""
+    surface = CASES[case]()
+    classes, X = vertex_classes(surface), surface.vertices
+
+    def forces(X):
+        return motion_space(surface, classes, X).project(energy_and_gradient(surface, X)[1])
+
+    space = motion_space(surface, classes, X)
+    here = linearise(surface, classes, space, X, energy_and_gradient(surface, X)[1])
+    d = random_motion(surface, 3)
+    d /= np.abs(d).max()
+    t = 1e-5
+    numeric = space.to_coordinates((forces(X + t * d) - forces(X - t * d)) / (2 * t))
+    assert np.abs(here.times(d) - numeric).max() < 1e-8
