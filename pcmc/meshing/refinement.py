@@ -144,8 +144,8 @@ def _refine_once(surface: Surface, project: Projection | None) -> Surface:
 def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tuple[tuple[Guide, Bools], ...]:
     """The lines and circles that vertices X (n,3) of a finer mesh slide along; the first ``kept`` are old.
 
-    A new vertex slides if it is fixed, on the line, and between vertices of the old mesh of which one slides
-    and the other is the next that does not.
+    A new vertex slides if it is fixed, on the line, and no farther along it than the last old vertices, the
+    sliding ones and their neighbours on the boundary.
     """
     lines: list[tuple[Guide, Bools]] = []
     near = 1e-9 * surface.size
@@ -177,7 +177,7 @@ def onto_round_edges(surface: Surface, points: Floats) -> Floats:
 
 
 def _round_edges(surface: Surface, circle: Circle, along: Bools, points: Floats) -> tuple[Bools, Floats]:
-    """Which points (k,3) are on a sliding vertex, or between two on the circle of which one slides.
+    """Which points (k,3) are at a sliding vertex, or between one and its neighbour on the circle.
 
     And how high the circle rises there over the edge between the two, (k,) length.
     """
