@@ -218,6 +218,22 @@ class Surface:
         """(e,) edges of the boundary in a mirror plane, where the surface goes on behind it."""
         return supports.mirror_edges(self.on_planes, self.topology)
 
+    @cached_array
+    def pinned(self) -> Bools:
+        """(n,) ``fixed`` without the vertices that two planes let slide along their common line."""
+        pinned = self.fixed.copy()
+        for _, along in self.auto_lines:
+            pinned &= ~along
+        return pinned
+
+    @cached_array
+    def on_ground(self) -> Bools:
+        """(n,) vertices that slide on Π, also those that another plane lets slide along a line there only."""
+        sliding = self.on_plane.copy()
+        for _, along in self.auto_lines:
+            sliding |= along & self.given.on_plane
+        return sliding
+
     @cached_property
     def auto_lines(self) -> tuple[tuple[Guide, Bools], ...]:
         """The part of ``on_line`` that was not given: lines that two planes have in common."""
