@@ -10,6 +10,7 @@ from ..contact.pinching import standing_part
 from ..energy import kernels
 from ..energy.functional import add_cables_and_weights, apply_supports
 from ..surface import Surface
+from ..surface.flat_pieces import common_point
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths, vertex_sums
 from ..surface.topology import Curve
 from .proof import UnbalancedJunction, Unheld
@@ -37,14 +38,19 @@ def load_ratio(surface: Surface) -> float:
     inside = surface.fixed & ~topo.on_boundary
     line = inside[topo.edges].all(axis=1)
     carrying = (topo.boundary_edge & surface.held[topo.edges].all(axis=1)) | line
-    capacity = float(sheets[carrying] @ segment_lengths(X, topo.edges[carrying]))
-    single = inside | (surface.held & topo.on_boundary)
+    lengths = segment_lengths(X, topo.edges[carrying])
+    for plane, mask in surface.on_planes:  # a plane carries across itself; a mirror plane nothing at all
+        steep = 0.0 if plane.mirror else abs(float(np.dot(plane.normal, surface.plane.normal)))
+        lengths[mask[topo.edges[carrying]].all(axis=1)] *= steep
+    capacity = float(sheets[carrying] @ lengths)
+    supports = surface.fixed | surface.on_plane
+    single = inside | (supports & topo.on_boundary)
     single[topo.edges[carrying]] = False
     if single.any():
         opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
         capacity += 0.5 * float((pull.mean(axis=1)[:, None] * opposite * single[F]).sum())
     ends, tension = surface.cable_edges
-    capacity += float(tension[surface.held[ends].sum(axis=1) == 1].sum())
+    capacity += float(tension[supports[ends].sum(axis=1) == 1].sum())
     return abs(load(surface)) / capacity if capacity > 0.0 else 0.0
 
 
@@ -79,7 +85,7 @@ def coarseness(surface: Surface) -> float:
     4.0
     """
     X, topo = surface.vertices, surface.topology
-    length = segment_lengths(X, topo.edges[topo.boundary_edge])
+    length = segment_lengths(X, topo.edges[topo.boundary_edge & ~surface.mirror_edge])
     corners = X[surface.faces[~surface.walls[surface.patch_of_face]]]
     plan = abs(float(area_vectors(corners).sum(axis=0) @ np.array(surface.plane.normal)))
     if not len(length) or plan == 0.0:
@@ -116,7 +122,7 @@ def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
 
 def _strained(surface: Surface, pinchable: Bools, share: float) -> UnbalancedJunction | None:
     """A junction whose largest tension is over ``share`` of the sum of the others."""
-    held = surface.fixed | surface.on_plane
+    held = surface.held
     for curve in surface.topology.junctions:
         strongest = max(curve.sheets, key=lambda patch: surface.tensions[patch])
         *others, largest = sorted(surface.tensions[list(curve.sheets)])
@@ -150,14 +156,26 @@ def unheld(surface: Surface, stable: bool) -> Unheld | None:
     (Unheld(vertex=0, pressed=True), None)
     """
     parts, used = surface.topology.components, surface.faces[:, 0]
-    loaded = (surface.pressures != 0.0) | (surface.weights != 0.0)
-    pressed = np.unique(parts[used[loaded[surface.patch_of_face]]])
-    held = surface.fixed.copy()
-    held[surface.faces[surface.room_signs.any(axis=0)[surface.patch_of_face]]] = True
+    pressed = np.unique(parts[used[surface.pressures[surface.patch_of_face] != 0.0]])
+    held = surface.given.fixed.copy()
+    for _, along in surface.given.on_line:
+        held |= along
+    beyond = surface.room_signs.any(axis=0) | (surface.weights != 0.0)
+    held[surface.faces[beyond[surface.patch_of_face]]] = True
     for part in np.setdiff1d(parts[used], parts[held]):
-        if stable or part not in pressed:
+        if (stable or part not in pressed) and _may_shrink(surface, parts == part):
             return Unheld(int(np.flatnonzero(parts == part)[0]), bool(part in pressed))
     return None
+
+
+def _may_shrink(surface: Surface, part: Bools) -> bool:
+    """Whether the planes that a part slides on meet in a point, towards which it can shrink."""
+    planes = [(surface.plane, surface.given.on_plane), *surface.on_planes]
+    there = [plane for plane, mask in planes if (mask & part).any()]
+    if len(there) < 2:
+        return True
+    point = common_point(np.array(there[0].point), there)
+    return bool(all(abs(plane.height(point)) <= 1e-9 * surface.size for plane in there))
 
 
 def pressures_left_over(surface: Surface) -> str:
@@ -200,7 +218,7 @@ def conormal_sum(surface: Surface) -> Floats:
 def held_lengths(surface: Surface) -> Floats:
     """(n,) half the length of the boundary edges at each vertex that are held at both ends, length."""
     ends = surface.topology.edges[surface.topology.boundary_edge]
-    ends = ends[(surface.fixed | surface.on_plane)[ends].all(axis=1)]
+    ends = ends[surface.held[ends].all(axis=1)]
     half = 0.5 * segment_lengths(surface.vertices, ends)
     return np.asarray(np.bincount(ends.ravel(), np.repeat(half, 2), surface.n), dtype=float)
 
@@ -265,7 +283,7 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
 
 def boundary_table(surface: Surface, forces: Floats) -> pd.DataFrame:
     """One row per held boundary curve: where it is, its share of the reactions (n,3), most per length."""
-    held = surface.fixed | surface.on_plane
+    held = surface.held
     loops = surface.topology.boundary_loops
     # the reaction of a corner is shared equally by its curves, so that the rows add up to the total
     count = np.zeros(surface.n)

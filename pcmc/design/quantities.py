@@ -131,7 +131,7 @@ def _reaction(surface: Surface, of: str | None) -> Measurement:
     normal. Force/length.
     """
     topo = surface.topology
-    held = (surface.fixed | surface.on_plane)[topo.edges].all(axis=1)
+    held = surface.held[topo.edges].all(axis=1)
     edges = considered = np.flatnonzero(topo.boundary_edge & held)
     if of is not None:
         considered = np.intersect1d(edges, topo.edge_of_face[_faces_of(surface, of)])

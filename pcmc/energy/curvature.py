@@ -14,6 +14,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface, expect_surface
 from ..surface.geometry import vertex_area_vectors
+from ..surface.supports import symmetric_part
 from .functional import weighted
 
 Method = Literal["cotangent", "variational"]
@@ -43,6 +44,8 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     validate.choice("method", method, METHODS)
     area_gradient = weighted(surface, np.ones(len(surface.patches)))[2]
     area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces)
+    symmetric_part(surface.on_planes, area_gradient)
+    area_vector = symmetric_part(surface.on_planes, area_vector)
     along = np.einsum("ij,ij->i", area_gradient, area_vector)
     with np.errstate(divide="ignore", invalid="ignore"):
         if method == "cotangent":
@@ -100,5 +103,11 @@ def curvature_error(surface: Surface, method: Method = "cotangent") -> Floats:
 
 
 def _within_one_sheet(surface: Surface) -> Bools:
-    """(n,) vertices off boundaries and junctions, and where sheets do not just touch."""
-    return surface.topology.interior & (surface.topology.fans == 1)
+    """(n,) vertices off boundaries and junctions, and where sheets do not just touch.
+
+    The boundary in a mirror plane is none.
+    """
+    topo = surface.topology
+    inside = np.ones(surface.n, dtype=bool)
+    inside[topo.edges[topo.curve_edge & ~surface.mirror_edge]] = False
+    return inside & (topo.fans == 1)

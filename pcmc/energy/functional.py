@@ -27,6 +27,7 @@ from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
 from . import kernels
 from .cables import add_cables, add_pull, cable_blocks
+from .plane_pieces import add_plane_forces, add_plane_volumes, plane_hessian
 from .weight import add_weights, moments, weight_blocks
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def energy(surface: Surface) -> float:
 def energy_at(surface: Surface, X: Floats) -> float:
     """E of the surface with its vertices at X (n,3)."""
     areas, volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), X)
+    add_plane_volumes(surface, X, volumes)
     return total(surface.tensions, areas, surface.pressures, volumes) + add_cables_and_weights(surface, X)
 
 
@@ -75,6 +77,8 @@ def energy_and_gradient(
     """
     X = surface.vertices if X is None else X
     areas, volumes, gradient = kernels.measure(kernels.energy_mesh(surface), X, workers)
+    add_plane_volumes(surface, X, volumes)
+    add_plane_forces(surface, surface.pressures, X, gradient)
     further = add_cables_and_weights(surface, X, gradient)
     if supports:
         apply_supports(surface, gradient, X)
@@ -103,15 +107,15 @@ def apply_supports(surface: Surface, vectors: Floats, X: Floats | None = None) -
     """Leave of vectors (n,3) what the supports allow, in place.
 
     Nothing at fixed vertices, the part along the line or circle at those that slide along one, and the part
-    along Π at those that slide there; with the vertices at X (n,3) or where the surface has them.
+    along their plane at those that slide there; with the vertices at X (n,3) or where the surface has them.
     """
     X = surface.vertices if X is None else X
     along = [line.along(vectors[vertices], X[vertices]) for line, vertices in surface.on_line]
     vectors[surface.fixed] = 0.0
     for (_, vertices), part in zip(surface.on_line, along, strict=True):
         vectors[vertices] = part
-    sliding = surface.on_plane
-    vectors[sliding] = surface.plane.along(vectors[sliding])
+    for plane, sliding in surface.sliding:
+        vectors[sliding] = plane.along(vectors[sliding])
     return vectors
 
 
@@ -144,8 +148,8 @@ def hessian(surface: Surface) -> csr_array:
     unknowns = 3 * surface.faces[:, :, None] + np.arange(3)
     rows = np.broadcast_to(unknowns[:, :, None, :, None], blocks.shape)
     columns = np.broadcast_to(unknowns[:, None, :, None, :], blocks.shape)
-    size = 3 * surface.n
-    H = csr_array(coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
+    shape = (3 * surface.n, 3 * surface.n)
+    H = csr_array(coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=shape))
     ends = surface.cable_edges.ends
     if len(ends):
         k = cable_blocks(surface, surface.vertices)
@@ -153,16 +157,18 @@ def hessian(surface: Surface) -> csr_array:
         unknowns = 3 * ends[:, :, None] + np.arange(3)
         rows = np.broadcast_to(unknowns[:, :, None, :, None], both.shape)
         columns = np.broadcast_to(unknowns[:, None, :, None, :], both.shape)
-        H = csr_array(H + coo_array((both.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
-    return H
+        H = csr_array(H + coo_array((both.ravel(), (rows.ravel(), columns.ravel())), shape=shape))
+    return H + plane_hessian(surface) if surface.flat_pieces else H
 
 
 def weighted(
     surface: Surface, tensions: Floats | float = 0.0, pressures: Floats | float = 0.0, X: Floats | None = None
 ) -> tuple[Floats, Floats, Floats]:
     """A_i and V_i (k,), and Σ α ∇A - p ∇V (n,3), supports not applied, with other α and p (k,)."""
-    other = (np.full(len(surface.patches), weights, dtype=float) for weights in (tensions, pressures))
-    return kernels.measure(kernels.energy_mesh(surface, *other), surface.vertices if X is None else X)
+    alpha, p = (np.full(len(surface.patches), weights, dtype=float) for weights in (tensions, pressures))
+    X = surface.vertices if X is None else X
+    areas, volumes, forces = kernels.measure(kernels.energy_mesh(surface, alpha, p), X)
+    return areas, add_plane_volumes(surface, X, volumes), add_plane_forces(surface, p, X, forces)
 
 
 def gradient_by(surface: Surface, kind: str, index: int, X: Floats | None = None) -> Floats:
@@ -193,8 +199,12 @@ def patch_areas(surface: Surface) -> Floats:
 
 
 def patch_volumes(surface: Surface) -> Floats:
-    """(k,) signed volume V_i of each patch's cone to ``surface.origin``, length³ (10b)."""
-    return kernels.areas_and_volumes(kernels.energy_mesh(surface), surface.vertices)[1]
+    """(k,) signed volume V_i of each patch's cone to ``surface.origin``, length³ (10b).
+
+    With the flat pieces of ``plane_pieces`` where a boundary slides on a plane that misses the origin.
+    """
+    volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), surface.vertices)[1]
+    return add_plane_volumes(surface, surface.vertices, volumes)
 
 
 def volume(surface: Surface) -> float:

@@ -5,8 +5,8 @@
 - on a cable the same, also where it runs inside a sheet or along a free edge;
 - at a point where such curves meet, where a cable ends or its tension changes, or which sheets share that
   have no edge in common there: all three directions;
-- always within what the support allows: nothing where fixed, along Π where sliding, or along a
-  line or circle.
+- always within what the support allows: nothing where fixed, along the plane where sliding, or along a
+  line or circle. In a mirror plane the sheet goes on: its boundary there is no curve.
 
 The remaining directions only slide vertices along the shape and belong to mesh quality. Faces without
 tension and pressure exert no force: they are left out, and a vertex of such faces alone has no motion.
@@ -36,6 +36,7 @@ from ..surface.geometry import (
     vector,
     vertex_area_vectors,
 )
+from ..surface.supports import mirror_edges
 from ..surface.topology import (
     CURVE,
     POINT,
@@ -157,6 +158,8 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     faces.setflags(write=False)  # compiled loops then see one type of array
     patch.setflags(write=False)
     on_curve = topo.curve_edge | topo.one_way_edge
+    if surface.on_planes:
+        on_curve = on_curve & ~mirror_edges(surface.on_planes, topo)
     pull = tensions_on(topo.edges, surface.cable_edges, surface.n) if surface.cables else None
     if pull is not None:
         on_curve = on_curve | (pull > 0.0)
@@ -209,9 +212,10 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     point = np.concatenate([np.flatnonzero(moving & (classes.kind == POINT)), curve[~straight]])
     basis[point], dimension[point] = np.eye(3), 3
 
-    sliding = np.flatnonzero(moving & surface.on_plane)
-    if len(sliding):
-        _within_plane(np.array(surface.plane.normal), tangent, sliding, basis, dimension)
+    for plane, mask in surface.sliding:
+        sliding = np.flatnonzero(moving & mask)
+        if len(sliding):
+            _within_plane(np.array(plane.normal), tangent, sliding, basis, dimension)
     for line, along_line in surface.on_line:
         sliding = np.flatnonzero(along_line & moving)
         if isinstance(line, Circle):
@@ -272,7 +276,7 @@ def _against_the_others(topo: Topology) -> Bools:
 
 
 def _within_plane(normal: Floats, tangent: Floats, sliding: Ints, basis: Floats, dimension: Ints) -> None:
-    """Cut the basis at sliding vertices down to directions along Π, in place."""
+    """Cut the basis at sliding vertices down to directions along their plane, in place."""
     first, second = perpendicular(normal[None])
     for size in (1, 2, 3):
         chosen = sliding[dimension[sliding] == size]

@@ -24,6 +24,7 @@ from ..surface.geometry import cross, divided, dot, norm, point, scaled, sub, ve
 from .cables import assemble_cables
 from .kernels import Mesh
 from .motion_space import MotionSpace, VertexClasses
+from .plane_pieces import add_plane_hessian
 from .turning import circle_turning
 from .weight import assemble_weights
 
@@ -89,6 +90,7 @@ def assemble(
         into = pattern.indptr, pattern.offset
         assemble_weights(surface, faces, patch, X, *space, *into, hessian, stiffness, data)
     if hessian:
+        add_plane_hessian(surface, classes, space, pattern, hessian, data)
         rows, factor = circle_turning(surface, space, X)
         data[pattern.indptr[space.start[rows]]] += hessian * (factor * space.basis[rows, 0]).sum(axis=1)
     return data

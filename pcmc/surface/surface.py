@@ -17,6 +17,7 @@ from ..base.errors import FreeSurfaceWarning, SurfaceError
 from . import checks, supports
 from .cable import Cable, CableEdges, cable_edges, checked_cables
 from .circle import Circle, Guide
+from .flat_pieces import FlatPieces, common_point, flat_pieces
 from .geometry import bounding_size
 from .patch import Patch
 from .plane import Plane
@@ -35,6 +36,7 @@ FIELDS = (
     "on_planes",
     "cables",
     "rooms",
+    "given",
 )
 GROUND = Plane()
 FAR = 30.0  # sizes from the point of Π: farther, volumes seen from it lose over three digits
@@ -74,6 +76,11 @@ class Surface:
     cables : sequence of Cable, names unique: edges with a line tension.
     rooms : sequence of Room, names unique: volumes that are prescribed instead of pressures.
 
+    Attributes
+    ----------
+    given : ``fixed``, ``on_plane`` and ``on_line`` as given. Those of the surface also have the vertices that
+        cannot move, or along a line only, because they slide on several planes.
+
     Raises
     ------
     SurfaceError
@@ -98,6 +105,7 @@ class Surface:
     on_planes: tuple[tuple[Plane, Bools], ...] = ()
     cables: tuple[Cable, ...] = ()
     rooms: tuple[Room, ...] = ()
+    given: supports.Supports = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.plane, Plane):
@@ -113,12 +121,17 @@ class Surface:
         on_line = checks.on_line(self.on_line, X)
         on_plane = checks.mask(self.on_plane, len(X), "on_plane")
         on_planes = supports.plane_masks(self.on_planes, len(X))
+        given = supports.Supports(fixed.copy(), on_plane, tuple(on_line))
         if on_planes:
+            at_end = topology(F, patch, len(X)).on_boundary
+            on_planes = supports.completed(on_planes, X, at_end, fixed)
+            supports.check_mirrors(on_planes, X, F, patch, [p.name for p in patches])
             both = [(self.plane, on_plane), *on_planes]
             on_line, points = supports.guides_and_points(both, fixed, on_line)
             fixed |= points
         for _, along in on_line:
             fixed |= along
+        object.__setattr__(self, "given", given.frozen())
         object.__setattr__(self, "on_line", tuple((line, read_only(along)) for line, along in on_line))
         sliding = on_plane & ~fixed
         object.__setattr__(self, "on_planes", tuple((plane, read_only(mask)) for plane, mask in on_planes))
@@ -166,7 +179,9 @@ class Surface:
         topo = self.topology
         pressure = self.pressures[self.patch_of_face, None] * topo.sense
         left = np.bincount(topo.edge_of_face.ravel(), pressure.ravel(), len(topo.edges))
-        held = self.held[topo.edges].all(axis=1)
+        held = (self.fixed | self.on_plane)[topo.edges].all(axis=1)
+        for _, mask in self.on_planes:
+            held |= mask[topo.edges].all(axis=1)
         rounding = 1e-12 * np.abs(self.pressures).max(initial=0.0)
         return np.where(held | (np.abs(left) <= rounding), 0.0, left)
 
@@ -178,16 +193,52 @@ class Surface:
         is the point of Π below the middle of the surface, so that a volume over Π does not depend on
         where it is drawn; or the middle itself, if that is far above Π and nothing slides. Forces do not
         change as long as the pressures cancel along all edges that are not held; where they do not
-        cancel, the origin stays the point of Π.
+        cancel, the origin stays the point of Π. Else it is moved along Π to lie on as many of the planes in
+        ``on_planes`` as possible: these then add nothing to volumes (``flat_pieces``).
         """
         point, middle = np.array(self.plane.point), self.vertices.mean(axis=0)
-        near = np.linalg.norm(middle - point) <= FAR * self.size
-        if near or self.uncancelled.any():
+        if self.uncancelled.any():
             return point
-        height = float(self.plane.height(middle))
-        if self.on_plane.any() or abs(height) <= FAR * self.size:
-            middle = middle - height * np.array(self.plane.normal)
-        return np.asarray(middle)
+        if np.linalg.norm(middle - point) > FAR * self.size:
+            height = float(self.plane.height(middle))
+            if self.given.on_plane.any() or abs(height) <= FAR * self.size:
+                middle = middle - height * np.array(self.plane.normal)
+            point = middle
+        if self.on_planes:
+            point = common_point(point, [self.plane, *(plane for plane, _ in self.on_planes)])
+        return np.asarray(point)
+
+    @cached_property
+    def flat_pieces(self) -> FlatPieces:
+        """The flat pieces that close volumes on sliding planes away from ``origin``; see ``flat_pieces``."""
+        return flat_pieces(self)
+
+    @cached_array
+    def mirror_edge(self) -> Bools:
+        """(e,) edges of the boundary in a mirror plane, where the surface goes on behind it."""
+        return supports.mirror_edges(self.on_planes, self.topology)
+
+    @cached_array
+    def pinned(self) -> Bools:
+        """(n,) ``fixed`` without the vertices that two planes let slide along their common line."""
+        pinned = self.fixed.copy()
+        for _, along in self.auto_lines:
+            pinned &= ~along
+        return pinned
+
+    @cached_array
+    def on_ground(self) -> Bools:
+        """(n,) vertices that slide on Π, also those that another plane lets slide along a line there only."""
+        sliding = self.on_plane.copy()
+        for _, along in self.auto_lines:
+            sliding |= along & self.given.on_plane
+        return sliding
+
+    @cached_property
+    def auto_lines(self) -> tuple[tuple[Guide, Bools], ...]:
+        """The part of ``on_line`` that was not given: lines that two planes have in common."""
+        given = [line for line, _ in self.given.on_line]
+        return tuple(pair for pair in self.on_line if all(pair[0] is not line for line in given))
 
     @cached_array
     def walls(self) -> Bools:
@@ -311,6 +362,7 @@ class Surface:
             vars(self)[name] = read_only(value) if isinstance(value, np.ndarray) else value
         for _, along in (*self.on_line, *self.on_planes):
             read_only(along)
+        self.given.frozen()
 
     def patch_faces(self, patches: Sequence[int]) -> Bools:
         """(m,) mask of the triangles of the given patches."""
@@ -329,6 +381,8 @@ class Surface:
             other.__dict__[name] = changes.get(name, getattr(self, name))
         if "patches" not in changes:  # seen from one point all along a solver's way
             other.__dict__["origin"] = self.origin
+            if self.on_planes and "faces" not in changes:
+                other.__dict__["flat_pieces"] = self.flat_pieces
         return other
 
 
