@@ -299,6 +299,11 @@ class Surface:
         names = [p.name for p in self.patches]
         return names.index(validate.choice("patch", name, names))
 
+    def cable_index(self, name: str) -> int:
+        """Index of the cable called ``name``."""
+        names = [cable.name for cable in self.cables]
+        return names.index(validate.choice("cable", name, names))
+
     def moved(self, vertices: npt.ArrayLike) -> Surface:
         """The same surface with its vertices elsewhere, (n,3); faces, supports, patches are shared.
 
