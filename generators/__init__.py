@@ -17,6 +17,7 @@ from .tetrahedron import (
     tetrahedral_film,
     tetrahedral_film_exact,
 )
+from .triple_bubble import triple_bubble, triple_bubble_exact
 from .tubes import catenoid, catenoid_exact, catenoid_fold, catenoid_neck, cylinder, cylinder_exact
 from .two_caps import two_caps
 from .two_squares import two_squares
@@ -59,6 +60,8 @@ __all__ = [
     "tetrahedral_film",
     "tetrahedral_film_exact",
     "three_patches",
+    "triple_bubble",
+    "triple_bubble_exact",
     "two_caps",
     "two_squares",
     "unduloid_length",
