@@ -24,6 +24,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
 from . import kernels
+from .flat_pieces import flat_pieces
 from .plane_pieces import add_plane_forces, add_plane_volumes, plane_hessian
 
 if TYPE_CHECKING:
@@ -138,7 +139,7 @@ def hessian(surface: Surface) -> csr_array:
     columns = np.broadcast_to(unknowns[:, None, :, None, :], blocks.shape)
     shape = (3 * surface.n, 3 * surface.n)
     whole = csr_array(coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=shape))
-    return whole + plane_hessian(surface) if surface.flat_pieces else whole
+    return whole + plane_hessian(surface) if flat_pieces(surface) else whole
 
 
 def weighted(

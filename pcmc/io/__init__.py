@@ -40,6 +40,7 @@ class Format:
     separate : whether it has a mesh per patch, which cannot have triangles without area.
     walls : whether such triangles go with a separate format as text.
     lines : whether it holds the lines and circles that vertices slide along.
+    planes : whether it holds planes other than Π that vertices slide on, and mirror planes.
     loses : what it never holds.
     """
 
@@ -50,13 +51,14 @@ class Format:
     separate: bool = False
     walls: bool = False
     lines: bool = False
+    planes: bool = False
     loses: tuple[str, ...] = ()
 
 
 FORMATS = {
-    ".pcmc": Format("native", scalars="both", certificate=True, shared=True, lines=True),
-    ".fe": Format("evolver", shared=True),
-    ".dmp": Format("evolver", shared=True),
+    ".pcmc": Format("native", scalars="both", certificate=True, shared=True, lines=True, planes=True),
+    ".fe": Format("evolver", shared=True, planes=True),
+    ".dmp": Format("evolver", shared=True, planes=True),
     ".obj": Format("obj"),
     ".ply": Format("ply", scalars="both"),
     ".stl": Format("stl", separate=True, loses=("supports", "tensions", "pressures")),
@@ -188,8 +190,10 @@ def write(
     lost = [name for name, scalar in scalars.items() if len(scalar) not in sizes]
     if certificate is not None and not form.certificate:
         lost.append("certificate")
-    if surface.on_line and not form.lines:
+    if surface.given.on_line and not form.lines:
         lost.append("lines or circles that vertices slide along (they are fixed in it)")
+    if surface.on_planes and not form.planes:
+        lost.append("planes other than Π that vertices slide on, and mirror planes (fixed in it)")
     shown, walls = surface, None
     if form.separate:
         shown = standing_part(surface).surface
