@@ -10,8 +10,8 @@ from ..contact.pinching import standing_part
 from ..energy import kernels
 from ..energy.functional import add_cables_and_weights, apply_supports
 from ..surface import Surface
-from ..surface.flat_pieces import common_point
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths, vertex_sums
+from ..surface.supports import common_point
 from ..surface.topology import Curve
 from .proof import UnbalancedJunction, Unheld
 

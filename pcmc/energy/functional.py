@@ -27,6 +27,7 @@ from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
 from . import kernels
 from .cables import add_cables, add_pull, cable_blocks
+from .flat_pieces import flat_pieces
 from .plane_pieces import add_plane_forces, add_plane_volumes, plane_hessian
 from .weight import add_weights, moments, weight_blocks
 
@@ -158,7 +159,7 @@ def hessian(surface: Surface) -> csr_array:
         rows = np.broadcast_to(unknowns[:, :, None, :, None], both.shape)
         columns = np.broadcast_to(unknowns[:, None, :, None, :], both.shape)
         H = csr_array(H + coo_array((both.ravel(), (rows.ravel(), columns.ravel())), shape=shape))
-    return H + plane_hessian(surface) if surface.flat_pieces else H
+    return H + plane_hessian(surface) if flat_pieces(surface) else H
 
 
 def weighted(

@@ -5,7 +5,7 @@ With c the apex of a piece, seen from the surface's origin like all positions, a
     V  = -(1/6) ⟨c, a × b⟩ + ⟨n, v⟩
     ∂V/∂a = (1/6) c × b,   ∂V/∂b = -(1/6) c × a,   ∂V/∂v = n,   ∂²V/∂a∂b = (1/6) [c]×
 
-where v are the ends of the boundary on that plane; see ``surface.flat_pieces``. All of it costs nothing where
+where v are the ends of the boundary on that plane; see ``flat_pieces``. All of it costs nothing where
 every plane passes through the origin: mirror planes through one point of Π, for instance.
 """
 
@@ -18,19 +18,17 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled
 from ..surface import Surface
-from ..surface.flat_pieces import FlatPieces
 from ..surface.geometry import cross, dot, scaled, vector
+from .flat_pieces import FlatPieces, flat_pieces
 from .motion_space import MotionSpace, VertexClasses
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from .projected_hessian import Pattern
-
 
 def add_plane_volumes(surface: Surface, X: Floats, volumes: Floats) -> Floats:
     """The volumes (k,) with the flat pieces of each patch added, in place; vertices at X (n,3)."""
-    pieces = surface.flat_pieces
+    pieces = flat_pieces(surface)
     if pieces:
         a, b = _sides(surface, pieces)
         X = X - surface.origin
@@ -43,7 +41,7 @@ def add_plane_volumes(surface: Surface, X: Floats, volumes: Floats) -> Floats:
 
 def add_plane_forces(surface: Surface, pressures: Floats, X: Floats, gradient: Floats) -> Floats:
     """The gradient (n,3) with -Σ p ∂V of the flat pieces added, in place; pressures (k,)."""
-    pieces = surface.flat_pieces
+    pieces = flat_pieces(surface)
     if pieces:
         a, b = _sides(surface, pieces)
         X = X - surface.origin
@@ -56,7 +54,7 @@ def add_plane_forces(surface: Surface, pressures: Floats, X: Floats, gradient: F
 
 def add_plane_turns(surface: Surface, D: Floats, change: Floats) -> Floats:
     """(∂²E) D with the flat pieces' part added to change (n,3), in place; D (n,3) a motion."""
-    pieces = surface.flat_pieces
+    pieces = flat_pieces(surface)
     if pieces:
         a, b = _sides(surface, pieces)
         p = surface.pressures[surface.patch_of_face[pieces.face], None] / 6.0
@@ -69,7 +67,7 @@ def plane_hessian(surface: Surface) -> csr_array:
     """-Σ p ∂²V of the flat pieces, sparse symmetric (3n,3n); unknown 3v + d is coordinate d of v."""
     from scipy.sparse import coo_array, csr_array
 
-    pieces = surface.flat_pieces
+    pieces = flat_pieces(surface)
     a, b = _sides(surface, pieces)
     sixth_p = surface.pressures[surface.patch_of_face[pieces.face]] / 6.0
     columns = np.cross(pieces.apex[:, None, :], np.eye(3))  # c × e_s
@@ -82,17 +80,23 @@ def plane_hessian(surface: Surface) -> csr_array:
 
 
 def add_plane_hessian(
-    surface: Surface, classes: VertexClasses, space: MotionSpace, pattern: Pattern, scale: float, data: Floats
+    surface: Surface,
+    classes: VertexClasses,
+    space: MotionSpace,
+    indptr: Ints,
+    offset: Ints,
+    scale: float,
+    data: Floats,
 ) -> Floats:
-    """The values (k,) of a matrix in the pattern, with scale · Bᵀ(-p ∂²V)B of the flat pieces added."""
-    pieces = surface.flat_pieces
+    """Values (k,) with scale · Bᵀ(-p ∂²V)B of the flat pieces added, at the places of a ``Pattern``."""
+    pieces = flat_pieces(surface)
     if pieces:
         pressed = classes.active[pieces.face] & (surface.pressures[surface.patch_of_face[pieces.face]] != 0.0)
         number = np.cumsum(classes.active) - 1
         face, corner = number[pieces.face[pressed]], pieces.corner[pressed]
         weight = scale * surface.pressures[surface.patch_of_face[pieces.face[pressed]]] / 6.0
         apex = np.ascontiguousarray(pieces.apex[pressed])
-        _add_to_pattern(classes.faces, face, corner, apex, weight, space, pattern, data)
+        _add_to_pattern(classes.faces, face, corner, apex, weight, space, indptr, offset, data)
     return data
 
 
@@ -110,12 +114,12 @@ def _add_to_pattern(
     apex: Floats,
     weight: Floats,
     space: MotionSpace,
-    pattern: Pattern,
+    indptr: Ints,
+    offset: Ints,
     data: Floats,
 ) -> None:
     """Add -p ⟨b_a, [c]× b_b⟩ / 6 = -weight ⟨c, b_b × b_a⟩ at the places of the two vertices of each side."""
     basis, dimension, start = space.basis, space.dimension, space.start
-    indptr, offset = pattern.indptr, pattern.offset
     for e in range(len(face)):
         f, i = face[e], corner[e]
         v, w = F[f, i], F[f, (i + 1) % 3]

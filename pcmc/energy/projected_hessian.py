@@ -90,7 +90,7 @@ def assemble(
         into = pattern.indptr, pattern.offset
         assemble_weights(surface, faces, patch, X, *space, *into, hessian, stiffness, data)
     if hessian:
-        add_plane_hessian(surface, classes, space, pattern, hessian, data)
+        add_plane_hessian(surface, classes, space, pattern.indptr, pattern.offset, hessian, data)
         rows, factor = circle_turning(surface, space, X)
         data[pattern.indptr[space.start[rows]]] += hessian * (factor * space.basis[rows, 0]).sum(axis=1)
     return data

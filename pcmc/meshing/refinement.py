@@ -122,11 +122,17 @@ def carry_planes(surface: Surface, cut: Bools) -> tuple[tuple[Plane, Bools], ...
 
     A new vertex is on a plane if its edge is part of the boundary there, or of a curve in a mirror plane.
     """
-    topo, parts = surface.topology, []
-    for plane, mask in surface.on_planes:
-        along = mask[topo.edges].all(axis=1) & (topo.curve_edge if plane.mirror else topo.boundary_edge)
-        parts.append((plane, np.concatenate([mask, along[cut]])))
-    return tuple(parts)
+    pairs = zip(surface.on_planes, edges_on_planes(surface), strict=True)
+    return tuple((plane, np.concatenate([mask, along[cut]])) for (plane, mask), along in pairs)
+
+
+def edges_on_planes(surface: Surface) -> list[Bools]:
+    """For each of ``on_planes`` the (e,) edges whose new vertices slide on it."""
+    topo = surface.topology
+    return [
+        mask[topo.edges].all(axis=1) & (topo.curve_edge if plane.mirror else topo.boundary_edge)
+        for plane, mask in surface.on_planes
+    ]
 
 
 def projected(project: Projection, points: Floats) -> Floats:

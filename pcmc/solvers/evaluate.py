@@ -10,6 +10,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats
 from ..base.compiled import blocks, compiled, threads
 from ..energy import kernels
+from ..energy.flat_pieces import flat_pieces
 from ..energy.functional import add_cables_and_weights, total
 from ..energy.motion_space import tension_forces
 from ..energy.plane_pieces import add_plane_forces, add_plane_volumes
@@ -84,7 +85,7 @@ class Evaluator:
             kernels.measure_block(self._mesh, X, 0, m, area, volume, G)
         else:
             area, volume, G = kernels.measure(self._mesh, X)
-        if self._surface.flat_pieces:
+        if flat_pieces(self._surface):
             add_plane_volumes(self._surface, X, volume)
             add_plane_forces(self._surface, pressure, X, G)
         further = add_cables_and_weights(self._surface, X, G)

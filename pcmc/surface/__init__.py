@@ -1,7 +1,7 @@
 """The surface itself: patches, planes, cables, rooms, mesh, their checks, topology, and triangle geometry.
 
-Gives ``Patch``, ``Plane``, ``Line``, ``Circle``, ``Cable``, ``Room``, ``Surface``, and ``cut``, ``mirrored`` of it,
-to all other rooms. Imports only ``base``.
+Gives ``Patch``, ``Plane``, ``Line``, ``Circle``, ``Cable``, ``Room``, ``Surface``, ``cut`` and
+``mirrored`` to all other rooms. Imports only ``base``.
 """
 
 from .cable import Cable

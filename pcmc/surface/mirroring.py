@@ -65,9 +65,9 @@ def mirrored(surface: Surface, planes: Sequence[Plane | str] | None = None) -> S
     The vertices in mirror planes are shared by the images; the faces of reflected images are turned over, so
     that each patch keeps its positive side. A patch continues under its name in its images, unless more than
     two of its triangles would meet at an edge, or it bounds a room that is separate from its images: then
-    images that do not touch it are numbered, "wall (2)". Supports, weights, cables and rooms are carried over;
-    a room that a plane cuts has the volume of its parts together, and a cable in a mirror plane the tension
-    of its images together.
+    images that do not touch it are numbered, "wall (2)". Supports, weights, cables and rooms are carried
+    over; a room that a plane cuts has the volume of its parts together, and a cable in a mirror plane the
+    tension of its images together.
 
     Parameters
     ----------

@@ -98,6 +98,24 @@ def check_mirrors(
             )
 
 
+def common_point(point: Floats, planes: Sequence[Plane]) -> Floats:
+    """(3,) the point nearest to ``point`` that lies on the first plane and on as many more as possible.
+
+    >>> wall = Plane((2, 0, 0), (1, 0, 0))
+    >>> common_point(np.zeros(3), [Plane(), wall, Plane((5, 0, 0), (1, 0, 0))]).tolist()
+    [2.0, 0.0, 0.0]
+    """
+    chosen: list[Plane] = []
+    for plane in planes:
+        normals = np.array([p.normal for p in (*chosen, plane)])
+        away = -np.array([float(p.height(point)) for p in (*chosen, plane)])
+        move = np.linalg.lstsq(normals, away, rcond=FLAT)[0]
+        if np.abs(normals @ move - away).max() <= 1e-12 * (1.0 + np.abs(away).max()):
+            chosen.append(plane)
+            point = point + move
+    return point
+
+
 def mirror_edges(planes: Sequence[tuple[Plane, Bools]], topo: Topology) -> Bools:
     """(e,) edges of one triangle that lie in a mirror plane."""
     inside = np.zeros(len(topo.edges), dtype=bool)

@@ -17,7 +17,6 @@ from ..base.errors import FreeSurfaceWarning, SurfaceError
 from . import checks, supports
 from .cable import Cable, CableEdges, cable_edges, checked_cables
 from .circle import Circle, Guide
-from .flat_pieces import FlatPieces, common_point, flat_pieces
 from .geometry import bounding_size
 from .patch import Patch
 from .plane import Plane
@@ -110,6 +109,9 @@ class Surface:
     def __post_init__(self) -> None:
         if not isinstance(self.plane, Plane):
             validate.refuse("plane", self.plane, "a Plane", error=SurfaceError)
+        if self.plane.mirror:
+            message = "plane: Π cannot be a mirror plane; give that plane in on_planes= instead"
+            raise SurfaceError(message, what="plane")
         X = checks.positions(self.vertices)
         checks.large_enough(X)
         F = checks.face_array(self.faces, len(X))
@@ -205,13 +207,8 @@ class Surface:
                 middle = middle - height * np.array(self.plane.normal)
             point = middle
         if self.on_planes:
-            point = common_point(point, [self.plane, *(plane for plane, _ in self.on_planes)])
+            point = supports.common_point(point, [self.plane, *(plane for plane, _ in self.on_planes)])
         return np.asarray(point)
-
-    @cached_property
-    def flat_pieces(self) -> FlatPieces:
-        """The flat pieces that close volumes on sliding planes away from ``origin``; see ``flat_pieces``."""
-        return flat_pieces(self)
 
     @cached_array
     def mirror_edge(self) -> Bools:
@@ -386,8 +383,8 @@ class Surface:
             other.__dict__[name] = changes.get(name, getattr(self, name))
         if "patches" not in changes:  # seen from one point all along a solver's way
             other.__dict__["origin"] = self.origin
-            if self.on_planes and "faces" not in changes:
-                other.__dict__["flat_pieces"] = self.flat_pieces
+            if "flat_pieces" in vars(self) and "faces" not in changes:
+                vars(other)["flat_pieces"] = vars(self)["flat_pieces"]
         return other
 
 

@@ -2,28 +2,27 @@
 
 V_i is the volume of the cones from ``Surface.origin`` o to the triangles. Where the boundary slides on a
 plane through o, the side of the cones lies in that plane and carries nothing. On another plane k it does not,
-and a flat piece between the boundary and the point c of plane k nearest to o is added, as seen from o:
+and a flat piece between the boundary and a point c of plane k is added, as seen from o:
 
     V_i += -(1/6) Σ ⟨c, a × b⟩
 
 over the sides a → b of triangles that lie in plane k, all positions seen from o. Where the boundary leaves
-plane k for a plane j, the piece ends along the line that both have in common; with c' its point nearest to o,
+plane k for a plane j, the piece ends along the line that both have in common. c is chosen on as many of these
+lines as possible, and then as near to o as possible. On others, with c' the point of the line nearest to o,
 V_i += ∓(1/6) ⟨c, v × c'⟩ for the vertex v there (- at the head of the last side, + at the tail of the first).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from .checks import lying
-from .plane import Plane
-
-if TYPE_CHECKING:
-    from .surface import Surface
+from ..surface import Plane, Surface
+from ..surface.checks import lying
+from ..surface.supports import common_point
 
 MEETS = 1e-9  # sine of an angle up to which two planes count as parallel
 
@@ -61,9 +60,16 @@ def ground(surface: Surface) -> Bools:
 
 
 def flat_pieces(surface: Surface) -> FlatPieces:
-    """The flat pieces of a surface; ``NONE`` where all planes pass through its origin."""
+    """The flat pieces of a surface, computed once; ``NONE`` where all planes pass through its origin."""
     if not surface.on_planes:
         return NONE
+    pieces: FlatPieces | None = vars(surface).get("flat_pieces")
+    if pieces is None:
+        pieces = vars(surface)["flat_pieces"] = _flat_pieces(surface)
+    return pieces
+
+
+def _flat_pieces(surface: Surface) -> FlatPieces:
     masks = [(surface.plane, ground(surface)), *surface.on_planes]
     topo, origin = surface.topology, surface.origin
     distance = np.array([-float(plane.height(origin)) for plane, _ in masks])
@@ -77,10 +83,11 @@ def flat_pieces(surface: Surface) -> FlatPieces:
         plane, mask = masks[k]
         chosen = mask[topo.edges].all(axis=1) & ~taken
         taken = taken | chosen
-        apex = distance[k] * np.array(plane.normal)
+        others = [other for number, other in enumerate(masks) if number != k]
+        touching = [other for other, there in others if (there & mask).any()]
+        apex = common_point(origin + distance[k] * np.array(plane.normal), [plane, *touching]) - origin
         side = _sides(surface, chosen, apex)
         sides.append(side)
-        others = [other for number, other in enumerate(masks) if number != k]
         ends.append(_ends(surface, side, (plane, mask), others))
     if not sum(len(side[0]) for side in sides):
         return NONE
@@ -111,6 +118,8 @@ def _ends(
     normal, done = np.zeros((len(places), 3)), count == 0.0
     for plane, mask in others:
         here = ~done & mask[vertex]
+        if here.any() and abs(plane.height(origin + apex[0])) <= 1e-12 * surface.size:
+            done |= here  # the piece's last side lies in that plane, too
         normals = np.array([own[0].normal, plane.normal])
         if not here.any() or np.linalg.norm(np.cross(*normals)) <= MEETS:
             continue
@@ -120,21 +129,3 @@ def _ends(
         done |= here
     used = normal.any(axis=1)
     return vertex[used], patch[used], normal[used]
-
-
-def common_point(point: Floats, planes: Sequence[Plane]) -> Floats:
-    """(3,) the point nearest to ``point`` that lies on the first plane and on as many more as possible.
-
-    >>> wall = Plane((2, 0, 0), (1, 0, 0))
-    >>> common_point(np.zeros(3), [Plane(), wall, Plane((5, 0, 0), (1, 0, 0))]).tolist()
-    [2.0, 0.0, 0.0]
-    """
-    chosen: list[Plane] = []
-    for plane in planes:
-        normals = np.array([p.normal for p in (*chosen, plane)])
-        away = -np.array([float(p.height(point)) for p in (*chosen, plane)])
-        move = np.linalg.lstsq(normals, away, rcond=MEETS)[0]
-        if np.abs(normals @ move - away).max() <= 1e-12 * (1.0 + np.abs(away).max()):
-            chosen.append(plane)
-            point = point + move
-    return point
