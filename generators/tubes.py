@@ -112,7 +112,7 @@ def catenoid_exact(
     deep: bool = False,
     half: bool = False,
 ) -> ExactSolution:
-    """A = π c² (2h/c + sinh(2h/c)), half of it with ``half``; index 0, of the deep one 1.
+    """A = π c² (2h/c + sinh(2h/c)), or half of that with ``half``; the index is 0, or 1 if ``deep``.
 
     >>> wide, deep = catenoid_exact(), catenoid_exact(deep=True)
     >>> round(wide.area, 6), round(deep.area, 6), wide.index, deep.index

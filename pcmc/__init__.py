@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .energy.functional import energy, gradient, hessian
     from .existence import solve
     from .io import read, write
-    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface
+    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
 
 __all__ = [
     "BoundaryMotion",
@@ -39,6 +39,7 @@ __all__ = [
     "certify",
     "check_mesh",
     "curvature_error",
+    "cut",
     "energy",
     "errors",
     "explore",
@@ -47,6 +48,7 @@ __all__ = [
     "hessian",
     "mean_curvature",
     "meet",
+    "mirrored",
     "read",
     "sensitivities",
     "solve",
@@ -66,7 +68,7 @@ _NAMES = {
     "energy.functional": ("energy", "gradient", "hessian"),
     "existence": ("solve",),
     "io": ("read", "write"),
-    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
+    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
 }
 
 

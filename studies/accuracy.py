@@ -26,6 +26,7 @@ from pcmc.meshing.curve_projection import onto_held_curves
 from pcmc.meshing.refinement import refine
 from pcmc.plan import Area, Divider, Hole, Plan, circle
 
+from .elevations import with_triangles
 from .folder import Folder
 from .orders import Order, slope
 from .study import Study
@@ -252,10 +253,7 @@ def _near(surface: Surface, reach: float) -> Surface:
     roof = ~surface.walls[surface.patch_of_face]
     away = np.linalg.norm((surface.vertices - CORNER)[:, :2], axis=1)
     near = roof & (away[surface.faces].min(axis=1) <= reach)
-    used, faces = np.unique(surface.faces[near], return_inverse=True)
-    numbers, patch = np.unique(surface.patch_of_face[near], return_inverse=True)
-    kept = tuple(surface.patches[k] for k in numbers)
-    return Surface(surface.vertices[used], faces.reshape(-1, 3), patch, kept, fixed=surface.fixed[used])
+    return with_triangles(surface, near)
 
 
 STUDY = Study(

@@ -48,8 +48,8 @@ from .alpha_grid_branches import (
 )
 from .alpha_grid_sentences import sentences
 from .cases import run_sweep
+from .figure_panels import category_panels
 from .folder import Folder
-from .panels import category_panels
 from .study import Study
 
 TRIES = 12  # equilibria from which a branch is sought

@@ -43,8 +43,9 @@ from .corner_ladder import (
     opening,
     rise,
 )
+from .elevations import with_triangles
+from .figure_panels import category_panels
 from .folder import Folder
-from .panels import category_panels
 from .refinement import FAMILIES
 from .study import Study
 
@@ -391,10 +392,7 @@ def _near(surface: Surface, place: Floats, reach: float) -> Surface:
     """The roofs' triangles within a distance of a place."""
     roof = ~surface.walls[surface.patch_of_face]
     near = roof & (np.linalg.norm(surface.vertices[surface.faces] - place, axis=2).max(axis=1) <= reach)
-    used, faces = np.unique(surface.faces[near], return_inverse=True)
-    patches, patch = np.unique(surface.patch_of_face[near], return_inverse=True)
-    kept = tuple(surface.patches[k] for k in patches)
-    return Surface(surface.vertices[used], faces.reshape(-1, 3), patch, kept, fixed=surface.fixed[used])
+    return with_triangles(surface, near)
 
 
 STUDY = Study(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from pcmc import Surface
-from pcmc.base.arrays import Floats, Ints
+from pcmc.base.arrays import Bools, Floats, Ints
 from pcmc.surface.colours import patch_colors
 
 WIDTH = 1086  # pixels
@@ -74,3 +74,11 @@ def _paint(axes: Any, surface: Surface, faces: Ints, axis: int) -> None:
             linewidths=np.where(np.sort(walls), 0.9, 0.35),
         )
     )
+
+
+def with_triangles(surface: Surface, chosen: Bools) -> Surface:
+    """The part of a surface that has these of its triangles (m,)."""
+    used, faces = np.unique(surface.faces[chosen], return_inverse=True)
+    numbers, patch = np.unique(surface.patch_of_face[chosen], return_inverse=True)
+    patches = tuple(surface.patches[k] for k in numbers)
+    return Surface(surface.vertices[used], faces.reshape(-1, 3), patch, patches, fixed=surface.fixed[used])

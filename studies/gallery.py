@@ -193,7 +193,7 @@ def figure(folder: Folder) -> None:
     """All surfaces, their errors, and the changes of index."""
     from pcmc.plot import panel
 
-    from .panels import curve_panels
+    from .figure_panels import curve_panels
 
     records = folder.read_table("records")
     shown = [example for example in EXAMPLES if (records.example == example.name).any()]

@@ -28,9 +28,9 @@ from pcmc import Surface, certify
 from pcmc.solvers import solve
 from pcmc.solvers.result import Progress
 
+from .figure_panels import curve_panels
 from .flow import NOISE_RESIDUAL, PAPER, SHORT_ITERATIONS, errors, forced_steps
 from .folder import Folder
-from .panels import curve_panels
 from .study import Study
 
 ITERATIONS, EVALUATIONS = 1000, 2000

@@ -210,9 +210,8 @@ def vertex_numbers(corners: npt.ArrayLike, n: int) -> Ints:
 
 def _refined(surface: Surface, boundary: str | Projection, corners: Ints) -> Surface:
     """The surface on a mesh with four times as many triangles."""
-    project = boundary if callable(boundary) else None
-    if boundary == "smooth":
-        project = lambda _: smooth_midpoints(surface, corners=corners)  # noqa: E731
+    named: dict[str, Projection] = {"smooth": lambda _: smooth_midpoints(surface, corners=corners)}
+    project = named.get(boundary) if isinstance(boundary, str) else boundary
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FreeSurfaceWarning)  # given with the first surface
         return refine(surface, 1, project)

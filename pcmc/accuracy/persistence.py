@@ -82,7 +82,7 @@ def lost(start: Surface, result: Result) -> Finding:
 
 
 def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -> Finding:
-    """The finding about surfaces at rest on meshes each of which refines the one before."""
+    """The finding about surfaces at rest, each on a refinement of the mesh before."""
     for surface, certificate in zip(surfaces[1:], certificates[1:], strict=True):
         if certificate.index != certificates[0].index:
             return _other_index(surface, certificate, certificates[0])

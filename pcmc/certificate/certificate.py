@@ -15,7 +15,7 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..contact.pinching import excess_pull, standing_part
-from ..energy.curvature import METHODS, curvature_error, mean_curvature
+from ..energy.curvature import METHODS, curvature_error, mean_curvature, target_curvature
 from ..energy.functional import energy_and_gradient, patch_areas, volume
 from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
 from ..energy.motion_space import VertexClasses, force_scale, motion_space
@@ -28,6 +28,7 @@ from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
 from .balance import boundary_table, junction_table, load, load_ratio, pressures_left_over, reactions
+from .cables import cable_end_table, cable_table
 from .proof import Proof
 from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
 
@@ -59,11 +60,14 @@ class Certificate:
         length. A corner's reaction is shared equally by its curves; per length it counts in full.
     rooms : one row per room of prescribed volume: the volume it has, the one prescribed, the difference
         over the latter, and the room's pressure.
-    load, support : forces along Π's normal, of the pressure and of all supports; their sum is what
-        the mesh leaves along the sheets.
+    cables : one row per cable, cut at supports and branches: force, length, middle, the pull of the
+        sheets and of the cable across it, force left; see ``pcmc.certificate.cables.cable_table``.
+    cable_ends : one row per end of these: vertex, place, whether held, the force of a support there.
+    load, support : forces along Π's normal, of pressure and weight and of all supports; their sum is
+        what the mesh leaves along the sheets.
     reactions : (n,3) force of each support on the surface.
     pinched : (k,) vertices where a junction rests on Π and its wall has no height.
-    load_ratio : pressure along Π's normal over the most that the boundary's tension could carry; see
+    load_ratio : pressure and weight along Π's normal over the most that the supports could carry; see
         the function ``load_ratio``.
     proofs : why there is no equilibrium, if that is the verdict: ``Overload``, ``UnbalancedJunction``,
         ``Fold`` or ``Unheld``.
@@ -90,6 +94,8 @@ class Certificate:
     pinched: Ints
     load_ratio: float
     proofs: tuple[Proof, ...] = ()
+    cables: pd.DataFrame = field(default_factory=pd.DataFrame)
+    cable_ends: pd.DataFrame = field(default_factory=pd.DataFrame)
     rooms: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     @property
@@ -130,12 +136,11 @@ class Certificate:
             ("load, reactions", f"{self.load:.6g}, {self.support:.6g} along the plane's normal"),
         ]
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
-        tables = [
-            frame.to_string(index=False, float_format=lambda x: f"{x:.4g}")
-            for frame in (self.patches, self.rooms, self.junctions, self.boundaries)
-            if len(frame)
+        tables = self.patches, self.rooms, self.junctions, self.boundaries, self.cables, self.cable_ends
+        shown = [
+            frame.to_string(index=False, float_format=lambda x: f"{x:.4g}") for frame in tables if len(frame)
         ]
-        return "\n\n".join([head, *tables])
+        return "\n\n".join([head, *shown])
 
 
 def certify(
@@ -241,6 +246,8 @@ def certify(
         pinched=np.flatnonzero(part.resting),
         load_ratio=ratio,
         proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),
+        cables=cable_table(standing, left),
+        cable_ends=cable_end_table(standing),
         rooms=rooms,
     )
 
@@ -284,7 +291,7 @@ def _pulled_off(excess: Floats) -> str:
 
 def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Floats) -> pd.DataFrame:
     errors = {method: np.abs(curvature_error(standing, method)) for method in METHODS}
-    curvature = mean_curvature(standing, "variational")
+    curvature, target = mean_curvature(standing, "variational"), target_curvature(standing)
     rows = []
     for index, patch in enumerate(surface.patches):
         faces = standing.patch_of_face == index
@@ -295,7 +302,9 @@ def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Fl
             "patch": patch.name,
             "tension": patch.tension,
             "pressure": patch.pressure,
-            "target": patch.target_curvature,
+            "target": float(target[inside].mean())
+            if patch.weight and inside.any()
+            else patch.target_curvature,
             "area": float(areas[index]),
             "mean_H": float(curvature[inside].mean()) if inside.any() else np.nan,
         }

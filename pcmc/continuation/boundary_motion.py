@@ -19,7 +19,7 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..energy.functional import weighted
+from ..energy.functional import energy_and_gradient
 from ..surface import Surface
 
 DIFFERENCE = 1e-5  # of the size of λ: step of the central difference for dP/dλ
@@ -128,7 +128,7 @@ class BoundaryLine:
 
     def energy_derivative(self, surface: Surface, X: Floats, value: float) -> float:
         """Σ ⟨∇E, dP/dλ⟩ over the fixed vertices at X (n,3), force·length per unit of λ."""
-        forces = weighted(surface, surface.tensions, surface.pressures, X)[2]
+        forces = energy_and_gradient(surface, X, supports=False)[1]
         return float((forces[surface.fixed] * self.velocity(value)).sum())
 
     def gradient(self, surface: Surface, X: Floats) -> Floats:

@@ -28,7 +28,7 @@ from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
 from ..contact.pinching import StandingPart, excess_pull, place_wall_rows, standing_part
-from ..energy.functional import energy_and_gradient, weighted
+from ..energy.functional import energy_and_gradient, gradient_by
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..energy.projected_hessian import assemble, hessian_pattern
@@ -106,19 +106,20 @@ def _slopes(
     motions = np.stack([motion for motion, _ in changes])
     slope = np.einsum("pnd,nd->p", motions, quantity.by_position)
     for k, parameter in enumerate(parameters):
-        by_patch = quantity.by_tension if parameter.kind == "tension" else quantity.by_pressure
-        if by_patch is not None and parameter.kind != "volume":
-            slope[k] += by_patch @ _patch_rates(surface, parameter, parameters)
+        by_part = quantity.by(parameter.kind)
+        if by_part is not None:
+            slope[k] += by_part @ _rates(surface, parameter, parameters)
         if quantity.by_pressure is not None and surface.rooms:
             slope[k] += quantity.by_pressure @ (changes[k][1] @ surface.room_signs)
     return slope
 
 
-def _patch_rates(surface: Surface, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
-    """(k,) d/dλ of each patch's tension or pressure; wall pressures change with those of the rooms."""
-    one = np.zeros(len(surface.patches))
-    one[surface.patch_index(parameter.patch)] = 1.0
-    if parameter.kind == "tension":
+def _rates(surface: Surface, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
+    """(k,) d/dλ of each patch's or cable's own number; wall pressures change with those of the rooms."""
+    of_cable = parameter.kind == "cable"
+    one = np.zeros(len(surface.cables) if of_cable else len(surface.patches))
+    one[surface.cable_index(parameter.patch) if of_cable else surface.patch_index(parameter.patch)] = 1.0
+    if parameter.kind != "pressure":
         return one
     named = {surface.patch_index(p.patch) for p in parameters if p.kind == "pressure"}
     return one + wall_pressure_changes(surface, one, named)
@@ -195,9 +196,9 @@ class _LinearResponse:
         shown = self.part.surface
         if parameter.kind == "volume":
             return np.zeros(self.space.size)
-        rates = _patch_rates(shown, parameter, parameters)
-        force = weighted(shown, rates) if parameter.kind == "tension" else weighted(shown, 0.0, rates)
-        return -self.space.to_coordinates(force[2])
+        rates = _rates(shown, parameter, parameters)
+        force = sum(rates[i] * gradient_by(shown, parameter.kind, int(i)) for i in np.flatnonzero(rates))
+        return -self.space.to_coordinates(np.asarray(force))
 
     def _times(self, z: Floats) -> Floats:
         """J, or the bordered matrix, times z (N+r,)."""

@@ -12,8 +12,15 @@ from ..surface import Patch, Plane, Surface
 
 def metadata_text(surface: Surface) -> str:
     """Patches, plane and counts as JSON, for the comment or metadata of a format."""
-    patches, plane = [astuple(p) for p in surface.patches], (surface.plane.point, surface.plane.normal)
+    patches = [_row(patch) for patch in surface.patches]
+    plane = surface.plane.point, surface.plane.normal
     return json.dumps({"patches": patches, "plane": plane, "counts": [surface.n, surface.m]})
+
+
+def _row(patch: Patch) -> tuple[object, ...]:
+    """The fields of a patch in their order; without a weight as versions before weights wrote them."""
+    row = astuple(patch)
+    return row if patch.weight else row[:-1]
 
 
 @dataclass(frozen=True)

@@ -59,26 +59,7 @@ def solve(
 ) -> Result:
     """Find an equilibrium, starting from the given surface.
 
-    Parameters
-    ----------
-    surface : the surface to start from; it is not changed.
-    method : ``"newton"``, the geometric solver; ``"nesterov"``, the paper's flow; ``"lbfgs"``,
-        NLopt's L-BFGS.
-    callback : called with a Progress after each iteration (each evaluation for ``"lbfgs"``). Raise
-        StopIteration in it to stop; any other exception passes through.
-    options : fields of the method's options class: ``NewtonOptions``, ``NesterovOptions``, ``LbfgsOptions``.
-
-    Returns
-    -------
-    Result
-        Not converging is a status there, never an exception. Ctrl-C stops as StopIteration does.
-
-    Raises
-    ------
-    OptionError
-        For an unknown method or option, with the nearest known one, or a value out of range.
-    SurfaceError
-        If ``surface`` is no Surface, or all of its vertices are at one point.
+    Arguments, result and errors are those of ``pcmc.solve``, which tries further starts if this one fails.
 
     Examples
     --------

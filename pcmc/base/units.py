@@ -1,0 +1,136 @@
+"""Units of length and force: their sizes, conversion, and the texts that results show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from . import validate
+from .errors import OptionError
+
+MICROMETRES = {
+    "m": 1_000_000,
+    "mm": 1_000,
+    "cm": 10_000,
+    "ft": 304_800,
+    "in": 25_400,
+    "µm": 1,
+    "dm": 100_000,
+    "km": 1_000_000_000,
+    "yd": 914_400,
+    "mi": 1_609_344_000,
+}
+"""The whole micrometres in each unit of length that a drawing may have: factors are exact quotients."""
+
+LENGTHS = ("m", "mm", "cm", "ft", "in")
+"""The units of length of a project."""
+
+FORCES = ("N", "kN", "MN", "lbf", "kip")
+"""The units of force of a project."""
+
+DXF_UNITS = {1: "in", 2: "ft", 3: "mi", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 13: "µm", 14: "dm"}
+"""The units of length by ``$INSUNITS`` of a .dxf file; 0 is none."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """The units of a surface's numbers: coordinates in ``length``, tensions in ``force``/``length``.
+
+    Every other quantity follows: pressures are in force/length², curvatures in 1/length, volumes in length³.
+    An empty text is no unit.
+
+    Attributes
+    ----------
+    length : one of ``LENGTHS``, or empty.
+    force : one of ``FORCES``, or empty; it needs a length.
+
+    Raises
+    ------
+    OptionError : for another unit, and for a force without a length.
+
+    Examples
+    --------
+    >>> units = Units("m", "kN")
+    >>> units.tension, units.pressure, units.volume
+    ('kN/m', 'kN/m²', 'm³')
+    >>> Units("mm").tension, Units().tension, Units().curvature
+    ('force/mm', 'force/length', '1/length')
+    """
+
+    length: str = ""
+    force: str = ""
+
+    def __post_init__(self) -> None:
+        if self.length:
+            validate.choice("units", self.length, LENGTHS)
+        if self.force:
+            validate.choice("force", self.force, FORCES)
+        if self.force and not self.length:
+            text = f'force = "{self.force}" needs a unit of length, too; add units = "m"'
+            raise OptionError(text, what="units", expected=LENGTHS)
+
+    def __bool__(self) -> bool:
+        """Whether there is a unit of length."""
+        return bool(self.length)
+
+    @property
+    def area(self) -> str:
+        """The unit of areas: "m²"."""
+        return f"{self.length or 'length'}²"
+
+    @property
+    def volume(self) -> str:
+        """The unit of volumes: "m³"."""
+        return f"{self.length or 'length'}³"
+
+    @property
+    def curvature(self) -> str:
+        """The unit of curvatures: "1/m"."""
+        return f"1/{self.length or 'length'}"
+
+    @property
+    def tension(self) -> str:
+        """The unit of tensions, and of reactions per length: "kN/m"."""
+        return f"{self.force or 'force'}/{self.length or 'length'}"
+
+    @property
+    def pressure(self) -> str:
+        """The unit of pressures: "kN/m²"."""
+        return f"{self.tension}²"
+
+    @property
+    def energy(self) -> str:
+        """The unit of E: "kN·m"."""
+        return f"{self.force or 'force'}·{self.length or 'length'}"
+
+
+def length_factor(source: str, target: str) -> float:
+    """What a length in ``source`` is multiplied by to be in ``target``; 1 where one of them is empty.
+
+    Raises
+    ------
+    OptionError : for a text that is no unit of ``MICROMETRES``.
+
+    Examples
+    --------
+    >>> length_factor("mm", "m"), length_factor("ft", "in"), length_factor("", "m")
+    (0.001, 12.0, 1.0)
+    """
+    for unit in filter(None, (source, target)):
+        validate.choice("units", unit, tuple(MICROMETRES))
+    if not source or not target or source == target:
+        return 1.0
+    return MICROMETRES[source] / MICROMETRES[target]
+
+
+def conversion_note(source: str, target: str) -> str:
+    """The line that says that lengths were converted; empty where nothing changes.
+
+    >>> conversion_note("mm", "m")
+    'lengths converted from mm to m (1 mm = 0.001 m)'
+    """
+    factor = length_factor(source, target)
+    return (
+        ""
+        if factor == 1.0
+        else f"lengths converted from {source} to {target} (1 {source} = {factor:g} {target})"
+    )
