@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from refusals import refused
-from scipy.optimize import brentq
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, fsolve
 from shapes import octahedron, pyramid
 
 import generators
@@ -330,27 +331,101 @@ def test_of_two_connected_bubbles_one_swallows_the_other():
     assert areas[1] < areas[0]
 
 
-def test_a_cylinder_between_rings_is_stable_up_to_its_circumference():
-    """Plateau's limit, 2πR at a prescribed volume; it is πR under a given pressure."""
-    errors = []
-    for edge_length in (0.6, 0.3, 0.15):
-        errors.append(critical_length(edge_length, 2.0 * np.pi) - 2.0 * np.pi)
-    assert order(errors) == pytest.approx(2.0, abs=0.25)
-    assert abs(errors[-1]) < 0.015
+def cylinder(edge_length: float, length: float, between: str) -> Surface:
+    """A cylinder of the volume that it has, between fixed rings or plates that its ends slide on."""
+    surface = generators.cylinder(edge_length, length=length, exact=True)
+    rooms = [Room("inside", {"tube": 1}, 1.0)]
+    if between == "rings":
+        surface = replace(surface, rooms=rooms)
+    else:
+        lid = Plane((0.0, 0.0, length), (0.0, 0.0, 1.0), "lid")
+        low, high = np.isclose(surface.vertices[:, 2], 0.0), np.isclose(surface.vertices[:, 2], length)
+        mesh = surface.vertices, surface.faces, surface.patch_of_face, surface.patches
+        surface = Surface(*mesh, on_plane=low, on_planes={lid: high}, rooms=rooms)
+    return surface.retensioned(volumes={"inside": room_volumes(surface)[0]})
 
 
-def critical_length(edge_length: float, near: float) -> float:
-    """The length at which the lowest eigenvalue of a cylinder of prescribed volume passes 0."""
+@pytest.mark.parametrize(("between", "limit"), [("rings", 2.0 * np.pi), ("plates", np.pi)])
+def test_a_cylinder_of_prescribed_volume_is_stable_up_to_a_length(between, limit):
+    """Plateau's limit 2πR between rings, πR between plates; under a given pressure both are half of that."""
 
-    def softest(length: float) -> float:
-        surface = generators.cylinder(edge_length, length=length, exact=True)
-        surface = replace(surface, rooms=[Room("inside", {"tube": 1}, 1.0)])
-        surface = surface.retensioned(volumes={"inside": room_volumes(surface)[0]})
-        certificate = pcmc.solve(surface, target="stationary").certificate
+    def softest(length: float, edge_length: float) -> float:
+        certificate = pcmc.solve(cylinder(edge_length, length, between), target="stationary").certificate
         assert (certificate.index == 1) == (certificate.eigenvalues[0] < 0.0)
         return float(certificate.eigenvalues[0])
 
-    return float(brentq(softest, 0.95 * near, 1.01 * near, xtol=1e-4))
+    span = 0.95 * limit, 1.01 * limit
+    errors = [brentq(softest, *span, args=(h,), xtol=1e-4) - limit for h in (0.6, 0.3, 0.15)]
+    assert order(errors) == pytest.approx(2.0, abs=0.25)
+    assert abs(errors[-1]) < 0.0025 * limit
+
+
+def test_volumes_between_planes_are_those_enclosed_and_their_gradients():
+    surface = cylinder(0.5, 3.0, "plates")
+    assert room_volumes(surface)[0] == pytest.approx(3.0 * np.pi, rel=0.03)
+    d = np.sin(2.0 * surface.vertices[:, [1, 2, 0]] + 0.3)
+    d[~surface.free, 2] = 0.0
+    slope = (room_volume_gradients(surface)[0] * d).sum()
+    steps = 0.1 * 0.5 ** np.arange(4)
+    values = np.array([room_volumes(surface.moved(surface.vertices + t * d))[0] for t in steps])
+    assert order(values - room_volumes(surface)[0] - steps * slope) == pytest.approx(2.0, abs=0.1)
+
+
+def heavy_profile(volume: float, alpha: float, weight: float) -> tuple[float, float]:
+    """Height and foot radius of a heavy bubble on Π, which meets Π at a right angle.
+
+    E = ∫ σ(z) dA - p V with the effective tension σ = α + w z is stationary where p = σ (κ₁ + κ₂) + w n_z.
+    From the apex down, with s along the profile and φ its slope, r' = cos φ, z' = -sin φ, n_z = cos φ, and
+
+        φ' = (p - w cos φ) / σ(z) - sin φ / r,    φ' = (p - w) / 2σ at the apex, φ = π/2 on Π.
+    """
+
+    def ends(height: float, pressure: float):
+        def rates(_, y):
+            r, z, phi, _ = y
+            sigma = alpha + weight * z
+            bend = (pressure - weight * np.cos(phi)) / sigma
+            other = np.sin(phi) / r if r > 1e-12 else 0.5 * bend
+            return [np.cos(phi), -np.sin(phi), bend - other, np.pi * r**2 * np.sin(phi)]
+
+        def upright(_, y):
+            return y[2] - 0.5 * np.pi
+
+        upright.terminal = True
+        return solve_ivp(
+            rates, (0.0, 10.0), [0.0, height, 0.0, 0.0], events=upright, rtol=1e-11, atol=1e-12
+        ).y
+
+    def misfit(unknown):
+        y = ends(*unknown)
+        return [y[1, -1], y[3, -1] - volume]
+
+    radius = (1.5 * volume / np.pi) ** (1.0 / 3.0)
+    height, pressure = fsolve(misfit, [0.9 * radius, 2.0 * alpha / radius], xtol=1e-12)
+    return height, ends(height, pressure)[0, -1]
+
+
+def test_the_profile_without_weight_is_the_half_ball():
+    assert heavy_profile(2 * np.pi / 3, 1.0, 1e-12) == pytest.approx((1.0, 1.0), abs=1e-9)
+
+
+def test_a_heavy_bubble_has_the_profile_of_its_weight():
+    height, radius = heavy_profile(2 * np.pi / 3, 1.0, 1.5)
+    assert height < 0.9 < 1.05 < radius
+    heights, radii = [], []
+    for edge_length in (0.4, 0.2, 0.1):
+        half = generators.hemisphere(edge_length, alpha=0.5)
+        bubble = half.retensioned({"bubble": 1.0}, weights={"bubble": 1.5})
+        result = pcmc.solve(replace(bubble, rooms=[Room("inside", {"bubble": 1}, 2 * np.pi / 3)]))
+        assert result.converged, result.message
+        assert (result.certificate.verdict.name, result.certificate.index) == ("NEUTRAL", 0)
+        X = result.surface.vertices
+        foot = X[result.surface.on_plane]
+        heights.append(X[:, 2].max() - height)
+        radii.append(np.linalg.norm(foot - foot.mean(axis=0), axis=1).mean() - radius)
+    assert order(heights)[-1] == pytest.approx(2.0, abs=0.3)
+    assert order(radii)[-1] == pytest.approx(2.0, abs=0.3)
+    assert max(abs(heights[-1]), abs(radii[-1])) < 0.01
 
 
 # ---- continuation, sensitivities, targets ---------------------------------------------------------
@@ -481,10 +556,15 @@ def test_files_carry_rooms(suffix, tmp_path):
 
 
 @pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
-@pytest.mark.parametrize("name", ["bubbles", "raised roof", "cap"])
+@pytest.mark.parametrize("name", ["bubbles", "raised roof", "cap", "plates"])
 def test_evolver_has_the_same_volumes_energy_and_gradient(name):
     bubbles = generators.double_bubble(0.8, volumes=(1.0, 0.7))
-    surface = {"bubbles": bubbles, "raised roof": raised(), "cap": cap(1.0, 0.4)}[name]
+    surface = {
+        "bubbles": bubbles,
+        "raised roof": raised(),
+        "cap": cap(1.0, 0.4),
+        "plates": cylinder(0.6, 3.0, "plates"),
+    }[name]
     out = evolver.run(surface, 'foreach body bb do printf "V %.17g %.17g\\n", bb.volume, bb.target')
     found = evolver.numbers(out, "V", 2)
     np.testing.assert_allclose(found[:, 0], room_volumes(surface), rtol=1e-12)

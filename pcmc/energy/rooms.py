@@ -1,8 +1,9 @@
 """The volumes of rooms that are prescribed, and their gradients.
 
 The volume V of a room is the one that its patches enclose: the cones from ``Surface.origin`` to its patches,
-each with the sign of its normal, and what closes their boundary. Along edges on Π the cones' sides lie in Π.
-A boundary off Π must be fixed; a flat fan about its middle closes it, and adds a constant.
+each with the sign of its normal, and what closes their boundary. Along edges on Π the cones' sides lie in Π;
+along edges on other sliding planes flat pieces close it (``flat_pieces``). Any other boundary must be fixed;
+a flat fan about its middle closes it, and adds a constant.
 
 A pressure δ in all of the room adds -δ V to E. At rest the pressures δ are those at which V is as prescribed:
 δ is the multiplier of the condition V = V̄ in
@@ -26,6 +27,7 @@ from ..surface.topology import components
 from . import kernels
 from .functional import apply_supports
 from .motion_space import MotionSpace
+from .plane_pieces import add_plane_forces, add_plane_volumes
 
 ROUNDING = 1e-13  # of the largest pressure: a wall between rooms of one pressure has none
 ON_PLANE = 1e-9  # of the size: a vertex as high as this over Π is on it
@@ -69,8 +71,9 @@ def volumes_at(surface: Surface, X: Floats) -> Floats:
     """(r,) the volumes of the rooms of a surface with its vertices at X (n,3)."""
     if not surface.rooms:
         return np.zeros(0)
-    cones = kernels.areas_and_volumes(kernels.energy_mesh(surface), X)[1]
-    return surface.room_signs @ cones + closing_volumes(surface)
+    volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), X)[1]
+    add_plane_volumes(surface, X, volumes)
+    return surface.room_signs @ volumes + closing_volumes(surface)
 
 
 def volume_gradients_at(surface: Surface, X: Floats) -> Floats:
@@ -78,7 +81,8 @@ def volume_gradients_at(surface: Surface, X: Floats) -> Floats:
     gradients = np.zeros((len(surface.rooms), *X.shape))
     if len(gradients):
         _add_gradients(kernels.energy_mesh(surface), X, np.array(surface.room_signs), gradients)
-    for gradient in gradients:
+    for gradient, signs in zip(gradients, surface.room_signs, strict=True):
+        add_plane_forces(surface, -signs, X, gradient)
         apply_supports(surface, gradient, X)
     return gradients
 
@@ -205,6 +209,8 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
     edges = surface.topology.edges
     lying = grounded[edges].all(axis=1)
     _refuse_open(surface, room, np.flatnonzero((left != 0.0) & ~_closed_by_support(surface, edges, lying)))
+    for _, mask in surface.on_planes:
+        lying |= mask[edges].all(axis=1)
     off = np.flatnonzero((left != 0.0) & ~lying)
     if not len(off):
         return
@@ -227,11 +233,13 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
 
 
 def _closed_by_support(surface: Surface, edges: Ints, lying: Bools) -> Bools:
-    """(e,) edges whose cone does not change: held along Π, or fixed, or along one straight line."""
+    """(e,) edges that something closes: on Π or another sliding plane, fixed, or along one straight line."""
     fixed = surface.fixed.copy()
     for _, along in surface.on_line:
         fixed &= ~along
     closed = fixed[edges].all(axis=1) | (lying & surface.held[edges].all(axis=1))
+    for _, mask in surface.on_planes:
+        closed |= mask[edges].all(axis=1)
     for line, along in surface.on_line:
         if isinstance(line, Line):
             on_it = along | (fixed & (line.distance(surface.vertices) <= ON_PLANE * surface.size))
@@ -248,9 +256,9 @@ def _refuse_open(surface: Surface, room: Room, edges: Iterable[int]) -> None:
     place = surface.vertices[ends].mean(axis=0).round(4).tolist()
     raise SurfaceError(
         f"room {room.name!r} does not close: its patches end along {len(numbers)} edges that are neither held"
-        f" on the plane nor fixed, the first from vertex {ends[0]} to {ends[1]} near {place}; name the"
-        " patches that are missing, with 1 where the normal points out of the room and -1 where it points in,"
-        " or hold that edge",
+        f" on a plane nor fixed down to Π, the first from vertex {ends[0]} to {ends[1]} near {place}; name"
+        " the patches that are missing, with 1 where the normal points out of the room and -1 where it points"
+        " in, or hold that edge",
         what="rooms",
         where=room.name,
         found=ends.tolist(),

@@ -31,6 +31,7 @@ import pandas as pd
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError
 from ..energy.flat_pieces import flat_pieces
+from ..energy.plane_pieces import add_plane_volumes
 from ..energy.rooms import room_pressures, room_volumes
 from ..meshing.refinement import edges_on_planes
 from ..surface import Cable, Patch, Plane, Room, Surface
@@ -171,7 +172,8 @@ def _cones(surface: Surface) -> Floats:
     """(k,) the volumes of the patches' cones seen from the point of Π, as the program sees them."""
     corners = surface.vertices[surface.faces] - np.array(surface.plane.point)
     volumes = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
-    return np.bincount(surface.patch_of_face, volumes, len(surface.patches))
+    of_patch = np.bincount(surface.patch_of_face, volumes, len(surface.patches))
+    return add_plane_volumes(surface, surface.vertices, of_patch)
 
 
 def _room_pressures(surface: Surface) -> tuple[Floats, Floats]:
