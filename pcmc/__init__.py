@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .io.repairing import Repaired, repair
     from .panels import FewerFamilies, Panels, fewer_families, panels
     from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
-    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface
+    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
 
 __all__ = [
     "BoundaryMotion",
@@ -50,6 +50,7 @@ __all__ = [
     "certify",
     "check_mesh",
     "curvature_error",
+    "cut",
     "energy",
     "errors",
     "explore",
@@ -60,6 +61,7 @@ __all__ = [
     "mean_curvature",
     "meet",
     "panels",
+    "mirrored",
     "read",
     "repair",
     "read_results",
@@ -93,7 +95,7 @@ _NAMES = {
         "write_structure",
     ),
     "panels": ("FewerFamilies", "Panels", "fewer_families", "panels"),
-    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
+    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
 }
 
 

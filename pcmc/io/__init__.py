@@ -56,6 +56,9 @@ class Format:
     separate : whether it has a mesh per patch, which cannot have triangles without area.
     walls : whether such triangles go with a separate format as text.
     lines : whether it holds the lines and circles that vertices slide along.
+    cables : whether it holds cables.
+    rooms : whether it holds the volumes that rooms prescribe.
+    planes : whether it holds planes other than Π that vertices slide on, and mirror planes.
     loses : what it never holds.
     reads : whether pcmc reads it, too.
     unit : the unit of length that the format prescribes; empty if a file may have any, or says none.
@@ -70,6 +73,9 @@ class Format:
     separate: bool = False
     walls: bool = False
     lines: bool = False
+    cables: bool = False
+    rooms: bool = False
+    planes: bool = False
     loses: tuple[str, ...] = ()
     reads: bool = True
     unit: str = ""
@@ -77,9 +83,18 @@ class Format:
 
 
 FORMATS = {
-    ".pcmc": Format("native", scalars="both", certificate=True, shared=True, lines=True),
-    ".fe": Format("evolver", shared=True, units=False),
-    ".dmp": Format("evolver", shared=True, units=False),
+    ".pcmc": Format(
+        "native",
+        scalars="both",
+        certificate=True,
+        shared=True,
+        lines=True,
+        planes=True,
+        cables=True,
+        rooms=True,
+    ),
+    ".fe": Format("evolver", shared=True, units=False, planes=True, cables=True, rooms=True),
+    ".dmp": Format("evolver", shared=True, units=False, planes=True, cables=True, rooms=True),
     ".obj": Format("obj"),
     ".ply": Format("ply", scalars="both"),
     ".stl": Format("stl", separate=True, loses=("supports", "tensions", "pressures"), units=False),
@@ -247,8 +262,16 @@ def write(
             lost.append(f"colours of {colour!r}")
     if certificate is not None and not form.certificate:
         lost.append("certificate")
-    if surface.on_line and not form.lines:
+    if surface.given.on_line and not form.lines:
         lost.append("lines or circles that vertices slide along (they are fixed in it)")
+    if surface.weights.any() and "tensions" in form.loses:
+        lost.append("weights")
+    if surface.cables and not form.cables:
+        lost.append("cables")
+    if surface.rooms and not form.rooms:
+        lost.append("volumes of rooms (it has the pressures reached)")
+    if surface.on_planes and not form.planes:
+        lost.append("planes other than Π that vertices slide on, and mirror planes (fixed in it)")
     if units and not form.units:
         lost.append(f"its unit {units.length}")
     if units and form.unit:
