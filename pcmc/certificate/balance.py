@@ -54,6 +54,17 @@ def load_ratio(surface: Surface) -> float:
     return abs(load(surface)) / capacity if capacity > 0.0 else 0.0
 
 
+def load_is_given(surface: Surface) -> bool:
+    """Whether a ``load_ratio`` above 1 says something about every shape of the surface, not about this one.
+
+    The load depends on the shape where patches weigh something, where the surface has free edges, as between
+    cables, and where rooms prescribe volumes instead of pressures.
+    """
+    topo = surface.topology
+    free = topo.boundary_edge & ~surface.held[topo.edges].all(axis=1)
+    return not (surface.rooms or surface.weights.any() or free.any())
+
+
 def load(surface: Surface) -> float:
     """Σ p A_T ν_T · n - Σ w A_T: the force of pressure and weight along Π's normal n, on the supports."""
     vector = area_vectors(surface.vertices[surface.faces])
