@@ -1,5 +1,6 @@
 """Starting surfaces: the paper's examples, and surfaces with a closed form."""
 
+from .barrel import barrel
 from .bezier_hall import bezier_hall
 from .delaunay import delaunay, delaunay_exact, delaunay_force, delaunay_limit, unduloid_length
 from .double_bubble import double_bubble, double_bubble_exact
@@ -7,6 +8,7 @@ from .enneper import enneper, enneper_exact, enneper_wire
 from .fans import four_fans, three_patches
 from .joined_caps import joined_caps, joined_caps_exact
 from .lens import hemisphere, hemisphere_exact, lens, lens_circle, lens_exact
+from .schwarz_p import schwarz_p
 from .sphere import sphere, sphere_exact
 from .spherical_cap import spherical_cap, spherical_cap_exact
 from .tetrahedron import (
@@ -20,6 +22,7 @@ from .two_caps import two_caps
 from .two_squares import two_squares
 
 __all__ = [
+    "barrel",
     "bezier_hall",
     "catenoid",
     "catenoid_exact",
@@ -44,6 +47,7 @@ __all__ = [
     "lens",
     "lens_circle",
     "lens_exact",
+    "schwarz_p",
     "skew_quadrilateral",
     "skew_quadrilateral_exact",
     "sphere",
