@@ -14,6 +14,7 @@ import pandas as pd
 
 from ..base import validate
 from ..base.arrays import Floats, Ints
+from ..base.units import NO_UNITS, Units
 from ..contact.pinching import excess_pull, standing_part
 from ..energy.curvature import METHODS, curvature_error, mean_curvature
 from ..energy.functional import energy_and_gradient, patch_areas, volume
@@ -109,9 +110,14 @@ class Certificate:
         }
 
     def __str__(self) -> str:
+        return self.text()
+
+    def text(self, units: Units = NO_UNITS) -> str:
+        """The findings as a table, with the units of its numbers if they are given."""
         rows = [
             ("verdict", self.verdict.value),
             ("", self.detail),
+            ("units", units.sentence if units else ""),
             ("residual", f"{self.residual:.2e} of {self.scale:.4g}"),
             ("energy", f"{self.energy:.10g}"),
             ("volume", f"{self.volume:.6g}"),

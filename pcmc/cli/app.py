@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .caching import cache_
 from .showing import convert, explore, plot
 from .solving import certify_, remesh_, solve_
 from .structure import structure
@@ -51,5 +52,6 @@ for name, command, summary in (
     ("structure", structure, "Write a structural model for CalculiX."),
     ("sweep", sweep, "Solve every combination of some values; write a table."),
     ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
+    ("cache", cache_, "Show or remove the roofs that are kept."),
 ):
     app.command(name, short_help=summary)(command)

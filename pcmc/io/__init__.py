@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,15 @@ import numpy.typing as npt
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, MissingExtra, PcmcError, unknown
 from ..base.files import atomic_write, check_name, check_regular
+from ..base.units import MICROMETRES, Units, length_factor
+from ..base.validate import choice
 from ..contact.pinching import standing_part
 from ..surface import Plane, Surface
 from .flat_walls import encode_walls, restore_walls
 from .import_warnings import import_warnings
 from .libraries import unreadable
 from .mesh_data import MeshData, checked, merged, to_surface, without_unused
+from .scaling import as_units, converted, scaled_surface
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,8 @@ class Format:
     walls : whether such triangles go with a separate format as text.
     lines : whether it holds the lines and circles that vertices slide along.
     loses : what it never holds.
+    unit : the unit of length that the format prescribes; empty if a file may have any, or says none.
+    units : whether a file says its units.
     """
 
     module: str
@@ -51,19 +56,21 @@ class Format:
     walls: bool = False
     lines: bool = False
     loses: tuple[str, ...] = ()
+    unit: str = ""
+    units: bool = True
 
 
 FORMATS = {
     ".pcmc": Format("native", scalars="both", certificate=True, shared=True, lines=True),
-    ".fe": Format("evolver", shared=True),
-    ".dmp": Format("evolver", shared=True),
+    ".fe": Format("evolver", shared=True, units=False),
+    ".dmp": Format("evolver", shared=True, units=False),
     ".obj": Format("obj"),
     ".ply": Format("ply", scalars="both"),
-    ".stl": Format("stl", separate=True, loses=("supports", "tensions", "pressures")),
+    ".stl": Format("stl", separate=True, loses=("supports", "tensions", "pressures"), units=False),
     ".vtp": Format("vtk", scalars="both"),
     ".vtu": Format("vtk", scalars="both"),
-    ".glb": Format("gltf", scalars="vertices", separate=True, walls=True),
-    ".gltf": Format("gltf", scalars="vertices", separate=True, walls=True),
+    ".glb": Format("gltf", scalars="vertices", separate=True, walls=True, unit="m"),
+    ".gltf": Format("gltf", scalars="vertices", separate=True, walls=True, unit="m"),
     ".3dm": Format("rhino", separate=True, walls=True),
 }
 """The formats by suffix."""
@@ -81,6 +88,7 @@ def read(
     fixed: npt.ArrayLike | str | None = None,
     on_plane: npt.ArrayLike | None = None,
     plane: Plane | None = None,
+    units: str = "m",
 ) -> Surface:
     """The Surface in a file, read as its suffix says.
 
@@ -92,12 +100,15 @@ def read(
     fixed, on_plane : as in Surface, in place of the file's; ``fixed="boundary"`` fixes all boundary
         vertices, and is the default for formats without supports.
     plane : Π in place of the file's, or the plane z = 0 if it has none.
+    units : the unit of length of the Surface. A file in another unit is converted: coordinates, and the
+        tensions and pressures that it has. The numbers of a file without a unit stay. A Surface itself has no
+        unit: give the same to ``write``.
 
     Warns
     -----
-    FileWarning : once, with all that was changed (polygons cut into triangles, unused vertices left
-        out, ...) and all probable mistakes in a mesh from another program (an open seam, patches
-        turned against each other, an axis up that is not z).
+    FileWarning : once, with all that was changed (another unit, polygons cut into triangles, unused
+        vertices left out, ...) and all probable mistakes in a mesh from another program (an open seam,
+        patches turned against each other, an axis up that is not z).
 
     Raises
     ------
@@ -105,17 +116,21 @@ def read(
         file, ``where`` the line or element.
     SurfaceError : for a mesh that is not a surface.
     MissingExtra : when the format needs a library that is not installed.
+    OptionError : for an unknown unit.
     """
-    return _read(path, (tensions, pressures, fixed, on_plane, plane))
-
-
-def read_bare(path: str | os.PathLike[str]) -> Surface:
-    """``read`` without arguments, with a warning also if the file has no supports."""
-    return _read(path, ())
-
-
-def _read(path: str | os.PathLike[str], given: tuple[Any, ...]) -> Surface:
+    choice("units", units, tuple(MICROMETRES))
     data = load(path)
+    return _surface(path, converted(data, units), (tensions, pressures, fixed, on_plane, plane))
+
+
+def read_bare(path: str | os.PathLike[str]) -> tuple[Surface, MeshData]:
+    """The Surface in a file, in the file's own units, and all its data; a note if it has no supports."""
+    data = load(path)
+    return _surface(path, data, ()), data
+
+
+def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...]) -> Surface:
+    """The Surface of a file's data; warns of all that was changed."""
     try:
         surface = to_surface(data, *given)
     except PcmcError as error:
@@ -136,6 +151,8 @@ def load(path: str | os.PathLike[str]) -> MeshData:
     try:
         path.open("rb").close()  # the libraries' errors for a missing file differ
         data = without_unused(checked(import_module(f".{form.module}", __name__).read(path)))
+        if form.unit:
+            data = replace(data, units=Units(form.unit, data.units.force))
         if form.shared:
             return data
         return restore_walls(merged(data))
@@ -158,6 +175,7 @@ def write(
     *,
     scalars: Mapping[str, Floats] | None = None,
     certificate: object | None = None,
+    units: Units | str | None = None,
 ) -> None:
     """Write a surface as the suffix says; the file appears whole or not at all.
 
@@ -170,6 +188,9 @@ def write(
     path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
     scalars : (n,) or (m,) arrays by name (curvature, error, ...), for formats that hold them.
     certificate : a Certificate, or values by name, for the format that holds it (.pcmc).
+    units : of the surface: a unit of length such as "mm", or ``pcmc.base.units.Units`` with that of forces.
+        The file says them. .glb and .gltf are in metres, as glTF prescribes: the surface is converted
+        (scalars are not). Without a unit the numbers are written as they are, in .3dm as metres.
 
     Warns
     -----
@@ -185,11 +206,17 @@ def write(
             raise FileError(text, what=str(path), where="patches", found=patch.name)
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
     sizes = {"": (), "vertices": (surface.n,), "both": (surface.n, surface.m)}[form.scalars]
+    units = as_units(units)
     lost = [name for name, scalar in scalars.items() if len(scalar) not in sizes]
     if certificate is not None and not form.certificate:
         lost.append("certificate")
     if surface.on_line and not form.lines:
         lost.append("lines or circles that vertices slide along (they are fixed in it)")
+    if units and not form.units:
+        lost.append(f"its unit {units.length}")
+    if units and form.unit:
+        surface = scaled_surface(surface, length_factor(units.length, form.unit))
+        units = Units(form.unit, units.force)
     shown, walls = surface, None
     if form.separate:
         shown = standing_part(surface).surface
@@ -200,8 +227,9 @@ def write(
     values = _values(certificate)
     try:
         module = import_module(f".{form.module}", __name__)
+        content = {"scalars": scalars, "certificate": values, "walls": walls, "units": units}
         with atomic_write(path) as temporary:
-            note = module.write(temporary, shown, scalars=scalars, certificate=values, walls=walls)
+            note = module.write(temporary, shown, **content)
     except OSError as error:
         raise FileError(f"{path}: cannot be written ({error.strerror or error})", what=str(path)) from None
     except PcmcError as error:

@@ -21,6 +21,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import FileError
 from ..base.files import check_regular
+from ..base.units import Units
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.surface import FAR
@@ -34,7 +35,9 @@ SUPPORT = "_SUPPORT"
 ITEMS = 4  # of arrays, for each byte of a file; arrays may share their bytes
 
 
-def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], walls: str | None, **_: Any) -> None:
+def write(
+    path: Path, surface: Surface, scalars: Mapping[str, Floats], units: Units, walls: str | None, **_: Any
+) -> None:
     """One file, with its buffers inside."""
     trimesh = load_library("trimesh")
     data = {SUPPORT: support_of(surface).astype(np.float32)}
@@ -59,7 +62,7 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], walls: st
         material = trimesh.visual.material.PBRMaterial(patch.name, baseColorFactor=[*color, 1.0], **shine)
         mesh.visual = trimesh.visual.TextureVisuals(material=material)
         scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name, transform=place)
-    scene.metadata["pcmc"] = metadata_text(surface)
+    scene.metadata["pcmc"] = metadata_text(surface, units)
     if walls is not None:
         scene.metadata[KEY] = walls
     if path.suffix.lower() == ".glb":

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
+from ..base.units import NO_UNITS, Units
 from ..base.validate import choice
 from ..surface import Guide, Patch, Plane, Surface, checks
 from ..surface.geometry import bounding_size
@@ -43,6 +44,7 @@ class MeshData:
     walls : the text of ``flat_walls.encode_walls``, where patches are separate meshes and a wall has
         no height.
     lines : as ``on_line`` in Surface.
+    units : of the numbers; no unit where the file has none.
     """
 
     vertices: Floats
@@ -57,6 +59,7 @@ class MeshData:
     joined: bool = False
     walls: str | None = None
     lines: tuple[tuple[Guide, Bools], ...] = ()
+    units: Units = NO_UNITS
 
 
 def checked(data: MeshData) -> MeshData:

@@ -22,6 +22,7 @@ import pandas as pd
 
 from ..base.arrays import Bools, Floats
 from ..base.errors import FileError
+from ..base.units import Units
 from ..surface import Circle, Guide, Line, Surface
 from .libraries import translated_errors
 from .mesh_data import MeshData, support_of
@@ -34,14 +35,19 @@ ROOM = 64_000_000  # bytes that any file may become
 
 
 def write(
-    path: Path, surface: Surface, scalars: Mapping[str, Floats], certificate: Mapping[str, Any], **_: Any
+    path: Path,
+    surface: Surface,
+    scalars: Mapping[str, Floats],
+    certificate: Mapping[str, Any],
+    units: Units,
+    **_: Any,
 ) -> None:
     """The archive; the same surface gives the same bytes."""
     tables = {k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object}
     meta = {
         "format": FORMAT,
         "version": 3 if surface.on_circle else 2 if surface.on_line else 1,
-        "description": metadata_text(surface),
+        "description": metadata_text(surface, units),
         "certificate": {k: v for k, v in certificate.items() if k not in tables},
     }
     arrays: dict[str, Any] = {f"scalar {name}": value for name, value in scalars.items()}
@@ -91,6 +97,7 @@ def read(path: Path) -> MeshData:
             metadata.plane,
             lines=_lines(arrays) + _circles(arrays),
             scalars=_under("scalar ", arrays),
+            units=metadata.units,
             certificate={**meta["certificate"], **_under("certificate ", arrays)},
         )
 

@@ -67,7 +67,7 @@ def vtk_arrays(path: str) -> dict[str, Any]:
 
 
 def rhino_arrays(path: str) -> dict[str, Any]:
-    """Layers and objects of a Rhino file: names and user texts, meshes and point clouds."""
+    """Layers and objects of a Rhino file, names, user texts, meshes and point clouds; its unit system."""
     import numpy as np
     import rhino3dm
 
@@ -91,7 +91,8 @@ def rhino_arrays(path: str) -> dict[str, Any]:
         elif isinstance(geometry, rhino.PointCloud):
             held["points"] = coordinates(geometry.GetPoints())
         objects.append(held)
-    return {"layers": layers, "objects": objects}
+    unit = str(model.Settings.ModelUnitSystem.name)
+    return {"layers": layers, "objects": objects, "unit": unit}
 
 
 def limit_memory(size: int) -> None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from .. import io
 from ..base.errors import FileError, OptionError, PcmcError
 from ..base.files import check_name, check_regular
+from ..base.units import NO_UNITS, Units
 from ..plan import Plan, plan_from
 from ..solvers import find_method
 from ..surface import Surface
@@ -42,6 +43,7 @@ class Project:
     ----------
     path : the file.
     plan : of the surface; None if ``path`` holds a surface itself.
+    units : of all its numbers, and of the files written.
     method, options : as in ``pcmc.solve``.
     wanted : the accuracy asked for.
     mesh_check : whether the result is solved on finer meshes, too; None if the file does not say.
@@ -56,6 +58,7 @@ class Project:
 
     path: Path
     plan: Plan | None = None
+    units: Units = NO_UNITS
     method: str = "newton"
     options: Mapping[str, Any] = field(default_factory=dict)
     wanted: AccuracyWanted = field(default_factory=AccuracyWanted)
@@ -168,11 +171,17 @@ def build(path: PathLike) -> Surface:
 
 
 def surface_of(project: Project) -> Surface:
-    """The mesh of the project's plan."""
+    """The mesh of the project's plan, or the surface in its file."""
+    return start_of(project)[0]
+
+
+def start_of(project: Project) -> tuple[Surface, Units]:
+    """The mesh of the project's plan, or the surface in its file, and its units."""
     if project.plan is None:
-        return io.read_bare(project.path)
+        surface, data = io.read_bare(project.path)
+        return surface, data.units
     with in_file(project.path):
-        return project.plan.surface()
+        return project.plan.surface(), project.units
 
 
 def project_of(path: Path, data: Mapping[str, Any]) -> Project:
@@ -190,6 +199,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
         return Project(
             path=path,
             plan=plan_from(data["plan"]),
+            units=Units(data.get("units", ""), data.get("force", "")),
             method=method,
             options=options,
             wanted=wanted,

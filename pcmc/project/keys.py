@@ -10,6 +10,7 @@ from inspect import cleandoc
 from typing import Any
 
 from ..accuracy.adaptive import ACCURACY_OF
+from ..base.units import FORCES, LENGTHS
 from ..plan import Area, Divider, Hole, Plan
 from ..plan.parts import BOTTOMS, EDGES
 from ..solvers import METHODS, find_method
@@ -20,6 +21,7 @@ from .remeshing import WHEN, Remeshing
 from .structure import Structure
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
+FIRST = "First lines"  # the keys before any table
 REQUIRED = MISSING  # the default of a key that must be given
 
 
@@ -125,6 +127,8 @@ def main_sections() -> tuple[Section, ...]:
             "",
             "The file: a plan and what to do with it.",
             (
+                Key("units", "a text", None, "of lengths: plan, heights, files and pictures", LENGTHS),
+                Key("force", "a text", None, "of forces; tensions are in ``force`` / ``units``", FORCES),
                 Key("plan", "a table", REQUIRED, "the roof, by the lines of its plan"),
                 Key("solve", "a table", None, "the solver and its options"),
                 Key("remesh", "a table or a list of tables", None, "other triangles, once or more"),
@@ -234,7 +238,7 @@ def sections() -> tuple[Section, ...]:
     """Every section that a project file may have, with its keys.
 
     >>> [key.name for key in sections()[0].keys]
-    ['plan', 'solve', 'remesh', 'targets', 'structure', 'output']
+    ['units', 'force', 'plan', 'solve', 'remesh', 'targets', 'structure', 'output']
     """
     solve = (solve_section(method) for method in METHODS)
     return (*main_sections(), *solve, *target_sections(), _CURVE)
@@ -243,10 +247,10 @@ def sections() -> tuple[Section, ...]:
 def reference() -> str:
     """All sections and keys as Markdown, a table for each section."""
     lines = []
-    for section in sections()[1:]:
+    for section in sections():
         condition = f" with `{section.condition}`" if section.condition else ""
-        title = section.name if section is _CURVE else f"[{section.name}]"
-        lines += [f"## `{title}`{condition}", "", section.help, ""]
+        title = f"`{section.name}`" if section is _CURVE else f"`[{section.name}]`" if section.name else FIRST
+        lines += [f"## {title}{condition}", "", section.help, ""]
         lines += ["| key | value | default | meaning |", "|---|---|---|---|"]
         for key in section.keys:
             value = ", ".join(f'`"{c}"`' for c in key.choices) or key.kind

@@ -96,7 +96,7 @@ def digest(path: PathLike) -> str:
     """
     if is_project(path):
         return hashlib.sha256(read_data(Path(path))[0].encode()).hexdigest()
-    surface = io.read(path)
+    surface = io.read_bare(path)[0]
     sha = hashlib.sha256(repr((surface.patches, surface.plane)).encode())
     for name in ("vertices", "faces", "patch_of_face", "fixed", "on_plane"):
         sha.update(getattr(surface, name).tobytes())
