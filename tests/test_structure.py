@@ -387,6 +387,17 @@ def test_a_project_is_solved_and_has_the_values(tmp_path, monkeypatch, capsys):
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
 
 
+def test_a_roof_that_misses_its_targets_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    targets = '[targets]\nmeet = [{quantity = "apex", of = "roof", value = 30.0}]\nvary = ["roof"]\n'
+    (tmp_path / "roof.toml").write_text(PROJECT + targets)
+    assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
+    assert "targets" in capsys.readouterr().err
+    assert not (tmp_path / "roof.inp").exists()
+    assert cli.main(["structure", "roof.toml", "-o", "roof.inp", "--anyway"]) == 1
+    assert (tmp_path / "roof.inp").exists()
+
+
 def test_reactions_of_an_exact_answer_are_ours(tmp_path):
     """The elements' force at a held node, Σ α ∂A, less the load on the node itself is the reaction."""
     surface = pyramid()

@@ -69,20 +69,20 @@ def structure(
         wanted = projects.Structure(**values | {k: v for k, v in given.items() if v is not None})
         wanted.check(start)
         solved: Surface | Result = start
-        good = True
+        missed = False
         if project is not None:
             outcome = projects.designed(project, say, use_cache=cache)
-            solved, good = outcome.result, outcome.good or not outcome.certificate.certified
-        if not (good or anyway):
-            text = f"{file}: the roof misses its targets; pcmc solve {file} shows them, --anyway writes the model"
-            raise FileError(text, what=str(file))
+            solved, missed = outcome.result, outcome.certificate.certified and not outcome.good
+        if missed and not anyway:
+            hint = f"pcmc solve {file} shows them, --anyway writes the model"
+            raise FileError(f"{file}: the roof misses its targets; {hint}", what=str(file))
         say("certifying")
         model = wanted.model(solved, anyway)
         write_structure(output, model)
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
-    return OK if model.certified and good else NOT_CERTIFIED
+    return OK if model.certified and not missed else NOT_CERTIFIED
 
 
 def _thickness(surface: Surface, given: list[str] | None) -> float | dict[str, float] | None:
