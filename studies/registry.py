@@ -21,6 +21,7 @@ from . import (
     gallery,
     mesh_check,
     mesh_search,
+    panel_families,
     refinement,
     solvers,
     stability,
@@ -45,6 +46,7 @@ MODULES = (
     existence,
     mesh_check,
     accuracy,
+    panel_families,
     gallery,
     structure,
 )

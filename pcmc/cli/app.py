@@ -7,7 +7,10 @@ from typing import Annotated
 
 import typer
 
+from .building import draw_, panels_
 from .caching import cache_
+from .planning import plan
+from .repairing import repair_
 from .showing import convert, explore, plot
 from .solving import certify_, remesh_, solve_
 from .structure import structure
@@ -49,7 +52,11 @@ for name, command, summary in (
     ("remesh", remesh_, "Change the triangle size, solve and certify again."),
     ("convert", convert, "Write a surface in another format."),
     ("plot", plot, "Draw a surface."),
+    ("repair", repair_, "Repair a dirty mesh."),
+    ("plan", plan, "Write the project file for a drawing."),
     ("structure", structure, "Write a structural model for CalculiX."),
+    ("panels", panels_, "Sort the panels of a roof into families; write a schedule."),
+    ("draw", draw_, "Draw plan, elevations, sections and panels for those who build."),
     ("sweep", sweep, "Solve every combination of some values; write a table."),
     ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
     ("cache", cache_, "Show or remove the roofs that are kept."),

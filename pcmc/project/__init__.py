@@ -34,10 +34,12 @@ from .cache import cached_files
 from .cache import clear as clear_cache
 from .cache import folder as cache_folder
 from .designed import designed
+from .drawn import files_of, is_drawing
 from .file import Project, build, load, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
 from .outcome import Outcome
-from .output import COLOURS, check_names, check_outputs, check_picture, paint, write_all
+from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
+from .planning import project_text, proposal_text
 from .remeshing import Remeshing
 from .running import check_of, check_project_mesh, run, run_project, solve_project, surface_files
 from .structure import Structure
@@ -47,6 +49,7 @@ __all__ = [
     "COLOURS",
     "REQUIRED",
     "Key",
+    "OnStep",
     "Outcome",
     "Project",
     "Remeshing",
@@ -64,9 +67,13 @@ __all__ = [
     "clear_cache",
     "designed",
     "digest",
+    "files_of",
+    "is_drawing",
     "is_project",
     "load",
     "paint",
+    "project_text",
+    "proposal_text",
     "reference",
     "run",
     "run_project",
