@@ -33,6 +33,10 @@ Pressures = Annotated[
 ]
 ViewName = Annotated[str, option("NAME", "diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")]
 Colour = Annotated[str, option("NAME", "patches, curvature, error or reactions.", "--colour", "--color")]
+Whole = Annotated[
+    bool,
+    typer.Option("--whole", help="Unfold a surface at its mirror planes: the whole roof, not its piece."),
+]
 MANY_FILES = option("FILE", "File to write; may be repeated.", "-o", "--output")
 
 

@@ -12,9 +12,9 @@ from .. import project as projects
 from ..base.errors import OptionError, unknown
 from ..base.interrupts import defer_interrupts
 from ..io import load, write
-from ..surface import Surface
+from ..surface import Surface, mirrored, unfolded
 from . import OK, arguments
-from .arguments import TOML, Colour, Input, Pressures, Settings, ViewName, option
+from .arguments import TOML, Colour, Input, Pressures, Settings, ViewName, Whole, option
 from .progress import working
 
 
@@ -25,6 +25,7 @@ def convert(
     ],
     tension: Settings = None,
     pressure: Pressures = None,
+    whole: Whole = False,
 ) -> int:
     """Write a surface in another format: .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf .3dm.
 
@@ -39,6 +40,11 @@ def convert(
     if file.suffix.lower() != TOML and not (tension or pressure):
         content = load(file)
         data = {"scalars": content.scalars, "certificate": content.certificate or None}
+    if whole:
+        unfold = unfolded(surface)
+        scalars = data.get("scalars", {}).items()
+        source = {surface.n: unfold.vertex, surface.m: unfold.face}
+        surface, data = unfold.surface, {"scalars": {k: v[source[len(v)]] for k, v in scalars}}
     with defer_interrupts():
         write(output, surface, **data)
     print(f"written: {output}")
@@ -50,6 +56,7 @@ def plot(
     picture: Annotated[Path, typer.Argument(metavar="PNG")],
     view: ViewName = "diagonal",
     colour: Colour = "patches",
+    whole: Whole = False,
 ) -> int:
     """Draw a surface, coloured by patch, mean curvature or curvature error, or with its reactions.
 
@@ -62,6 +69,7 @@ def plot(
     projects.check_picture(seen, colour)
     projects.check_outputs([picture])
     surface = arguments.surface_in(file)
+    surface = mirrored(surface) if whole else surface
     projects.write_all([(picture, lambda path: projects.paint(surface, path, seen, colour))])
     print(f"written: {picture}")
     return OK
