@@ -19,7 +19,7 @@ from .circle import Circle, Guide
 from .line import Line
 from .plane import Plane
 from .room import Room
-from .supports import NEAR
+from .supports import NEAR, refuse_in_mirror
 from .surface import Surface, expect_surface
 from .topology import topology
 
@@ -381,7 +381,7 @@ def cut(surface: Surface, plane: Plane) -> Surface:
     Raises
     ------
     SurfaceError
-        If a triangle crosses the plane, or nothing lies on one side of it.
+        If a triangle crosses the plane or lies in it, or nothing lies on one side of it.
 
     >>> from pcmc import Patch
     >>> square = Surface([[-1, 0, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3], [1, 2, 3]], [0, 0],
@@ -397,10 +397,12 @@ def cut(surface: Surface, plane: Plane) -> Surface:
     height = plane.height(surface.vertices)
     side = np.where(np.abs(height) <= NEAR * surface.size, 0, np.sign(height)).astype(int)
     corners = side[surface.faces]
+    names = [patch.name for patch in surface.patches]
     crossing = np.flatnonzero((corners > 0).any(axis=1) & (corners < 0).any(axis=1))
     if len(crossing):
         text = f"triangle {crossing[0]} crosses the {plane} ({len(crossing)} such triangles); the mesh must"
         raise SurfaceError(f"{text} have edges along the plane", what="plane", where=int(crossing[0]))
+    refuse_in_mirror(plane, side == 0, surface.faces, surface.patch_of_face, names)
     stays = (corners > 0).any(axis=1)
     if stays.all() or not stays.any():
         where = "in front of" if stays.all() else "behind"
