@@ -95,5 +95,15 @@ if not TYPE_CHECKING:
             return import_module(f".{name}", __name__)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
+    def _cell_html(value: object) -> str:
+        return import_module(".plot.notebook", __name__).cell_html(value)
+
+    if "IPython" in sys.modules:  # a notebook: its cells show surfaces as pictures
+        _shell = sys.modules["IPython"].get_ipython()
+        if _shell is not None:
+            _html = _shell.display_formatter.formatters["text/html"]
+            _html.for_type_by_name("pcmc.surface.surface", "Surface", _cell_html)
+            _html.for_type_by_name("pcmc.solvers.result", "Result", _cell_html)
+
     def __dir__() -> list[str]:
         return sorted({*globals(), *__all__})

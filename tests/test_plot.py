@@ -109,21 +109,21 @@ def test_each_surface_may_show_patches_of_its_own():
     assert (larger[:, 210:390] < 250).any()
 
 
-def test_legend_names_what_is_drawn(monkeypatch):
+def test_legend_names_what_is_seen(monkeypatch):
     surface, shown = two_squares(4, alpha_aux=1.0), []
     entries = legend.entries
     monkeypatch.setattr(legend, "entries", lambda pictures: shown.append(entries(pictures)) or shown[-1])
     plot.draw(surface, legend=True)
-    plot.draw(surface, legend=True, patches=["left", "right"])  # only the wall slides
+    plot.draw(surface, legend=True, patches=["wall"])  # which the sheets hide
     plot.draw(surface, legend=True, scalars=pcmc.mean_curvature(surface))
     plot.draw(surface, legend=True, scalars=np.ones(surface.m), supports=False)
     assert [(list(colors), list(dots)) for colors, dots in shown] == [
-        (["left", "right", "wall"], ["fixed", "sliding"]),
         (["left", "right"], ["fixed"]),
-        (["no value"], ["fixed", "sliding"]),
+        (["wall"], ["fixed", "sliding"]),
+        (["no value"], ["fixed"]),
         ([], []),
     ]
-    assert shown[0][1] == {"fixed": FIXED_DOT, "sliding": SLIDING_DOT}
+    assert shown[1][1] == {"fixed": FIXED_DOT, "sliding": SLIDING_DOT}
 
 
 def test_no_text_of_a_full_panel_lies_on_another(monkeypatch):
@@ -171,6 +171,17 @@ def test_same_picture_same_bytes(tmp_path):
         plot.draw(surface, tmp_path / name, numbers=pcmc.mean_curvature(surface), legend=True)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
+
+
+@pytest.mark.parametrize(("suffix", "head"), [(".svg", b"<?xml"), (".pdf", b"%PDF")])
+def test_pictures_are_written_as_svg_and_pdf_too(tmp_path, suffix, head):
+    for name in ("a", "b"):
+        plot.lines({"height": ([1, 2], [3, 4])}, tmp_path / f"{name}{suffix}", y="apex")
+        plot.draw(tent(), tmp_path / f"{name} tent{suffix}", legend=True)
+    for pair in (("a", "b"), ("a tent", "b tent")):
+        one, other = ((tmp_path / f"{name}{suffix}").read_bytes() for name in pair)
+        assert one == other
+        assert one.startswith(head)
 
 
 def test_pictures_stay_small(tmp_path):
@@ -324,8 +335,8 @@ def test_a_misspelt_patch_or_colour_map_is_answered_with_the_nearest():
 
 
 def test_bad_paths_leave_nothing(tmp_path):
-    with refused(FileError, what=str(tmp_path / "a.pdf"), expected=".png"):
-        plot.draw(flat_square(), tmp_path / "a.pdf")
+    with refused(FileError, what=str(tmp_path / "a.gif"), expected=(".png", ".svg", ".pdf")):
+        plot.draw(flat_square(), tmp_path / "a.gif")
     with refused(FileError, what=str(tmp_path / "no folder" / "a.png")):
         plot.draw(flat_square(), tmp_path / "no folder" / "a.png")
     assert not list(tmp_path.iterdir())

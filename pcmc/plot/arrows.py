@@ -14,6 +14,7 @@ from ..certificate.balance import reactions_per_length
 from ..surface import Surface
 from .figure import INK, SMALL, TEXT, Image, finish
 from .pictures import DOTS_FROM, EDGES_FROM, Path, ViewName, fit_frames, frame_axes, frames_of
+from .raster import paint
 from .scene import mean_edge, scene, view_of
 
 ARROW = "#B2182B"
@@ -62,7 +63,7 @@ def vectors(
     if label:
         figure.supxlabel(" ", fontsize=2.0 * SMALL)  # the place of the arrow that tells the scale
     fit_frames(figure, [axes], [frame], 1)
-    frame.show(axes, painted, renderer)
+    frame.show(axes, paint(painted, frame.low, frame.scale, frame.size, renderer))
     if longest > 0.0:
         chosen = _thinned(at, size, most)
         in_plane = {"angles": "xy", "scale_units": "xy", "scale": 1.0}

@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ..base.arrays import Bools, Floats
 from ..surface import Surface
-from ..surface.colours import patch_colors
+from ..surface.colours import patch_colors, rgb
 from .figure import INK, SMALL
 from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT
 
 IN_A_LINE = 6
-Shown = tuple[Surface, Sequence[str] | None, Floats | None, bool]
-"""A surface, the patches of it that are drawn, the values that colour it, whether supports are dots."""
+ALIKE = 0.03  # difference of two colours' directions up to which one may be the other in a shade
+SHADES = (0.5, 1.06)  # brightness of a sheet, lit or not, of its colour's
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A surface in a picture: the patches drawn, the values that colour it, whether supports are dots."""
+
+    surface: Surface
+    patches: Sequence[str] | None
+    values: Floats | None
+    dots: bool
+    image: Floats  # (h,w,3), as painted
 
 
 def shown_vertices(surface: Surface, patches: Sequence[str] | None) -> Bools:
@@ -27,22 +40,36 @@ def shown_vertices(surface: Surface, patches: Sequence[str] | None) -> Bools:
 
 
 def entries(pictures: Iterable[Shown]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Colours of areas by name, and of dots by name, in all the pictures together."""
+    """Colours of areas by name, and of dots by name, that can be seen in all the pictures together."""
     colors: dict[str, Any] = {}
     dots: dict[str, Any] = {}
-    for surface, patches, values, supports in pictures:
-        shown = shown_vertices(surface, patches)
+    for picture in pictures:
+        surface, values, names = picture.surface, picture.values, picture.patches
+        shown = shown_vertices(surface, names)
         if values is None:
             for patch, color in zip(surface.patches, patch_colors(surface), strict=True):
-                if patches is None or patch.name in patches:
+                if (names is None or patch.name in names) and _visible(picture.image, color, 3):
                     colors.setdefault(patch.name, tuple(color))
         elif np.isnan(values[shown] if len(values) == surface.n else values).any():
             colors["no value"] = NO_VALUE
-        if supports and surface.fixed[shown].any():
-            dots["fixed"] = FIXED_DOT
-        if supports and surface.on_plane[shown].any():
-            dots["sliding"] = SLIDING_DOT
+        for name, held, dot in (
+            ("fixed", surface.fixed, FIXED_DOT),
+            ("sliding", surface.held & ~surface.fixed, SLIDING_DOT),
+        ):
+            if picture.dots and held[shown].any() and _visible(picture.image, rgb(dot), 2):
+                dots[name] = dot
     return colors, dots
+
+
+def _visible(image: Floats, color: Floats, across: int) -> bool:
+    """Whether a square of so many pixels has the colour, in any shade: thinner lines are mixed colours."""
+    size = np.linalg.norm(image, axis=2)
+    reference = float(np.linalg.norm(color)) * 255.0
+    alike = (
+        np.linalg.norm(image / np.maximum(size, 1.0)[..., None] - color * 255.0 / reference, axis=2) < ALIKE
+    )
+    alike &= (size > SHADES[0] * reference) & (size < SHADES[1] * reference)
+    return bool(sliding_window_view(alike, (across, across)).all(axis=(2, 3)).any())
 
 
 def add_legend(figure: Any, pictures: Iterable[Shown]) -> None:

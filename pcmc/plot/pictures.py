@@ -17,9 +17,9 @@ from ..surface import Surface
 from ..surface.geometry import area_vectors
 from .colors import color_scale
 from .figure import INK, SMALL, TEXT, Image, finish, fit_height, grid, new
-from .legend import add_legend, shown_vertices
+from .legend import Shown, add_legend, shown_vertices
 from .raster import paint
-from .scene import Scene, View, mean_edge, scene, view_of
+from .scene import View, mean_edge, scene, view_of
 
 Path = str | os.PathLike[str]
 ViewName = str | tuple[float, float]
@@ -135,18 +135,21 @@ def panel(
         place.set_title(drawing.title, fontsize=TEXT, color=INK, pad=5.0)
     if colors is not None:
         colors.bar(figure, axes, label)
-    if legend:
-        shown = [(d.surface, d.patches, d.values, dots) for d, dots in zip(drawings, dotted, strict=True)]
-        add_legend(figure, shown)
-    fit_frames(figure, axes, frames, columns)
+    images = []
     for k, drawing in enumerate(drawings):
-        surface, view = drawing.surface, drawing.view
         fill = None if colors is None or drawing.values is None else colors.rgb(drawing.values)
         meshed = edge[k] >= EDGES_FROM if edges is None else edges
-        painted = scene(surface, view, fill, supports=dotted[k], edges=meshed, patches=drawing.patches)
-        frames[k].show(axes[k], painted, renderer)
+        view, chosen = drawing.view, drawing.patches
+        painted = scene(drawing.surface, view, fill, supports=dotted[k], edges=meshed, patches=chosen)
+        images.append(paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer))
+    if legend:
+        seen = zip(drawings, dotted, images, strict=True)
+        add_legend(figure, [Shown(d.surface, d.patches, d.values, dots, image) for d, dots, image in seen])
+    fit_frames(figure, axes, frames, columns)
+    for drawing, frame, image, place in zip(drawings, frames, images, axes, strict=True):
+        frame.show(place, image)
         if drawing.numbers is not None:
-            _print_numbers(axes[k], surface, view, drawing.numbers, form)
+            _print_numbers(place, drawing.surface, drawing.view, drawing.numbers, form)
     return finish(figure, path)
 
 
@@ -204,9 +207,8 @@ class Frame:
     low: Floats
     scale: float
 
-    def show(self, axes: Any, painted: Scene, renderer: str) -> None:
-        """Paint a scene on the axes, pixel on pixel."""
-        image = paint(painted, self.low, self.scale, self.size, renderer)
+    def show(self, axes: Any, image: Floats) -> None:
+        """Place a painted scene on the axes, pixel on pixel."""
         right, top = self.low + np.array(self.size) / self.scale
         figure, box = axes.figure.bbox, axes.get_window_extent()
         left = round(box.x0) / figure.width

@@ -161,7 +161,7 @@ def main_sections() -> tuple[Section, ...]:
             "What to write. Without it nothing is written.",
             (
                 Key("files", "a list of names", [], "files of the surface; the suffix names the format"),
-                Key("picture", "a text", None, "name of a picture, .png"),
+                Key("picture", "a text", None, "name of a picture, .png, .svg or .pdf"),
                 Key("view", "a name or two angles", "diagonal", directions),
                 Key("colour", "a text", "patches", "of the picture", COLOURS),
             ),

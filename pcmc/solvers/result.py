@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -57,7 +57,7 @@ class Status(Enum):
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """The end of a solve. Every value describes exactly ``surface``.
 
@@ -82,9 +82,13 @@ class Result:
     energy: float
     iterations: int
     evaluations: int
-    rows: Sequence[Mapping[str, Any]] = field(repr=False)
+    rows: Sequence[Mapping[str, Any]]
     note: str = ""
     proofs: tuple[Proof, ...] = ()
+
+    def __repr__(self) -> str:
+        """How the solver ended, above the surface it reached."""
+        return f"{self.message}\nE = {self.energy:.10g}, {self.iterations} iterations\n{self.surface!r}"
 
     @property
     def converged(self) -> bool:

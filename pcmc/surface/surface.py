@@ -38,6 +38,7 @@ FIELDS = (
     "given",
 )
 GROUND = Plane()
+NAMED = 6  # patches that repr names
 FAR = 30.0  # sizes from the point of Π: farther, volumes seen from it lose over three digits
 
 
@@ -53,7 +54,7 @@ def expect_surface(value: object) -> None:
         validate.refuse("surface", type(value).__name__, "a Surface", error=SurfaceError)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Surface:
     """A triangle mesh of several patches, with its supports.
 
@@ -331,6 +332,22 @@ class Surface:
         return self._with(
             patches=tuple(patches), cables=pulling, rooms=_renewed("room", self.rooms, "volume", volumes)
         )
+
+    def __repr__(self) -> str:
+        """Size, patches, walls and supports, a line each."""
+        height = self.plane.height(self.vertices)
+        parts = {True: "walls", False: "patches"}
+        lines = [f"Surface of {self.m} triangles and {self.n} vertices, {self.size:.4g} across"]
+        for wall, name in sorted(parts.items()):
+            kept = [p for p in self.patches if p.auxiliary == wall]
+            if kept:
+                named = (f"{p.name} (tension {p.tension:g}, pressure {p.pressure:g})" for p in kept[:NAMED])
+                more = f", and {len(kept) - NAMED} more" if len(kept) > NAMED else ""
+                lines.append(f"  {name}: {', '.join(named)}{more}")
+        sliding = np.count_nonzero(self.held & ~self.fixed)
+        lines.append(f"  supports: {np.count_nonzero(self.fixed)} vertices fixed, {sliding} sliding")
+        lines.append(f"  heights over the plane: {height.min():.4g} to {height.max():.4g}")
+        return "\n".join(lines)
 
     def __copy__(self) -> Surface:
         """The surface itself: it never changes."""
