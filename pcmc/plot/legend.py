@@ -53,8 +53,8 @@ def entries(pictures: Iterable[Shown]) -> tuple[dict[str, Any], dict[str, Any]]:
         elif np.isnan(values[shown] if len(values) == surface.n else values).any():
             colors["no value"] = NO_VALUE
         for name, held, dot in (
-            ("fixed", surface.fixed, FIXED_DOT),
-            ("sliding", surface.held & ~surface.fixed, SLIDING_DOT),
+            ("fixed", surface.pinned, FIXED_DOT),
+            ("sliding", surface.held & ~surface.pinned, SLIDING_DOT),
         ):
             if picture.dots and held[shown].any() and _visible(picture.image, rgb(dot), 2):
                 dots[name] = dot
