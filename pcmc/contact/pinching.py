@@ -203,7 +203,8 @@ def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surf
     supports = {"fixed": surface.fixed | held, "on_plane": surface.on_plane | (resting & ~held)}
     if surface.on_planes:
         supports |= resting_supports(surface, resting & ~held)
-    return surface._with(vertices=X, faces=F, patch_of_face=patch, topology=topo, **supports)
+    cables = tuple(filter(None, (cable.carried(owner) for cable in surface.cables)))
+    return surface._with(vertices=X, faces=F, patch_of_face=patch, topology=topo, cables=cables, **supports)
 
 
 def resting_supports(surface: Surface, resting: Bools) -> dict[str, object]:
@@ -365,6 +366,14 @@ def place_pinched_walls(surface: Surface, walls: Walls, resting: Bools, X: Float
     X, places = X.copy(), rows.top_places(X)
     X[rows.vertices[gone]] = places[gone]
     return X[owner]
+
+
+def standing_faces(part: StandingPart, whole: Surface) -> Ints:
+    """(k,) the faces of the whole surface that are those of its standing part, in the same order."""
+    if not part.resting.any():
+        return np.arange(whole.m)
+    owner = _owners(whole.n, part.walls, part.resting)
+    return np.flatnonzero(_standing_faces(whole, part.walls, part.resting, owner)[1])
 
 
 def _standing_faces(surface: Surface, walls: Walls, resting: Bools, owner: Ints) -> tuple[Ints, Bools]:

@@ -36,10 +36,12 @@ from ..surface.geometry import (
     vertex_area_vectors,
 )
 from ..surface.topology import SHEET
+from .cables import add_cable_products
 from .kernels import Mesh
 from .motion_space import MotionSpace, VertexClasses, curve_chords
 from .plane_pieces import add_plane_turns
 from .turning import circle_turning
+from .weight import add_weight_products
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +74,8 @@ class Linearisation:
         change = np.zeros_like(self.X)
         turn = np.zeros(len(self.X))
         _add_times(classes.mesh(surface), self.X, d, self.sheet_factor, change, turn)
+        add_cable_products(surface, self.X, d, change)
+        add_weight_products(surface, classes.faces, classes.patch_of_face, self.X, d, change)
         add_plane_turns(surface, d, change)
         turned = curve_chords(surface, classes, d)[self.curve_rows]
         change[classes.curve[self.curve_rows]] += self.curve_factor[:, None] * turned

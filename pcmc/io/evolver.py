@@ -2,7 +2,8 @@
 
 A patch's tension is its faces' ``tension``; the patches of one pressure p ≠ 0 are one body with
 ``pressure p``; fixed vertices are ``fixed``, sliding ones lie on ``constraint 1``, the plane Π, and on
-``constraint 2`` and so on, the other planes; a comment names these, and says which are mirrors.
+``constraint 2`` and so on, the other planes; a comment names these, and says which are mirrors. Cables and
+weights are in ``evolver_forces``.
 Evolver measures volumes from the origin (``symmetric_content``: det/6 per face, Eq. 10b), so the
 coordinates are relative to the point of Π, or with other planes to ``Surface.origin``, and a comment says
 where that is. A plane that does not pass there has the ``content`` of its flat pieces, as an integral along
@@ -10,8 +11,8 @@ its edges: ∫ ⟨-c × x / 6, dx⟩ = -⟨c, a × b⟩ / 6; the ends of these p
 vertex, with its pressure. Then the program's ``total_energy`` is E of Eq. (20).
 
 The reader takes datafiles of this kind, those that the program's ``dump`` writes, and others whose
-sections list elements by number. For a body with a prescribed volume the Lagrange multiplier is the
-pressure.
+sections list elements by number. A room of prescribed volume is a body with that ``volume``; its Lagrange
+multiplier is the pressure, and ``volconst`` the part of the volume that the program's cones do not see.
 """
 
 from __future__ import annotations
@@ -30,18 +31,22 @@ import pandas as pd
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError
 from ..energy.flat_pieces import flat_pieces
+from ..energy.plane_pieces import add_plane_volumes
+from ..energy.rooms import room_pressures, room_volumes
 from ..meshing.refinement import edges_on_planes
-from ..surface import Patch, Plane, Surface
+from ..surface import Cable, Patch, Plane, Room, Surface
+from . import evolver_forces
 from .expressions import constant, linear
 from .mesh_data import FIXED, FREE, SLIDING, MeshData, given_support
 from .polygons import triangulate
 from .text import format_rows
 
+ROUNDING = 1e-12  # of the largest pressure: what is left of differences
 HEADER = """\
 // Piecewise constant-mean-curvature surface, written by pcmc.
 // total_energy is E = sum tension * area - sum pressure * volume, volumes seen from the origin.
 // origin {origin}
-{patches}
+{names}
 SPACE_DIMENSION 3
 SYMMETRIC_CONTENT
 DEFINE FACET ATTRIBUTE patch INTEGER
@@ -54,16 +59,22 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
     edges = surface.topology.edges + 1
     patches = list(enumerate(surface.patches, 1))
     face_tag = np.array([f" tension {p.tension!r} patch {k}" for k, p in patches])
+    face_tag = evolver_forces.patch_tags(surface, face_tag)
     origin = surface.origin if surface.on_planes else np.array(surface.plane.point)
     X = surface.vertices - origin
     sides = ((surface.topology.edge_of_face + 1) * surface.topology.sense)[:, [2, 0, 1]]
     header = HEADER.format(
         origin=" ".join(map(repr, origin.tolist())),
-        patches="\n".join(f"// patch {k} {p.name}" for k, p in patches),
+        names="\n".join(
+            [f"// patch {k} {p.name}" for k, p in patches]
+            + [f"// room {k} {room.name}" for k, room in enumerate(surface.rooms, 1)]
+            + evolver_forces.names(surface)
+        ),
     )
     vertex_tag, edge_tag = _tags(surface)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(header + _constraints(surface, origin) + "\nVERTICES\n")
+        file.write(header + _constraints(surface, origin) + evolver_forces.definitions(surface, origin))
+        file.write("\nVERTICES\n")
         file.write(format_rows("%d %r %r %r%s\n", _count(X), *X.T, vertex_tag))
         file.write("\nEDGES\n")
         file.write(format_rows("%d %d %d%s\n", _count(edges), *edges.T, edge_tag))
@@ -110,7 +121,8 @@ def _tags(surface: Surface) -> tuple[Any, Any]:
     vertices = _with_constraints(kinds[given_support(surface)], masks).astype(object)
     for k, vertex in enumerate(flat_pieces(surface).end):
         vertices[vertex] += f" corner_{k}"
-    return vertices, _with_constraints(kinds[_edge_support(surface)], edges_on_planes(surface))
+    edges = _with_constraints(kinds[_edge_support(surface)], edges_on_planes(surface))
+    return vertices, evolver_forces.edge_tags(surface, edges)
 
 
 def _with_constraints(tags: Any, masks: Sequence[Bools]) -> Any:
@@ -132,13 +144,51 @@ def _edge_support(surface: Surface) -> Ints:
 
 
 def _bodies(surface: Surface) -> str:
-    text = ""
-    of_face = surface.pressures[surface.patch_of_face]
-    for body, pressure in enumerate(np.unique(of_face[of_face != 0.0]), 1):
-        members = (np.flatnonzero(of_face == pressure) + 1).astype(str)
-        lines = [" ".join(members[k : k + 15]) for k in range(0, len(members), 15)]
-        text += f"{body} " + " \\\n  ".join(lines) + f" pressure {float(pressure)!r}\n"
+    """A body for each room, with its volume, and one for each pressure that is not that of a room."""
+    text, pressures = "", surface.pressures
+    if surface.rooms:
+        multipliers, pressures = _room_pressures(surface)
+        beyond = room_volumes(surface) - surface.room_signs @ _cones(surface)
+        for k, (room, signs) in enumerate(zip(surface.rooms, surface.room_signs, strict=True)):
+            members = signs[surface.patch_of_face].astype(int) * _count(surface.faces)
+            rest = f" volume {room.volume!r} volconst {float(beyond[k])!r}"
+            text += _body(
+                k + 1, members[members != 0], f"{rest} lagrange_multiplier {float(multipliers[k])!r}"
+            )
+    of_face = pressures[surface.patch_of_face]
+    for body, pressure in enumerate(np.unique(of_face[of_face != 0.0]), 1 + len(surface.rooms)):
+        members = np.flatnonzero(of_face == pressure) + 1
+        text += _body(body, members, f" pressure {float(pressure)!r}")
     return text
+
+
+def _body(number: int, members: Ints, rest: str) -> str:
+    words = members.astype(str)
+    lines = [" ".join(words[k : k + 15]) for k in range(0, len(words), 15)]
+    return f"{number} " + " \\\n  ".join(lines) + f"{rest}\n"
+
+
+def _cones(surface: Surface) -> Floats:
+    """(k,) the volumes of the patches' cones seen from the point of Π, as the program sees them."""
+    corners = surface.vertices[surface.faces] - np.array(surface.plane.point)
+    volumes = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    of_patch = np.bincount(surface.patch_of_face, volumes, len(surface.patches))
+    return add_plane_volumes(surface, surface.vertices, of_patch)
+
+
+def _room_pressures(surface: Surface) -> tuple[Floats, Floats]:
+    """(r,) the pressures of the rooms, and (k,) those of the patches beside them."""
+    signs = surface.room_signs
+    multipliers = room_pressures(surface)
+    left = surface.pressures - multipliers @ signs
+    left[np.abs(left) <= ROUNDING * np.abs(surface.pressures).max(initial=0.0)] = 0.0
+    both = np.flatnonzero((signs > 0.0).any(axis=0) & (left != 0.0))
+    if len(both):
+        name = surface.patches[both[0]].name
+        text = f"patch {name!r} has a pressure of {left[both[0]]:g} beside that of its rooms, and a datafile"
+        text += " has one body on each side of a face; give its pressure to all patches of the room"
+        raise FileError(text, where=name, found=float(left[both[0]]))
+    return multipliers, left
 
 
 # Reading
@@ -153,14 +203,26 @@ def read(path: Path) -> MeshData:
     ids, X, support, constraints = _vertices(file["vertices"], known)
     face_ids, corners, counts, rest = _faces(file["edges"], file["faces"], ids)
     F, source, notes = triangulate(X, corners, counts)
-    pressure, more = _pressures(file, face_ids, known)
-    patch_of_face, patches = _patches(header, file["faces"], rest, pressure, known)
+    pressure, prescribed, more = _pressures(file, face_ids, known)
+    patch_of_face, patches = _patches(header, file["faces"], rest, (pressure, *prescribed.values()), known)
     given = re.search(r"^// origin (\S+) (\S+) (\S+)$", header, re.M)
     place = _Section(header, 1)
     origin = np.array([_numbers((c,), known, place, 0)[0] for c in given.groups()] if given else np.zeros(3))
     plane, planes = _planes(header, file["top"], constraints, support, origin, known)
+    rooms = _rooms(header, prescribed, patch_of_face, patches)
     X, notes = X + origin, (*notes, *more)
-    return MeshData(X, F, patch_of_face[source], patches, support, plane, notes=notes, planes=planes)
+    return MeshData(
+        X,
+        F,
+        patch_of_face[source],
+        patches,
+        support,
+        plane,
+        notes=notes,
+        planes=planes,
+        rooms=rooms,
+        cables=_cables(header, file["edges"], ids, known),
+    )
 
 
 @dataclass(frozen=True)
@@ -283,6 +345,20 @@ def _faces(edges: _Section, faces: _Section, vertex_ids: Ints) -> tuple[Ints, In
     return ids, tail, counts, [f[2] for f in listed]
 
 
+def _cables(header: str, edges: _Section, vertex_ids: Ints, known: Mapping[str, float]) -> tuple[Cable, ...]:
+    """The edges with a tension, as cables."""
+    if not re.search(r"\b(?:tension|density)\b", edges.text, re.I):
+        return ()
+    rows = edges.elements(r"\d+[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)([^\n]*)", "an edge number and two vertices")
+    numbers = np.stack([_whole([row[k] for row in rows], edges) for k in (0, 1)], axis=1)
+    ends = np.stack([_places(vertex_ids, column, edges, "vertex") for column in numbers.T], axis=1)
+
+    def number(word: str, row: int) -> float:
+        return float(_numbers((word,), known, edges, row)[0])
+
+    return evolver_forces.cables(header, [row[2] for row in rows], ends, number)
+
+
 def _places(ids: Ints, wanted: Ints, section: _Section, what: str, row: Ints | None = None) -> Ints:
     """Where each wanted id stands among the ids."""
     order = np.argsort(ids, kind="stable")
@@ -294,11 +370,16 @@ def _places(ids: Ints, wanted: Ints, section: _Section, what: str, row: Ints | N
     return place
 
 
-def _pressures(file: _Sections, face_ids: Ints, known: Mapping[str, float]) -> tuple[Floats, tuple[str, ...]]:
-    """(m,) pressure along each face's normal: the sum over the bodies on its two sides."""
-    pressure = np.zeros(len(face_ids))
+def _pressures(
+    file: _Sections, face_ids: Ints, known: Mapping[str, float]
+) -> tuple[Floats, dict[tuple[str, float], Ints], tuple[str, ...]]:
+    """(m,) pressure along each face's normal: the sum over the bodies on its two sides.
+
+    And the bodies of prescribed volume: by number and volume, (m,) 1 or -1 where a face bounds them.
+    """
+    pressure, prescribed = np.zeros(len(face_ids)), {}
     if "bodies" not in file:
-        return pressure, ("the file has no bodies, so no patch is under pressure",)
+        return pressure, prescribed, ("the file has no bodies, so no patch is under pressure",)
     section, without = file["bodies"], []
     listed = section.elements(r"(\d+)((?:[^\S\n]+-?\d+)*)([^\n]*)", "a body number and its faces")
     inside = np.ones(len(listed))
@@ -312,33 +393,58 @@ def _pressures(file: _Sections, face_ids: Ints, known: Mapping[str, float]) -> t
     signed = _whole(" ".join(members for _, members, _ in listed).split(), section, of_body)
     place = _places(face_ids, np.abs(signed), section, "face", of_body)
     np.add.at(pressure, place, np.sign(signed) * inside[of_body])
+    for row, (number, _, rest) in enumerate(listed):
+        given = re.search(r"\bvolume\s+(\S+)", rest, re.I)
+        if given is not None:
+            sides = np.zeros(len(face_ids), dtype=np.int64)
+            np.add.at(sides, place[of_body == row], np.sign(signed[of_body == row]))
+            prescribed[number, _numbers((given[1],), known, section, row)[0]] = sides
+    if prescribed:  # the difference of two rooms' pressures is 0 but for rounding
+        pressure[np.abs(pressure) <= ROUNDING * np.abs(pressure).max(initial=0.0)] = 0.0
     note = f"body {', '.join(without)} has no pressure in the file; 1 is used"
-    return pressure, (note,) if without else ()
+    return pressure, prescribed, (note,) if without else ()
 
 
 def _patches(
-    header: str, section: _Section, rest: list[str], pressure: Floats, known: Mapping[str, float]
+    header: str,
+    section: _Section,
+    rest: list[str],
+    of_face: Sequence[Floats | Ints],
+    known: Mapping[str, float],
 ) -> tuple[Ints, tuple[Patch, ...]]:
-    """Faces of the same patch number, tension and pressure are a patch."""
+    """Faces of one patch number, tension, weight, pressure and rooms (each (m,) ``of_face``) are a patch."""
     code, kinds = pd.factorize(np.array(rest, dtype=object))
     first = np.unique(code, return_index=True)[1]
-    number, tension = np.zeros(len(kinds)), np.ones(len(kinds))
+    number, tension, weight = np.zeros(len(kinds)), np.ones(len(kinds)), np.zeros(len(kinds))
     for k, words in enumerate(kinds):
         row = int(first[k])
-        for target, key in ((number, "patch"), (tension, "tension|density")):
+        for target, key in ((number, "patch"), (tension, "tension|density"), (weight, "weight")):
             given = re.search(rf"\b(?:{key})\s+(\S+)", words, re.I)
             if given:
                 target[k] = _numbers((given[1],), known, section, row)[0]
-    rows_, of_face = np.unique(
-        np.stack([number[code], tension[code], pressure], axis=1), axis=0, return_inverse=True
-    )
+    laws = np.stack([number[code], tension[code], weight[code], *of_face], axis=1)
+    rows_, patch_of_face = np.unique(laws, axis=0, return_inverse=True)
     names = dict(re.findall(r"^// patch (\d+) ([^\n]+)$", header, re.M))
     once = len(np.unique(rows_[:, 0])) == len(rows_)
     patches = [
-        Patch(names.get(str(int(a)), f"patch {k}") if once else f"patch {k}", t, p)
-        for k, (a, t, p) in enumerate(rows_, 1)
+        Patch(names.get(str(int(a)), f"patch {k}") if once else f"patch {k}", t, p, weight=w)
+        for k, (a, t, w, p, *_) in enumerate(rows_, 1)
     ]
-    return of_face.ravel(), tuple(patches)
+    return patch_of_face.ravel(), tuple(patches)
+
+
+def _rooms(
+    header: str, prescribed: Mapping[tuple[str, float], Ints], patch_of_face: Ints, patches: tuple[Patch, ...]
+) -> tuple[Room, ...]:
+    """The bodies of prescribed volume as rooms, with the names that pcmc has given them."""
+    names = dict(re.findall(r"^// room (\d+) ([^\n]+)$", header, re.M))
+    rooms = []
+    for (number, volume), sides in prescribed.items():
+        of_patch = np.zeros(len(patches), dtype=np.int64)
+        of_patch[patch_of_face] = sides
+        signs = {patches[k].name: int(of_patch[k]) for k in np.flatnonzero(of_patch)}
+        rooms.append(Room(names.get(number, f"body {number}"), signs, volume))
+    return tuple(rooms)
 
 
 def _planes(

@@ -14,9 +14,10 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
+from ..base.units import NO_UNITS, Units
 from ..base.validate import choice
 from ..meshing.refinement import given_supports
-from ..surface import Guide, Patch, Plane, Surface, checks
+from ..surface import Cable, Guide, Patch, Plane, Room, Surface, checks
 from ..surface.geometry import bounding_size
 from ..surface.topology import topology
 
@@ -43,7 +44,8 @@ class MeshData:
         vertices at one place stay two: those of a wall without height below a junction on Π.
     walls : the text of ``flat_walls.encode_walls``, where patches are separate meshes and a wall has
         no height.
-    lines, planes : as ``on_line`` and ``on_planes`` in Surface.
+    lines, planes, cables, rooms : as ``on_line``, ``on_planes``, ``cables`` and ``rooms`` in Surface.
+    units : of the numbers; no unit where the file has none.
     """
 
     vertices: Floats
@@ -58,7 +60,10 @@ class MeshData:
     joined: bool = False
     walls: str | None = None
     lines: tuple[tuple[Guide, Bools], ...] = ()
+    units: Units = NO_UNITS
     planes: tuple[tuple[Plane, Bools], ...] = ()
+    cables: tuple[Cable, ...] = ()
+    rooms: tuple[Room, ...] = ()
 
 
 def checked(data: MeshData) -> MeshData:
@@ -80,6 +85,8 @@ def checked(data: MeshData) -> MeshData:
             _numeric(values, f"scalar {name}", "fiub", (n,))
     for _, along in data.lines:
         _numeric(along, "on_line", "b", (n,))
+    for cable in data.cables:
+        within(cable.edges, f"cable {cable.name}", n)
     for _, mask in data.planes:
         _numeric(mask, "on_planes", "b", (n,))
     patch = within(patch, "patch_of_face", len(data.patches))
@@ -185,6 +192,7 @@ def _selected(data: MeshData, keep: Ints, place: Ints) -> MeshData:
         scalars={k: v[keep] if len(v) == n else v for k, v in data.scalars.items()},
         lines=tuple((line, along[keep]) for line, along in data.lines),
         planes=tuple((plane, mask[keep]) for plane, mask in data.planes),
+        cables=tuple(filter(None, (cable.carried(place) for cable in data.cables))),
     )
 
 
@@ -216,7 +224,9 @@ def to_surface(
     if rounded.any():  # back onto the plane
         X = X - np.where(rounded, height, 0.0)[:, None] * np.array(plane.normal)
     lines, planes = (data.lines, data.planes) if fixed is None else ((), ())
-    return Surface(X, data.faces, data.patch_of_face, patches, held, sliding, plane, lines, planes)
+    supports = held, sliding, plane, lines, planes
+    parts = {"cables": data.cables, "rooms": data.rooms}
+    return Surface(X, data.faces, data.patch_of_face, patches, *supports, **parts)
 
 
 def _changed(

@@ -166,7 +166,10 @@ def _refine_once(surface: Surface, project: Projection | None) -> Surface:
     F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
     fixed, sliding = (np.concatenate(p) for p in zip(given_supports(surface), (held, slides), strict=True))
     lines, planes = carry_lines(surface, X, fixed, surface.n), carry_planes(surface, every)
-    return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane, lines, planes)
+    edges = surface.topology.edges
+    cables = [cable.cut(edges, surface.n + np.arange(len(edges))) for cable in surface.cables]
+    supports = fixed, sliding, surface.plane, lines, planes
+    return Surface(X, F, patch, surface.patches, *supports, cables=cables, rooms=surface.rooms)
 
 
 def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tuple[tuple[Guide, Bools], ...]:

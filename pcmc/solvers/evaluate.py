@@ -11,7 +11,7 @@ from ..base.arrays import Bools, Floats
 from ..base.compiled import blocks, compiled, threads
 from ..energy import kernels
 from ..energy.flat_pieces import flat_pieces
-from ..energy.functional import total
+from ..energy.functional import add_cables_and_weights, total
 from ..energy.motion_space import tension_forces
 from ..energy.plane_pieces import add_plane_forces, add_plane_volumes
 from ..surface import Surface
@@ -88,11 +88,12 @@ class Evaluator:
         if flat_pieces(self._surface):
             add_plane_volumes(self._surface, X, volume)
             add_plane_forces(self._surface, pressure, X, G)
+        further = add_cables_and_weights(self._surface, X, G)
         for plane, mask in self._others:
             G[mask] = plane.along(G[mask])
         squared = _apply_supports(G, *self._supports)
         with np.errstate(all="ignore"):
-            return Point(X, total(tension, area, pressure, volume), G, squared)
+            return Point(X, total(tension, area, pressure, volume) + further, G, squared)
 
 
 @compiled

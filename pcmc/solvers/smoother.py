@@ -148,7 +148,8 @@ class HarmonicExtension:
     ) -> None:
         used = ~classes.idle
         space = _one_unknown_each(used)
-        equal = surface.retensioned({p.name: 1.0 for p in surface.patches})
+        none = {cable.name: 0.0 for cable in surface.cables}
+        equal = surface.retensioned({p.name: 1.0 for p in surface.patches}, cables=none)
         pattern = hessian_pattern(classes, space)
         data = assemble(equal, classes, space, pattern, X, hessian=0.0, stiffness=1.0)
         diagonal = pattern.indptr[:-1]
