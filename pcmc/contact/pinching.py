@@ -368,6 +368,14 @@ def place_pinched_walls(surface: Surface, walls: Walls, resting: Bools, X: Float
     return X[owner]
 
 
+def standing_faces(part: StandingPart, whole: Surface) -> Ints:
+    """(k,) the faces of the whole surface that are those of its standing part, in the same order."""
+    if not part.resting.any():
+        return np.arange(whole.m)
+    owner = _owners(whole.n, part.walls, part.resting)
+    return np.flatnonzero(_standing_faces(whole, part.walls, part.resting, owner)[1])
+
+
 def _standing_faces(surface: Surface, walls: Walls, resting: Bools, owner: Ints) -> tuple[Ints, Bools]:
     """(m,3) faces between the owners of their vertices, and which of them stand (m,)."""
     F = owner[surface.faces]

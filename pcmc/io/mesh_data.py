@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
+from ..base.units import NO_UNITS, Units
 from ..base.validate import choice
 from ..meshing.refinement import given_supports
 from ..surface import Cable, Guide, Patch, Plane, Room, Surface, checks
@@ -44,6 +45,7 @@ class MeshData:
     walls : the text of ``flat_walls.encode_walls``, where patches are separate meshes and a wall has
         no height.
     lines, planes, cables, rooms : as ``on_line``, ``on_planes``, ``cables`` and ``rooms`` in Surface.
+    units : of the numbers; no unit where the file has none.
     """
 
     vertices: Floats
@@ -58,6 +60,7 @@ class MeshData:
     joined: bool = False
     walls: str | None = None
     lines: tuple[tuple[Guide, Bools], ...] = ()
+    units: Units = NO_UNITS
     planes: tuple[tuple[Plane, Bools], ...] = ()
     cables: tuple[Cable, ...] = ()
     rooms: tuple[Room, ...] = ()

@@ -23,6 +23,7 @@ import pandas as pd
 
 from ..base.arrays import Bools, Floats
 from ..base.errors import FileError
+from ..base.units import Units
 from ..surface import Cable, Circle, Guide, Line, Plane, Room, Surface
 from .libraries import translated_errors
 from .mesh_data import MeshData, given_support
@@ -35,14 +36,19 @@ ROOM = 64_000_000  # bytes that any file may become
 
 
 def write(
-    path: Path, surface: Surface, scalars: Mapping[str, Floats], certificate: Mapping[str, Any], **_: Any
+    path: Path,
+    surface: Surface,
+    scalars: Mapping[str, Floats],
+    certificate: Mapping[str, Any],
+    units: Units,
+    **_: Any,
 ) -> None:
     """The archive; the same surface gives the same bytes."""
     tables = {k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object}
     meta = {
         "format": FORMAT,
         "version": _version(surface),
-        "description": metadata_text(surface),
+        "description": metadata_text(surface, units),
         "certificate": {k: v for k, v in certificate.items() if k not in tables},
     }
     if surface.rooms:
@@ -105,6 +111,7 @@ def read(path: Path) -> MeshData:
             cables=_cables(arrays, meta.get("cables", [])),
             rooms=_rooms(meta),
             scalars=_under("scalar ", arrays),
+            units=metadata.units,
             certificate={**meta["certificate"], **_under("certificate ", arrays)},
         )
 

@@ -1,7 +1,8 @@
 """Rhino (.3dm): a layer per patch with its mesh in double precision, in the patch's colour.
 
 Tensions, pressures, plane and walls without height are the layers' user text; supports are point clouds
-on the layers "fixed" and "sliding". Scalars are lost.
+on the layers "fixed" and "sliding". Ridges, rims and wall lines are curves on layers of their own, for
+drawing; reading leaves them out. Scalars are lost.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, MissingExtra
+from ..base.units import RHINO_UNITS, Units, length_factor
 from ..surface import Surface
 from ..surface.colours import patch_colors
+from ..surface.curve_kinds import curves_by_kind
 from ..surface.geometry import bounding_size
 from . import flat_walls
 from .libraries import load_library
@@ -28,15 +31,18 @@ from .reading_process import read_arrays
 
 KEY = "pcmc"
 VERSION = 7  # of Rhino's format
+UNIT = "m"  # of files whose surface has none
+SYSTEMS = {unit: name for name, unit in RHINO_UNITS.items()}
+CURVES = {"PCMC-RIDGE": (200, 0, 0, 255), "PCMC-RIM": (0, 0, 0, 255), "PCMC-WALL": (0, 128, 0, 255)}
 COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255)}
 
 
-def write(path: Path, surface: Surface, walls: str | None, **_: Any) -> None:
-    """A layer per patch; the unit is metres."""
+def write(path: Path, surface: Surface, walls: str | None, units: Units, **_: Any) -> None:
+    """A layer per patch, in the unit of the surface; in metres if there is none."""
     rhino = load_library("rhino3dm")
     model = rhino.File3dm()
-    model.Settings.ModelUnitSystem = rhino.UnitSystem.Meters
-    text = metadata_text(surface)
+    model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, SYSTEMS[units.length or UNIT])
+    text = metadata_text(surface, units)
     for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
         faces = surface.faces[surface.patch_of_face == k]
         if not len(faces):
@@ -62,8 +68,23 @@ def write(path: Path, surface: Surface, walls: str | None, **_: Any) -> None:
             for point in held.tolist():
                 cloud.Add(rhino.Point3d(*point))
             model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], text))
+    _add_curves(rhino, model, surface)
     if not model.Write(str(path), VERSION):
         raise FileError("rhino3dm cannot write it; check that the folder exists and the disk has space")
+
+
+def _add_curves(rhino: Any, model: Any, surface: Surface) -> None:
+    """Ridges, rims and wall lines as polylines, each kind on its layer."""
+    layers: dict[str, Any] = {}
+    for kind, curve in curves_by_kind(surface):
+        name = f"PCMC-{kind}"
+        if name not in layers:
+            layers[name] = _layer(rhino, model, name, CURVES[name], "")
+        points = surface.vertices[curve.vertices].tolist()
+        line = rhino.Polyline(len(points) + 1)
+        for point in points + points[:1] * curve.closed:
+            line.Add(*point)
+        model.Objects.AddPolyline(line, layers[name])
 
 
 def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str) -> Any:
@@ -104,19 +125,36 @@ def read(path: Path) -> MeshData:
             start += len(X[-1])
         elif "points" in item and name in HELD:
             held[HELD[name]].append(item["points"])
-        else:
+        elif name not in CURVES:
             others += 1
     if not X:
         text = f"the file has no meshes ({others} other objects); mesh the surfaces in Rhino"
         raise FileError(text, where="meshes", found=0)
+    model, notes = _unit_of(arrays["unit"])
+    if metadata.plane is not None:  # a file of pcmc, whose geometry Rhino may have scaled since
+        own = metadata.units.length or UNIT
+        factor, model = length_factor(model, own), own
+        X = [factor * points for points in X]
+        held = {kind: [factor * points for points in parts] for kind, parts in held.items()}
     points = np.concatenate(X)
-    F, source, notes = triangulate(points, np.concatenate(corners), np.concatenate(counts))
+    F, source, cut = triangulate(points, np.concatenate(corners), np.concatenate(counts))
+    notes = (*notes, *cut)
     if others:
         notes = (*notes, f"{others} objects that are not meshes were left out")
     support = _supports(points, held) if metadata.plane is not None or any(held.values()) else None
     patch, names = pd.factorize(np.array(named, dtype=object))
     patches = metadata.named(names.tolist())
-    return MeshData(points, F, patch[source], patches, support, metadata.plane, notes=notes, walls=walls)
+    units = Units(model, metadata.units.force if model else "")
+    return MeshData(
+        points, F, patch[source], patches, support, metadata.plane, notes=notes, walls=walls, units=units
+    )
+
+
+def _unit_of(system: str) -> tuple[str, tuple[str, ...]]:
+    """The unit of length of a Rhino unit system, and a note if pcmc does not know it."""
+    if system in RHINO_UNITS or system in ("None", "Unset"):
+        return RHINO_UNITS.get(system, ""), ()
+    return "", (f"its unit {system} is unknown here: the numbers are taken as they are",)
 
 
 def _supports(X: Floats, held: dict[int, list[Floats]]) -> Ints:

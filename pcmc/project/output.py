@@ -18,8 +18,10 @@ from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknown
 from ..base.files import atomic_writes, check_name
 from ..base.interrupts import defer_interrupts
+from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..energy.curvature import curvature_error, mean_curvature
+from ..plot.figure import SUFFIXES, check_suffix
 from ..surface import Surface
 
 PathLike = str | os.PathLike[str]
@@ -78,18 +80,19 @@ def _final_name_in_warnings(temporary: Path, path: Path) -> Iterator[None]:
             warnings.warn(text, warning.category, stacklevel=4)
 
 
-def paint(surface: Surface, path: PathLike, view: Any, colour: str) -> None:
+def paint(surface: Surface, path: PathLike, view: Any, colour: str, units: Units = NO_UNITS) -> None:
     """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
     # needs the extra plot, which a project without a picture does not
     from ..plot import draw, reactions
 
     check_picture(view, colour)
     if colour == "curvature":
-        draw(surface, path, view=view, scalars=mean_curvature(surface), label="mean curvature")
+        label = f"mean curvature, {units.curvature}"
+        draw(surface, path, view=view, scalars=mean_curvature(surface), label=label)
     elif colour == "error":
         draw(surface, path, view=view, scalars=curvature_error(surface), label="curvature error")
     elif colour == "reactions":
-        reactions(surface, path, view=view)
+        reactions(surface, path, view=view, label=units.tension)
     else:
         draw(surface, path, view=view, legend=True)
 
@@ -112,12 +115,11 @@ def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> N
     for file in files:
         suffix = Path(file).suffix.lower()
         if suffix not in io.FORMATS:
-            hint = "; a picture has its own option" if suffix == ".png" else ""
+            hint = "; a picture has its own option" if suffix in SUFFIXES else ""
             text = f"{file}: {unknown('suffix', suffix, io.FORMATS)}{hint}"
             raise FileError(text, what=str(file), found=suffix)
-    if picture is not None and Path(picture).suffix.lower() != ".png":
-        text = f"{picture}: pictures are written as .png only; change the suffix"
-        raise FileError(text, what=str(picture), found=Path(picture).suffix, expected=".png")
+    if picture is not None:
+        check_suffix(picture)
 
 
 def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:

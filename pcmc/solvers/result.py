@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..surface import Surface
+from ..surface import Plane, Surface
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,7 +57,7 @@ class Status(Enum):
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """The end of a solve. Every value describes exactly ``surface``.
 
@@ -83,17 +83,23 @@ class Result:
     energy: float
     iterations: int
     evaluations: int
-    rows: Sequence[Mapping[str, Any]] = field(repr=False)
+    rows: Sequence[Mapping[str, Any]]
     note: str = ""
     proofs: tuple[Proof, ...] = ()
     room_changes: tuple[float, ...] = ()
+
+    def __repr__(self) -> str:
+        """How the solver ended, above the surface it reached."""
+        return f"{self.message}\nE = {self.energy:.10g}, {self.iterations} iterations\n{self.surface!r}"
 
     @property
     def converged(self) -> bool:
         """Whether the solver met its tolerance."""
         return self.status is Status.CONVERGED
 
-    def certify(self, *, modes: int = 1, tolerance: float | None = None) -> Certificate:
+    def certify(
+        self, *, modes: int = 1, tolerance: float | None = None, whole: bool | Sequence[str | Plane] = False
+    ) -> Certificate:
         """The certificate of ``surface``, which also takes into account how the solver ended.
 
         Parameters as for ``pcmc.certify``.
@@ -109,7 +115,14 @@ class Result:
             Status.PINCHED: Evidence.COLLAPSED,
         }.get(self.status)
         tolerance = TOLERANCE if tolerance is None else tolerance
-        return certify(self.surface, modes=modes, tolerance=tolerance, evidence=evidence, proofs=self.proofs)
+        return certify(
+            self.surface,
+            modes=modes,
+            tolerance=tolerance,
+            evidence=evidence,
+            proofs=self.proofs,
+            whole=whole,
+        )
 
     @cached_property
     def certificate(self) -> Certificate:

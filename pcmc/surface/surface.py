@@ -21,6 +21,7 @@ from .geometry import bounding_size
 from .patch import Patch
 from .plane import Plane
 from .room import Room, checked_rooms, room_signs
+from .summary import summary
 from .topology import Topology, topology
 
 FIELDS = (
@@ -53,7 +54,7 @@ def expect_surface(value: object) -> None:
         validate.refuse("surface", type(value).__name__, "a Surface", error=SurfaceError)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Surface:
     """A triangle mesh of several patches, with its supports.
 
@@ -346,6 +347,54 @@ class Surface:
         return self._with(
             patches=tuple(patches), cables=pulling, rooms=_renewed("room", self.rooms, "volume", volumes)
         )
+
+    def __repr__(self) -> str:
+        """Size, patches, walls and supports, a line each."""
+        return summary(self)
+
+    def with_snow(self, snow: float, patches: Iterable[str] | None = None) -> Surface:
+        """The same surface under snow, by lower pressures: p - s for p.
+
+        A load s on the plan area has the potential s ∫ z dA_plan = s V, V the volume over Π; so E changes by
+        s V, as it does when the pressure falls by s. This holds where the boundary of the patches is held,
+        lies on Π, or meets other patches: at a free edge V is that of cones to Π's point, whose sides would
+        carry snow, too.
+
+        Parameters
+        ----------
+        snow : s, force per area of the plan; Π's normal points up.
+        patches : names of the patches that it lies on; by default all under pressure, or all if none is.
+
+        Raises
+        ------
+        SurfaceError
+            Where an edge of these patches is free. There a weight per area of the patch itself can stand for
+            snow: ``retensioned(weights={"roof": s})``.
+
+        Examples
+        --------
+        >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        >>> roof = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 2.0, 1.0)], fixed=range(3))
+        >>> roof.with_snow(0.25).pressures.tolist()
+        [0.75]
+        """
+        snow = validate.number("snow", snow, error=SurfaceError)
+        pressed = [patch.name for patch in self.patches if not patch.auxiliary]
+        names = list(patches) if patches is not None else pressed or [patch.name for patch in self.patches]
+        given = {name: self.pressures[self.patch_index(name)] - snow for name in names}
+        kept = [patch.name for patch in self.patches if patch.auxiliary]
+        loaded = self.retensioned(pressures=given, walls=set(kept) - set(names))
+        edges = np.flatnonzero(loaded.uncancelled)
+        if snow != 0.0 and len(edges):
+            i, j = (int(v) for v in self.topology.edges[edges[0]])
+            message = (
+                f"snow: {len(edges)} edges are free, the first from vertex {i} to {j}, and there a change of"
+            )
+            message += " pressure is not the same as snow; give a weight instead, as in"
+            raise SurfaceError(
+                f"{message} retensioned(weights={{{names[0]!r}: {snow:g}}})", what="snow", where=(i, j)
+            )
+        return loaded
 
     def __copy__(self) -> Surface:
         """The surface itself: it never changes."""
