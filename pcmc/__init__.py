@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from .existence import solve
     from .io import read, write
     from .io.repairing import Repaired, repair
-    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface
+    from .panels import FewerFamilies, Panels, fewer_families, panels
+    from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
+    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
 
 __all__ = [
     "BoundaryMotion",
@@ -27,35 +29,48 @@ __all__ = [
     "Circle",
     "Design",
     "Direction",
+    "FewerFamilies",
     "Line",
+    "Material",
     "MeshCheck",
     "MeshVerdict",
+    "Panels",
     "Parameter",
     "Patch",
     "Plane",
     "Repaired",
     "Room",
+    "SelfWeight",
+    "Snow",
+    "StructuralModel",
     "Surface",
     "Target",
     "Verdict",
+    "Wind",
     "certify",
     "check_mesh",
     "curvature_error",
+    "cut",
     "energy",
     "errors",
     "explore",
+    "fewer_families",
     "follow",
     "gradient",
     "hessian",
     "mean_curvature",
     "meet",
+    "panels",
+    "mirrored",
     "read",
     "repair",
+    "read_results",
     "sensitivities",
     "solve",
     "solve_to_accuracy",
     "target_curvature",
     "write",
+    "write_structure",
 ]
 
 # Each name is imported at its first use. So ``import pcmc`` takes milliseconds, and the command can
@@ -70,15 +85,26 @@ _NAMES = {
     "existence": ("solve",),
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),
-    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
+    "structure": (
+        "Material",
+        "SelfWeight",
+        "Snow",
+        "StructuralModel",
+        "Wind",
+        "read_results",
+        "write_structure",
+    ),
+    "panels": ("FewerFamilies", "Panels", "fewer_families", "panels"),
+    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
 }
 
 
 class _Package(ModuleType):
-    """``pcmc.energy`` is the function, although a folder has the same name."""
+    """``pcmc.energy`` and ``pcmc.panels`` are functions, although folders have the same names."""
 
     def __setattr__(self, name: str, value: object) -> None:
-        if name != "energy" or not isinstance(value, ModuleType):  # the import sets the folder
+        folder = isinstance(value, ModuleType)  # set by its import
+        if not (folder and name in ("energy", "panels")):
             super().__setattr__(name, value)
 
 
@@ -96,6 +122,16 @@ if not TYPE_CHECKING:
         if find_spec(f"{__name__}.{name}") is not None:
             return import_module(f".{name}", __name__)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+    def _cell_html(value: object) -> str:
+        return import_module(".plot.notebook", __name__).cell_html(value)
+
+    if "IPython" in sys.modules:  # a notebook: its cells show surfaces as pictures
+        _shell = sys.modules["IPython"].get_ipython()
+        if _shell is not None:
+            _html = _shell.display_formatter.formatters["text/html"]
+            _html.for_type_by_name("pcmc.surface.surface", "Surface", _cell_html)
+            _html.for_type_by_name("pcmc.solvers.result", "Result", _cell_html)
 
     def __dir__() -> list[str]:
         return sorted({*globals(), *__all__})

@@ -1,428 +1,310 @@
-"""Plans from drawings: layers, gaps, exact curves, wrong drawings, and one command from start to end."""
+"""Drawings: exact sections, panels at true size, and files that other programs read."""
 
 from __future__ import annotations
 
-import math
+import re
 import warnings
+import xml.etree.ElementTree as ET
+from itertools import combinations
 
+import ezdxf
 import numpy as np
 import pytest
+import rhino3dm
 from refusals import refused
+from shapely.geometry import Polygon
 
 import pcmc
-from pcmc import cli, project
-from pcmc.base.errors import FileError, FileWarning, OptionError, PlanError, SurfaceError
-from pcmc.io.reading_process import read_arrays
-from pcmc.plan import bezier, circle, curve, ellipse, join, plan_from, polyline
-from pcmc.plan.curve_data import curve_data
-from pcmc.plan.curves import arc
-from pcmc.plan.drawing import read_drawing
-from pcmc.plan.proposal import ROOM, least_tension, proposed
-from pcmc.plan.strokes import bezier_spans, read_strokes
+from generators import spherical_cap, two_squares
+from pcmc.base.errors import FileError, OptionError, SurfaceError
+from pcmc.cli import main
+from pcmc.drawings import FORMATS, drawing_set, pdf
+from pcmc.drawings.panel_sheets import panel_sheets
+from pcmc.drawings.sections import section
+from pcmc.drawings.sheet import LAYERS, corner, room
+from pcmc.surface.geometry import cross_2d, edge_vectors
 
-pytest.importorskip("ezdxf")
-pytest.importorskip("tomlkit")
-rhino3dm = pytest.importorskip("rhino3dm")
-shapely = pytest.importorskip("shapely")
-
-import drawn  # noqa: E402 — needs ezdxf
-
-BOX = [(0, 0), (10, 0), (10, 6), (0, 6)]
+UP = np.array([0.0, 0.0, 1.0])
 
 
-def drawing(path, *calls, outline=True, unit=6):
-    """A drawing with a box as outline, and calls of the modelspace: name, layer, arguments."""
-    document, space = drawn.new(unit)
-    if outline:
-        space.add_lwpolyline(BOX, close=True, dxfattribs=drawn.on("outline"))
-    for name, layer, *arguments in calls:
-        entity = getattr(space, f"add_{name}")(*arguments, dxfattribs=drawn.on(layer))
-        if name == "text":
-            entity.set_placement((5, 3))
-    file = path / "hall.dxf"
-    document.saveas(file)
-    return file
+@pytest.fixture(scope="module")
+def squares():
+    """Example 1 at rest."""
+    return pcmc.solve(two_squares(6, alpha_aux=1.0)).surface
+
+
+@pytest.fixture(scope="module")
+def drawings(squares):
+    return drawing_set(squares, "m", sheet="A3", tolerance=0.01, name="two squares")
+
+
+def length(points, closed=False):
+    ends = np.append(points, points[:1], axis=0) if closed else points
+    return float(np.linalg.norm(np.diff(ends, axis=0), axis=1).sum())
+
+
+# ------------------------------------------------------------------------------------ sections
+
+
+def test_the_sections_of_a_sphere_come_near_its_circles_with_order_2():
+    """At height h the cap of a sphere of radius r has a circle of radius √(r² - (h + d)²)."""
+    errors = []
+    for edge in (0.3, 0.15, 0.075):
+        cap = pcmc.solve(spherical_cap(edge_length=edge)).surface
+        top, rim = cap.vertices[:, 2].max(), np.linalg.norm(cap.vertices[:, :2], axis=1).max()
+        radius = (top**2 + rim**2) / (2.0 * top)
+        (line,) = section(cap, 0.5 * top * UP, UP)
+        assert line.closed
+        assert np.abs(line.points[:, 2] - 0.5 * top).max() <= 1e-14
+        circle = np.sqrt(radius**2 - (0.5 * top - top + radius) ** 2)
+        errors.append(abs(length(line.points, True) / (2.0 * np.pi * circle) - 1.0))
+    assert 1.7 < np.log2(errors[0] / errors[-1]) / 2.0 < 2.3  # it swings: the plane cuts where it happens to
+
+
+def test_every_point_of_a_section_is_on_an_edge_and_in_the_plane(squares):
+    normal = np.array([0.6, 0.8, 0.0])
+    topo, X = squares.topology, squares.vertices
+    lines = section(squares, np.array([0.3, 0.1, 0.0]), normal)
+    assert {line.patch for line in lines} == {0, 1, 2}  # the wall, too
+    for line in lines:
+        assert np.abs((line.points - [0.3, 0.1, 0.0]) @ normal).max() <= 1e-13
+        a, b = X[topo.edges[:, 0]], X[topo.edges[:, 1]]
+        for point in line.points:
+            detour = np.linalg.norm(point - a, axis=1) + np.linalg.norm(point - b, axis=1)
+            assert (detour - np.linalg.norm(b - a, axis=1)).min() <= 1e-12
+
+
+def test_a_plane_through_vertices_gives_one_line_per_patch_and_one_at_the_rim_none(squares):
+    lines = section(squares, np.zeros(3), np.array([0.0, 1.0, 0.0]))
+    assert sorted(line.patch for line in lines if line.patch < 2) == [0, 1]
+    left = next(line for line in lines if line.patch == 0)
+    assert sorted({float(left.points[0, 0]), float(left.points[-1, 0])}) == pytest.approx([-4.0, 0.0])
+    assert (np.linalg.norm(np.diff(left.points, axis=0), axis=1) > 0.0).all()
+    assert section(squares, np.zeros(3), UP) == []
+
+
+# ---------------------------------------------------------------------------------- panel sheets
+
+
+@pytest.mark.parametrize(("name", "millimetres"), [("A4", 60.0), ("A3", 100.0), ("A1", 250.0)])
+def test_panels_on_sheets_are_congruent_apart_and_within_the_frame(squares, name, millimetres):
+    schedule = pcmc.panels(squares, 0.01)
+    sheets = panel_sheets(schedule, name, millimetres)
+    assert len(sheets) > 1
+    number = 0
+    low, high = corner(), corner() + room(name)
+    for sheet in sheets:
+        outlines = [line.points for line in sheet.lines if line.layer == "PCMC-CUT"]
+        for outline in outlines:
+            face = squares.faces[schedule.panels["face"][number]]
+            solid = np.linalg.norm(edge_vectors(squares.vertices[face]), axis=1)
+            flat = np.linalg.norm(edge_vectors(np.pad(outline, ((0, 0), (0, 1)))), axis=1)
+            assert np.abs(flat / millimetres - solid).max() <= 1e-9
+            turn = cross_2d(outline[1] - outline[0], outline[2] - outline[0])
+            assert turn > 0.0  # outside up, never turned over
+            assert (outline >= low - 1e-9).all()
+            assert (outline <= high + 1e-9).all()
+            number += 1
+        shapes = [Polygon(outline) for outline in outlines]
+        assert max((a.intersection(b).area for a, b in combinations(shapes, 2)), default=0.0) < 1e-9
+    assert number == len(schedule.panels)
+
+
+def test_labels_of_neighbours_name_each_other_and_the_same_edge(squares):
+    schedule = pcmc.panels(squares, 0.01)
+    labels = {}
+    number = 0
+    for sheet in panel_sheets(schedule, "A3", 100.0):
+        texts = [text.text for text in sheet.texts if text.layer == "PCMC-LABEL"]
+        for k in range(0, len(texts), 3):
+            number += 1
+            labels[number] = texts[k : k + 3]
+    seen = 0
+    for panel, edges in labels.items():
+        for text in edges:
+            others, edge = re.fullmatch(r"(\d+|rim) / e(\d+)", text).groups()
+            face = squares.faces[schedule.panels["face"][panel - 1]]
+            assert set(squares.topology.edges[int(edge)]) <= set(face)
+            if others != "rim":
+                assert f"{panel} / e{edge}" in labels[int(others)]
+                seen += 1
+    assert seen == 2 * int((schedule.edges["neighbour"] > 0).sum())
+
+
+def test_a_panel_that_does_not_fit_names_the_smallest_format(squares):
+    schedule = pcmc.panels(squares, 0.01)
+    longest = schedule.panels[["a", "b", "c"]].to_numpy().max()
+    with refused(OptionError, what="sheet", found="A4", expected="A2"):
+        panel_sheets(schedule, "A4", 480.0 / longest)
+    with refused(OptionError, what="sheet", found="A0", expected=None):
+        panel_sheets(schedule, "A0", 3000.0 / longest)
+
+
+# ---------------------------------------------------------------------------------------- files
+
+
+def test_the_dxf_passes_the_audit_and_has_the_roof_in_its_units(tmp_path, squares, drawings):
+    drawings.write(tmp_path / "roof.dxf")
+    doc = ezdxf.readfile(tmp_path / "roof.dxf")
+    audit = doc.audit()
+    assert not audit.errors
+    assert not audit.fixes
+    assert doc.header["$INSUNITS"] == ezdxf.units.M
+    assert doc.header["$MEASUREMENT"] == 1
+    for name, layer in LAYERS.items():
+        assert doc.layers.get(name).dxf.lineweight == layer.weight
+    model = doc.modelspace()
+    assert len(model.query("3DFACE")) == int((~squares.walls[squares.patch_of_face]).sum())
+    ridge = [np.array(list(line.points())) for line in model.query('POLYLINE[layer=="PCMC-RIDGE"]')]
+    junction = squares.vertices[squares.topology.junctions[0].vertices]
+    assert sum(map(length, ridge)) == pytest.approx(length(junction), abs=1e-12)
+    points = np.array([tuple(p.dxf.location) for p in model.query("POINT")])
+    assert np.array_equal(points, drawings.points[["x", "y", "z"]].to_numpy())
+    assert {text.dxf.text for text in model.query("TEXT")} == set(drawings.points["point"])
+    assert len(doc.layouts) == 1 + len(drawings.sheets)
+    first = doc.layouts.get("001")
+    assert (first.dxf.paper_width, first.dxf.paper_height) == FORMATS["A3"]
+    shown = {text.dxf.text for text in first.query("TEXT")}
+    assert {"Plan", f"sheet 1 of {len(drawings.sheets)}"} <= shown
 
 
 @pytest.mark.parametrize(
-    ("name", "patches", "least"), [("nave", 3, 1.2), ("pavilion", 1, 3.0), ("flower", 5, 1.2)]
+    ("units", "code", "metric"), [("mm", 4, 1), ("cm", 5, 1), ("ft", 2, 0), ("in", 1, 0)]
 )
-def test_from_a_drawing_to_a_certified_roof_in_one_command(tmp_path, capsys, name, patches, least):
-    file = getattr(drawn, name)(tmp_path / f"{name}.dxf")
-    roof = tmp_path / "roof.3dm"
-    assert cli.main(["solve", str(file), "-o", str(roof), "--no-mesh-check"]) == 0
-    printed = capsys.readouterr()
-    assert "stable" in printed.out
-    surface = pcmc.read(roof)
-    loaded = [patch for patch in surface.patches if not patch.auxiliary]
-    assert len(loaded) == patches
-    assert surface.vertices[:, 2].max() > least
-    assert pcmc.certify(surface).certified
-
-
-def test_the_l_shape_and_its_written_project_give_the_same_roof(tmp_path):
-    file = drawn.corner(tmp_path / "corner.dxf")
-    text, _ = project.project_text(file)
-    (tmp_path / "roof.toml").write_text(text)
-    one, two = (project.load(path) for path in (file, tmp_path / "roof.toml"))
-    first, second = (project.surface_of(p) for p in (one, two))
-    assert [p.name for p in first.patches] == [p.name for p in second.patches]
-    np.testing.assert_allclose(first.vertices, second.vertices, atol=1e-8)
-    assert pcmc.certify(pcmc.solve(first).surface).certified
-
-
-def test_a_project_that_refers_to_its_drawing_follows_it(tmp_path):
-    file = drawn.nave(tmp_path / "nave.dxf")
-    path = tmp_path / "roof.toml"
-    path.write_text(
-        '[plan]\ndrawing = "nave.dxf"\nedge_length = 1.0\n[plan.patches]\napse = {tension = 9.0}\n'
-        '[[plan.dividers]]\nname = "chancel"\nwall = 4.5\n'
+def test_units_reach_the_header_and_the_scale(tmp_path, squares, units, code, metric):
+    drawings = drawing_set(squares, units, sheet="A0")
+    drawings.write(tmp_path / "roof.dxf")
+    doc = ezdxf.readfile(tmp_path / "roof.dxf")
+    assert (doc.header["$INSUNITS"], doc.header["$MEASUREMENT"]) == (code, metric)
+    plan = drawings.sheets[0]
+    rims = np.concatenate([line.points for line in plan.lines if line.layer == "PCMC-RIM"])
+    scale = int(plan.scale.removeprefix("1:"))
+    millimetres = {"mm": 1.0, "cm": 10.0, "ft": 304.8, "in": 25.4}[units]
+    assert np.ptp(rims, axis=0).tolist() == pytest.approx(
+        [8.0 * millimetres / scale, 4.0 * millimetres / scale]
     )
-    assert project.files_of(path) == [path, file]
-    before = project.digest(path)
-    with pytest.warns(FileWarning, match="annotation"):
-        loaded = project.load(path)
-    surface = project.surface_of(loaded)
-    tension = {patch.name: patch.tension for patch in surface.patches}
-    assert (tension["apse"], tension["chancel"], loaded.plan.edge_length) == (9.0, 4.5, 1.0)
-    assert tension["east"] == tension["west"] != 9.0
-    drawn.nave(file, scale=2.0)
-    assert project.digest(path) != before
-    with pytest.warns(FileWarning):
-        assert project.build(path).size > 1.9 * surface.size
 
 
-def test_millimetres_and_metres_give_the_same_plan(tmp_path):
-    metres = read_drawing(drawn.nave(tmp_path / "m.dxf"))
-    small = drawn.nave(tmp_path / "mm.dxf", scale=1000.0, unit=4)
-    same, own = read_drawing(small, "m"), read_drawing(small)
-    assert (metres.unit, same.unit, same.units, own.units) == ("m", "mm", "m", "mm")
-    assert same.notes[0] == "lengths converted from mm to m (1 mm = 0.001 m)"
-    assert own.outline.length == pytest.approx(1000.0 * metres.outline.length, rel=1e-12)
-    values = [proposed(plan) for plan in (metres, same)]
-    assert values[0]["patches"].keys() == values[1]["patches"].keys()
-    assert values[0]["edge_length"] == values[1]["edge_length"]
+def test_pdf_pages_and_svg_files_have_the_size_of_their_sheets(tmp_path, drawings):
+    written = drawings.write(tmp_path / "roof.pdf", tmp_path / "roof.svg")
+    count = len(drawings.sheets)
+    names = ["roof.pdf", *(f"roof-{k + 1}.svg" for k in range(count))]
+    assert [path.name for path in written] == names
+    data = (tmp_path / "roof.pdf").read_bytes()
+    boxes = re.findall(rb"/MediaBox \[ *0 0 ([\d.]+) ([\d.]+) *\]", data)
+    assert len(boxes) == count
+    for box in boxes:
+        assert [float(side) * 25.4 / 72.0 for side in box] == pytest.approx(FORMATS["A3"], abs=0.01)
+    root = ET.parse(tmp_path / "roof-1.svg").getroot()
+    assert (root.get("width"), root.get("height")) == ("420mm", "297mm")
+    drawings.write(tmp_path / "again.pdf")
+    assert (tmp_path / "again.pdf").read_bytes() == data
 
 
-def test_small_gaps_are_closed_and_said_and_arcs_stay_arcs(tmp_path):
-    plan = read_drawing(drawn.nave(tmp_path / "nave.dxf", gap=0.01))
-    assert plan.outline.closed
-    assert "1 gap closed, up to 0.01 long" in plan.notes[0]
-    assert f"up to {plan.gap:.3g}" in plan.notes[0]
-    whole = read_drawing(drawn.nave(tmp_path / "whole.dxf"))
-    for one in (plan, whole):
-        (half,) = [piece for piece in one.outline.pieces if piece.sweep]
-        assert np.linalg.norm(half.points[1]) == pytest.approx(4.0, rel=1e-12)
-    with refused(PlanError, what="layer 'OUTLINE'") as caught:
-        read_drawing(tmp_path / "nave.dxf", gap=0.001)
-    assert caught.value.found == pytest.approx(0.01)
-    assert len(caught.value.where) == 2
+def test_all_files_appear_together_or_none(tmp_path, monkeypatch, drawings):
+    def fail(sheets, path):
+        path.write_bytes(b"half")
+        raise OSError(28, "No space left on device")
+
+    (tmp_path / "roof.dxf").write_text("old")
+    monkeypatch.setattr(pdf, "write_pdf", fail)
+    with refused(FileError, what=str(tmp_path / "roof.pdf")):
+        drawings.write(tmp_path / "roof.dxf", tmp_path / "roof.pdf", tmp_path / "roof.svg")
+    assert [path.name for path in tmp_path.iterdir()] == ["roof.dxf"]
+    assert (tmp_path / "roof.dxf").read_text() == "old"
+    with refused(FileError, found=".dwg"):
+        drawings.write(tmp_path / "roof.dwg")
 
 
-def test_ends_of_dividers_that_just_miss_their_line_are_moved_to_it(tmp_path):
-    file = drawing(tmp_path, ("line", "divider a", (5, 0.006), (5, 6.004)))
-    plan = read_drawing(file)
-    np.testing.assert_allclose(plan.dividers["a"].at([0.0, 1.0]), [[5, 0], [5, 6]], atol=1e-9)
-    assert "2 ends of dividers moved by up to 0.006" in plan.notes[0]
-
-
-def test_strokes_drawn_twice_count_once(tmp_path):
-    lines = ("line", "divider a", (5, 0), (5, 6)), ("line", "divider a", (5, 6), (5, 0))
-    plan = read_drawing(drawing(tmp_path, *lines))
-    assert list(plan.dividers) == ["a"]
-    assert "drawn twice" in plan.notes[0]
-
-
-WRONG = {
-    "empty": ({"outline": False}, [], "outline", None),
-    "only faces": (
-        {"outline": False},
-        [("3dface", "roof", [(0, 0), (1, 0), (1, 1), (0, 1)])],
-        "outline",
-        None,
-    ),
-    "misspelt": ({"outline": False}, [("circle", "outlne", (0, 0), 3)], "outline", None),
-    "an open outline": (
-        {"outline": False},
-        [("lwpolyline", "outline", [*BOX, (0, 0.3)])],
-        "layer 'outline'",
-        ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0)),
-    ),
-    "a fork": (
-        {"outline": False},
-        [("line", "outline", (0, 0), end) for end in ((4, 0), (0, 4), (4, 4))],
-        "layer 'outline'",
-        (0.0, 0.0, 0.0),
-    ),
-    "a stray line": ({}, [("line", "outline", (20, 0), (24, 0))], "layer 'outline'", (20.0, 0.0, 0.0)),
-    "two outlines": ({}, [("circle", "outline", (5, 3), 1)], "layer 'outline'", None),
-    "an open hole": (
-        {},
-        [("line", "hole a", (2, 2), (3, 3))],
-        "layer 'hole a'",
-        ((2.0, 2.0, 0.0), (3.0, 3.0, 0.0)),
-    ),
-    "a leaning mast": ({}, [("line", "mast", (5, 3, 0), (6, 3, 2))], "layer 'mast'", (5.0, 3.0, 0.0)),
-    "a height without a number": ({}, [("text", "height", "high")], "layer 'height'", None),
-    "a patch without a name": ({}, [("point", "patch", (5, 3))], "layer 'patch'", None),
-}
-
-
-@pytest.mark.parametrize("case", WRONG)
-def test_wrong_drawings_are_refused_with_layer_and_place(tmp_path, case):
-    options, calls, what, where = WRONG[case]
-    file = drawing(tmp_path, *calls, **options)
-    with refused(PlanError, what=what, where=where) as caught:
-        read_drawing(file)
-    assert str(file) in str(caught.value)
-
-
-BAD_LINES = {
-    "crosses itself": ("lwpolyline", [(2, 0), (8, 6), (8, 0), (2, 6)], (5.0, 3.0)),
-    "ends inside": ("line", (5, 0), (5, 5), (5.0, 5.0)),
-    "outside": ("line", (25, 0), (25, 6), None),
-}
-
-
-@pytest.mark.parametrize("case", BAD_LINES)
-def test_errors_of_the_plan_name_the_layer_and_the_entity(tmp_path, case):
-    kind, *arguments, where = BAD_LINES[case]
-    loaded = project.load(drawing(tmp_path, (kind, "divider north", *arguments)))
-    with refused(PlanError, what="divider 'north'", where=where) as caught:
-        project.surface_of(loaded)
-    assert f"layer 'divider north': {'LWPOLYLINE' if kind == 'lwpolyline' else 'LINE'}" in str(caught.value)
-
-
-def test_names_that_do_not_fit_the_drawing_are_refused(tmp_path):
-    file = drawing(tmp_path, ("text", "patch", "nave = 7.5"))
-    plan = read_drawing(file)
-    assert proposed(plan)["patches"]["nave"]["tension"] == 7.5
-    with refused(OptionError, what="patches", where="nve"):
-        proposed(plan, {"patches": {"nve": {"tension": 1.0}}})
-    with refused(OptionError, what="dividers", found="a"):
-        proposed(plan, {"dividers": [{"name": "a", "wall": 1.0}]})
-    for line, what in (
-        ("gap = 1\noutline = [[0, 0], [1, 0], [0, 1]]", "plan.gap"),
-        ('drawing = "../a.dxf"', "plan.drawing"),
-    ):
-        (tmp_path / "p.toml").write_text(f"[plan]\n{line}\n")
-        with refused(FileError, what=what):
-            project.load(tmp_path / "p.toml")
-
-
-def test_heights_masts_and_levels(tmp_path):
-    file = drawing(
-        tmp_path,
-        ("point", "heights", (2, 3, 1.1)),
-        ("text", "height", "h = 1,2 m"),
-        ("line", "mast", (8, 3, 0), (8, 3, 2)),
-        ("circle", "mast ring", (7, 2, 1.5), 0.4),
-    )
-    plan = read_drawing(file)
-    np.testing.assert_allclose(plan.heights, [[2, 3, 1.1], [5, 3, 1.2]])
-    np.testing.assert_allclose(plan.supports, [[8, 3, 2]])
-    assert list(plan.holes) == ["ring"]
-    assert not plan.flat
-    with pytest.warns(FileWarning, match="draw a mast's top as a ring"):
-        loaded = project.load(file)
-    assert [(t.quantity, t.of, t.value) for t in loaded.targets] == [
-        ("height", (2.0, 3.0), 1.1),
-        ("height", (5.0, 3.0), 1.2),
-    ]
-    document, space = drawn.new()
-    space.add_lwpolyline(BOX, close=True, dxfattribs={"layer": "outline", "elevation": 105.0})
-    document.saveas(tmp_path / "high.dxf")
-    surface = project.build(tmp_path / "high.dxf")
-    assert surface.plane.point == (0.0, 0.0, 105.0)
-    assert surface.vertices[:, 2].min() == 105.0
-
-
-def test_a_height_in_the_drawing_is_met(tmp_path):
-    file = drawing(tmp_path, ("point", "height", (5, 3, 1.25)))
-    outcome = project.run(file)
-    assert outcome.good
-    assert outcome.surface.vertices[:, 2].max() == pytest.approx(1.25, abs=0.02)
-
-
-def test_blocks_layers_that_are_off_and_other_entities(tmp_path):
-    document, space = drawn.new()
-    bay = document.blocks.new("BAY")
-    bay.add_circle((0, 0), 5)
-    space.add_blockref("BAY", (3, 3), dxfattribs={"layer": "outline", "xscale": 2.0, "yscale": 1.0})
-    document.layers.add("divider old").off()
-    space.add_line((3, -2), (3, 8), dxfattribs=drawn.on("divider old"))
-    document.saveas(tmp_path / "hall.dxf")
-    plan = read_drawing(tmp_path / "hall.dxf")
-    (piece,) = plan.outline.pieces
-    assert np.linalg.norm(piece.points[1:], axis=1).tolist() == pytest.approx([10.0, 5.0])
-    assert not plan.dividers
-    assert "'divider old' (1)" in plan.notes[0]
-
-
-def test_curves_of_rhino_stay_exact(tmp_path):
-    model = rhino3dm.File3dm()
-    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters
-
-    def on(name):
-        layer = rhino3dm.Layer()
-        layer.Name = name
-        attributes = rhino3dm.ObjectAttributes()
-        attributes.LayerIndex = model.Layers.Add(layer)
-        return attributes
-
-    def at(*points):
-        return [rhino3dm.Point3d(1000.0 * x, 1000.0 * y, 1000.0 * z) for x, y, z in points]
-
-    edge = on("Outline")
-    model.Objects.AddPolyline(rhino3dm.Polyline(at((8, 18, 0), (8, 0, 0), (0, 0, 0), (0, 18, 0))), edge)
-    model.Objects.AddArc(rhino3dm.Arc(*at((0, 18, 0), (4, 22, 0), (8, 18, 0))), edge)
-    model.Objects.AddLine(*at((0, 18, 0), (8, 18, 0)), on("divider chancel"))
-    eye = rhino3dm.Circle(*at((4, 9, 2)), 1200.0)
-    model.Objects.AddCurve(rhino3dm.NurbsCurve.CreateFromCircle(eye), on("hole eye"))
-    model.Objects.AddTextDot("nave", *at((4, 5, 0)), on("patch"))
-    path = tmp_path / "hall.3dm"
-    model.Write(str(path), 7)
-    assert project.is_drawing(path)
-    plan = read_drawing(path, "m")
-    assert (plan.unit, plan.units) == ("mm", "m")
-    (half,) = [piece for piece in plan.outline.pieces if piece.sweep]
-    assert np.linalg.norm(half.points[1]) == pytest.approx(4.0, rel=1e-12)
-    assert abs(half.sweep) == pytest.approx(math.pi, rel=1e-12)
-    assert curve_data(plan.holes["eye"]) == {"circle": {"centre": [4.0, 9.0, 2.0], "radius": 1.2}}
-    assert {name: d["bottom"] for d in proposed(plan)["dividers"] for name in [d["name"]]} == {
-        "chancel": "sloped"
-    }
-    with refused(FileError, what=str(path)):
-        raise_for_overwriting(path)
-    pcmc.write(tmp_path / "roof.3dm", plan_from(proposed(plan)).surface())
-    assert not project.is_drawing(tmp_path / "roof.3dm")
-
-
-def raise_for_overwriting(path):
-    from pcmc.cli.solving import _project
-
+def test_rhino_files_have_ridges_rims_and_walls_as_curves(tmp_path, squares):
+    path = tmp_path / "roof.3dm"
+    pcmc.write(path, squares)
+    model = rhino3dm.File3dm.Read(str(path))
+    lengths = {}
+    for item in model.Objects:
+        if isinstance(item.Geometry, rhino3dm.PolylineCurve):
+            name = model.Layers[item.Attributes.LayerIndex].Name
+            line = item.Geometry
+            points = np.array([[p.X, p.Y, p.Z] for p in (line.Point(k) for k in range(line.PointCount))])
+            lengths[name] = lengths.get(name, 0.0) + length(points)
+    junction = squares.vertices[squares.topology.junctions[0].vertices]
+    assert lengths["PCMC-RIDGE"] == pytest.approx(length(junction), abs=1e-9)
+    assert lengths["PCMC-RIM"] == pytest.approx(24.0, abs=1e-9)
+    assert "PCMC-WALL" in lengths
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        _project(path, None, [path], None)
+        warnings.simplefilter("error")
+        again = pcmc.read(path)
+    assert np.array_equal(np.sort(again.vertices, axis=0), np.sort(squares.vertices, axis=0))
 
 
-def test_spans_of_a_nurbs_circle_are_on_the_circle():
-    corner = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0)]
-    weights = np.array([1, 0.5**0.5] * 4 + [1])
-    knots = np.array([0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4.0])
-    spans = bezier_spans(2, knots, np.array(corner, dtype=float), weights)
-    assert len(spans) == 4
-    for points, w in spans:
-        on_circle = bezier(points, w).at(np.linspace(0, 1, 9))
-        np.testing.assert_allclose(np.linalg.norm(on_circle, axis=1), 1.0, rtol=1e-14)
+# ------------------------------------------------------------------------------------- bad input
+
+
+@pytest.mark.parametrize("units", [None, "", "parsec", 3])
+def test_units_that_are_missing_or_unknown_are_refused(squares, units):
+    with refused(OptionError, what="units", found=units):
+        drawing_set(squares, units)
 
 
 @pytest.mark.parametrize(
-    "path",
+    ("options", "fields"),
     [
-        circle([3, 4], 2.0),
-        ellipse([1, 2, 3], [[2, 0, 0], [0, 0, 1.5]], -200.0),
-        ellipse([0, 0, 1], [[0, 2, 0], [0, 0, 2]]),
-        bezier([[0, 0], [1, 3], [4, 0]], [1.0, 0.3, 2.0]),
-        join(polyline([[0, 0], [8, 0]]), arc([8, 0], [10, 2], [8, 4]), polyline([[8, 4], [0, 4], [0, 0]])),
+        ({"sheet": "B2"}, {"what": "sheet"}),
+        ({"scale": 0}, {"what": "scale"}),
+        ({"scale": 10, "sheet": "A4"}, {"what": "scale", "expected": "A0"}),
+        ({"scale": 1, "sheet": "A4"}, {"what": "scale", "expected": None}),
+        ({"heights": [9.0]}, {"what": "heights", "found": 9.0}),
+        ({"heights": [float("nan")]}, {"what": "heights"}),
+        ({"lines": [((0, 50), (1, 50))]}, {"what": "lines"}),
+        ({"lines": [((1, 1), (1, 1))]}, {"what": "lines"}),
+        ({"panel_sheets": True}, {"what": "tolerance"}),
+        ({"tolerance": 0.0}, {"what": "tolerance"}),
     ],
-    ids=["circle", "arc of an ellipse", "upright circle", "rational", "joined"],
 )
-def test_plain_data_of_a_curve_give_it_again(path):
-    again = curve(curve_data(path))
-    t = np.linspace(0, len(path.pieces), 33)
-    np.testing.assert_allclose(again.at(t), path.at(t), atol=1e-10)
-    assert again.closed == path.closed
-    np.testing.assert_allclose(path.reversed().at(t[::-1]), path.at(t), atol=1e-12)
+def test_what_cannot_be_drawn_is_refused(squares, options, fields):
+    with refused(OptionError, **fields):
+        drawing_set(squares, "m", **options)
 
 
-def test_the_least_tension_is_that_of_the_paper_for_round_and_long_plans():
-    """α = p R / 2 over a circle, p R over a barrel of half-width R; the proposal has room above it."""
-    barrel = shapely.box(0, 0, 2, 200)
-    assert least_tension(shapely.Point(0, 0).buffer(3.0, quad_segs=200)) == pytest.approx(1.5, rel=1e-3)
-    assert least_tension(barrel) == pytest.approx(1.0, rel=0.02)
-    side = 1.0 / (2.0 + math.sqrt(math.pi))  # a unit square's Cheeger constant is 2 + √π
-    assert least_tension(shapely.box(0, 0, 1, 1)) == pytest.approx(side, rel=1e-6)
-    assert ROOM > 1.0
+def test_a_surface_that_is_not_certified_is_refused_or_every_sheet_is_marked():
+    start = two_squares(4, alpha_aux=1.0)
+    with refused(SurfaceError, what="surface"):
+        drawing_set(start, "m")
+    drawings = drawing_set(start, "cm", tolerance=0.1, panel_sheets=True, sheet="A3", anyway=True)
+    for sheet in drawings.sheets:
+        assert [text.text for text in sheet.texts if text.layer == "PCMC-MARK"] == [
+            "NOT CERTIFIED: not converged"
+        ]
 
 
-def test_ellipses_are_refused_by_name():
-    for spec, what in (
-        ({"ellipse": {"centre": [0, 0]}}, "ellipse"),
-        ({"ellipse": {"centre": [0, 0], "axes": [[1, 0], [2, 0]]}}, "ellipse"),
-        ({"ellipse": {"centre": [0, 0], "axes": [[1, 0], [0, 2]], "sweep": 400}}, "ellipse"),
-        ({"bezier": [[0, 0], [1, 1]], "weights": [1.0]}, "bezier"),
-        ({"bezier": [[0, 0], [1, 1]], "weights": [1.0, -1.0]}, "bezier: weights"),
-        ({"polyline": [[0, 0], [1, 1]], "weights": [1.0, 1.0]}, "weights"),
-    ):
-        with refused(OptionError, what=what):
-            curve(spec)
+def test_a_certified_surface_has_no_mark(drawings):
+    assert not [t for sheet in drawings.sheets for t in sheet.texts if t.layer == "PCMC-MARK"]
 
 
-def test_hostile_drawings_are_refused_in_one_line(tmp_path):
-    file = tmp_path / "a.dxf"
-    for content in (
-        b"",
-        b"\x00" * 3000,
-        b"0\nSECTION\n2\nENTITIES\n0\nLINE\n8\n",
-        b"AutoCAD Binary DXF\r\n\x1a\x00",
-    ):
-        file.write_bytes(content)
-        with pytest.raises((FileError, PlanError)) as caught:
-            read_drawing(file)
-        assert "\n" not in str(caught.value)
-    far = drawing(tmp_path, ("line", "divider a", (1e300, 0), (5, 6)))
-    with refused(FileError, where="divider a"):
-        read_drawing(far)
+def test_the_command_draws_a_file(tmp_path, squares, capsys):
+    roof = tmp_path / "roof.pcmc"
+    pcmc.write(roof, squares)
+    options = ["--units", "m", "--sheet", "A3", "--height", "0.2", "--line=-4,0.1,4,0.1"]
+    assert main(["draw", str(roof), "-o", str(tmp_path / "roof.dxf"), *options]) == 0
+    assert "sheets A3" in capsys.readouterr().out
+    assert {path.name for path in tmp_path.iterdir()} == {"roof.pcmc", "roof.dxf"}
 
 
-def test_a_line_far_longer_than_the_plan_is_refused(tmp_path):
-    loaded = project.load(drawing(tmp_path, ("line", "divider a", (5, 0), (5, 5e9))))
-    with refused(PlanError, what="divider 'a'", found=5e9):
-        project.surface_of(loaded)
-
-
-@pytest.mark.slow
-def test_blocks_of_blocks_of_blocks_end(tmp_path):
-    file = tmp_path / "a.dxf"
-    document, space = drawn.new()
-    inner = document.blocks.new("B0")
-    inner.add_line((0, 0), (1, 0))
-    for level in range(1, 8):  # ten copies of ten copies ...
-        block = document.blocks.new(f"B{level}")
-        for k in range(10):
-            block.add_blockref(f"B{level - 1}", (k, 0))
-    space.add_blockref("B7", (0, 0), dxfattribs=drawn.on("outline"))
-    document.saveas(file)
-    with refused(FileError, what=str(file)) as caught:
-        read_strokes(file)
-    assert "entities" in str(caught.value)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FileWarning")
-def test_flipped_bits_of_a_drawing_raise_our_errors_only(tmp_path):
-    data = drawn.corner(tmp_path / "corner.dxf").read_bytes()
-    begin = data.index(b"ENTITIES")
-    end = data.index(b"ENDSEC", begin)
-    random = np.random.default_rng(5)
-    file = tmp_path / "flipped.dxf"
-    outcomes = set()
-    for _ in range(25):
-        flipped = bytearray(data)
-        for place in random.integers(begin, end, 3):
-            flipped[place] ^= 1 << int(random.integers(8))
-        file.write_bytes(bytes(flipped))
-        try:
-            project.surface_of(project.load(file))
-            outcomes.add("read")
-        except (FileError, PlanError, OptionError, SurfaceError) as error:
-            outcomes.add("refused" if "\n" not in str(error) else "in several lines")
-    assert outcomes == {"read", "refused"}
-
-
-def test_the_reading_process_gives_plain_values(tmp_path):
-    content = read_arrays("dxf drawing", drawing(tmp_path))
-    assert content["unit"] == "m"
-    assert [entity["layer"] for entity in content["entities"]] == ["outline"]
-    assert len(content["entities"][0]["pieces"]) == 4
+@pytest.mark.parametrize(
+    "options",
+    [
+        [],
+        ["--units", "m", "--scale", "1"],
+        ["--units", "m", "--line", "1,2,3"],
+        ["--units", "m", "--height", "high"],
+        ["--units", "m", "--panel-sheets"],
+        ["--units", "m", "-o", "{}/roof.dwg"],
+    ],
+)
+def test_the_command_refuses_bad_input_in_one_line(tmp_path, squares, capsys, options):
+    roof = tmp_path / "roof.pcmc"
+    pcmc.write(roof, squares)
+    words = [text.format(tmp_path) for text in options]
+    assert main(["draw", str(roof), "-o", str(tmp_path / "roof.dxf"), *words]) == 2
+    assert capsys.readouterr().err.strip().count("\n") == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["roof.pcmc"]

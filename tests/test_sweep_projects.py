@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
+from refusals import refused
 from tables import same
 
 import pcmc
@@ -12,10 +14,11 @@ from generators import two_squares
 from pcmc import cli
 from pcmc.base.errors import FileError, OptionError, PcmcError
 from pcmc.project import digest, run, varied
-from pcmc.sweep import read_store
+from pcmc.sweep import draw_sweep, read_store
 from pcmc.sweep import run as run_sweep
 from pcmc.sweep.projects import project_sweep, solve_project
 
+NUMBERS = ["west.apex", "east.apex", "rise", "roof_area", "largest_reaction"]
 TEXT = """
 [plan]
 edge_length = 1.5                 # coarse: these are tests
@@ -145,7 +148,8 @@ GRID = ["west.tension=3,3.2", "wall 1.tension=0.5,0.8"]
 
 
 def test_the_command_makes_a_table(roof, capsys):
-    assert cli.main(["sweep", "roof.toml", *GRID, "east.tension=3.1", "--csv", "t.csv"]) == 0
+    given = ["sweep", "roof.toml", *GRID, "east.tension=3.1", "--csv", "t.csv"]
+    assert cli.main([*given, "--all", "--plot", "t.png"]) == 0
     shown = capsys.readouterr().out
     table = pd.read_csv("t.csv")
     assert table["west.tension"].tolist() == [3.0, 3.0, 3.2, 3.2]
@@ -155,13 +159,51 @@ def test_the_command_makes_a_table(roof, capsys):
     assert (table["verdict"] == "stable").all()
     assert shown.count("stable") == 4
     assert shown.split()[:3] == ["west.tension", "wall", "1.tension"]
-    assert sorted(p.name for p in roof.parent.iterdir()) == ["roof.toml", "t.csv"]
+    with Image.open("t.png") as picture:
+        assert picture.width == 900
+    assert sorted(p.name for p in roof.parent.iterdir()) == ["roof.toml", "t.csv", "t.png"]
+    assert cli.main(given) == 0
+    short = pd.read_csv("t.csv", index_col="case")
+    assert list(short) == ["west.tension", "wall 1.tension", "status", "verdict", *NUMBERS]
+    assert (short["rise"] == short[["west.apex", "east.apex"]].max(axis=1)).all()
+    start = varied(roof, {"west.tension": 3.0, "wall 1.tension": 0.5, "east.tension": 3.1})[1]
+    first = pcmc.solve(start).certificate
+    row = short.loc[0]
+    assert row["roof_area"] == pytest.approx(first.patches["area"][:2].sum(), rel=1e-9)
+    assert row["largest_reaction"] == pytest.approx(first.boundaries["per_length_max"].max(), rel=1e-9)
+
+
+def test_one_varied_number_is_drawn_as_curves_of_the_certified_cases():
+    table = pd.DataFrame({"a": [2, 1], "b": [1, 1], "verdict": ["stable", "saddle"], "x.apex": [3.0, 2.0]})
+    table["rise"] = table["x.apex"]
+    assert draw_sweep(table, ["a", "b"]).shape[2] == 3
+    for parameters, verdict in ((["b"], "stable"), (["a"], "saddle")):
+        with refused(OptionError, what="plot"):
+            draw_sweep(table.assign(verdict=verdict), parameters)
+
+
+def test_two_varied_numbers_mark_what_is_not_certified_and_what_is_missing(monkeypatch):
+    seen = {}
+    monkeypatch.setattr("pcmc.plot.heatmap", lambda *table, **rest: seen.update(table=table, **rest))
+    rows = {"a": [1, 2, 1], "b": [1, 1, 2], "verdict": ["stable", "degenerate", "neutral"]}
+    draw_sweep(pd.DataFrame(rows | {"x.apex": [1.0, 9.0, 2.0], "rise": [1.0, 9.0, 2.0]}), ["a", "b"])
+    (rise,) = seen["table"][2].values()
+    assert np.array_equal(rise, [[1.0, np.nan], [2.0, np.nan]], equal_nan=True)
+    assert next(iter(seen["marks"].values())).tolist() == [[False, True], [False, True]]
+
+
+def test_a_store_says_how_many_cases_it_keeps(roof, capsys):
+    given = ["sweep", "roof.toml", "--workers", "1", "--store", "s", "west.tension=3,3.2"]
+    assert cli.main(given) == 0
+    assert "are finished" not in capsys.readouterr().out
+    assert cli.main([*given[:-1], "west.tension=3,3.2,3.4"]) == 0
+    assert "s: 2 cases are finished, 1 to run" in capsys.readouterr().out
 
 
 def test_a_surface_is_swept_too_by_any_method(roof, capsys):
     run(roof)
     pcmc.write("roof.ply", varied(roof, {})[1])
-    given = ["sweep", "roof.ply", "west.tension=3,4", "--workers", "1", "--csv", "t.csv"]
+    given = ["sweep", "roof.ply", "west.tension=3,4", "--workers", "1", "--csv", "t.csv", "--all"]
     assert cli.main([*given, "--method", "lbfgs"]) in (0, 1)
     table = pd.read_csv("t.csv")
     assert set(table["method"]) == {"lbfgs"}
@@ -241,7 +283,8 @@ def test_a_project_changed_while_it_is_swept_is_noticed(roof):
     ("arguments", "message"),
     [
         (["roof.toml", "wst.tension=1,2"], "did you mean 'west.tension'"),
-        (["roof.toml", "west.tension=3"], "the grid is empty"),
+        (["roof.toml", "wst.tension=3"], "did you mean 'west.tension'"),
+        (["roof.toml", "west.tension=3,4", "--plot", "t.gif"], "t.gif: pictures are"),
         (["roof.toml", "west.tension=3,4", "west.tension=5"], "west.tension is given twice"),
         (["roof.tml", "west.tension=3,4"], "roof.tml: expected a project"),
         (["none.toml", "west.tension=3,4"], "none.toml: cannot be read"),

@@ -115,11 +115,11 @@ def check_input(file: Path) -> None:
 def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str] | None) -> Surface:
     """The surface with the tensions and pressures of the command line."""
     loaded = [patch.name for patch in surface.patches if not patch.auxiliary]
-    tensions, pressures = _by_name(loaded, tension, "--tension"), _by_name(loaded, pressure, "--pressure")
+    tensions, pressures = by_name(loaded, tension, "--tension"), by_name(loaded, pressure, "--pressure")
     return with_pressures(surface, tensions, pressures)
 
 
-def _by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:
+def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:
     """Value by patch, from NAME=VALUE, or VALUE for all ``names``. A later one replaces an earlier one."""
     values: dict[str, float] = {}
     for text in given or ():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,6 +11,7 @@ import typer
 
 from ..base.errors import FileError, MissingExtra, OptionError
 from ..io import FORMATS, READ_ONLY
+from ..plot.figure import check_suffix
 from ..project import check_outputs
 from . import INTERRUPTED, NOT_CERTIFIED, OK
 from .arguments import DXF, TOML, integer, number, option, values_of
@@ -18,6 +20,7 @@ from .progress import sweeping
 TABLES = (".csv", ".parquet")
 WHAT = "A project (.toml), a surface, or package.module:function that returns a Surface."
 SEARCH = "Try further starts where the first leads to no equilibrium: slower, but with the proof."
+PLOT = "Picture to write: apexes over one varied number, or the rise over two."
 STORE = "File for finished cases. The same command again runs only the missing ones."
 
 
@@ -29,6 +32,8 @@ def sweep(
     ] = None,
     store: Annotated[Path | None, option("FILE", STORE)] = None,
     csv: Annotated[Path | None, option("FILE", "Table to write (.csv or .parquet).")] = None,
+    every: Annotated[bool, typer.Option("--all", help="Write all columns, not only the first ones.")] = False,
+    plot: Annotated[Path | None, option("FILE", PLOT)] = None,
     workers: Annotated[
         int | None, option("NUMBER", "Local processes; default: one per processor.", parser=integer)
     ] = None,
@@ -50,28 +55,33 @@ def sweep(
     may also be the keys of a number in the file: plan.edge_length, plan.outline.3.1 (the first coordinate of
     the third corner). For a generator it is one of its parameters, or an option of the method. With a store,
     values may be added later: only new cases are run. If the project file has changed, name a new store.
+    The table has the parameters, the verdict, the apex of each patch, the rise, the area, and the largest
+    reaction per length; with --all it has every number of the certificate, too.
 
     \b
     Examples:
       pcmc sweep roof.toml corner.tension=6,6.2 "wall 1.tension=1,2" --csv roof.csv
       pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
     """
-    from ..sweep import run, write_table
+    from ..sweep import draw_sweep, run, short_table, write_table
     from ..sweep.store import FAILED
 
-    check_outputs([path for path in (csv, store) if path is not None])
+    check_outputs([path for path in (csv, store, plot) if path is not None])
     if csv is not None and csv.suffix not in TABLES:
         text = f"{csv}: a table is written as {' or '.join(TABLES)}; change the suffix"
         raise FileError(text, what=str(csv), found=csv.suffix, expected=TABLES)
     if csv is not None and csv.suffix == ".parquet" and find_spec("pyarrow") is None:
         raise MissingExtra("pyarrow", "files")
+    if plot is not None:
+        check_suffix(plot)
     given: dict[str, list[Any]] = {}
     for name, listed in map(values_of, values):
         if name in given:
             raise OptionError(f"{name} is given twice; list its values with commas: {name}=1,2", what=name)
         given[name] = listed
     grid = {name: listed for name, listed in given.items() if len(listed) > 1}
-    fixed = {name: listed[0] for name, listed in given.items() if len(listed) == 1}
+    grid = grid or given  # one case, whose names are checked as those of any other
+    fixed = {name: listed[0] for name, listed in given.items() if name not in grid}
     with sweeping() as draw:
         cases = _cases(what, grid, fixed, method, {"mesh_check": mesh_check, "search": search})
         table = run(
@@ -82,13 +92,16 @@ def sweep(
             time_limit=time_limit,
             retry_failed=retry_failed,
             on_record=draw,
+            on_resume=partial(_print_kept, store),
         )
     if table.empty:
         return INTERRUPTED
+    first = short_table(table, list(grid))
     if csv is not None:
-        write_table(csv, table)
-    columns = [c for c in (*grid, "status", "verdict", "mesh_verdict", "targets_met") if c in table]
-    print(table[columns].to_string())
+        write_table(csv, table if every else first)
+    if plot is not None:
+        draw_sweep(table, list(grid), plot)
+    print(first.to_string(float_format=lambda x: f"{x:.5g}"))
     _print_failures(table[table["status"].isin(FAILED)])
     if len(table) < len(cases):
         return INTERRUPTED
@@ -109,6 +122,12 @@ def _cases(
         raise OptionError(f"{what}: expected {kinds} such as generators:two_caps", what="WHAT", found=what)
     about = {"generator": what, "method": method or "newton"}
     return Sweep(solve_case, grid, about | {name: True for name, on in wanted.items() if on} | fixed)
+
+
+def _print_kept(store: Path | None, kept: int, missing: int) -> None:
+    """Say how many finished cases the store gives."""
+    if kept:
+        print(f"{store}: {kept} cases are finished, {missing} to run")
 
 
 def _print_failures(failed: Any) -> None:

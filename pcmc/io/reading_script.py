@@ -97,6 +97,36 @@ def rhino_arrays(path: str) -> dict[str, Any]:
     return {"layers": layers, "objects": objects, "unit": unit}
 
 
+def ifc_arrays(path: str) -> dict[str, Any]:
+    """The face sets of a roof that pcmc wrote, their names and supports, and pcmc's texts."""
+    import ifcopenshell
+    import numpy as np
+    from ifcopenshell.util import element, placement
+
+    get_pset, get_local_placement = element.get_pset, placement.get_local_placement
+    model: Any = ifcopenshell.open(path)
+    found: dict[str, Any] = {"text": None, "walls": None, "parts": []}
+    for roof in model.by_type("IfcRoof"):
+        texts = get_pset(roof, "Pcmc_Surface")
+        if not texts:
+            continue
+        found["text"], found["walls"] = texts["Description"], texts.get("Walls")
+        for part in (part for whole in roof.IsDecomposedBy for part in whole.RelatedObjects):
+            item = part.Representation.Representations[0].Items[0]
+            points = np.array(item.Coordinates.CoordList, dtype=np.float64).reshape(-1, 3)
+            place = get_local_placement(part.ObjectPlacement)
+            found["parts"].append(
+                {
+                    "name": part.Name,
+                    "points": points @ place[:3, :3].T + place[:3, 3],
+                    "faces": np.array(item.CoordIndex, dtype=np.int64).reshape(-1, 3) - 1,
+                    "supports": get_pset(part, "Pcmc_Patch", "Supports"),
+                }
+            )
+        break
+    return found
+
+
 def limit_memory(size: int) -> None:
     """On Linux, refuse memory beyond what a sound file of this size needs."""
     if sys.platform == "linux":
@@ -129,6 +159,7 @@ def from_file(name: str, function: str) -> Callable[[str], dict[str, Any]]:
 READERS = {
     "vtk": vtk_arrays,
     "rhino": rhino_arrays,
+    "ifc": ifc_arrays,
     "dxf drawing": from_file("reading_drawings", "dxf_entities"),
     "3dm drawing": from_file("reading_drawings", "rhino_entities"),
     "meshlab": from_file("reading_meshes", "meshlab_arrays"),

@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..surface import Surface
-from ..surface.colours import patch_colors
+from ..surface.colours import patch_colors, rgb
 from .figure import INK, SMALL
-from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT
+from .raster import Painted
+from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, Scene
 
 IN_A_LINE = 6
-Shown = tuple[Surface, Sequence[str] | None, Floats | None, bool]
-"""A surface, the patches of it that are drawn, the values that colour it, whether supports are dots."""
+LEAST_PATCH, LEAST_DOT = 9.0, 4.0  # pixels from which a patch, a dot counts as seen
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A surface in a picture: the patches drawn, the values that colour it, and what is seen of it."""
+
+    surface: Surface
+    patches: Sequence[str] | None
+    values: Floats | None
+    scene: Scene
+    painted: Painted
 
 
 def shown_vertices(surface: Surface, patches: Sequence[str] | None) -> Bools:
@@ -27,22 +39,31 @@ def shown_vertices(surface: Surface, patches: Sequence[str] | None) -> Bools:
 
 
 def entries(pictures: Iterable[Shown]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Colours of areas by name, and of dots by name, in all the pictures together."""
+    """Colours of areas by name, and of dots by name, that can be seen in all the pictures together."""
     colors: dict[str, Any] = {}
     dots: dict[str, Any] = {}
-    for surface, patches, values, supports in pictures:
-        shown = shown_vertices(surface, patches)
+    for picture in pictures:
+        surface, values = picture.surface, picture.values
+        shown = shown_vertices(surface, picture.patches)
         if values is None:
-            for patch, color in zip(surface.patches, patch_colors(surface), strict=True):
-                if patches is None or patch.name in patches:
-                    colors.setdefault(patch.name, tuple(color))
+            for patch in np.flatnonzero(_pixels_of_patches(picture) >= LEAST_PATCH):
+                colors.setdefault(surface.patches[patch].name, tuple(patch_colors(surface)[patch]))
         elif np.isnan(values[shown] if len(values) == surface.n else values).any():
             colors["no value"] = NO_VALUE
-        if supports and surface.fixed[shown].any():
-            dots["fixed"] = FIXED_DOT
-        if supports and surface.on_plane[shown].any():
-            dots["sliding"] = SLIDING_DOT
+        seen = picture.scene.dot_colors[picture.painted.dots >= LEAST_DOT]
+        for name, dot in (("fixed", FIXED_DOT), ("sliding", SLIDING_DOT)):
+            if (seen == rgb(dot)).all(axis=1).any():
+                dots[name] = dot
     return colors, dots
+
+
+def _pixels_of_patches(picture: Shown) -> Floats:
+    """(k,) pixels on which each patch is seen."""
+    surface, names = picture.surface, picture.patches
+    patch = surface.patch_of_face
+    if names is not None:
+        patch = patch[surface.patch_faces([surface.patch_index(name) for name in names])]
+    return np.bincount(patch, picture.painted.triangles, len(surface.patches))
 
 
 def add_legend(figure: Any, pictures: Iterable[Shown]) -> None:

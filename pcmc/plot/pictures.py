@@ -17,9 +17,9 @@ from ..surface import Surface
 from ..surface.geometry import area_vectors
 from .colors import color_scale
 from .figure import INK, SMALL, TEXT, Image, finish, fit_height, grid, new
-from .legend import add_legend, shown_vertices
+from .legend import Shown, add_legend, shown_vertices
 from .raster import paint
-from .scene import Scene, View, mean_edge, scene, view_of
+from .scene import View, mean_edge, scene, view_of
 
 Path = str | os.PathLike[str]
 ViewName = str | tuple[float, float]
@@ -47,7 +47,6 @@ def draw(
     patches: Sequence[str] | None = None,
     title: str = "",
     width: int = 900,
-    renderer: str = "auto",
 ) -> Image:
     """A picture of a surface, in parallel projection.
 
@@ -66,7 +65,6 @@ def draw(
     legend : explain the colours of patches, supports, and places without a value.
     patches : names of those to draw, such as the walls; by default all.
     width : of the picture in pixels.
-    renderer : "pyvista", "matplotlib", or "auto": pyvista where the system has OpenGL.
 
     Returns
     -------
@@ -74,8 +72,8 @@ def draw(
 
     Raises
     ------
-    OptionError : for an unknown view, renderer or colour map, or arrays of a wrong shape.
-    MissingExtra : when pyvista or matplotlib is not installed.
+    OptionError : for an unknown view or colour map, or arrays of a wrong shape.
+    MissingExtra : when matplotlib is not installed.
     """
     return panel(
         [surface],
@@ -93,7 +91,6 @@ def draw(
         legend=legend,
         titles=[title] if title else (),
         width=width,
-        renderer=renderer,
     )
 
 
@@ -116,7 +113,6 @@ def panel(
     patches: Sequence[str] | Sequence[Sequence[str] | None] | None = None,
     one_scale: bool = True,
     width: int = 1200,
-    renderer: str = "auto",
 ) -> Image:
     """Several surfaces in one picture, with one scale of colour.
 
@@ -135,18 +131,21 @@ def panel(
         place.set_title(drawing.title, fontsize=TEXT, color=INK, pad=5.0)
     if colors is not None:
         colors.bar(figure, axes, label)
-    if legend:
-        shown = [(d.surface, d.patches, d.values, dots) for d, dots in zip(drawings, dotted, strict=True)]
-        add_legend(figure, shown)
-    fit_frames(figure, axes, frames, columns)
+    shown = []
     for k, drawing in enumerate(drawings):
-        surface, view = drawing.surface, drawing.view
         fill = None if colors is None or drawing.values is None else colors.rgb(drawing.values)
         meshed = edge[k] >= EDGES_FROM if edges is None else edges
-        painted = scene(surface, view, fill, supports=dotted[k], edges=meshed, patches=drawing.patches)
-        frames[k].show(axes[k], painted, renderer)
+        view, chosen = drawing.view, drawing.patches
+        parts = scene(drawing.surface, view, fill, supports=dotted[k], edges=meshed, patches=chosen)
+        painted = paint(parts, frames[k].low, frames[k].scale, frames[k].size)
+        shown.append(Shown(drawing.surface, chosen, drawing.values, parts, painted))
+    if legend:
+        add_legend(figure, shown)
+    fit_frames(figure, axes, frames, columns)
+    for drawing, frame, picture, place in zip(drawings, frames, shown, axes, strict=True):
+        frame.show(place, picture.painted.image)
         if drawing.numbers is not None:
-            _print_numbers(axes[k], surface, view, drawing.numbers, form)
+            _print_numbers(place, drawing.surface, drawing.view, drawing.numbers, form)
     return finish(figure, path)
 
 
@@ -204,9 +203,8 @@ class Frame:
     low: Floats
     scale: float
 
-    def show(self, axes: Any, painted: Scene, renderer: str) -> None:
-        """Paint a scene on the axes, pixel on pixel."""
-        image = paint(painted, self.low, self.scale, self.size, renderer)
+    def show(self, axes: Any, image: Floats) -> None:
+        """Place a painted scene on the axes, pixel on pixel."""
         right, top = self.low + np.array(self.size) / self.scale
         figure, box = axes.figure.bbox, axes.get_window_extent()
         left = round(box.x0) / figure.width

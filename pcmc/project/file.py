@@ -24,6 +24,7 @@ from .checking import check_keys
 from .drawn import is_drawing, with_drawing
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
+from .structure import Structure
 
 if TYPE_CHECKING:
     from ..design import Parameter, Target
@@ -52,6 +53,7 @@ class Project:
     search : whether further starts are tried where the first leads to no equilibrium.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
+    structure : of the structural model; None without [structure].
     files, picture : the output.
     folder : made for the output if it is missing; None if the names include their folders.
     view, colour : of the picture; ``colour`` is one of ``COLOURS``.
@@ -69,6 +71,7 @@ class Project:
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
     vary: Sequence[Parameter] = ()
+    structure: Structure | None = None
     files: Sequence[PathLike] = ()
     picture: PathLike | None = None
     folder: Path | None = None
@@ -232,6 +235,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             mesh_check=mesh_check,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
             **(_search(data["targets"]) if "targets" in data else {}),
+            structure=Structure(**data["structure"]) if "structure" in data else None,
             files=files,
             picture=picture,
             view=tuple(view) if isinstance(view, list) else view,

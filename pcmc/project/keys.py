@@ -18,6 +18,7 @@ from ..surface import Plane
 from .accuracy import AccuracyWanted
 from .output import COLOURS
 from .remeshing import WHEN, Remeshing
+from .structure import Structure
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
 FIRST = "First lines"  # the keys before any table
@@ -147,6 +148,7 @@ def main_sections() -> tuple[Section, ...]:
                 Key("solve", "a table", None, "the solver and its options"),
                 Key("remesh", "a table or a list of tables", None, "other triangles, once or more"),
                 Key("targets", "a table", None, "heights, areas or volumes to be met"),
+                Key("structure", "a table", None, "material, thickness and loads of the structural model"),
                 Key("output", "a table", None, "the files and the picture to write"),
             ),
         ),
@@ -176,11 +178,16 @@ def main_sections() -> tuple[Section, ...]:
             _of_class(Remeshing, choices={"when": WHEN}),
         ),
         Section(
+            "structure",
+            "The structural model that `pcmc structure` writes, in the units of the surface.",
+            _of_class(Structure, {"young": "a number", "wind": "a table"}),
+        ),
+        Section(
             "output",
             "What to write. Without it nothing is written.",
             (
                 Key("files", "a list of names", [], "files of the surface; the suffix names the format"),
-                Key("picture", "a text", None, "name of a picture, .png"),
+                Key("picture", "a text", None, "name of a picture, .png, .svg or .pdf"),
                 Key("view", "a name or two angles", "diagonal", directions),
                 Key("colour", "a text", "patches", "of the picture", COLOURS),
             ),
@@ -249,7 +256,7 @@ def sections() -> tuple[Section, ...]:
     """Every section that a project file may have, with its keys.
 
     >>> [key.name for key in sections()[0].keys]
-    ['units', 'force', 'plan', 'solve', 'remesh', 'targets', 'output']
+    ['units', 'force', 'plan', 'solve', 'remesh', 'targets', 'structure', 'output']
     """
     solve = (solve_section(method) for method in METHODS)
     return (*main_sections(), *solve, *target_sections(), _CURVE)

@@ -21,6 +21,7 @@ from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..energy.curvature import curvature_error, mean_curvature
+from ..plot.figure import SUFFIXES, check_suffix
 from ..surface import Surface
 
 PathLike = str | os.PathLike[str]
@@ -114,12 +115,11 @@ def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> N
     for file in files:
         suffix = Path(file).suffix.lower()
         if suffix not in io.FORMATS:
-            hint = "; a picture has its own option" if suffix == ".png" else ""
+            hint = "; a picture has its own option" if suffix in SUFFIXES else ""
             text = f"{file}: {unknown('suffix', suffix, io.FORMATS)}{hint}"
             raise FileError(text, what=str(file), found=suffix)
-    if picture is not None and Path(picture).suffix.lower() != ".png":
-        text = f"{picture}: pictures are written as .png only; change the suffix"
-        raise FileError(text, what=str(picture), found=Path(picture).suffix, expected=".png")
+    if picture is not None:
+        check_suffix(picture)
 
 
 def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:

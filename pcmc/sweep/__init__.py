@@ -11,6 +11,7 @@ each case in a process of its own (case_process.py, case_script.py). May import 
 
 from .grid import Sweep, checked
 from .running import Progress, run
+from .short_table import draw_sweep, short_table
 from .solving import solve_case
 from .store import Record, read_store
 from .table import provenance, table, write_table
@@ -20,9 +21,11 @@ __all__ = [
     "Record",
     "Sweep",
     "checked",
+    "draw_sweep",
     "provenance",
     "read_store",
     "run",
+    "short_table",
     "solve_case",
     "table",
     "write_table",

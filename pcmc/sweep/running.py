@@ -57,6 +57,7 @@ def run(
     time_limit: float | None = 600.0,
     retry_failed: bool = False,
     on_record: Callable[[Progress], object] | None = None,
+    on_resume: Callable[[int, int], object] | None = None,
 ) -> pd.DataFrame:
     """Run every case of the sweep that its store does not hold yet.
 
@@ -77,6 +78,7 @@ def run(
     retry_failed : run the stored cases that failed again.
     on_record : called with a Progress after each stored case. Raise StopIteration to stop as Ctrl-C does;
         any other exception passes through.
+    on_resume : called once, before any case runs, with how many cases the store holds and how many remain.
 
     Returns
     -------
@@ -100,7 +102,7 @@ def run(
     1        2  finished    1.0
     2        3  finished    1.5
     """
-    _check_options(executor, scheduler, workers, time_limit, on_record)
+    _check_options(executor, scheduler, workers, time_limit, on_record, on_resume)
     with ExitStack() as stack:
         stored = None if store is None else stack.enter_context(open_store(store, sweep))
         records = {} if stored is None else dict(stored.records)
@@ -109,6 +111,8 @@ def run(
             for number, parameters in enumerate(sweep)
             if number not in records or (retry_failed and records[number].failed)
         }
+        if on_resume is not None:
+            on_resume(len(sweep) - len(todo), len(todo))
         if todo:
             finished = SimpleQueue[Future[dict[str, Any]] | None]()
             stack.enter_context(_interrupts(lambda: finished.put(None)))
@@ -139,6 +143,7 @@ def _check_options(
     workers: int | None,
     time_limit: float | None,
     on_record: object,
+    on_resume: object,
 ) -> None:
     given = {"executor": executor, "scheduler": scheduler, "workers": workers}
     names = [name for name, value in given.items() if value is not None]
@@ -151,6 +156,8 @@ def _check_options(
         raise _wrong_option("scheduler", scheduler, "'tcp://host:8786'")
     if on_record is not None and not callable(on_record):
         raise _wrong_option("on_record", on_record, "a function of a Progress")
+    if on_resume is not None and not callable(on_resume):
+        raise _wrong_option("on_resume", on_resume, "a function of two numbers of cases")
     if workers is not None:
         validate.integer("workers", workers, least=1)
     if time_limit is not None:

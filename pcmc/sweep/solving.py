@@ -7,12 +7,15 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .. import existence, solvers
 from ..base import validate
 from ..base.errors import OptionError, PcmcError, unknown
 from ..energy.functional import gradient
 from ..solvers import find_method
 from ..solvers.result import Result
+from ..surface import Surface
 from .case_script import resolve
 from .grid import checked
 
@@ -20,6 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from ..accuracy import MeshCheck
+    from ..certificate import Certificate
 
 Parts = tuple[Callable[..., Any], dict[str, Any], dict[str, Any]]
 
@@ -114,6 +118,7 @@ def row(result: Result, names: Container[str]) -> dict[str, Any]:
         "gradient_squared": float((gradient(result.surface) ** 2).sum()),
         **certificate.numbers(),
         **_cells(certificate.patches, certificate.patches["patch"]),
+        **_heights(result.surface, certificate),
         **_cells(certificate.junctions, [f"junction {i}" for i in certificate.junctions.index]),
         **_cells(certificate.boundaries, [f"boundary {i}" for i in certificate.boundaries.index]),
     }
@@ -133,6 +138,22 @@ def mesh_columns(result: Result, check: Callable[[Result], MeshCheck]) -> dict[s
         return check(result).numbers()
     except PcmcError as error:  # the case itself is good without it
         return {"mesh_verdict": "not checked", "mesh_detail": str(error)}
+
+
+def _heights(surface: Surface, certificate: Certificate) -> dict[str, float]:
+    """The apex of each patch over Π, the rise over the lowest support, the roof's area, and the reactions."""
+    height, walls = surface.plane.height(surface.vertices), surface.walls
+    apex = np.full(len(surface.patches), -np.inf)
+    np.maximum.at(apex, surface.patch_of_face, height[surface.faces].max(axis=1))
+    lowest = height[surface.held].min(initial=height.max()) if surface.held.any() else height.min()
+    roof = ~walls if not walls.all() else walls
+    per_length = certificate.boundaries.get("per_length_max")
+    numbers = {f"{p.name}.apex": float(apex[k]) for k, p in enumerate(surface.patches) if not walls[k]}
+    return numbers | {
+        "rise": float(apex[roof].max() - lowest),
+        "roof_area": float(certificate.patches["area"][roof].sum()),
+        "largest_reaction": 0.0 if per_length is None else float(per_length.max()),
+    }
 
 
 def _cells(frame: pd.DataFrame, names: Iterable[str]) -> dict[str, Any]:

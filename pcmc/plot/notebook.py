@@ -1,0 +1,38 @@
+"""How a surface looks as the value of a notebook's cell: a picture above a few lines of text."""
+
+from __future__ import annotations
+
+import html
+from base64 import b64encode
+from io import BytesIO
+
+from ..base.errors import MissingExtra
+from ..solvers.result import Result
+from ..surface import Surface
+
+WIDTH = 700  # pixels
+
+
+def cell_html(value: Surface | Result) -> str:
+    """A picture of a surface, or of the one in a result, above its ``repr``; without ``plot`` the text alone.
+
+    >>> from pcmc import Patch
+    >>> one = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a<b", 1.0)], fixed=[0])
+    >>> "a&lt;b" in cell_html(one), cell_html(one).count("<img")
+    (True, 1)
+    """
+    text = f"<pre>{html.escape(repr(value))}</pre>"
+    try:
+        return _picture(value if isinstance(value, Surface) else value.surface) + text
+    except MissingExtra:
+        return text
+
+
+def _picture(surface: Surface) -> str:
+    from PIL import Image
+
+    from .pictures import draw
+
+    stream = BytesIO()
+    Image.fromarray(draw(surface, width=WIDTH, legend=True)).save(stream, format="PNG", optimize=True)
+    return f'<img alt="surface" src="data:image/png;base64,{b64encode(stream.getvalue()).decode()}">'
