@@ -1,12 +1,16 @@
 """Starting surfaces: the paper's examples, and surfaces with a closed form."""
 
+from .barrel import barrel
 from .bezier_hall import bezier_hall
+from .catenary import catenary
 from .delaunay import delaunay, delaunay_exact, delaunay_force, delaunay_limit, unduloid_length
 from .double_bubble import double_bubble, double_bubble_exact
 from .enneper import enneper, enneper_exact, enneper_wire
 from .fans import four_fans, three_patches
+from .hypar_roof import hypar_roof, hypar_roof_edge
 from .joined_caps import joined_caps, joined_caps_exact
 from .lens import hemisphere, hemisphere_exact, lens, lens_circle, lens_exact
+from .schwarz_p import schwarz_p
 from .sphere import sphere, sphere_exact
 from .spherical_cap import spherical_cap, spherical_cap_exact
 from .tetrahedron import (
@@ -15,12 +19,15 @@ from .tetrahedron import (
     tetrahedral_film,
     tetrahedral_film_exact,
 )
+from .triple_bubble import triple_bubble, triple_bubble_exact
 from .tubes import catenoid, catenoid_exact, catenoid_fold, catenoid_neck, cylinder, cylinder_exact
 from .two_caps import two_caps
 from .two_squares import two_squares
 
 __all__ = [
+    "barrel",
     "bezier_hall",
+    "catenary",
     "catenoid",
     "catenoid_exact",
     "catenoid_fold",
@@ -39,11 +46,14 @@ __all__ = [
     "four_fans",
     "hemisphere",
     "hemisphere_exact",
+    "hypar_roof",
+    "hypar_roof_edge",
     "joined_caps",
     "joined_caps_exact",
     "lens",
     "lens_circle",
     "lens_exact",
+    "schwarz_p",
     "skew_quadrilateral",
     "skew_quadrilateral_exact",
     "sphere",
@@ -53,6 +63,8 @@ __all__ = [
     "tetrahedral_film",
     "tetrahedral_film_exact",
     "three_patches",
+    "triple_bubble",
+    "triple_bubble_exact",
     "two_caps",
     "two_squares",
     "unduloid_length",

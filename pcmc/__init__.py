@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from .energy.functional import energy, gradient, hessian
     from .existence import solve
     from .io import read, write
+    from .io.repairing import Repaired, repair
     from .panels import FewerFamilies, Panels, fewer_families, panels
-    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface
+    from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
+    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
 
 __all__ = [
     "BoundaryMotion",
@@ -29,19 +31,26 @@ __all__ = [
     "Direction",
     "FewerFamilies",
     "Line",
+    "Material",
     "MeshCheck",
     "MeshVerdict",
     "Panels",
     "Parameter",
     "Patch",
     "Plane",
+    "Repaired",
     "Room",
+    "SelfWeight",
+    "Snow",
+    "StructuralModel",
     "Surface",
     "Target",
     "Verdict",
+    "Wind",
     "certify",
     "check_mesh",
     "curvature_error",
+    "cut",
     "energy",
     "errors",
     "explore",
@@ -52,12 +61,16 @@ __all__ = [
     "mean_curvature",
     "meet",
     "panels",
+    "mirrored",
     "read",
+    "repair",
+    "read_results",
     "sensitivities",
     "solve",
     "solve_to_accuracy",
     "target_curvature",
     "write",
+    "write_structure",
 ]
 
 # Each name is imported at its first use. So ``import pcmc`` takes milliseconds, and the command can
@@ -71,8 +84,18 @@ _NAMES = {
     "energy.functional": ("energy", "gradient", "hessian"),
     "existence": ("solve",),
     "io": ("read", "write"),
+    "io.repairing": ("Repaired", "repair"),
+    "structure": (
+        "Material",
+        "SelfWeight",
+        "Snow",
+        "StructuralModel",
+        "Wind",
+        "read_results",
+        "write_structure",
+    ),
     "panels": ("FewerFamilies", "Panels", "fewer_families", "panels"),
-    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
+    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
 }
 
 

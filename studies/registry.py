@@ -25,6 +25,7 @@ from . import (
     refinement,
     solvers,
     stability,
+    structure,
 )
 from .study import Study
 
@@ -47,6 +48,7 @@ MODULES = (
     accuracy,
     panel_families,
     gallery,
+    structure,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out

@@ -1,5 +1,6 @@
 """What several test files start from."""
 
+import os
 import signal
 
 import pytest
@@ -14,6 +15,7 @@ def pytest_sessionstart():
     Some tests raise SIGINT, and a process that they start inherits whether it is ignored.
     """
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    os.environ["PCMC_CACHE"] = "off"  # no test takes a roof that another run has solved
 
 
 @pytest.fixture(scope="session")

@@ -318,7 +318,7 @@ def test_counts_and_offsets_that_vtk_believes(tmp_path, suffix, old, new, capfd)
 def test_field_data_without_a_value_are_none(tmp_path, suffix):
     path = vtk(tmp_path, suffix, 'NumberOfTuples="1"', 'NumberOfTuples="0"')
     with pytest.warns(FileWarning):
-        assert pcmc.io.read_bare(path).m == 4
+        assert pcmc.io.read_bare(path)[0].m == 4
 
 
 def test_a_reader_that_dies_is_an_error_and_the_next_file_is_read(tmp_path, monkeypatch):

@@ -157,7 +157,7 @@ def test_rhino_quads_on_layers(tmp_path):
     model.Objects.AddPoint(rhino3dm.Point3d(0, 0, 0))
     model.Write(str(tmp_path / "a.3dm"), 7)
     with pytest.warns(FileWarning, match=r"2 quads were .*; 1 objects that are not meshes were"):
-        check(pcmc.read(tmp_path / "a.3dm"))
+        check(pcmc.read(tmp_path / "a.3dm", units="mm"))  # the library's own unit
     empty = rhino3dm.File3dm()
     empty.Objects.AddPoint(rhino3dm.Point3d(0, 0, 0))
     empty.Write(str(tmp_path / "b.3dm"), 7)

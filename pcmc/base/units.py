@@ -30,6 +30,20 @@ FORCES = ("N", "kN", "MN", "lbf", "kip")
 DXF_UNITS = {1: "in", 2: "ft", 3: "mi", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 13: "µm", 14: "dm"}
 """The units of length by ``$INSUNITS`` of a .dxf file; 0 is none."""
 
+RHINO_UNITS = {
+    "Meters": "m",
+    "Millimeters": "mm",
+    "Centimeters": "cm",
+    "Feet": "ft",
+    "Inches": "in",
+    "Microns": "µm",
+    "Decimeters": "dm",
+    "Kilometers": "km",
+    "Yards": "yd",
+    "Miles": "mi",
+}
+"""The units of length by the name of a .3dm file's unit system."""
+
 
 @dataclass(frozen=True)
 class Units:
@@ -40,7 +54,7 @@ class Units:
 
     Attributes
     ----------
-    length : one of ``LENGTHS``, or empty.
+    length : one of ``MICROMETRES``, or empty; projects and pages use those of ``LENGTHS``.
     force : one of ``FORCES``, or empty; it needs a length.
 
     Raises
@@ -61,7 +75,7 @@ class Units:
 
     def __post_init__(self) -> None:
         if self.length:
-            validate.choice("units", self.length, LENGTHS)
+            validate.choice("units", self.length, tuple(MICROMETRES))
         if self.force:
             validate.choice("force", self.force, FORCES)
         if self.force and not self.length:
@@ -98,9 +112,23 @@ class Units:
         return f"{self.tension}²"
 
     @property
+    def sentence(self) -> str:
+        """All units in one line, for the head of a table.
+
+        >>> Units("m", "kN").sentence
+        'lengths in m, tensions in kN/m, pressures in kN/m², reactions in kN'
+        """
+        lengths, reactions = f"lengths in {self.length or 'length'}", f"reactions in {self.force or 'force'}"
+        return f"{lengths}, tensions in {self.tension}, pressures in {self.pressure}, {reactions}"
+
+    @property
     def energy(self) -> str:
         """The unit of E: "kN·m"."""
         return f"{self.force or 'force'}·{self.length or 'length'}"
+
+
+NO_UNITS = Units()
+"""Those of numbers whose units are not given."""
 
 
 def length_factor(source: str, target: str) -> float:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import math
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,11 +14,14 @@ import typer
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
-from ..io import FORMATS, read_bare
+from ..base.units import Units
+from ..io import FORMATS, READ_ONLY, read_bare
+from ..io.mesh_data import MeshData
+from ..project.output import OnStep
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 
-TOML = ".toml"
+TOML, DXF = ".toml", ".dxf"
 
 
 def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
@@ -24,7 +29,8 @@ def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, metavar=metavar, help=meaning, **more)
 
 
-Input = Annotated[Path, typer.Argument(metavar="FILE", help="A surface, or a project (.toml).")]
+INPUT = "A surface, a project (.toml), or a drawing (.dxf, .3dm)."
+Input = Annotated[Path, typer.Argument(metavar="FILE", help=INPUT)]
 _EVERY = "A bare VALUE applies to every patch under pressure"
 Settings = Annotated[list[str] | None, option("NAME=VALUE", f"Tension of a patch. {_EVERY}.", "--tension")]
 Pressures = Annotated[
@@ -33,6 +39,10 @@ Pressures = Annotated[
 ]
 ViewName = Annotated[str, option("NAME", "diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")]
 Colour = Annotated[str, option("NAME", "patches, curvature, error or reactions.", "--colour", "--color")]
+START = "The start shape of a project, before it is solved, instead of its designed roof."
+Start = Annotated[bool, typer.Option("--start", help=START)]
+CACHE = "Keep a project's roof and take it from there the next time; --no-cache solves it again."
+Cache = Annotated[bool, typer.Option("--cache/--no-cache", help=CACHE)]
 MANY_FILES = option("FILE", "File to write; may be repeated.", "-o", "--output")
 
 
@@ -52,27 +62,64 @@ def integer(text: str | int) -> int:
         raise typer.BadParameter(f"expected a whole number, found {text!r}") from None
 
 
-def surface_in(file: Path) -> Surface:
-    """The surface in a file, or the start surface of a project."""
+@dataclass(frozen=True, eq=False)
+class Given:
+    """The surface that a command is given.
+
+    Attributes
+    ----------
+    surface : the surface in a file, the designed roof of a project, or its start shape.
+    units : of its numbers.
+    outcome : how the roof of a project was reached; None for a file and for a start shape.
+    data : everything in a file; None for a project, and where its tensions or pressures are changed.
+    """
+
+    surface: Surface
+    units: Units
+    outcome: projects.Outcome | None = None
+    data: MeshData | None = None
+
+
+def given(
+    file: Path,
+    say: OnStep,
+    tension: list[str] | None = None,
+    pressure: list[str] | None = None,
+    *,
+    start: bool = False,
+    cache: bool = True,
+) -> Given:
+    """The surface in a file, or the designed roof of a project; with ``start`` its start shape."""
     check_input(file)
-    return projects.build(file) if file.suffix.lower() == TOML else read_bare(file)
+    changed = partial(retensioned, tension=tension, pressure=pressure) if tension or pressure else None
+    if not projects.is_project(file):
+        surface, data = read_bare(file)
+        if changed is None:
+            return Given(surface, data.units, data=data)
+        return Given(changed(surface), data.units)
+    project = projects.load(file)
+    if start:
+        surface = projects.surface_of(project)
+        return Given(surface if changed is None else changed(surface), project.units)
+    outcome = projects.designed(project, say, changed=changed, use_cache=cache)
+    return Given(outcome.surface, outcome.units, outcome)
 
 
 def check_input(file: Path) -> None:
-    """Refuse a file whose suffix is neither a project's nor a surface's."""
-    suffix = file.suffix.lower()
-    if suffix not in (TOML, *FORMATS):
-        raise FileError(f"{file}: {unknown('suffix', suffix, [TOML, *FORMATS])}", what=str(file))
+    """Refuse a file whose suffix is neither a project's nor a drawing's nor a surface's."""
+    suffix, known = file.suffix.lower(), (TOML, *FORMATS, *READ_ONLY, DXF)
+    if suffix not in known:
+        raise FileError(f"{file}: {unknown('suffix', suffix, known)}", what=str(file))
 
 
 def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str] | None) -> Surface:
     """The surface with the tensions and pressures of the command line."""
     loaded = [patch.name for patch in surface.patches if not patch.auxiliary]
-    tensions, pressures = _by_name(loaded, tension, "--tension"), _by_name(loaded, pressure, "--pressure")
+    tensions, pressures = by_name(loaded, tension, "--tension"), by_name(loaded, pressure, "--pressure")
     return with_pressures(surface, tensions, pressures)
 
 
-def _by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:
+def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:
     """Value by patch, from NAME=VALUE, or VALUE for all ``names``. A later one replaces an earlier one."""
     values: dict[str, float] = {}
     for text in given or ():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -11,11 +12,13 @@ import typer
 from .. import project as projects
 from ..base.errors import OptionError, unknown
 from ..base.interrupts import defer_interrupts
-from ..io import load, write
+from ..base.units import NO_UNITS
+from ..io import write
 from ..surface import Surface
-from . import OK, arguments
-from .arguments import TOML, Colour, Input, Pressures, Settings, ViewName, option
+from . import NOT_CERTIFIED, OK, arguments
+from .arguments import Cache, Colour, Input, Pressures, Settings, Start, ViewName, option
 from .progress import working
+from .reports import report
 
 
 def convert(
@@ -25,24 +28,47 @@ def convert(
     ],
     tension: Settings = None,
     pressure: Pressures = None,
+    start: Start = False,
+    cache: Cache = True,
+    colour: Annotated[
+        str,
+        option(
+            "NAME", "Scalar of the file that colours the vertices of a .glb or .usda.", "--colour", "--color"
+        ),
+    ] = "",
 ) -> int:
-    """Write a surface in another format: .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf .3dm.
+    """Write a surface or a project's roof as .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf .3dm .ifc .usda.
 
     \b
-    Example:
+    Examples:
       pcmc convert roof.pcmc roof.3dm
+      pcmc convert roof.toml roof.ifc
+      pcmc convert roof.pcmc roof.glb --colour error
     """
     projects.check_names([output])
     projects.check_outputs([output])
-    surface = arguments.retensioned(arguments.surface_in(file), tension, pressure)
-    data: dict[str, Any] = {}
-    if file.suffix.lower() != TOML and not (tension or pressure):
-        content = load(file)
-        data = {"scalars": content.scalars, "certificate": content.certificate or None}
-    with defer_interrupts():
-        write(output, surface, **data)
+    with working() as say:
+        shown = arguments.given(file, say, tension, pressure, start=start, cache=cache)
+    if shown.outcome is not None:
+        if not _is_good(file, shown.outcome):
+            return NOT_CERTIFIED
+        projects.write_all(projects.surface_files(shown.outcome, [output], colour))
+    else:
+        data: dict[str, Any] = {"units": shown.units, "colour": colour}
+        if shown.data is not None:
+            data |= {"scalars": shown.data.scalars, "certificate": shown.data.certificate or None}
+        with defer_interrupts():
+            write(output, shown.surface, **data)
     print(f"written: {output}")
     return OK
+
+
+def _is_good(file: Path, outcome: projects.Outcome) -> bool:
+    """Print how the design of a project ended; whether its roof may be shown as the designed one."""
+    report(outcome)
+    if not outcome.good:
+        print(f"nothing written (pcmc explore {file} shows this roof, --start the start shape)")
+    return outcome.good
 
 
 def plot(
@@ -50,19 +76,26 @@ def plot(
     picture: Annotated[Path, typer.Argument(metavar="PNG")],
     view: ViewName = "diagonal",
     colour: Colour = "patches",
+    start: Start = False,
+    cache: Cache = True,
 ) -> int:
-    """Draw a surface, coloured by patch, mean curvature or curvature error, or with its reactions.
+    """Draw a surface or a project's roof, by patch, mean curvature, curvature error, or with its reactions.
 
     \b
-    Example:
+    Examples:
       pcmc plot roof.pcmc roof.png --colour error
+      pcmc plot roof.toml start.png --start
     """
     projects.check_names([], picture)
     seen = arguments.view_of(view)
     projects.check_picture(seen, colour)
     projects.check_outputs([picture])
-    surface = arguments.surface_in(file)
-    projects.write_all([(picture, lambda path: projects.paint(surface, path, seen, colour))])
+    with working() as say:
+        shown = arguments.given(file, say, start=start, cache=cache)
+    if shown.outcome is not None and not _is_good(file, shown.outcome):
+        return NOT_CERTIFIED
+    painting = partial(projects.paint, shown.surface, view=seen, colour=colour, units=shown.units)
+    projects.write_all([(picture, painting)])
     print(f"written: {picture}")
     return OK
 
@@ -78,8 +111,10 @@ def explore(
     host: Annotated[str, option("ADDRESS", "Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, option("NUMBER", "Port; 0 for any free one.", parser=arguments.integer)] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
+    start_shape: Start = False,
+    cache: Cache = True,
 ) -> int:
-    """Explore a surface in the browser until Ctrl-C.
+    """Explore a surface, or a project's roof, in the browser until Ctrl-C.
 
     \b
     Examples:
@@ -93,12 +128,15 @@ def explore(
     with working() as say:
         say("building")
         if file is not None:
-            surface, title = arguments.surface_in(file), file.name
+            shown = arguments.given(file, say, start=start_shape, cache=cache)
+            surface, title, units = shown.surface, file.name, shown.units
+            if shown.outcome is not None:
+                report(shown.outcome)
         else:
             values = {name: listed[0] for name, listed in map(arguments.values_of, parameter or ())}
-            surface, title = _example(str(example), values), str(example)
+            surface, title, units = _example(str(example), values), str(example), NO_UNITS
         say("solving")
-        explorer = start(surface, host, port, title)
+        explorer = start(surface, host, port, title, units)
     open_and_wait(explorer, browser)
     return OK
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,13 +15,14 @@ from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
-from ..base.errors import PcmcError
+from ..base.errors import FileError, PcmcError
 from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import MANY_FILES, TOML, Input, Pressures, Settings, number, option
+from .arguments import MANY_FILES, Cache, Input, Pressures, Settings, Start, number, option
 from .progress import working
+from .reports import report
 
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
 CHECKED = f"Solve on two finer meshes, too, for error bars; by default up to {MOST_CHECKED} triangles."
@@ -49,6 +51,7 @@ def solve_(
     accuracy_of: Annotated[str | None, option("NAME", ACCURACY_OF, "--accuracy-of")] = None,
     most_triangles: Annotated[int | None, option("NUMBER", MOST_TRIANGLES, parser=arguments.integer)] = None,
     mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
+    cache: Cache = True,
 ) -> int:
     """Solve a surface or a project, certify it, write all files, or none; then check its mesh.
 
@@ -71,10 +74,13 @@ def solve_(
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
     project = replace(project, mesh_check=False)
+    if projects.is_drawing(file) and project.drawing is not None:
+        print(projects.proposal_text(project))
     with working() as say:
         changed = partial(arguments.retensioned, tension=tension, pressure=pressure)
-        outcome = projects.run_project(project, say, anyway=anyway, changed=changed)
-    _report(outcome)
+        changed = changed if tension or pressure else None
+        outcome = projects.run_project(project, say, anyway=anyway, changed=changed, use_cache=cache)
+    report(outcome)
     if project.outputs and not outcome.files:
         print("nothing written (use --anyway to write it)")
     _check_mesh(project, outcome, wanted)
@@ -98,32 +104,26 @@ def _check_mesh(project: projects.Project, outcome: projects.Outcome, wanted: bo
         print(f"\n{check.brief()}")
 
 
-def _report(outcome: projects.Outcome) -> None:
-    """Print how the solver ended, the targets and parameters, the verdict, and the files written."""
-    print(f"{outcome.surface.m} triangles; {outcome.result.message}")
-    if outcome.accurate is not None:
-        print(outcome.accurate.message)
-    if outcome.design is not None:
-        print(f"targets {outcome.design.message}")
-        if outcome.design.met:  # otherwise the message has the values
-            tables = (outcome.design.targets, outcome.design.parameters)
-            print(", with ".join(", ".join(f"{k} {v:.6g}" for k, v in t["value"].items()) for t in tables))
-    print(outcome.certificate.verdict.value)
-    if outcome.certificate.detail:
-        print(outcome.certificate.detail)
-    if outcome.files:
-        print(f"written: {', '.join(map(str, outcome.files))}")
-
-
 def _project(
     file: Path, folder: Path | None, output: list[Path] | None, picture: Path | None
 ) -> projects.Project:
     """The project, with the output files of the command line if there are any."""
     arguments.check_input(file)
-    if file.suffix.lower() != TOML:
+    if not projects.is_project(file):
         return projects.Project(file, files=output or (), picture=picture, folder=folder)
     project = projects.load(file).in_folder(file.parent if folder is None else folder)
+    _keep_drawing(project, output or ())
     return replace(project, files=output or project.files, picture=picture or project.picture)
+
+
+def _keep_drawing(project: projects.Project, outputs: Sequence[Path]) -> None:
+    """Refuse to write a roof over the drawing that it is made from."""
+    if project.drawing is None:
+        return
+    for path in outputs:
+        if path.resolve() == project.drawing.path.resolve():
+            text = f"{path}: this is the drawing; name another file for the roof"
+            raise FileError(text, what=str(path))
 
 
 def certify_(
@@ -131,28 +131,35 @@ def certify_(
     tension: Settings = None,
     pressure: Pressures = None,
     meshes: Annotated[int | None, option("NUMBER", MESHES, parser=arguments.integer)] = None,
+    start: Start = False,
+    cache: Cache = True,
 ) -> int:
-    """Check a surface: residual forces, curvature errors, stability, reactions.
+    """Check a surface, or a project's roof: residual forces, curvature errors, stability, reactions.
 
     \b
     Examples:
       pcmc certify roof.pcmc
+      pcmc certify roof.toml
       pcmc certify roof.pcmc --meshes 3
     """
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as say:
+        shown = arguments.given(file, say, tension, pressure, start=start, cache=cache)
+        surface, outcome = shown.surface, shown.outcome
         say("certifying")
-        surface = arguments.retensioned(arguments.surface_in(file), tension, pressure)
-        certificate = certify(surface)
-    print(certificate)
+        certificate = certify(surface) if outcome is None else outcome.certificate
+    if outcome is not None:
+        report(outcome, verdict=False)
+    print(certificate.text(shown.units))
     if meshes is not None and certificate.index is not None:
         sys.stdout.flush()
         with working() as say:
             say("checking the mesh")
             check = check_mesh(surface, meshes)
         print(f"\n{check}")
-    return OK if certificate.certified else NOT_CERTIFIED
+    good = certificate.certified if outcome is None else outcome.good
+    return OK if good else NOT_CERTIFIED
 
 
 def remesh_(
@@ -179,14 +186,16 @@ def remesh_(
     if not solved:
         with working() as say:
             say("remeshing")
-            surface = remesh(arguments.surface_in(file), **stage.options)
-            projects.write_all([(path, partial(write, surface=surface)) for path in output], say)
+            shown = arguments.given(file, say, start=True)
+            surface = remesh(shown.surface, **stage.options)
+            writing = partial(write, surface=surface, units=shown.units)
+            projects.write_all([(path, writing) for path in output], say)
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
     project = replace(_project(file, None, output, None), remeshing=(stage,), picture=None)
     with working() as say:
         outcome = projects.run_project(project, say)
-    _report(outcome)
+    report(outcome)
     if outcome.files:
         return OK
     print("nothing written (use --no-solve to write the new mesh)")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..base.units import NO_UNITS, Units
 from ..surface import Surface
 
 if TYPE_CHECKING:
@@ -56,11 +57,13 @@ def open_and_wait(explorer: Explorer, open_browser: bool = True) -> None:
         explorer.close()
 
 
-def start(surface: Surface, host: str = "127.0.0.1", port: int = 0, title: str = "") -> Explorer:
+def start(
+    surface: Surface, host: str = "127.0.0.1", port: int = 0, title: str = "", units: Units = NO_UNITS
+) -> Explorer:
     """Start the server in the background; the Explorer returned has ``.url`` and ``.close()``."""
     from .server import Explorer
 
-    return Explorer(surface, host, port, title)
+    return Explorer(surface, host, port, title, units)
 
 
 def show(surface: Surface, height: int = 680, title: str = "") -> View:

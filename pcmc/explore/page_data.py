@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from ..accuracy.mesh_check import MeshCheck, with_bar
 from ..base.arrays import Floats
+from ..base.units import Units
 from ..certificate.balance import reactions_per_length
 from ..certificate.certificate import Certificate
 from ..energy.curvature import curvature_error, mean_curvature
@@ -54,6 +55,13 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
         "fixed": np.flatnonzero(surface.fixed),
         "sliding": np.flatnonzero(surface.on_plane),
     }
+
+
+def unit_texts(units: Units) -> dict[str, Any]:
+    """The units that the page shows; ``given`` is whether they are more than "force" and "length"."""
+    names = ("area", "volume", "curvature", "tension", "pressure", "energy")
+    texts = {name: getattr(units, name) for name in names}
+    return {"given": bool(units), "length": units.length or "length", **texts}
 
 
 def centre(surface: Surface) -> Floats:

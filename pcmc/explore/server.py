@@ -24,12 +24,13 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from ..base.errors import MissingExtra, OptionError, PcmcError, SurfaceError, unknown
+from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..io import FORMATS, write
 from ..project.output import fields as written_fields
 from ..surface import Patch, Surface
 from .messages import pack, plain
-from .page_data import centre, fields, findings, mesh_findings, outline
+from .page_data import centre, fields, findings, mesh_findings, outline, unit_texts
 from .session import Session, State, solved_start
 
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
@@ -62,13 +63,13 @@ class Explorer:
     Each page has its own session in ``sessions``, the most recently used last.
     """
 
-    def __init__(self, surface: Surface, host: str, port: int, title: str) -> None:
+    def __init__(self, surface: Surface, host: str, port: int, title: str, units: Units = NO_UNITS) -> None:
         if not isinstance(surface, Surface):
             found = type(surface).__name__
             raise SurfaceError(f"explore: expected a Surface, found {found}", what="surface", found=found)
         self._server = _listen(host, port)
         self._server.explorer = self
-        self.title = title
+        self.title, self.units = title, units
         self.local = host in LOOPBACK
         self.origin = centre(surface)
         self.start = solved_start(surface)
@@ -264,7 +265,8 @@ class _Handler(BaseHTTPRequestHandler):
                 raise RequestError(f"session: expected a name, found {name!r:.60}")
             name, session = (name, explorer.session(name)) if name else explorer.open()
             header, arrays = outline(session.surface)
-            first = {"session": name, "title": explorer.title, "formats": list(FORMATS), **header}
+            about = {"title": explorer.title, "units": unit_texts(explorer.units)}
+            first = {"session": name, "formats": list(FORMATS), **about, **header}
             self._send_state(session.state(), first, arrays)
         elif len(steps) == 3 and steps[0] == "api" and steps[2] == "check":
             check = explorer.session(steps[1]).check_mesh()
@@ -328,7 +330,8 @@ class _Handler(BaseHTTPRequestHandler):
             warnings.simplefilter("ignore")  # the page says which formats carry the numbers
             path = Path(folder) / f"surface{suffix}"
             scalars = written_fields(state.surface, state.certificate)
-            write(path, state.surface, scalars=scalars, certificate=plain(state.certificate.numbers()))
+            numbers = plain(state.certificate.numbers())
+            write(path, state.surface, scalars=scalars, certificate=numbers, units=self.server.explorer.units)
             body = path.read_bytes()
         self._send(body, "application/octet-stream", f'attachment; filename="surface{suffix}"')
 

@@ -7,14 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field
 
 from ..base.errors import FileError
+from ..base.units import NO_UNITS, Units
 from ..surface import Patch, Plane, Surface
 
 
-def metadata_text(surface: Surface) -> str:
-    """Patches, plane and counts as JSON, for the comment or metadata of a format."""
+def metadata_text(surface: Surface, units: Units = NO_UNITS) -> str:
+    """Patches, plane, counts, and units if there are any, as JSON: a format's comment or metadata."""
     patches = [_row(patch) for patch in surface.patches]
     plane = surface.plane.point, surface.plane.normal
-    return json.dumps({"patches": patches, "plane": plane, "counts": [surface.n, surface.m]})
+    values: dict[str, object] = {"patches": patches, "plane": plane, "counts": [surface.n, surface.m]}
+    return json.dumps(values | ({"units": astuple(units)} if units else {}))
 
 
 def _row(patch: Patch) -> tuple[object, ...]:
@@ -25,11 +27,12 @@ def _row(patch: Patch) -> tuple[object, ...]:
 
 @dataclass(frozen=True)
 class Metadata:
-    """The same read back: patches by name, the plane, numbers of vertices and faces."""
+    """The same read back: patches by name, the plane, numbers of vertices and faces, units."""
 
     patches: Mapping[str, Patch] = field(default_factory=dict)
     plane: Plane | None = None
     counts: tuple[int, int] | None = None
+    units: Units = NO_UNITS
 
     def named(self, names: Sequence[str]) -> tuple[Patch, ...]:
         """The patches of these names; tension and pressure are 1 where the metadata lack them."""
@@ -49,9 +52,11 @@ def parse_metadata(text: str | None) -> Metadata:
     try:
         values = json.loads(text)
         patches = [Patch(*p) for p in values["patches"]]
-        plane = Plane(*(tuple(v) for v in values["plane"]))
+        point, normal = map(tuple, values["plane"])
+        plane = Plane(point, normal)
         counts = (int(values["counts"][0]), int(values["counts"][1]))
+        units = Units(*values.get("units", ()))
     except (ValueError, KeyError, TypeError, IndexError):
         message = f"the pcmc metadata in it are damaged: {text[:60]!r}"
         raise FileError(message, where="metadata", found=text[:60]) from None
-    return Metadata({p.name: p for p in patches}, plane, counts)
+    return Metadata({p.name: p for p in patches}, plane, counts, units)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
+from ..base.units import Units
 from ..surface import Surface
 from .mesh_data import FREE, HELD, MeshData, support_of
 from .metadata import metadata_text, parse_metadata
@@ -26,11 +27,11 @@ POINT = re.compile(r"^[^\S\n]*p[^\S\n]+(\d[\d \t]*)$", re.M)
 CORNER = re.compile(r"[-+]?\d{1,18}(/\S*)?")
 
 
-def write(path: Path, surface: Surface, **_: Any) -> None:
+def write(path: Path, surface: Surface, units: Units, **_: Any) -> None:
     """Vertices with all digits, supports, then the faces group by group."""
     support = support_of(surface)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"{MARK}{metadata_text(surface)}\n")
+        file.write(f"{MARK}{metadata_text(surface, units)}\n")
         file.write(format_rows("v %r %r %r\n", *surface.vertices.T))
         for name, kind in HELD.items():
             held = np.flatnonzero(support == kind) + 1
@@ -69,8 +70,8 @@ def read(path: Path) -> MeshData:
     metadata.check_counts(len(X), len(F))
     known = support if comment or support.any() else None
     patch, patches = np.concatenate(groups)[source], metadata.named(list(names))
-    joined = metadata.counts is not None
-    return MeshData(X, F, patch, patches, known, metadata.plane, notes=notes, joined=joined)
+    about: dict[str, Any] = {"joined": metadata.counts is not None, "units": metadata.units}
+    return MeshData(X, F, patch, patches, known, metadata.plane, notes=notes, **about)
 
 
 def _vertices(text: str) -> Floats:

@@ -38,6 +38,5 @@ def from_meshes(scene: Any, default: str, metadata: Metadata) -> MeshData:
     scalars = {k: np.concatenate(v) for k, v in data.items() if sum(map(len, v)) == start}
     patch, names = pd.factorize(np.array(named, dtype=object))
     patches = metadata.named(names.tolist())
-    return MeshData(
-        np.concatenate(X), np.concatenate(F), patch, patches, plane=metadata.plane, scalars=scalars
-    )
+    about: dict[str, Any] = {"plane": metadata.plane, "scalars": scalars, "units": metadata.units}
+    return MeshData(np.concatenate(X), np.concatenate(F), patch, patches, **about)

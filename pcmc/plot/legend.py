@@ -7,28 +7,27 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from ..base.arrays import Bools, Floats
 from ..surface import Surface
 from ..surface.colours import patch_colors, rgb
 from .figure import INK, SMALL
-from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT
+from .raster import Painted
+from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, Scene
 
 IN_A_LINE = 6
-ALIKE = 0.03  # difference of two colours' directions up to which one may be the other in a shade
-SHADES = (0.5, 1.06)  # brightness of a sheet, lit or not, of its colour's
+LEAST_PATCH, LEAST_DOT = 9.0, 4.0  # pixels from which a patch, a dot counts as seen
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """A surface in a picture: the patches drawn, the values that colour it, whether supports are dots."""
+    """A surface in a picture: the patches drawn, the values that colour it, and what is seen of it."""
 
     surface: Surface
     patches: Sequence[str] | None
     values: Floats | None
-    dots: bool
-    image: Floats  # (h,w,3), as painted
+    scene: Scene
+    painted: Painted
 
 
 def shown_vertices(surface: Surface, patches: Sequence[str] | None) -> Bools:
@@ -44,32 +43,27 @@ def entries(pictures: Iterable[Shown]) -> tuple[dict[str, Any], dict[str, Any]]:
     colors: dict[str, Any] = {}
     dots: dict[str, Any] = {}
     for picture in pictures:
-        surface, values, names = picture.surface, picture.values, picture.patches
-        shown = shown_vertices(surface, names)
+        surface, values = picture.surface, picture.values
+        shown = shown_vertices(surface, picture.patches)
         if values is None:
-            for patch, color in zip(surface.patches, patch_colors(surface), strict=True):
-                if (names is None or patch.name in names) and _visible(picture.image, color, 3):
-                    colors.setdefault(patch.name, tuple(color))
+            for patch in np.flatnonzero(_pixels_of_patches(picture) >= LEAST_PATCH):
+                colors.setdefault(surface.patches[patch].name, tuple(patch_colors(surface)[patch]))
         elif np.isnan(values[shown] if len(values) == surface.n else values).any():
             colors["no value"] = NO_VALUE
-        for name, held, dot in (
-            ("fixed", surface.fixed, FIXED_DOT),
-            ("sliding", surface.held & ~surface.fixed, SLIDING_DOT),
-        ):
-            if picture.dots and held[shown].any() and _visible(picture.image, rgb(dot), 2):
+        seen = picture.scene.dot_colors[picture.painted.dots >= LEAST_DOT]
+        for name, dot in (("fixed", FIXED_DOT), ("sliding", SLIDING_DOT)):
+            if (seen == rgb(dot)).all(axis=1).any():
                 dots[name] = dot
     return colors, dots
 
 
-def _visible(image: Floats, color: Floats, across: int) -> bool:
-    """Whether a square of so many pixels has the colour, in any shade: thinner lines are mixed colours."""
-    size = np.linalg.norm(image, axis=2)
-    reference = float(np.linalg.norm(color)) * 255.0
-    alike = (
-        np.linalg.norm(image / np.maximum(size, 1.0)[..., None] - color * 255.0 / reference, axis=2) < ALIKE
-    )
-    alike &= (size > SHADES[0] * reference) & (size < SHADES[1] * reference)
-    return bool(sliding_window_view(alike, (across, across)).all(axis=(2, 3)).any())
+def _pixels_of_patches(picture: Shown) -> Floats:
+    """(k,) pixels on which each patch is seen."""
+    surface, names = picture.surface, picture.patches
+    patch = surface.patch_of_face
+    if names is not None:
+        patch = patch[surface.patch_faces([surface.patch_index(name) for name in names])]
+    return np.bincount(patch, picture.painted.triangles, len(surface.patches))
 
 
 def add_legend(figure: Any, pictures: Iterable[Shown]) -> None:

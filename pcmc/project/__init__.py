@@ -1,8 +1,13 @@
 """A whole design in one TOML file: plan, solver, remeshing, targets, output.
 
-Gives ``run`` and ``load`` to sweeps, the page and the command. May import ``plot`` and the rooms below it.
+Gives ``designed``, ``run`` and ``load`` to sweeps, page, command. May import ``plot`` and the rooms below it.
+
+``designed(path)`` is the roof that a project describes, from a cache if it was solved before.
 
 ``sections()`` lists every section and key of a project file; ``reference()`` prints the list::
+
+    units = "m"               # optional: of lengths; and of forces
+    force = "kN"
 
     [plan]
     edge_length = 1.0
@@ -25,11 +30,19 @@ Gives ``run`` and ``load`` to sweeps, the page and the command. May import ``plo
     picture = "roof.png"
 """
 
+from .cache import cached_files
+from .cache import clear as clear_cache
+from .cache import folder as cache_folder
+from .designed import designed
+from .drawn import files_of, is_drawing
 from .file import Project, build, load, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
+from .outcome import Outcome
 from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
+from .planning import project_text, proposal_text
 from .remeshing import Remeshing
-from .running import Outcome, check_of, check_project_mesh, run, run_project, solve_project
+from .running import check_of, check_project_mesh, run, run_project, solve_project, surface_files
+from .structure import Structure
 from .varied import check_varied, digest, is_project, varied
 
 __all__ = [
@@ -41,22 +54,32 @@ __all__ = [
     "Project",
     "Remeshing",
     "Section",
+    "Structure",
     "build",
+    "cache_folder",
+    "cached_files",
     "check_names",
     "check_of",
     "check_outputs",
     "check_project_mesh",
     "check_picture",
     "check_varied",
+    "clear_cache",
+    "designed",
     "digest",
+    "files_of",
+    "is_drawing",
     "is_project",
     "load",
     "paint",
+    "project_text",
+    "proposal_text",
     "reference",
     "run",
     "run_project",
     "sections",
     "solve_project",
+    "surface_files",
     "surface_of",
     "varied",
     "write_all",

@@ -18,6 +18,7 @@ from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknown
 from ..base.files import atomic_writes, check_name
 from ..base.interrupts import defer_interrupts
+from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..energy.curvature import curvature_error, mean_curvature
 from ..plot.figure import SUFFIXES, check_suffix
@@ -79,18 +80,19 @@ def _final_name_in_warnings(temporary: Path, path: Path) -> Iterator[None]:
             warnings.warn(text, warning.category, stacklevel=4)
 
 
-def paint(surface: Surface, path: PathLike, view: Any, colour: str) -> None:
+def paint(surface: Surface, path: PathLike, view: Any, colour: str, units: Units = NO_UNITS) -> None:
     """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
     # needs the extra plot, which a project without a picture does not
     from ..plot import draw, reactions
 
     check_picture(view, colour)
     if colour == "curvature":
-        draw(surface, path, view=view, scalars=mean_curvature(surface), label="mean curvature")
+        label = f"mean curvature, {units.curvature}"
+        draw(surface, path, view=view, scalars=mean_curvature(surface), label=label)
     elif colour == "error":
         draw(surface, path, view=view, scalars=curvature_error(surface), label="curvature error")
     elif colour == "reactions":
-        reactions(surface, path, view=view)
+        reactions(surface, path, view=view, label=units.tension)
     else:
         draw(surface, path, view=view, legend=True)
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -18,52 +18,22 @@ from ..base.arrays import Ints
 from ..base.errors import BalanceWarning, OptionError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
-from ..certificate.certificate import Certificate
 from ..contact.pinching import standing_part
 from ..existence import solve
 from ..meshing.remeshing import remesh
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
-from .file import Project, in_file, load, surface_of
+from . import cache
+from .file import Project, in_file, load, start_of
+from .outcome import Outcome
 from .output import OnStep, PathLike, check_names, check_outputs, fields, ignore, paint, write_all
 
 if TYPE_CHECKING:
-    from ..accuracy import AccurateResult, MeshCheck
+    from ..accuracy import MeshCheck
     from ..design import Design
 
 
 SAME = 1e-9  # of the size: a vertex this near to a corner of the plan is that corner
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """The result of a project, the files written, the search for its targets, and its mesh check.
-
-    ``design``, ``mesh_check`` and ``accurate``, the search for an accuracy, are None where the project asks
-    for none.
-    """
-
-    result: Result
-    files: Sequence[Path]
-    design: Design | None = None
-    mesh_check: MeshCheck | None = None
-    accurate: AccurateResult | None = None
-
-    @property
-    def surface(self) -> Surface:
-        """The surface reached."""
-        return self.result.surface
-
-    @property
-    def certificate(self) -> Certificate:
-        """The certificate of the surface reached."""
-        return self.result.certificate
-
-    @property
-    def good(self) -> bool:
-        """Whether the surface is certified, every target is met, and every accuracy reached."""
-        met = self.design is None or self.design.met
-        return self.certificate.certified and met and (self.accurate is None or self.accurate.reached)
 
 
 def run(
@@ -104,12 +74,16 @@ def run_project(
     *,
     changed: Callable[[Surface], Surface] | None = None,
     anyway: bool = False,
+    use_cache: bool = True,
 ) -> Outcome:
     """As ``run``, for a loaded project; ``changed`` is applied to its initial surface.
 
-    The mesh check comes after the files are written: Ctrl-C during it leaves them.
+    The mesh check comes after the files are written: Ctrl-C during it leaves them. A good roof is kept in
+    the cache, unless it was changed or ``use_cache`` is false; it is solved in any case.
     """
     outcome = _solve_and_write(project, progress or ignore, changed, anyway)
+    if use_cache and changed is None:
+        cache.keep(project, outcome)
     if project.mesh_check and outcome.certificate.index is not None:
         outcome = replace(outcome, mesh_check=check_of(project, outcome, progress))
     return outcome
@@ -150,21 +124,42 @@ def _solve_and_write(
     outputs = project.outputs
     check_names(project.files, project.picture)
     check_outputs(outputs, project.folder)
-    report("reading" if project.plan is None else "meshing the plan")
-    start = surface_of(project)
-    start = start if changed is None else changed(start)
-    _check_balance(start)
-    outcome = solve_project(project, start, report)
+    outcome = solve_from_start(project, report, changed)
     if not outputs or not (outcome.good or anyway):
         return outcome
-    surface, certificate = outcome.surface, outcome.certificate
-    data: dict[str, Any] = {"scalars": fields(surface, certificate), "certificate": certificate}
-    works = [(Path(file), partial(io.write, surface=surface, **data)) for file in project.files]
+    works = surface_files(outcome, project.files)
     if project.picture is not None:
-        look = {"view": project.view, "colour": project.colour}
-        works.append((Path(project.picture), partial(paint, surface, **look)))
+        look = {"view": project.view, "colour": project.colour, "units": outcome.units}
+        works.append((Path(project.picture), partial(paint, outcome.surface, **look)))
     with made(project.folder or Path()):
         return replace(outcome, files=write_all(works, report))
+
+
+def surface_files(
+    outcome: Outcome, files: Iterable[PathLike], colour: str = ""
+) -> list[tuple[Path, Callable[[Path], None]]]:
+    """The files of a designed roof with all that their formats hold, for ``write_all``.
+
+    ``colour`` names the scalar that colours vertices.
+    """
+    data: dict[str, Any] = {
+        "scalars": fields(outcome.surface, outcome.certificate),
+        "certificate": outcome.certificate,
+        "units": outcome.units,
+        "colour": colour,
+    }
+    return [(Path(file), partial(io.write, surface=outcome.surface, **data)) for file in files]
+
+
+def solve_from_start(
+    project: Project, report: OnStep, changed: Callable[[Surface], Surface] | None
+) -> Outcome:
+    """Mesh a project, solve it, remesh it and meet its targets; write nothing."""
+    report("reading" if project.plan is None else "meshing the plan")
+    start, units = start_of(project)
+    start = start if changed is None else changed(start)
+    _check_balance(start)
+    return replace(solve_project(project, start, report), units=units)
 
 
 def _check_balance(surface: Surface) -> None:
@@ -173,7 +168,7 @@ def _check_balance(surface: Surface) -> None:
     imbalance = unbalanced(surface, pinchable)
     if imbalance:
         unless = ", unless the junction rests on the plane" if pinchable.any() else ""
-        warnings.warn(f"{imbalance}{unless}; solving anyway", BalanceWarning, stacklevel=3)
+        warnings.warn(f"{imbalance}{unless}; solving anyway", BalanceWarning, stacklevel=4)
 
 
 def solve_project(project: Project, surface: Surface, progress: OnStep | None = None) -> Outcome:

@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..surface import Surface
+from ..surface import Plane, Surface
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -74,6 +74,7 @@ class Result:
         ``energy`` and ``gradient_squared`` (‖∇E‖², the paper's squared sum).
     note : a further finding of the solver, shown in the message.
     proofs : why there is no equilibrium, where that was proved.
+    room_changes : δ of each room of prescribed volume, by which its pressure has changed, force/length².
     """
 
     surface: Surface
@@ -85,6 +86,7 @@ class Result:
     rows: Sequence[Mapping[str, Any]]
     note: str = ""
     proofs: tuple[Proof, ...] = ()
+    room_changes: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         """How the solver ended, above the surface it reached."""
@@ -95,7 +97,9 @@ class Result:
         """Whether the solver met its tolerance."""
         return self.status is Status.CONVERGED
 
-    def certify(self, *, modes: int = 1, tolerance: float | None = None) -> Certificate:
+    def certify(
+        self, *, modes: int = 1, tolerance: float | None = None, whole: bool | Sequence[str | Plane] = False
+    ) -> Certificate:
         """The certificate of ``surface``, which also takes into account how the solver ended.
 
         Parameters as for ``pcmc.certify``.
@@ -111,7 +115,14 @@ class Result:
             Status.PINCHED: Evidence.COLLAPSED,
         }.get(self.status)
         tolerance = TOLERANCE if tolerance is None else tolerance
-        return certify(self.surface, modes=modes, tolerance=tolerance, evidence=evidence, proofs=self.proofs)
+        return certify(
+            self.surface,
+            modes=modes,
+            tolerance=tolerance,
+            evidence=evidence,
+            proofs=self.proofs,
+            whole=whole,
+        )
 
     @cached_property
     def certificate(self) -> Certificate:
@@ -124,6 +135,13 @@ class Result:
         import pandas as pd
 
         return pd.DataFrame(self.rows)
+
+    @cached_property
+    def rooms(self) -> pd.DataFrame:
+        """A row per room of prescribed volume: the certificate's, and the ``change`` of its pressure."""
+        from ..certificate.certificate import room_table
+
+        return room_table(self.surface).assign(change=self.room_changes)
 
     @property
     def message(self) -> str:

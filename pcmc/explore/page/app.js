@@ -22,6 +22,7 @@ class Page {
       .catch((error) => (known && !location.search ? ask("api/open") : Promise.reject(error)));
     this.name = header.session;
     this.size = header.size;
+    this.units = header.units;
     this.choice = "patches";
     find("#title").textContent = header.title || "pcmc explore";
     document.title = header.title ? `${header.title} – pcmc explore` : "pcmc explore";
@@ -31,7 +32,7 @@ class Page {
     });
     this.startViewer(header, arrays);
     this.panel = new Panel(find("#patches"), header.patches, header.asked, find("#together"),
-      (final) => this.request(final));
+      (final) => this.request(final), header.units);
     find("#together-row").hidden = header.patches.length < 2;
     this.addChoices();
     this.addExports(header.formats);
@@ -127,7 +128,7 @@ class Page {
     this.header = header;
     this.arrays = { ...arrays, underPressure: this.underPressure };
     showVerdict(find("#verdict"), header);
-    showFindings(find("#findings tbody"), header.findings);
+    showFindings(find("#findings tbody"), header.findings, this.units);
     find("#check-result").hidden = true; // it was about the last surface
     find("#check").disabled = !header.at_rest;
     if (!this.next) this.panel.show(header.asked, header.shown, values);
@@ -145,7 +146,7 @@ class Page {
 
   colour() {
     const field = fieldOf(this.choice, this.arrays);
-    showLegend(find("#legend"), this.choice, field);
+    showLegend(find("#legend"), this.choice, field, this.units);
     if (!this.viewer) return;
     this.viewer.setField(field);
     this.viewer.setArrows(this.choice === "reactions" ? arrowsOf(this.arrays, field, this.size) : null);

@@ -10,9 +10,9 @@ const SIGNS = {
 
 export const COLOURS = {
   patches: { label: "Patches" },
-  curvature: { label: "Mean curvature", name: "Mean curvature H, 1/length (walls grey)" },
-  error: { label: "Curvature error", name: "Error (H − H̄) / H̄ of Meyer's mean curvature, %" },
-  reactions: { label: "Reactions", name: "Reaction of the supports, force/length" },
+  curvature: { label: "Mean curvature", name: (u) => `Mean curvature H, ${u.curvature} (walls grey)` },
+  error: { label: "Curvature error", name: () => "Error (H − H̄) / H̄ of Meyer's mean curvature, %" },
+  reactions: { label: "Reactions", name: (u) => `Reaction of the supports, ${u.tension}` },
 };
 
 /** The card that is always in view. */
@@ -42,13 +42,14 @@ function drawn({ asked, shown }) {
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** Numbers of the surface shown. */
-export function showFindings(body, findings) {
+export function showFindings(body, findings, units) {
+  const measured = (x, kind, count) => digits(x, count) + (units.given && x !== null ? ` ${units[kind]}` : "");
   const percent = (x) => (x === null ? "–" : x < 1e-6 ? "below 0.0001 %" : `${digits(100 * x, 3)} %`);
   const rows = [
-    ["Rise above the plane", digits(findings.height), "Largest height above the plane Π, length"],
-    ["Area under pressure", digits(findings.area), "Of all patches except walls, length²"],
-    ["Volume", digits(findings.volume), "Under the patches with pressure, length³"],
-    ["Energy", digits(findings.energy, 6), "Σ α A − Σ p V, force · length"],
+    ["Rise above the plane", measured(findings.height, "length"), `Largest height above the plane Π, ${units.length}`],
+    ["Area under pressure", measured(findings.area, "area"), `Of all patches except walls, ${units.area}`],
+    ["Volume", measured(findings.volume, "volume"), `Under the patches with pressure, ${units.volume}`],
+    ["Energy", measured(findings.energy, "energy", 6), `Σ α A − Σ p V, ${units.energy}`],
     ["Morse index", findings.index ?? "–", "Independent changes of shape that lower the energy; 0 is stable"],
     ["Load over capacity", percentOf(findings.load_ratio), "The pressure, as a part of the most that the tension of the boundary can carry; above 100 % no equilibrium exists"],
     ["Largest error of H", percent(findings.curvature_error), "Variational mean curvature against p / 2α; exact at rest"],
@@ -141,11 +142,11 @@ export function arrowsOf(arrays, field, size) {
 }
 
 /** The scale beside the surface. */
-export function showLegend(root, choice, field) {
+export function showLegend(root, choice, field, units) {
   root.hidden = !field;
   if (!field) return;
   const [low, high] = field.limits;
-  root.querySelector(".name").textContent = COLOURS[choice].name;
+  root.querySelector(".name").textContent = COLOURS[choice].name(units);
   root.querySelector(".bar").style.background = field.map.css;
   root.querySelector(".low").textContent = digits(low, 3);
   root.querySelector(".middle").textContent = digits((low + high) / 2, 3);

@@ -43,7 +43,8 @@ class Range {
 
 export class Panel {
   /** `changed(final)` is called while a value changes, and with true when the change is done. */
-  constructor(root, patches, asked, together, changed) {
+  constructor(root, patches, asked, together, changed, units) {
+    this.units = units;
     this.patches = patches;
     this.together = together;
     this.changed = changed;
@@ -75,6 +76,7 @@ export class Panel {
     const id = `${kind}-${index}`;
     const label = element("label", "", QUANTITIES[kind]);
     label.htmlFor = id;
+    label.title = this.units[kind];
     const track = element("span", "track");
     const shown = element("span", "shown");
     shown.hidden = true;

@@ -1,0 +1,86 @@
+"""The same surface in another unit of length: coordinates, and all that is per length, area or volume.
+
+With the factor f, lengths become f times as large, tensions (force/length) 1/f, pressures and weights
+(force/length²) 1/f², volumes f³. Forces stay, so the shape at rest stays the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import OptionError
+from ..base.units import MICROMETRES, NO_UNITS, Units, conversion_note, length_factor
+from ..surface import Circle, Line, Patch, Plane, Room, Surface
+from ..surface.surface import FIELDS
+from .mesh_data import MeshData
+
+
+def as_units(value: Any) -> Units:
+    """Units from a unit of length, or Units themselves; None is no unit.
+
+    >>> as_units("mm").length
+    'mm'
+    """
+    if value is None:
+        return NO_UNITS
+    if isinstance(value, Units):
+        return value
+    if isinstance(value, str):
+        return Units(value)
+    text = f"units: expected a unit of length such as 'mm', or Units, found {value!r:.40}"
+    raise OptionError(text, what="units", found=value, expected=tuple(MICROMETRES))
+
+
+def scaled(value: Any, factor: float) -> Any:
+    """A part of a surface, or a tuple of parts, in a unit of which ``factor`` make one of the old unit.
+
+    >>> scaled(Patch("roof", tension=2.0, pressure=3.0), 10.0)
+    Patch(name='roof', tension=0.2, pressure=0.03)
+    """
+    match value:
+        case tuple():
+            return tuple(scaled(part, factor) for part in value)
+        case Patch():
+            area = factor * factor
+            changes = {"pressure": value.pressure / area, "weight": value.weight / area}
+            return replace(value, tension=value.tension / factor, **changes)
+        case Plane() | Line():
+            return replace(value, point=_point(value.point, factor))
+        case Circle():
+            return replace(value, centre=_point(value.centre, factor), radius=factor * value.radius)
+        case Room():
+            return replace(value, volume=factor**3 * value.volume)
+    return value
+
+
+def scaled_surface(surface: Surface, factor: float) -> Surface:
+    """The surface in a unit of which ``factor`` make one of the old unit."""
+    if factor == 1.0:
+        return surface
+    parts = {name: scaled(getattr(surface, name), factor) for name in FIELDS}
+    return Surface(**parts | {"vertices": factor * surface.vertices})
+
+
+def converted(data: MeshData, length: str) -> MeshData:
+    """A file's data in another unit of length, with a note if that changes them.
+
+    Tensions and pressures change only where the file has them; scalars stay.
+    """
+    factor = length_factor(data.units.length, length)
+    if factor == 1.0:
+        return data
+    parts = {f.name: scaled(getattr(data, f.name), factor) for f in fields(data)}
+    if data.plane is None:  # tensions and pressures are 1, in any unit
+        parts["patches"] = data.patches
+    parts["vertices"] = factor * np.asarray(data.vertices, dtype=np.float64)
+    parts["units"] = Units(length, data.units.force)
+    parts["notes"] = (*data.notes, conversion_note(data.units.length, length))
+    return replace(data, **parts)
+
+
+def _point(point: tuple[float, float, float], factor: float) -> tuple[float, float, float]:
+    x, y, z = point
+    return factor * x, factor * y, factor * z

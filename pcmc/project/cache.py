@@ -1,0 +1,178 @@
+"""Roofs solved before, so that the next command need not solve them again.
+
+A file for each project in the user's cache folder, named after a hash of all that the roof depends on: the
+plan with the drawings that it was read from, the solver, the remeshing, the targets, the version of pcmc.
+The environment variable ``PCMC_CACHE`` names another folder; ``PCMC_CACHE=off`` keeps nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from .. import io
+from ..base.errors import FileError, LostWarning, PcmcError
+from ..base.files import atomic_write
+from ..io.mesh_data import to_surface
+from ..solvers.result import Result, Status
+from ..surface import Surface
+from ..surface.surface import FIELDS
+from .file import Project
+from .outcome import Outcome
+
+VARIABLE = "PCMC_CACHE"
+MOST = 100  # roofs kept; the one used longest ago goes first
+PARTS = ("plan", "method", "options", "wanted", "search", "remeshing", "targets", "vary")
+
+
+def folder() -> Path | None:
+    """The folder of the cache, which may not exist yet; None if it is switched off."""
+    given = os.environ.get(VARIABLE, "")
+    if given.lower() == "off":
+        return None
+    if given:
+        return Path(given)
+    from platformdirs import user_cache_path
+
+    return user_cache_path("pcmc") / "roofs"
+
+
+def cached_files() -> list[Path]:
+    """The files of the cache, the one used longest ago first."""
+    place = folder()
+    if place is None:
+        return []
+    with suppress(OSError):
+        return sorted(place.glob("*.pcmc"), key=lambda path: path.stat().st_mtime_ns)
+    return []
+
+
+def clear() -> list[Path]:
+    """Remove all files of the cache; return those removed."""
+    removed = []
+    for path in cached_files():
+        with suppress(OSError):
+            path.unlink()
+            removed.append(path)
+    return removed
+
+
+def cached(project: Project) -> Outcome | None:
+    """The designed roof of a project, if it was solved before. A damaged file counts as none."""
+    path = _path(project)
+    if path is None or not path.is_file():
+        return None
+    try:
+        data = io.load(path)
+        outcome = _outcome(project, data.certificate, to_surface(data))
+        os.utime(path)
+    except (PcmcError, OSError, KeyError, ValueError, TypeError):
+        return None
+    return outcome
+
+
+def keep(project: Project, outcome: Outcome) -> None:
+    """Put a designed roof into the cache, if it is good. A cache that cannot be written is left alone."""
+    path = _path(project)
+    if path is None or not outcome.good:
+        return
+    with suppress(OSError, PcmcError, LostWarning), warnings.catch_warnings():
+        warnings.simplefilter("error", LostWarning)  # a surface that the file cannot hold is not kept
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_write(path) as temporary:
+            io.write(temporary, outcome.surface, certificate=_values(outcome))
+            if not _same(outcome.surface, to_surface(io.load(temporary))):
+                raise FileError("the file does not hold all of the surface")
+        for old in cached_files()[:-MOST]:
+            old.unlink(missing_ok=True)
+
+
+def _same(one: Surface, other: Surface) -> bool:
+    """Whether two surfaces are equal to the last bit: the file holds all of it."""
+    return all(b"".join(_pieces(getattr(one, f))) == b"".join(_pieces(getattr(other, f))) for f in FIELDS)
+
+
+def _values(outcome: Outcome) -> dict[str, Any]:
+    """All of an outcome but its surface, as numbers and texts."""
+    result, design = outcome.result, outcome.design
+    names = ("method", "energy", "iterations", "evaluations", "note")
+    values: dict[str, Any] = {name: getattr(result, name) for name in names}
+    values["status"] = result.status.name
+    if design is not None:
+        tables = {name: getattr(design, name).to_dict("split") for name in ("targets", "parameters")}
+        values["design"] = {"status": design.status.name, "solves": design.solves, **tables}
+    return values
+
+
+def _outcome(project: Project, values: Mapping[str, Any], surface: Any) -> Outcome:
+    """The outcome again."""
+    names = ("method", "energy", "iterations", "evaluations")
+    solve = {name: values[name] for name in names}
+    result = Result(surface, Status[values["status"]], rows=(), note=values["note"], **solve)
+    design = None
+    if project.targets:
+        from ..design import Design, DesignStatus
+
+        given = values["design"]
+        tables = {name: pd.DataFrame(**given[name]) for name in ("targets", "parameters")}
+        status, solves = DesignStatus[given["status"]], given["solves"]
+        design = Design(status, result, solves=solves, history=pd.DataFrame(), **tables)
+    return Outcome(result, (), design, units=project.units, cached=True)
+
+
+def _path(project: Project) -> Path | None:
+    """The file for a project; None for one that is not kept."""
+    place = folder()
+    if place is None or project.plan is None:
+        return None
+    sha = hashlib.sha256(_program().encode())
+    try:
+        for name in PARTS:
+            for part in _pieces(getattr(project, name)):
+                sha.update(part)
+    except TypeError:  # a value without a text of its own
+        return None
+    return place / f"{sha.hexdigest()}.pcmc"
+
+
+@cache
+def _program() -> str:
+    """The version of pcmc, and the time of its newest file for those who change it."""
+    newest = max(path.stat().st_mtime_ns for path in Path(__file__).parents[1].rglob("*.py"))
+    return f"pcmc {version('pcmc-surfaces')} {newest}\n"
+
+
+def _pieces(value: Any) -> Iterator[bytes]:
+    """Bytes, the same for equal values and others for others; TypeError for a value of unknown kind."""
+    if is_dataclass(value) and not isinstance(value, type):
+        yield f"{type(value).__qualname__}(".encode()
+        for f in fields(value):
+            yield f"{f.name}=".encode()
+            yield from _pieces(getattr(value, f.name))
+    elif isinstance(value, np.ndarray) and value.dtype != object:
+        yield f"{value.dtype.str}{value.shape}".encode()
+        yield value.tobytes()
+    elif isinstance(value, Mapping):
+        yield f"{len(value)}{{".encode()
+        for key in sorted(value):
+            yield from _pieces(key)
+            yield from _pieces(value[key])
+    elif isinstance(value, str | bool | int | float | None):
+        yield f"{value!r};".encode()
+    elif isinstance(value, Sequence):
+        yield f"{len(value)}[".encode()
+        for item in value:
+            yield from _pieces(item)
+    else:
+        raise TypeError(f"no bytes for {type(value).__name__}")

@@ -1,0 +1,60 @@
+"""What a project leads to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..base.units import NO_UNITS, Units
+from ..certificate.certificate import Certificate
+from ..solvers.result import Result
+from ..surface import Surface
+
+if TYPE_CHECKING:
+    from ..accuracy import AccurateResult, MeshCheck
+    from ..design import Design
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """The designed roof of a project: solved, its targets met, remeshed.
+
+    Attributes
+    ----------
+    result : of the last solve; ``surface`` and ``certificate`` are its.
+    files : the files written.
+    design : the search for the targets; None without targets.
+    mesh_check : the surface on finer meshes; None where the project asks for none.
+    accurate : the search for an accuracy; None where the project asks for none.
+    units : those of the project, in which all numbers are.
+    cached : whether the roof was solved before and comes from the cache. Then ``accurate`` is None, and the
+        histories of ``result`` and ``design`` are empty.
+    """
+
+    result: Result
+    files: Sequence[Path]
+    design: Design | None = None
+    mesh_check: MeshCheck | None = None
+    accurate: AccurateResult | None = None
+    units: Units = NO_UNITS
+    cached: bool = False
+
+    @property
+    def surface(self) -> Surface:
+        """The surface reached."""
+        return self.result.surface
+
+    @property
+    def certificate(self) -> Certificate:
+        """The certificate of the surface reached."""
+        return self.result.certificate
+
+    @property
+    def good(self) -> bool:
+        """Whether the surface is certified, every target is met, and every accuracy reached."""
+        if self.cached:
+            return True  # no other roof is kept
+        met = self.design is None or self.design.met
+        return self.certificate.certified and met and (self.accurate is None or self.accurate.reached)
