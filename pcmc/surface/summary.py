@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from .surface import Surface
 
 NAMED = 6  # patches, cables or rooms that are named
 
 
-def summary(surface: Surface) -> str:
-    """Size, patches, walls, cables, rooms, supports and heights, a line each."""
+def summary(surface: Any) -> str:
+    """Of a Surface: size, patches, walls, cables, rooms, supports and heights, a line each."""
     patches = {
         wall: [
             f"{p.name} (tension {p.tension:g}, pressure {p.pressure:g})"
