@@ -61,7 +61,7 @@ def panels_(
     if change is not None:
         validate.positive("--change", change)
     projects.check_names([], picture)
-    projects.check_picture(seen, "patches")
+    projects.check_picture([seen], "patches")
     projects.check_outputs([path for one in files for path in _paths(one)] + ([picture] if picture else []))
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": anyway}
     with working() as say:
@@ -152,21 +152,14 @@ def _paths(path: Path) -> list[Path]:
     if suffix not in (CSV, *FORMATS):
         text = f"{path}: expected {CSV} for a schedule, or a format of surfaces: {', '.join(FORMATS)}"
         raise FileError(text, what=str(path), found=suffix)
-    return [path] if suffix != CSV else [path, *(_beside(path, name) for name in ("families", "edges"))]
-
-
-def _beside(path: Path, name: str) -> Path:
-    return path.with_name(f"{path.stem}-{name}{path.suffix}")
+    return [path] if suffix != CSV else projects.schedule_paths(path)
 
 
 def _works(path: Path, schedule: Panels, units: Units) -> list[Any]:
     """Each file with the function that writes it."""
     if path.suffix.lower() != CSV:
         return [(path, partial(write, surface=schedule.surface, units=units))]
-    tables = (schedule.panels, schedule.families, schedule.edges)
-    return [
-        (one, partial(table.to_csv, index=False)) for one, table in zip(_paths(path), tables, strict=True)
-    ]
+    return projects.schedule_works(path, schedule)
 
 
 def _paint(schedule: Panels, view: Any, path: Path) -> None:

@@ -98,14 +98,14 @@ def plot(
     """
     projects.check_names([], picture)
     seen = arguments.view_of(view)
-    projects.check_picture(seen, colour)
+    projects.check_picture([seen], colour)
     projects.check_outputs([picture])
     with working() as say:
         shown = arguments.given(file, say, start=start, cache=cache)
     if shown.outcome is not None and not _is_good(file, shown.outcome):
         return NOT_CERTIFIED
     surface = mirrored(shown.surface) if whole else shown.surface
-    painting = partial(projects.paint, surface, view=seen, colour=colour, units=shown.units)
+    painting = partial(projects.paint, surface, views=[seen], colour=colour, units=shown.units)
     projects.write_all([(picture, painting)])
     print(f"written: {picture}")
     return OK

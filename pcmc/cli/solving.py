@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +14,7 @@ from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
-from ..base.errors import FileError, PcmcError
+from ..base.errors import PcmcError
 from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
@@ -73,7 +72,8 @@ def solve_(
     goal = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
-    project = replace(project, mesh_check=False)
+    # a report has the mesh check's numbers; else it comes after the files, so that Ctrl-C leaves them
+    project = replace(project, mesh_check=project.documents.report is not None and wanted is not False)
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
     with working() as say:
@@ -83,7 +83,10 @@ def solve_(
     report(outcome)
     if project.outputs and not outcome.files:
         print("nothing written (use --anyway to write it)")
-    _check_mesh(project, outcome, wanted)
+    if outcome.mesh_check is None:
+        _check_mesh(project, outcome, wanted)
+    else:
+        print(f"\n{outcome.mesh_check.brief()}")
     return OK if outcome.good else NOT_CERTIFIED
 
 
@@ -112,18 +115,7 @@ def _project(
     if not projects.is_project(file):
         return projects.Project(file, files=output or (), picture=picture, folder=folder)
     project = projects.load(file).in_folder(file.parent if folder is None else folder)
-    _keep_drawing(project, output or ())
     return replace(project, files=output or project.files, picture=picture or project.picture)
-
-
-def _keep_drawing(project: projects.Project, outputs: Sequence[Path]) -> None:
-    """Refuse to write a roof over the drawing that it is made from."""
-    if project.drawing is None:
-        return
-    for path in outputs:
-        if path.resolve() == project.drawing.path.resolve():
-            text = f"{path}: this is the drawing; name another file for the roof"
-            raise FileError(text, what=str(path))
 
 
 def certify_(
@@ -193,6 +185,7 @@ def remesh_(
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
     project = replace(_project(file, None, output, None), remeshing=(stage,), picture=None)
+    project = replace(project, documents=projects.Documents())
     with working() as say:
         outcome = projects.run_project(project, say)
     report(outcome)

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from .. import io, solvers
 from ..base.arrays import Ints
-from ..base.errors import BalanceWarning, OptionError
+from ..base.errors import BalanceWarning, FileError, OptionError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
 from ..contact.pinching import standing_part
@@ -24,6 +24,7 @@ from ..meshing.remeshing import remesh
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from . import cache
+from .documents import Works, document_works
 from .file import Project, in_file, load, start_of
 from .outcome import Outcome
 from .output import OnStep, PathLike, check_names, check_outputs, fields, ignore, paint, write_all
@@ -78,13 +79,14 @@ def run_project(
 ) -> Outcome:
     """As ``run``, for a loaded project; ``changed`` is applied to its initial surface.
 
-    The mesh check comes after the files are written: Ctrl-C during it leaves them. A good roof is kept in
-    the cache, unless it was changed or ``use_cache`` is false; it is solved in any case.
+    The mesh check comes after the files are written, so that Ctrl-C during it leaves them; but before, where
+    a report is among them, which then has its numbers. A good roof is kept in the cache, unless it was
+    changed or ``use_cache`` is false; it is solved in any case.
     """
     outcome = _solve_and_write(project, progress or ignore, changed, anyway)
     if use_cache and changed is None:
         cache.keep(project, outcome)
-    if project.mesh_check and outcome.certificate.index is not None:
+    if project.mesh_check and outcome.mesh_check is None and outcome.certificate.index is not None:
         outcome = replace(outcome, mesh_check=check_of(project, outcome, progress))
     return outcome
 
@@ -123,16 +125,44 @@ def _solve_and_write(
     """The outcome of a project, its output written."""
     outputs = project.outputs
     check_names(project.files, project.picture)
+    _keep_drawing(project, outputs)
     check_outputs(outputs, project.folder)
     outcome = solve_from_start(project, report, changed)
     if not outputs or not (outcome.good or anyway):
         return outcome
+    if project.documents.report is not None and project.mesh_check and outcome.certificate.index is not None:
+        outcome = replace(outcome, mesh_check=check_of(project, outcome, report))
     works = surface_files(outcome, project.files)
     if project.picture is not None:
-        look = {"view": project.view, "colour": project.colour, "units": outcome.units}
+        look = {"views": project.views, "colour": project.colour, "units": outcome.units}
         works.append((Path(project.picture), partial(paint, outcome.surface, **look)))
+    works += _documents(project, outcome, anyway, report)
     with made(project.folder or Path()):
         return replace(outcome, files=write_all(works, report))
+
+
+def _keep_drawing(project: Project, outputs: Iterable[Path]) -> None:
+    """Refuse to write over the drawing that the roof is made from."""
+    for path in outputs:
+        if project.drawing is not None and path.resolve() == project.drawing.path.resolve():
+            text = f"{path}: this is the drawing of the plan; name another file for the roof"
+            raise FileError(text, what=str(path))
+
+
+def _documents(project: Project, outcome: Outcome, anyway: bool, report: OnStep) -> Works:
+    """The project's documents, each with the function that writes it."""
+    if not project.documents.names:
+        return []
+    report("drawing, sorting panels, modelling")
+    files = {project.path.name: "project"}
+    if project.drawing is not None:
+        files[project.drawing.path.name] = "drawing of the plan"
+    files |= {Path(file).name: "surface" for file in project.files}
+    if project.picture is not None:
+        files[Path(project.picture).name] = "picture"
+    name = project.path.stem
+    with in_file(project.path):
+        return document_works(project.documents, project.structure, outcome, name, files, anyway)
 
 
 def surface_files(
@@ -158,6 +188,9 @@ def solve_from_start(
     report("reading" if project.plan is None else "meshing the plan")
     start, units = start_of(project)
     start = start if changed is None else changed(start)
+    if project.documents.structure is not None and project.structure is not None:
+        with in_file(project.path):
+            project.structure.check(start)
     _check_balance(start)
     return replace(solve_project(project, start, report), units=units)
 

@@ -9,12 +9,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from ..accuracy import MeshCheck
 from ..base import validate
 from ..base.errors import FileError
 from ..base.files import atomic_write
@@ -26,6 +25,9 @@ from ..plot import draw, families, reactions
 from ..surface import Surface, expect_surface
 from . import pages, tables, words
 from .plan import PaperPlan, paper_plan
+
+if TYPE_CHECKING:
+    from ..accuracy import MeshCheck
 
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
 PIXELS = 1300  # width of a picture

@@ -78,7 +78,7 @@ def heading(text: str) -> Any:
 
 def paragraph(text: str) -> Any:
     """A paragraph of running text."""
-    return _paragraph(text, FONT, TEXT, before=0.0, after=4.0)
+    return _paragraph(text, FONT, TEXT, before=2.0, after=2.0)
 
 
 def new_page() -> Any:
@@ -122,16 +122,15 @@ def table(content: Table) -> list[Any]:
     from reportlab.lib.units import mm
     from reportlab.platypus import Table as Grid
 
-    size, rows = CELL, [content.head, *content.rows] if content.head else content.rows
+    headed = bool(content.head)
+    size, rows = CELL, [content.head, *content.rows] if headed else content.rows
     widths = _widths(rows, size)
     if sum(widths) > _width() * mm:
         size = max(5.0, size * _width() * mm / sum(widths))
         widths = _widths(rows, size)
     cells = [
         [
-            _cell(
-                text, size, bold=bool(content.head) and not k, right=bool(content.head) and j >= content.words
-            )
+            _cell(text, size, bold=headed and not k, right=headed and j >= content.words)
             for j, text in enumerate(row)
         ]
         for k, row in enumerate(rows)
@@ -140,12 +139,12 @@ def table(content: Table) -> list[Any]:
     look = [("VALIGN", (0, 0), (-1, -1), "TOP"), ("LINEBELOW", (0, 0), (-1, -1), 0.25, HexColor("#D8D8D8"))]
     look += [(f"{side}PADDING", (0, 0), (-1, -1), 2.0) for side in ("TOP", "BOTTOM")]
     look += [(f"{side}PADDING", (0, 0), (-1, -1), 3.0) for side in ("LEFT", "RIGHT")]
-    if content.head:
+    if headed:
         look.append(("LINEBELOW", (0, 0), (-1, 0), 0.6, HexColor(INK)))
     grid = Grid(
         cells,
         colWidths=[width * min(spare, 1.0) for width in widths],
-        repeatRows=1 if content.head else 0,
+        repeatRows=int(headed),
         style=look,
         hAlign="LEFT",
         spaceBefore=4.0,

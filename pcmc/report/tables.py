@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from ..accuracy import MeshCheck
 from ..base.units import Units
 from ..certificate import Certificate
 from ..certificate.balance import reactions_per_length
 from ..panels import Panels
 from ..surface import Surface
+
+if TYPE_CHECKING:
+    from ..accuracy import MeshCheck
 
 DIGITS = 4  # of the largest number of a column
 MOST_FAMILIES = 40  # rows of the panel schedule; the table of panels has all of them

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from ..accuracy import MeshCheck
+from typing import TYPE_CHECKING
+
 from ..base.units import Units
 from ..certificate import Certificate, Verdict
+
+if TYPE_CHECKING:
+    from ..accuracy import MeshCheck
 
 VERDICTS = {
     Verdict.STABLE: "The roof is in equilibrium, and the equilibrium is stable: tension and pressure balance"
     " everywhere, and after any small disturbance the roof returns to this shape.",
-    Verdict.NEUTRAL: "The roof is in equilibrium, but some change of shape needs almost no force. Hold the roof"
-    " against that change, or change tensions, before you build it.",
-    Verdict.SADDLE: "The roof is in equilibrium, but leaves this shape at the smallest disturbance. Do not build"
-    " it like this.",
+    Verdict.NEUTRAL: "The roof is in equilibrium, but some change of shape needs almost no force. Hold the"
+    " roof against that change, or change tensions, before you build it.",
+    Verdict.SADDLE: "The roof is in equilibrium, but leaves this shape at the smallest disturbance. Do not"
+    " build it like this.",
     Verdict.NOT_CONVERGED: "The roof is not in equilibrium yet: the forces do not balance. Solve it further.",
     Verdict.NO_EQUILIBRIUM: "There is no equilibrium: no shape balances these tensions and pressures.",
     Verdict.RAN_AWAY: "No equilibrium is known: the shape moved away without coming to rest.",
-    Verdict.UNDECIDED: "Rounding of the computer's numbers hides whether the roof is in equilibrium, or stable.",
+    Verdict.UNDECIDED: "Rounding of numbers hides whether the roof is in equilibrium, or stable.",
     Verdict.WALL_DOWN: "A ridge comes down on the bottom of its wall, where it cannot rest.",
     Verdict.DEGENERATE: "Triangles of the mesh have collapsed: the shape says nothing about a roof.",
 }
@@ -24,8 +28,8 @@ VERDICTS = {
 
 
 LEGEND = (
-    "J1, J2 and so on number the junctions, B1, B2 and so on the held boundaries, as in the tables. Black: rims."
-    " Red: ridges. Green: bottoms and ends of walls. Violet: cables. Grey: edges of panels."
+    "J1, J2 and so on number the junctions, B1, B2 and so on the held boundaries, as in the tables. Black:"
+    " rims. Red: ridges. Green: bottoms and ends of walls. Violet: cables. Grey: edges of panels."
 )
 """How to read the plan."""
 
@@ -52,12 +56,12 @@ def verdict_sentences(certificate: Certificate, check: MeshCheck | None = None) 
         share = f"{100.0 * certificate.load_ratio:.0f} %"
         sentences.append(f"Pressure and weight use {share} of the most that the boundary could carry.")
     if check is not None:
-        sentences.append(f"On finer meshes: {check.verdict.value}.")
+        sentences.append(f"The mesh check: {check.verdict.value.partition(': ')[2]}.")
     if certificate.symmetric_in:
         planes = ", ".join(certificate.symmetric_in)
         sentences.append(
-            f"This is the piece of the roof between its mirror planes ({planes}); the verdict is about changes"
-            " of shape that are symmetric in them."
+            f"This is the piece of the roof between its mirror planes ({planes}); the verdict is about"
+            " changes of shape that are symmetric in them."
         )
     if len(certificate.pinched):
         sentences.append(f"The ridge rests on the plane at {len(certificate.pinched)} vertices.")
