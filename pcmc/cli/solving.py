@@ -14,17 +14,15 @@ from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
-from ..base.errors import PcmcError
 from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
-from . import NOT_CERTIFIED, OK, arguments
+from . import NOT_CERTIFIED, OK, arguments, checking
 from .arguments import MANY_FILES, Cache, Input, Pressures, Settings, Start, number, option
+from .checking import CHECKED
 from .progress import working
 from .reports import report
 
-MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
-CHECKED = f"Solve on two finer meshes, too, for error bars; by default up to {MOST_CHECKED} triangles."
 MESHES = "Check the mesh on this many meshes in all, 3 for error bars and orders."
 ACCURACY = (
     "Error bar wanted, such as height=1e-3: finer triangles where the error comes from; may be repeated."
@@ -73,38 +71,23 @@ def solve_(
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
     # a report has the mesh check's numbers; else it comes after the files, so that Ctrl-C leaves them
-    project = replace(project, mesh_check=project.documents.report is not None and wanted is not False)
+    project = replace(project, mesh_check=False if project.documents.report is None else wanted)
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
     with working() as say:
-        changed = partial(arguments.retensioned, tension=tension, pressure=pressure)
-        changed = changed if tension or pressure else None
+        change = partial(arguments.retensioned, tension=tension, pressure=pressure)
+        changed = change if tension or pressure else None
         outcome = projects.run_project(project, say, anyway=anyway, changed=changed, use_cache=cache)
     report(outcome)
     if project.outputs and not outcome.files:
         print("nothing written (use --anyway to write it)")
-    if outcome.mesh_check is None:
-        _check_mesh(project, outcome, wanted)
-    else:
-        print(f"\n{outcome.mesh_check.brief()}")
-    return OK if outcome.good else NOT_CERTIFIED
-
-
-def _check_mesh(project: projects.Project, outcome: projects.Outcome, wanted: bool | None) -> None:
-    """Check the mesh of a surface at rest and print its table, unless it is not wanted or too large."""
-    if outcome.certificate.index is None or wanted is False:
-        return
-    if wanted is None and outcome.surface.m > MOST_CHECKED:
-        print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
-        return
-    sys.stdout.flush()
-    try:
-        with working() as say:
-            check = projects.check_of(project, outcome, say)
-    except PcmcError as error:  # the surface and its files are good without it
-        print(f"no mesh check: {error}")
-    else:
+    check = outcome.mesh_check
+    if check is None:
+        run = partial(projects.check_of, project, outcome)
+        check = checking.mesh_check(outcome.surface, outcome.certificate, wanted, run)
+    if check is not None:
         print(f"\n{check.brief()}")
+    return OK if outcome.good else NOT_CERTIFIED
 
 
 def _project(

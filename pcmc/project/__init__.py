@@ -44,12 +44,21 @@ from .outcome import Outcome
 from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
 from .planning import project_text, proposal_text
 from .remeshing import Remeshing
-from .running import check_of, check_project_mesh, run, run_project, solve_project, surface_files
+from .running import (
+    MOST_CHECKED,
+    check_of,
+    check_project_mesh,
+    run,
+    run_project,
+    solve_project,
+    surface_files,
+)
 from .structure import Structure
 from .varied import check_varied, digest, is_project, varied
 
 __all__ = [
     "COLOURS",
+    "MOST_CHECKED",
     "Documents",
     "REQUIRED",
     "Key",

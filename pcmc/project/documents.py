@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
@@ -19,9 +19,9 @@ from ..report.document import check_name as check_report
 from ..report.document import roof_report
 from ..structure import write_structure
 from .outcome import Outcome
+from .output import Works
 from .structure import Structure
 
-Works = list[tuple[Path, Callable[[Path], Any]]]
 CSV, INP = ".csv", ".inp"
 SINGLE = ("panels", "structure", "report")  # keys of one file each
 

@@ -249,7 +249,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             files=files,
             picture=picture,
             documents=documents,
-            views=views,
+            views=[tuple(view) if isinstance(view, list) else view for view in views],
             colour=colour,
             drawing=drawing,
         )
@@ -259,8 +259,7 @@ def _views(output: Mapping[str, Any]) -> list[Any]:
     """The views of the picture: the key views, or view."""
     if "view" in output and "views" in output:
         raise OptionError("output: give view or views, not both", what="output.views")
-    views = output.get("views", [output.get("view", "diagonal")])
-    return [tuple(view) if isinstance(view, list) else view for view in views]
+    return list(output.get("views", [output.get("view", "diagonal")]))
 
 
 def _check_inside(names: Sequence[str]) -> None:

@@ -25,6 +25,7 @@ from ..plot.figure import SUFFIXES, check_suffix
 from ..surface import Surface
 
 PathLike = str | os.PathLike[str]
+Works = list[tuple[Path, Callable[[Path], Any]]]  # each file with the function that writes it
 OnStep = Callable[[str], object]  # called with a few words at each step of a project
 COLOURS = ("patches", "curvature", "error", "reactions")
 
@@ -43,14 +44,12 @@ def fields(surface: Surface, certificate: Certificate) -> dict[str, Floats]:
     }
 
 
-def write_all(
-    works: Iterable[tuple[Path, Callable[[Path], None]]], progress: OnStep | None = None
-) -> list[Path]:
+def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
     """Write files, each by its own function of a path; all of them appear together, or none.
 
     The functions write to temporary files; errors and warnings name the final ones.
     """
-    report, works = progress or ignore, list(works)
+    report = progress or ignore
     paths = [path for path, _ in works]
     check_outputs(paths)
     with atomic_writes(paths) as temporaries:
@@ -94,7 +93,8 @@ def paint(
     look: dict[str, Any] = {"legend": True}
     scalars = None
     if colour == "reactions":
-        return reactions(surface, path, view=views[0], label=units.tension)
+        reactions(surface, path, view=views[0], label=units.tension)
+        return
     if colour == "curvature":
         scalars, look = mean_curvature(surface), {"label": f"mean curvature, {units.curvature}"}
     elif colour == "error":
@@ -109,7 +109,6 @@ def paint(
 
 def check_picture(views: Sequence[Any], colour: str) -> None:
     """Refuse views or a colour that ``paint`` does not know."""
-
     validate.choice("colour", colour, COLOURS)
     if not views:
         validate.refuse("views", views, "at least one view")

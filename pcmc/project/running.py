@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from .. import io, solvers
 from ..base.arrays import Ints
-from ..base.errors import BalanceWarning, FileError, OptionError
+from ..base.errors import BalanceWarning, FileError, OptionError, PcmcError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
 from ..contact.pinching import standing_part
@@ -24,16 +24,17 @@ from ..meshing.remeshing import remesh
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from . import cache
-from .documents import Works, document_works
+from .documents import document_works
 from .file import Project, in_file, load, start_of
 from .outcome import Outcome
-from .output import OnStep, PathLike, check_names, check_outputs, fields, ignore, paint, write_all
+from .output import OnStep, PathLike, Works, check_names, check_outputs, fields, ignore, paint, write_all
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
     from ..design import Design
 
 
+MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
 SAME = 1e-9  # of the size: a vertex this near to a corner of the plan is that corner
 
 
@@ -79,9 +80,9 @@ def run_project(
 ) -> Outcome:
     """As ``run``, for a loaded project; ``changed`` is applied to its initial surface.
 
-    The mesh check comes after the files are written, so that Ctrl-C during it leaves them; but before, where
-    a report is among them, which then has its numbers. A good roof is kept in the cache, unless it was
-    changed or ``use_cache`` is false; it is solved in any case.
+    The mesh check comes after the files are written, so that Ctrl-C during it leaves them. Where a report is
+    among them, it comes before, unless ``mesh_check`` is false or the mesh is large. A good roof is kept in
+    the cache, unless it was changed or ``use_cache`` is false; it is solved in any case.
     """
     outcome = _solve_and_write(project, progress or ignore, changed, anyway)
     if use_cache and changed is None:
@@ -130,15 +131,28 @@ def _solve_and_write(
     outcome = solve_from_start(project, report, changed)
     if not outputs or not (outcome.good or anyway):
         return outcome
-    if project.documents.report is not None and project.mesh_check and outcome.certificate.index is not None:
-        outcome = replace(outcome, mesh_check=check_of(project, outcome, report))
+    if project.documents.report is not None:
+        outcome = replace(outcome, mesh_check=_reported_check(project, outcome, report))
     works = surface_files(outcome, project.files)
     if project.picture is not None:
-        look = {"views": project.views, "colour": project.colour, "units": outcome.units}
-        works.append((Path(project.picture), partial(paint, outcome.surface, **look)))
+        painting = partial(paint, views=project.views, colour=project.colour, units=outcome.units)
+        works.append((Path(project.picture), partial(painting, outcome.surface)))
     works += _documents(project, outcome, anyway, report)
     with made(project.folder or Path()):
         return replace(outcome, files=write_all(works, report))
+
+
+def _reported_check(project: Project, outcome: Outcome, report: OnStep) -> MeshCheck | None:
+    """The mesh check for a report: where it is asked for, or left open and the mesh is small enough."""
+    wanted = outcome.surface.m <= MOST_CHECKED if project.mesh_check is None else project.mesh_check
+    if not wanted or outcome.certificate.index is None:
+        return None
+    try:
+        return check_of(project, outcome, report)
+    except PcmcError:
+        if project.mesh_check:
+            raise
+        return None  # the report is good without it
 
 
 def _keep_drawing(project: Project, outputs: Iterable[Path]) -> None:
@@ -165,9 +179,7 @@ def _documents(project: Project, outcome: Outcome, anyway: bool, report: OnStep)
         return document_works(project.documents, project.structure, outcome, name, files, anyway)
 
 
-def surface_files(
-    outcome: Outcome, files: Iterable[PathLike], colour: str = ""
-) -> list[tuple[Path, Callable[[Path], None]]]:
+def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> Works:
     """The files of a designed roof with all that their formats hold, for ``write_all``.
 
     ``colour`` names the scalar that colours vertices.

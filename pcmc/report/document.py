@@ -64,7 +64,6 @@ class RoofReport:
         Raises
         ------
         FileError : for another suffix than .pdf, or a file that cannot be written.
-        MissingExtra : reportlab or matplotlib is not installed.
         """
         path = check_name(path)
         content = self.pdf()
@@ -205,6 +204,7 @@ def roof_report(
     ------
     SurfaceError : the surface is not certified.
     OptionError : the unit of length is missing; the tolerance is not above 0.
+    MissingExtra : reportlab or matplotlib is not installed.
 
     Examples
     --------
@@ -220,6 +220,7 @@ def roof_report(
     if not isinstance(units, Units):
         validate.refuse("units", units, "Units, or a unit of length")
     expect_length(units.length, "a report")
+    pages.register_fonts()
     certificate = certified(surface, anyway)
     schedule = None if tolerance is None else panels(surface, tolerance, anyway=anyway)
     plan = paper_plan(surface, certificate, units)

@@ -25,7 +25,7 @@ def pdf(story: Callable[[], list[Any]], title: str, foot: str, mark: str) -> byt
 
     The content is laid out twice, as each page shows the number of all. No date is written.
     """
-    _fonts()
+    register_fonts()
     _, count = _laid_out(story(), title, foot, mark, 0)
     return _laid_out(story(), title, foot, mark, count)[0]
 
@@ -216,8 +216,13 @@ def _style(font: str, size: float, before: float, after: float, keep: bool, righ
     )
 
 
-def _fonts() -> None:
-    """Make matplotlib's letters known to reportlab: they have Greek, Cyrillic and the signs of units."""
+def register_fonts() -> None:
+    """Make matplotlib's letters known to reportlab: they have Greek, Cyrillic and the signs of units.
+
+    Raises
+    ------
+    MissingExtra : reportlab or matplotlib is not installed.
+    """
     try:
         from reportlab.pdfbase import pdfmetrics, ttfonts
     except ImportError:
