@@ -74,8 +74,8 @@ def solve_(
     project = replace(project, method=method or project.method, options=options, wanted=goal)
     project = replace(project, mesh_check=False)
     with working() as say:
-        changed = partial(arguments.retensioned, tension=tension, pressure=pressure)
-        changed = changed if tension or pressure else None
+        retensioned = partial(arguments.retensioned, tension=tension, pressure=pressure)
+        changed = retensioned if tension or pressure else None
         outcome = projects.run_project(project, say, anyway=anyway, changed=changed, use_cache=cache)
     report(outcome)
     if project.outputs and not outcome.files:

@@ -45,8 +45,8 @@ def scaled(value: Any, factor: float) -> Any:
             return tuple(scaled(part, factor) for part in value)
         case Patch():
             area = factor * factor
-            changes = {"pressure": value.pressure / area, "weight": value.weight / area}
-            return replace(value, tension=value.tension / factor, **changes)
+            pressure, weight = value.pressure / area, value.weight / area
+            return replace(value, tension=value.tension / factor, pressure=pressure, weight=weight)
         case Plane() | Line():
             return replace(value, point=_point(value.point, factor))
         case Circle():
