@@ -1,10 +1,12 @@
 """Starting surfaces: the paper's examples, and surfaces with a closed form."""
 
+from .barrel import catenary, hanging_barrel
 from .bezier_hall import bezier_hall
 from .delaunay import delaunay, delaunay_exact, delaunay_force, delaunay_limit, unduloid_length
 from .double_bubble import double_bubble, double_bubble_exact
 from .enneper import enneper, enneper_exact, enneper_wire
 from .fans import four_fans, three_patches
+from .hypar_roof import hypar_roof, hypar_roof_edge
 from .joined_caps import joined_caps, joined_caps_exact
 from .lens import hemisphere, hemisphere_exact, lens, lens_circle, lens_exact
 from .sphere import sphere, sphere_exact
@@ -15,12 +17,14 @@ from .tetrahedron import (
     tetrahedral_film,
     tetrahedral_film_exact,
 )
+from .triple_bubble import triple_bubble, triple_bubble_exact
 from .tubes import catenoid, catenoid_exact, catenoid_fold, catenoid_neck, cylinder, cylinder_exact
 from .two_caps import two_caps
 from .two_squares import two_squares
 
 __all__ = [
     "bezier_hall",
+    "catenary",
     "catenoid",
     "catenoid_exact",
     "catenoid_fold",
@@ -37,8 +41,11 @@ __all__ = [
     "enneper_exact",
     "enneper_wire",
     "four_fans",
+    "hanging_barrel",
     "hemisphere",
     "hemisphere_exact",
+    "hypar_roof",
+    "hypar_roof_edge",
     "joined_caps",
     "joined_caps_exact",
     "lens",
@@ -53,6 +60,8 @@ __all__ = [
     "tetrahedral_film",
     "tetrahedral_film_exact",
     "three_patches",
+    "triple_bubble",
+    "triple_bubble_exact",
     "two_caps",
     "two_squares",
     "unduloid_length",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pcmc import Patch, Surface
+from pcmc import Patch, Room, Surface
 from pcmc.base.arrays import Floats, Ints
 from pcmc.base.errors import FreeSurfaceWarning
 
@@ -87,13 +87,15 @@ class Builder:
         self.add_faces(strips(numbers, rows, mirrored), patch)
         return numbers[level == 0]
 
-    def closed_surface(self, patches: Sequence[Patch]) -> Surface:
+    def closed_surface(self, patches: Sequence[Patch], rooms: Sequence[Room] = ()) -> Surface:
         """The Surface of all parts, without supports: for closed surfaces only."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FreeSurfaceWarning)
-            return self.surface(patches)
+            return self.surface(patches, rooms=rooms)
 
-    def surface(self, patches: Sequence[Patch], fixed: Any = (), on_plane: Any = ()) -> Surface:
+    def surface(
+        self, patches: Sequence[Patch], fixed: Any = (), on_plane: Any = (), rooms: Sequence[Room] = ()
+    ) -> Surface:
         """The Surface of all parts; Π is z = 0."""
         return Surface(
             np.concatenate(self._points),
@@ -102,4 +104,5 @@ class Builder:
             tuple(patches),
             fixed=fixed,
             on_plane=on_plane,
+            rooms=tuple(rooms),
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pcmc import Patch, Surface
+from pcmc import Patch, Room, Surface
 from pcmc.base import validate
 from pcmc.base.arrays import Floats, Ints
 from pcmc.base.errors import OptionError
@@ -24,6 +24,7 @@ def double_bubble(
     alpha_left: float = 1.0,
     alpha_right: float = 1.0,
     alpha_aux: float = 1.0,
+    volumes: tuple[float, float] | None = None,
     exact: bool = False,
 ) -> Surface:
     """Two bubbles under the same unit pressure and the flat disc x = 0 they share; nothing is held.
@@ -35,6 +36,8 @@ def double_bubble(
     ----------
     edge_length : length.
     alpha_left, alpha_right, alpha_aux : tension of the patches "left", "right" and "wall".
+    volumes : prescribed for the rooms "left" and "right", length³. Then the bubbles start with these volumes
+        together, and their pressures are results.
     exact : put the vertices on the exact solution; otherwise it is stretched by 1.05, 1 and 0.95
         along the axes.
 
@@ -42,7 +45,11 @@ def double_bubble(
     >>> bool(double_bubble_exact().distance(surface).max() < 1e-12)
     True
     """
-    edge_length = validate.positive("edge_length", edge_length)
+    edge_length, scale = validate.positive("edge_length", edge_length), 1.0
+    if volumes is not None:
+        free = double_bubble_exact(alpha_left=alpha_left, alpha_right=alpha_right, alpha_aux=alpha_aux)
+        scale = float((sum(validate.positive("volumes", v) for v in volumes) / free.volume) ** (1.0 / 3.0))
+        edge_length /= scale
     offsets, rim_radius = _offsets(alpha_left, alpha_right, alpha_aux)
     count = int(even_segments(np.array([rim_radius]), edge_length)[0])
     around = 2.0 * np.pi * np.arange(count) / count
@@ -58,9 +65,16 @@ def double_bubble(
     net = ring_mesh(_segments(rim_radius * np.arange(1, rings + 1) / rings, count, edge_length))
     disc = rim_radius * disc_points(net)
     _glue(mesh, np.column_stack([0.0 * net.angle, disc]), net.faces, rim, WALL)
-    patches = [Patch("left", alpha_left), Patch("right", alpha_right), Patch("wall", alpha_aux, pressure=0.0)]
-    surface = mesh.closed_surface(patches)
-    return surface if exact else surface.moved(surface.vertices * STRETCH)
+    patches = [
+        Patch("left", alpha_left, 1.0 / scale),
+        Patch("right", alpha_right, 1.0 / scale),
+        Patch("wall", alpha_aux, pressure=0.0),
+    ]
+    signs = {"left": {"left": 1, "wall": 1}, "right": {"right": 1, "wall": -1}}
+    rooms = [Room(name, signs[name], v) for name, v in zip(signs, volumes or (), strict=False)]
+    surface = mesh.closed_surface(patches, rooms)
+    stretch = scale * (1.0 if exact else np.array(STRETCH))
+    return surface.moved(surface.vertices * stretch)
 
 
 def double_bubble_exact(

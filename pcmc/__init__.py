@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from .energy.functional import energy, gradient, hessian
     from .existence import solve
     from .io import read, write
-    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface
+    from .io.repairing import Repaired, repair
+    from .panels import FewerFamilies, Panels, fewer_families, panels
+    from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
+    from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
 
 __all__ = [
     "BoundaryMotion",
@@ -26,33 +29,48 @@ __all__ = [
     "Circle",
     "Design",
     "Direction",
+    "FewerFamilies",
     "Line",
+    "Material",
     "MeshCheck",
     "MeshVerdict",
+    "Panels",
     "Parameter",
     "Patch",
     "Plane",
+    "Repaired",
     "Room",
+    "SelfWeight",
+    "Snow",
+    "StructuralModel",
     "Surface",
     "Target",
     "Verdict",
+    "Wind",
     "certify",
     "check_mesh",
     "curvature_error",
+    "cut",
     "energy",
     "errors",
     "explore",
+    "fewer_families",
     "follow",
     "gradient",
     "hessian",
     "mean_curvature",
     "meet",
+    "panels",
+    "mirrored",
     "read",
+    "repair",
+    "read_results",
     "sensitivities",
     "solve",
     "solve_to_accuracy",
     "target_curvature",
     "write",
+    "write_structure",
 ]
 
 # Each name is imported at its first use. So ``import pcmc`` takes milliseconds, and the command can
@@ -66,15 +84,27 @@ _NAMES = {
     "energy.functional": ("energy", "gradient", "hessian"),
     "existence": ("solve",),
     "io": ("read", "write"),
-    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
+    "io.repairing": ("Repaired", "repair"),
+    "structure": (
+        "Material",
+        "SelfWeight",
+        "Snow",
+        "StructuralModel",
+        "Wind",
+        "read_results",
+        "write_structure",
+    ),
+    "panels": ("FewerFamilies", "Panels", "fewer_families", "panels"),
+    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
 }
 
 
 class _Package(ModuleType):
-    """``pcmc.energy`` is the function, although a folder has the same name."""
+    """``pcmc.energy`` and ``pcmc.panels`` are functions, although folders have the same names."""
 
     def __setattr__(self, name: str, value: object) -> None:
-        if name != "energy" or not isinstance(value, ModuleType):  # the import sets the folder
+        folder = isinstance(value, ModuleType)  # set by its import
+        if not (folder and name in ("energy", "panels")):
             super().__setattr__(name, value)
 
 

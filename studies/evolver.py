@@ -79,11 +79,17 @@ def gradient(surface: pcmc.Surface) -> Floats:
 
     The vertex attribute ``__force`` holds -∂E/∂x of all terms, before supports; it is filled by an
     iteration, and ``m 0`` makes that iteration move nothing. ``convert_to_quantities`` matters when
-    patches differ in pressure: without it the forces are not the derivative of ``total_energy``.
+    patches differ in pressure: without it the forces are not the derivative of ``total_energy``. With it
+    they lack those of line tensions, so cables cannot be compared where pressures differ.
     """
+    convert = "convert_to_quantities\n"
+    if surface.cables:
+        if len(np.unique(surface.pressures[surface.pressures != 0.0])) > 1:
+            raise EvolverError(f"{PROGRAM}: no forces of cables where patches differ in pressure")
+        convert = ""
     out = run(
         surface,
-        "convert_to_quantities\ndefine vertex attribute __force real[3]\nm 0\ng 1\n"
+        f"{convert}define vertex attribute __force real[3]\nm 0\ng 1\n"
         'foreach vertex vv do printf "F %.17g %.17g %.17g\\n",'
         " vv.__force[1], vv.__force[2], vv.__force[3]",
     )

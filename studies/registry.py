@@ -21,9 +21,11 @@ from . import (
     gallery,
     mesh_check,
     mesh_search,
+    panel_families,
     refinement,
     solvers,
     stability,
+    structure,
 )
 from .study import Study
 
@@ -44,7 +46,9 @@ MODULES = (
     existence,
     mesh_check,
     accuracy,
+    panel_families,
     gallery,
+    structure,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}
 EXTRAS = "extras"  # in place of a name: all that ``reproduce`` leaves out

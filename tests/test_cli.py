@@ -24,7 +24,21 @@ from pcmc.project import running
 from tests.test_project import SMALL
 
 HOME = Path(__file__).resolve().parent.parent
-COMMANDS = ["solve", "certify", "remesh", "convert", "plot", "sweep", "explore", "cache"]
+COMMANDS = [
+    "solve",
+    "certify",
+    "remesh",
+    "convert",
+    "plot",
+    "repair",
+    "plan",
+    "structure",
+    "panels",
+    "draw",
+    "sweep",
+    "explore",
+    "cache",
+]
 
 
 @pytest.fixture
@@ -101,6 +115,13 @@ def test_remesh_solves_again(solved, capsys):
 def test_convert_and_plot(solved, capsys):
     assert cli.main(["convert", "roof.pcmc", "roof.ply"]) == 0
     assert pcmc.read("roof.ply").m == pcmc.read("roof.pcmc").m
+    assert cli.main(["convert", "roof.pcmc", "roof.glb", "--colour", "error"]) == 0
+    assert b'"scalar":"error"' in (solved / "roof.glb").read_bytes()
+    assert cli.main(["convert", "roof.pcmc", "roof.ifc"]) == 0
+    assert "IFCLABEL('stable')" in (solved / "roof.ifc").read_text()
+    capsys.readouterr()
+    assert cli.main(["convert", "roof.pcmc", "roof.glb", "--colour", "eror"]) == 2
+    assert "unknown colour 'eror'; did you mean 'error'?" in capsys.readouterr().err
     for more in (
         ["--colour", "error"],
         ["--view", "30,20", "--color", "curvature"],

@@ -5,6 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
+import pcmc
+from generators import spherical_cap
 from pcmc.project import reference, run, sections
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -37,3 +41,20 @@ def test_the_page_of_keys_has_every_key_of_every_section():
     for section, part in zip(sections(), parts, strict=True):
         assert section.name in part.splitlines()[0]
         assert [key.name for key in section.keys if f"| `{key.name}` |" not in part] == []
+
+
+def test_meshes_for_compas_are_made_as_the_how_to_says():
+    pytest.importorskip("compas")
+    text = (DOCS / "how-to" / "compas.md").read_text(encoding="utf-8")
+    names = {}
+    exec(compile(re.findall(r"```python\n(.*?)```", text, re.S)[1], "compas.md", "exec"), names)
+    assert names["result"].converged
+
+
+def test_a_glb_is_coloured_as_the_how_to_says(tmp_path, monkeypatch):
+    pytest.importorskip("trimesh")
+    monkeypatch.chdir(tmp_path)
+    text = (DOCS / "how-to" / "files.md").read_text(encoding="utf-8")
+    code = next(one for one in re.findall(r"```python\n(.*?)```", text, re.S) if "colour=" in one)
+    exec(compile(code, "files.md", "exec"), {"pcmc": pcmc, "roof": spherical_cap(4)})
+    assert (tmp_path / "roof.glb").stat().st_size > 1000

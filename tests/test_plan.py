@@ -10,8 +10,9 @@ from pcmc.base.errors import PlanWarning
 from pcmc.energy.functional import patch_areas
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.plan import Area, Divider, Hole, Plan, plan_from
-from pcmc.plan.curves import arc, bezier, circle, join, polyline, to_local
+from pcmc.plan.curves import arc, bezier, circle, join, polyline
 from pcmc.plan.heights import dome, harmonic_heights
+from pcmc.plan.pieces import to_local
 from pcmc.plan.planar import triangulate
 from pcmc.surface.topology import POINT
 

@@ -55,7 +55,7 @@ def test_a_wall_that_follows_remains_a_wall():
     assert with_pressures(found, None, {"left": 1.0}).pressures.tolist() == [1.0, 1.0, 0.0]
 
 
-@pytest.mark.parametrize("suffix", [".glb", ".3dm"])
+@pytest.mark.parametrize("suffix", [".glb", ".3dm", ".ifc"])
 def test_a_pinched_wall_with_a_pressure_comes_back_where_patches_are_written_apart(suffix, tmp_path):
     pinched = pcmc.solve(two_squares(16, alpha_aux=2.0), target="stationary").surface
     surface = with_pressures(pinched, None, {"left": 1.02})

@@ -134,7 +134,7 @@ class _FineMesh:
             own = self.stiffness * self._missing(mode) ** 2
         else:
             slope = _slope(self.fine, quantity, of)
-        dual = self.system.space.to_vectors(self.system.factor.solve(self.system.space.to_coordinates(slope)))
+        dual = self.system.space.to_vectors(self.system.solve(self.system.space.to_coordinates(slope)))
         reaction = slope - _along(self.fine, dual)
         at_held = np.abs(np.einsum("nd,nd->n", reaction, self.held))[n:]
         return np.asarray(self.stiffness * missing * self._missing(dual) + at_held + own)

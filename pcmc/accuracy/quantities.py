@@ -87,7 +87,7 @@ def _boundaries(
     table = boundary_table(surface, certificate.reactions)
     if not len(table):
         return
-    held = surface.fixed | surface.on_plane
+    held = surface.held
     curves = [c for c in surface.topology.boundary_loops if held[c.vertices].any()]
     names = table["boundary"].astype(str).tolist()
     middles = table[["middle_x", "middle_y", "middle_z"]].to_numpy()
@@ -110,7 +110,7 @@ def _height(surface: Surface, patch: int) -> tuple[float, float]:
     vertices = np.unique(surface.faces[surface.patch_of_face == patch])
     top = int(vertices[local[vertices, 2].argmax()])
     value = float(local[top, 2])
-    if surface.fixed[top] or surface.on_plane[top]:
+    if surface.held[top]:
         return value, value
     topo = surface.topology
     around = (topo.edges == top).any(axis=1)

@@ -8,9 +8,10 @@ import pandas as pd
 from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import standing_part
 from ..energy import kernels
-from ..energy.functional import apply_supports
+from ..energy.functional import add_cables_and_weights, apply_supports
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths, vertex_sums
+from ..surface.supports import common_point
 from ..surface.topology import Curve
 from .proof import UnbalancedJunction, Unheld
 
@@ -19,34 +20,57 @@ ROUNDING = 1e-12  # of the size: a coordinate below is 0
 
 
 def load_ratio(surface: Surface) -> float:
-    """Pressure along Π's normal over the most that tension at the boundary could carry.
+    """Pressure and weight along Π's normal over the most that tension at the supports could carry.
 
-    Vertical balance of the whole: p |Ω| ≤ Σ α length(∂Ω) + Σ α_wall length(wall feet). Fixed lines
-    inside the surface carry, too: Σ α of all their sheets per length. So do single fixed vertices, at
-    most what their triangles pull. Above 1 no smooth surface with this boundary is at rest, whatever its
-    shape. A mesh may be, as its triangles balance along the normals alone. A cap over the unit disc with
-    edge length 0.2 comes to rest down to α = 0.493, where the ratio is 1.014; a pyramid over a square
-    with one free vertex down to α = 1/3, at 1.5. So the verdict uses the ratio only above
-    ``1 + coarseness``. 0 for a closed surface that nothing holds.
+    Vertical balance of the whole: p |Ω| ≤ Σ α length(∂Ω) + Σ α_wall length(wall feet), along the held
+    boundary. Fixed lines inside the surface carry, too: Σ α of all their sheets per length. So do single
+    held vertices, at most what their triangles pull; and cables, τ at each end on a support. A free edge
+    carries nothing. With weights, α + w z stands for α, and Σ w A counts against the pressure. Above 1 no
+    smooth surface with this boundary is at rest, whatever its shape. A mesh may be, as its triangles
+    balance along the normals alone. A cap over the unit disc with edge length 0.2 comes to rest down to
+    α = 0.493, where the ratio is 1.014; a pyramid over a square with one free vertex down to α = 1/3, at
+    1.5. So the verdict uses the ratio only above ``1 + coarseness``. 0 for a closed surface that nothing
+    holds.
     """
     topo, X, F = surface.topology, surface.vertices, surface.faces
-    tension = surface.tensions[surface.patch_of_face]
-    sheets = np.bincount(topo.edge_of_face.ravel(), np.repeat(tension, 3), len(topo.edges))
+    pull = np.abs(edge_tensions(surface))
+    sheets = np.bincount(topo.edge_of_face.ravel(), pull.ravel(), len(topo.edges))
     inside = surface.fixed & ~topo.on_boundary
     line = inside[topo.edges].all(axis=1)
-    carrying = topo.boundary_edge | line
-    capacity = float(sheets[carrying] @ segment_lengths(X, topo.edges[carrying]))
-    inside[topo.edges[line]] = False
-    if inside.any():
+    carrying = (topo.boundary_edge & surface.held[topo.edges].all(axis=1)) | line
+    lengths = segment_lengths(X, topo.edges[carrying])
+    for plane, mask in surface.on_planes:  # a plane carries across itself; a mirror plane nothing at all
+        steep = 0.0 if plane.mirror else abs(float(np.dot(plane.normal, surface.plane.normal)))
+        lengths[mask[topo.edges[carrying]].all(axis=1)] *= steep
+    capacity = float(sheets[carrying] @ lengths)
+    supports = surface.fixed | surface.on_plane
+    single = inside | (supports & topo.on_boundary)
+    single[topo.edges[carrying]] = False
+    if single.any():
         opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
-        capacity += 0.5 * float(tension @ (opposite * inside[F]).sum(axis=1))
+        capacity += 0.5 * float((pull.mean(axis=1)[:, None] * opposite * single[F]).sum())
+    ends, tension = surface.cable_edges
+    capacity += float(tension[supports[ends].sum(axis=1) == 1].sum())
     return abs(load(surface)) / capacity if capacity > 0.0 else 0.0
 
 
 def load(surface: Surface) -> float:
-    """Σ p A_T ν_T · n: the force of the pressure along Π's normal n, which the supports carry."""
+    """Σ p A_T ν_T · n - Σ w A_T: the force of pressure and weight along Π's normal n, on the supports."""
     vector = area_vectors(surface.vertices[surface.faces])
-    return float(surface.pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal)))
+    pressed = surface.pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
+    if not surface.weights.any():
+        return float(pressed)
+    return float(pressed - surface.weights[surface.patch_of_face] @ np.linalg.norm(vector, axis=1))
+
+
+def edge_tensions(surface: Surface) -> Floats:
+    """(m,3) the tension with which each triangle pulls at its sides, α + w z at their middles."""
+    patch = surface.patch_of_face
+    tension = np.repeat(surface.tensions[patch][:, None], 3, axis=1)
+    if surface.weights.any():
+        height = surface.plane.height(surface.vertices)[surface.faces]
+        tension += surface.weights[patch, None] * (height.sum(axis=1, keepdims=True) - height) / 2.0
+    return tension
 
 
 def coarseness(surface: Surface) -> float:
@@ -61,7 +85,7 @@ def coarseness(surface: Surface) -> float:
     4.0
     """
     X, topo = surface.vertices, surface.topology
-    length = segment_lengths(X, topo.edges[topo.boundary_edge])
+    length = segment_lengths(X, topo.edges[topo.boundary_edge & ~surface.mirror_edge])
     corners = X[surface.faces[~surface.walls[surface.patch_of_face]]]
     plan = abs(float(area_vectors(corners).sum(axis=0) @ np.array(surface.plane.normal)))
     if not len(length) or plan == 0.0:
@@ -75,6 +99,7 @@ def unbalanced(surface: Surface, pinchable: Bools) -> UnbalancedJunction | None:
     Σ α n = 0 (7) needs the largest tension to be at most the sum of the others. A junction that is held
     all along is left out, as its support takes the difference, and so is one with a wall that slides on
     Π and is stronger than its sheets: it comes down to rest on Π. ``pinchable`` (k,) marks such walls.
+    Nothing is known where a cable pulls, too, or a sheet's weight changes its tension with the height.
     """
     return _strained(surface, pinchable, 1.0 + 1e-9)
 
@@ -97,19 +122,31 @@ def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
 
 def _strained(surface: Surface, pinchable: Bools, share: float) -> UnbalancedJunction | None:
     """A junction whose largest tension is over ``share`` of the sum of the others."""
-    held = surface.fixed | surface.on_plane
+    held = surface.held
     for curve in surface.topology.junctions:
         strongest = max(curve.sheets, key=lambda patch: surface.tensions[patch])
         *others, largest = sorted(surface.tensions[list(curve.sheets)])
         excused = pinchable[strongest] or held[curve.vertices].all()
+        excused = excused or surface.weights[list(curve.sheets)].any() or _carries_cable(surface, curve)
         if largest > share * sum(others) and not excused:
             names = tuple(surface.patches[i].name for i in curve.sheets)
             return UnbalancedJunction(names, float(largest), tuple(float(t) for t in others))
     return None
 
 
+def _carries_cable(surface: Surface, curve: Curve) -> bool:
+    """Whether a cable runs along an edge of the curve."""
+    if not len(surface.cable_edges.ends):
+        return False
+    numbers = surface.topology.edge_numbers
+    on_cable = numbers(surface.cable_edges.ends)
+    return bool(np.isin(numbers(segments(surface, curve)[0]), on_cable).any())
+
+
 def unheld(surface: Surface, stable: bool) -> Unheld | None:
     """A part that no vertex fixes and that so has no equilibrium, or no ``stable`` one; or None.
+
+    A part around a room of prescribed volume can neither grow nor shrink: it may well be at rest.
 
     >>> from pcmc import Patch
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
@@ -120,10 +157,25 @@ def unheld(surface: Surface, stable: bool) -> Unheld | None:
     """
     parts, used = surface.topology.components, surface.faces[:, 0]
     pressed = np.unique(parts[used[surface.pressures[surface.patch_of_face] != 0.0]])
-    for part in np.setdiff1d(parts[used], parts[surface.fixed]):
-        if stable or part not in pressed:
+    held = surface.given.fixed.copy()
+    for _, along in surface.given.on_line:
+        held |= along
+    beyond = surface.room_signs.any(axis=0) | (surface.weights != 0.0)
+    held[surface.faces[beyond[surface.patch_of_face]]] = True
+    for part in np.setdiff1d(parts[used], parts[held]):
+        if (stable or part not in pressed) and _may_shrink(surface, parts == part):
             return Unheld(int(np.flatnonzero(parts == part)[0]), bool(part in pressed))
     return None
+
+
+def _may_shrink(surface: Surface, part: Bools) -> bool:
+    """Whether the planes that a part slides on meet in a point, towards which it can shrink."""
+    planes = [(surface.plane, surface.given.on_plane), *surface.on_planes]
+    there = [plane for plane, mask in planes if (mask & part).any()]
+    if len(there) < 2:
+        return True
+    point = common_point(np.array(there[0].point), there)
+    return bool(all(abs(plane.height(point)) <= 1e-9 * surface.size for plane in there))
 
 
 def pressures_left_over(surface: Surface) -> str:
@@ -144,11 +196,12 @@ def pressures_left_over(surface: Surface) -> str:
 def conormal_sum(surface: Surface) -> Floats:
     """(e,3) Σ α n over the triangles at each edge, n the outward co-normal, force/length.
 
-    Zero along a junction of smooth surfaces at rest (7); of triangles it is zero only in the limit.
+    With weights, α + w z stands for α. Zero along a junction of smooth surfaces at rest (7) without a
+    cable; of triangles it is zero only in the limit.
     """
     topo = surface.topology
     X, F = surface.vertices, surface.faces
-    total = np.zeros((len(topo.edges), 3))
+    total, tension = np.zeros((len(topo.edges), 3)), edge_tensions(surface)
     for corner in range(3):
         a, b, apex = X[F[:, corner - 2]], X[F[:, corner - 1]], X[F[:, corner]]
         along = b - a
@@ -157,7 +210,7 @@ def conormal_sum(surface: Surface) -> Floats:
         out = a - apex
         out -= np.einsum("ij,ij->i", out, along)[:, None] * along
         length = np.linalg.norm(out, axis=1)
-        pull = surface.tensions[surface.patch_of_face] / np.where(length > 0.0, length, 1.0)
+        pull = tension[:, corner] / np.where(length > 0.0, length, 1.0)
         np.add.at(total, topo.edge_of_face[:, corner], pull[:, None] * out)
     return total
 
@@ -165,7 +218,7 @@ def conormal_sum(surface: Surface) -> Floats:
 def held_lengths(surface: Surface) -> Floats:
     """(n,) half the length of the boundary edges at each vertex that are held at both ends, length."""
     ends = surface.topology.edges[surface.topology.boundary_edge]
-    ends = ends[(surface.fixed | surface.on_plane)[ends].all(axis=1)]
+    ends = ends[surface.held[ends].all(axis=1)]
     half = 0.5 * segment_lengths(surface.vertices, ends)
     return np.asarray(np.bincount(ends.ravel(), np.repeat(half, 2), surface.n), dtype=float)
 
@@ -173,13 +226,14 @@ def held_lengths(surface: Surface) -> Floats:
 def reactions(surface: Surface) -> Floats:
     """(n,3) forces of the supports: the whole force where fixed, its part normal to Π where sliding.
 
-    The force at a vertex is Σ α ∂A - ⅓ Σ p A_T ν_T, with a third of each triangle's pressure. At a
-    boundary this is not ∇E: there the volume is that of a cone to the point of Π, whose side moves with
-    the boundary but is under no pressure.
+    The force at a vertex is Σ α ∂A - ⅓ Σ p A_T ν_T, with a third of each triangle's pressure, and the
+    forces of cables and weights. At a boundary this is not ∇E: there the volume is that of a cone to the
+    point of Π, whose side moves with the boundary but is under no pressure.
     """
     X, F = surface.vertices, surface.faces
     zero = np.zeros(len(surface.patches))
     forces = kernels.measure(kernels.energy_mesh(surface, pressure=zero), X)[2]
+    add_cables_and_weights(surface, X, forces)
     third = area_vectors(X[F]) / 3.0
     forces -= vertex_sums(third * surface.pressures[surface.patch_of_face, None], F, surface.n)
     return forces - apply_supports(surface, forces.copy())
@@ -211,14 +265,14 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
     number = {tuple(edge): i for i, edge in zip(seams, topo.edges[seams].tolist(), strict=True)}
     rows = []
     for curve in topo.junctions:
-        pairs, lengths = _segments(surface, curve)
+        pairs, lengths = segments(surface, curve)
         edges = [number[tuple(pair)] for pair in np.sort(pairs, axis=1).tolist()]
         total, mean = float(lengths.sum()), float(lengths.mean()) or 1.0
         rows.append(
             {
                 "junction": " | ".join(surface.patches[i].name for i in curve.sheets),
                 "length": total,
-                **_middle(surface, curve),
+                **middle(surface, curve),
                 "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max()) / mean,
                 "sum_alpha_n_mean": float(imbalance[edges] @ lengths) / total if total else 0.0,
                 "sum_alpha_n_max": float(imbalance[edges].max()),
@@ -229,7 +283,7 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
 
 def boundary_table(surface: Surface, forces: Floats) -> pd.DataFrame:
     """One row per held boundary curve: where it is, its share of the reactions (n,3), most per length."""
-    held = surface.fixed | surface.on_plane
+    held = surface.held
     loops = surface.topology.boundary_loops
     # the reaction of a corner is shared equally by its curves, so that the rows add up to the total
     count = np.zeros(surface.n)
@@ -245,8 +299,8 @@ def boundary_table(surface: Surface, forces: Floats) -> pd.DataFrame:
         rows.append(
             {
                 "boundary": " | ".join(surface.patches[i].name for i in curve.sheets),
-                "length": float(_segments(surface, curve)[1].sum()),
-                **_middle(surface, curve),
+                "length": float(segments(surface, curve)[1].sum()),
+                **middle(surface, curve),
                 **dict(zip(("reaction_x", "reaction_y", "reaction_z"), total, strict=True)),
                 "per_length_max": float(per_length[curve.vertices].max()),
             }
@@ -254,15 +308,15 @@ def boundary_table(surface: Surface, forces: Floats) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _segments(surface: Surface, curve: Curve) -> tuple[Ints, Floats]:
+def segments(surface: Surface, curve: Curve) -> tuple[Ints, Floats]:
     order = np.append(curve.vertices, curve.vertices[:1]) if curve.closed else curve.vertices
     pairs = np.stack([order[:-1], order[1:]], axis=1)
     return pairs, segment_lengths(surface.vertices, pairs)
 
 
-def _middle(surface: Surface, curve: Curve) -> dict[str, float]:
+def middle(surface: Surface, curve: Curve) -> dict[str, float]:
     """The point half way along a curve, or the centre of a closed one; tells curves of one name apart."""
-    pairs, lengths = _segments(surface, curve)
+    pairs, lengths = segments(surface, curve)
     ends = surface.vertices[pairs]
     if curve.closed:
         place = lengths @ ends.mean(axis=1) / (lengths.sum() or 1.0)

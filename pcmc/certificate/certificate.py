@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,11 +16,12 @@ from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.units import NO_UNITS, Units
 from ..contact.pinching import excess_pull, standing_part
-from ..energy.curvature import METHODS, curvature_error, mean_curvature
+from ..energy.curvature import METHODS, curvature_error, mean_curvature, target_curvature
 from ..energy.functional import energy_and_gradient, patch_areas, volume
 from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
 from ..energy.motion_space import VertexClasses, force_scale, motion_space
 from ..energy.rigid_motions import rigid_modes, rigid_motions
+from ..energy.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest, stiffness
@@ -28,6 +29,7 @@ from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
 from .balance import boundary_table, junction_table, load, load_ratio, pressures_left_over, reactions
+from .cables import cable_end_table, cable_table
 from .proof import Proof
 from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
 
@@ -42,10 +44,12 @@ class Certificate:
     ----------
     verdict, detail : the verdict, and its reason (which mode, patch or place).
     residual : ‖Bᵀ∇E‖ over ``scale``: the forces left in the motion space, with the pull on pinched
-        vertices beyond what their wall can take, relative. Of several loose parts, that of the worst.
+        vertices beyond what their wall can take, relative. Of several loose parts, that of the worst. The
+        relative differences of prescribed volumes are added to it (as squares).
     scale : norm of the single triangles' tension forces, force.
     energy, volume : E (force·length) and the volume under the roof (length³).
-    index : Morse index; None where the surface is not at rest. Rigid motions are not counted.
+    index : Morse index; None where the surface is not at rest. Rigid motions are not counted, nor motions
+        that change a prescribed volume.
     eigenvalues : lowest second variations per unit area and displacement, force/length³, ascending.
     modes : (k,n,3) their displacement fields, unit mass.
     curvature_error : largest |H - H̄|/H̄ by the variational definition.
@@ -55,11 +59,16 @@ class Certificate:
         left and Σ α n, force/length.
     boundaries : one row per held boundary curve: length, middle, reaction, largest reaction per
         length. A corner's reaction is shared equally by its curves; per length it counts in full.
-    load, support : forces along Π's normal, of the pressure and of all supports; their sum is what
-        the mesh leaves along the sheets.
+    rooms : one row per room of prescribed volume: the volume it has, the one prescribed, the difference
+        over the latter, and the room's pressure.
+    cables : one row per cable, cut at supports and branches: force, length, middle, the pull of the
+        sheets and of the cable across it, force left; see ``pcmc.certificate.cables.cable_table``.
+    cable_ends : one row per end of these: vertex, place, whether held, the force of a support there.
+    load, support : forces along Π's normal, of pressure and weight and of all supports; their sum is
+        what the mesh leaves along the sheets.
     reactions : (n,3) force of each support on the surface.
     pinched : (k,) vertices where a junction rests on Π and its wall has no height.
-    load_ratio : pressure along Π's normal over the most that the boundary's tension could carry; see
+    load_ratio : pressure and weight along Π's normal over the most that the supports could carry; see
         the function ``load_ratio``.
     proofs : why there is no equilibrium, if that is the verdict: ``Overload``, ``UnbalancedJunction``,
         ``Fold`` or ``Unheld``.
@@ -86,6 +95,9 @@ class Certificate:
     pinched: Ints
     load_ratio: float
     proofs: tuple[Proof, ...] = ()
+    cables: pd.DataFrame = field(default_factory=pd.DataFrame)
+    cable_ends: pd.DataFrame = field(default_factory=pd.DataFrame)
+    rooms: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     @property
     def certified(self) -> bool:
@@ -130,12 +142,11 @@ class Certificate:
             ("load, reactions", f"{self.load:.6g}, {self.support:.6g} along the plane's normal"),
         ]
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
-        tables = [
-            frame.to_string(index=False, float_format=lambda x: f"{x:.4g}")
-            for frame in (self.patches, self.junctions, self.boundaries)
-            if len(frame)
+        tables = self.patches, self.rooms, self.junctions, self.boundaries, self.cables, self.cable_ends
+        shown = [
+            frame.to_string(index=False, float_format=lambda x: f"{x:.4g}") for frame in tables if len(frame)
         ]
-        return "\n\n".join([head, *tables])
+        return "\n\n".join([head, *shown])
 
 
 def certify(
@@ -183,6 +194,9 @@ def certify(
     left = space.to_vectors(in_motion_space)
     lacking = np.column_stack([left, unheld])
     residual = relative_forces(standing, classes, X, lacking)
+    rooms = room_table(surface)
+    if len(rooms):
+        residual = float(np.hypot(residual, np.linalg.norm(rooms["difference"])))
 
     qualities = triangle_quality(X, standing.faces)
     in_wall = part.walls.pinchable[standing.patch_of_face]
@@ -213,6 +227,7 @@ def certify(
         evidence=evidence,
         given=proofs,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
+        rigid=rigid.shape[1] if surface.rooms else 0,
     )
     verdict, reason = judge(findings)
     return Certificate(
@@ -237,6 +252,9 @@ def certify(
         pinched=np.flatnonzero(part.resting),
         load_ratio=ratio,
         proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),
+        cables=cable_table(standing, left),
+        cable_ends=cable_end_table(standing),
+        rooms=rooms,
     )
 
 
@@ -279,7 +297,7 @@ def _pulled_off(excess: Floats) -> str:
 
 def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Floats) -> pd.DataFrame:
     errors = {method: np.abs(curvature_error(standing, method)) for method in METHODS}
-    curvature = mean_curvature(standing, "variational")
+    curvature, target = mean_curvature(standing, "variational"), target_curvature(standing)
     rows = []
     for index, patch in enumerate(surface.patches):
         faces = standing.patch_of_face == index
@@ -290,7 +308,9 @@ def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Fl
             "patch": patch.name,
             "tension": patch.tension,
             "pressure": patch.pressure,
-            "target": patch.target_curvature,
+            "target": float(target[inside].mean())
+            if patch.weight and inside.any()
+            else patch.target_curvature,
             "area": float(areas[index]),
             "mean_H": float(curvature[inside].mean()) if inside.any() else np.nan,
         }
@@ -301,6 +321,22 @@ def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Fl
         row["quality"] = float(quality[faces].min(initial=1.0))
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def room_table(surface: Surface) -> pd.DataFrame:
+    """A row per room of prescribed volume; see ``Certificate.rooms``."""
+    if not surface.rooms:
+        return pd.DataFrame()
+    wanted, reached = prescribed_volumes(surface), room_volumes(surface)
+    return pd.DataFrame(
+        {
+            "room": [room.name for room in surface.rooms],
+            "volume": reached,
+            "prescribed": wanted,
+            "difference": (reached - wanted) / np.abs(wanted),
+            "pressure": room_pressures(surface),
+        }
+    )
 
 
 def _largest(values: pd.Series) -> float:

@@ -77,8 +77,8 @@ def held_groups(surface: Surface) -> tuple[Ints, Floats]:
     shrink.
     """
     topo, n = surface.topology, surface.n
-    held = surface.fixed | surface.on_plane
-    edges = topo.edges[topo.boundary_edge & held[topo.edges].all(axis=1)]
+    held = surface.held
+    edges = topo.edges[topo.boundary_edge & held[topo.edges].all(axis=1) & ~surface.mirror_edge]
     links = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
     label = connected_components(links, directed=False)[1]
     on_curve = np.zeros(n, dtype=bool)

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Bools, Floats
+from ..energy.weight import compressed, effective_tensions
 from ..surface import Surface
 from .balance import coarseness, hardly_balanced, unbalanced, unheld
 from .collapse import held_wall_down, where_collapsed
@@ -64,6 +65,7 @@ class Findings:
     evidence : what happened on the way, if a solver was there to see it.
     given : proofs that there is no equilibrium, which a solver brought.
     mode : (n,3) displacements of the lowest mode; empty where none is known.
+    rigid : number of rigid motions that nothing resists, where rooms prescribe volumes.
     """
 
     surface: Surface
@@ -79,6 +81,7 @@ class Findings:
     evidence: Evidence | None = None
     given: tuple[Proof, ...] = ()
     mode: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    rigid: int = 0
 
     @property
     def moving(self) -> bool:
@@ -108,8 +111,11 @@ class Findings:
     def overloaded(self) -> bool:
         """Whether the pressure is more than the boundary can carry, beyond what the mesh leaves open.
 
-        Where a solver saw the surface inflate or collapse, the mesh leaves nothing open.
+        Where a solver saw the surface inflate or collapse, the mesh leaves nothing open. Where rooms
+        prescribe volumes, the pressure is not given, and proves nothing.
         """
+        if self.surface.rooms:
+            return False
         settled = self.evidence in (Evidence.INFLATED, Evidence.COLLAPSED)
         return self.load_ratio > 1.0 + (0.0 if settled else coarseness(self.surface))
 
@@ -158,6 +164,7 @@ def _forces_left(f: Findings) -> str:
     reason = f"relative residual {f.residual:.1e}, tolerance {f.tolerance:.0e}"
     if f.hardly_balanced:
         reason += f"; {f.hardly_balanced}"
+    reason = "; ".join(filter(None, (reason, _compressed(f))))
     if f.load_ratio > 1.0:
         reason += (
             f"; the pressure is {f.load_ratio:.3f} times what the boundary's tension could carry:"
@@ -193,6 +200,22 @@ def _hidden_stability(f: Findings) -> str:
     return reason
 
 
+def _compressed(f: Findings) -> str:
+    """Names a patch whose weight leaves no tension somewhere; or empty."""
+    surface = f.surface
+    faces = np.flatnonzero(compressed(surface))
+    if not len(faces):
+        return ""
+    pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)[faces]
+    worst = faces[pull.argmin()]
+    name = surface.patches[surface.patch_of_face[worst]].name
+    place = surface.vertices[surface.faces[worst]].mean(axis=0).round(4).tolist()
+    return (
+        f"patch {name!r} is under compression in {len(faces)} triangles: its weight leaves α + w z ="
+        f" {pull.min():.3g} at {place}, and a sheet buckles there; raise its tension, or put Π lower"
+    )
+
+
 def _ways_down(f: Findings) -> str:
     return describe_saddle(f.surface, f.index or 0, f.mode)
 
@@ -222,8 +245,14 @@ RULES = (
     Rule(Verdict.UNDECIDED, lambda f: f.moving and f.residual <= NOISE * f.rounding, _hidden_forces),
     Rule(Verdict.NOT_CONVERGED, lambda f: f.moving, _forces_left),
     Rule(Verdict.NOT_CONVERGED, lambda f: bool(f.own_residuals.max() > SMALL * f.tolerance), _weak_patch),
+    Rule(Verdict.SADDLE, lambda f: bool(compressed(f.surface).any()), _compressed),
     Rule(Verdict.UNDECIDED, lambda f: f.index is None, _hidden_stability),
     Rule(Verdict.SADDLE, lambda f: f.index != 0, _ways_down),
+    Rule(
+        Verdict.NEUTRAL,
+        lambda f: f.rigid > 0,
+        lambda f: f"nothing resists {f.rigid} rigid motions; every change of shape at these volumes raises E",
+    ),
     Rule(
         Verdict.NEUTRAL,
         lambda f: abs(f.softest) < NEUTRAL,

@@ -7,9 +7,13 @@ from typing import Annotated
 
 import typer
 
+from .building import draw_, panels_
 from .caching import cache_
+from .planning import plan
+from .repairing import repair_
 from .showing import convert, explore, plot
 from .solving import certify_, remesh_, solve_
+from .structure import structure
 from .sweeping import sweep
 
 app = typer.Typer(
@@ -18,7 +22,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, the same on a terminal and in a pipe
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="""Roofs of patches in equilibrium: solve, certify, remesh, convert, draw, sweep, explore.
+    help="""Roofs of patches in equilibrium: solve, certify, remesh, convert, draw, model, sweep, explore.
 
     Exit codes: 0 the result is certified (or the command has done its work and certifies nothing), 1 the
     result is not certified, 2 bad input, 130 stopped by Ctrl-C.
@@ -48,6 +52,11 @@ for name, command, summary in (
     ("remesh", remesh_, "Change the triangle size, solve and certify again."),
     ("convert", convert, "Write a surface in another format."),
     ("plot", plot, "Draw a surface."),
+    ("repair", repair_, "Repair a dirty mesh."),
+    ("plan", plan, "Write the project file for a drawing."),
+    ("structure", structure, "Write a structural model for CalculiX."),
+    ("panels", panels_, "Sort the panels of a roof into families; write a schedule."),
+    ("draw", draw_, "Draw plan, elevations, sections and panels for those who build."),
     ("sweep", sweep, "Solve every combination of some values; write a table."),
     ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
     ("cache", cache_, "Show or remove the roofs that are kept."),

@@ -15,13 +15,13 @@ from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import Units
-from ..io import FORMATS, read_bare
+from ..io import FORMATS, READ_ONLY, read_bare
 from ..io.mesh_data import MeshData
 from ..project.output import OnStep
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 
-TOML = ".toml"
+TOML, DXF = ".toml", ".dxf"
 
 
 def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
@@ -29,7 +29,8 @@ def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, metavar=metavar, help=meaning, **more)
 
 
-Input = Annotated[Path, typer.Argument(metavar="FILE", help="A surface, or a project (.toml).")]
+INPUT = "A surface, a project (.toml), or a drawing (.dxf, .3dm)."
+Input = Annotated[Path, typer.Argument(metavar="FILE", help=INPUT)]
 _EVERY = "A bare VALUE applies to every patch under pressure"
 Settings = Annotated[list[str] | None, option("NAME=VALUE", f"Tension of a patch. {_EVERY}.", "--tension")]
 Pressures = Annotated[
@@ -91,7 +92,7 @@ def given(
     """The surface in a file, or the designed roof of a project; with ``start`` its start shape."""
     check_input(file)
     changed = partial(retensioned, tension=tension, pressure=pressure) if tension or pressure else None
-    if file.suffix.lower() != TOML:
+    if not projects.is_project(file):
         surface, data = read_bare(file)
         if changed is None:
             return Given(surface, data.units, data=data)
@@ -105,20 +106,20 @@ def given(
 
 
 def check_input(file: Path) -> None:
-    """Refuse a file whose suffix is neither a project's nor a surface's."""
-    suffix = file.suffix.lower()
-    if suffix not in (TOML, *FORMATS):
-        raise FileError(f"{file}: {unknown('suffix', suffix, [TOML, *FORMATS])}", what=str(file))
+    """Refuse a file whose suffix is neither a project's nor a drawing's nor a surface's."""
+    suffix, known = file.suffix.lower(), (TOML, *FORMATS, *READ_ONLY, DXF)
+    if suffix not in known:
+        raise FileError(f"{file}: {unknown('suffix', suffix, known)}", what=str(file))
 
 
 def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str] | None) -> Surface:
     """The surface with the tensions and pressures of the command line."""
     loaded = [patch.name for patch in surface.patches if not patch.auxiliary]
-    tensions, pressures = _by_name(loaded, tension, "--tension"), _by_name(loaded, pressure, "--pressure")
+    tensions, pressures = by_name(loaded, tension, "--tension"), by_name(loaded, pressure, "--pressure")
     return with_pressures(surface, tensions, pressures)
 
 
-def _by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:
+def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:
     """Value by patch, from NAME=VALUE, or VALUE for all ``names``. A later one replaces an earlier one."""
     values: dict[str, float] = {}
     for text in given or ():

@@ -30,13 +30,20 @@ def convert(
     pressure: Pressures = None,
     start: Start = False,
     cache: Cache = True,
+    colour: Annotated[
+        str,
+        option(
+            "NAME", "Scalar of the file that colours the vertices of a .glb or .usda.", "--colour", "--color"
+        ),
+    ] = "",
 ) -> int:
-    """Write a surface or a project's roof as .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf or .3dm.
+    """Write a surface or a project's roof as .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf .3dm .ifc .usda.
 
     \b
     Examples:
       pcmc convert roof.pcmc roof.3dm
-      pcmc convert roof.toml roof.obj
+      pcmc convert roof.toml roof.ifc
+      pcmc convert roof.pcmc roof.glb --colour error
     """
     projects.check_names([output])
     projects.check_outputs([output])
@@ -45,9 +52,9 @@ def convert(
     if shown.outcome is not None:
         if not _is_good(file, shown.outcome):
             return NOT_CERTIFIED
-        projects.write_all(projects.surface_files(shown.outcome, [output]))
+        projects.write_all(projects.surface_files(shown.outcome, [output], colour))
     else:
-        data: dict[str, Any] = {"units": shown.units}
+        data: dict[str, Any] = {"units": shown.units, "colour": colour}
         if shown.data is not None:
             data |= {"scalars": shown.data.scalars, "certificate": shown.data.certificate or None}
         with defer_interrupts():

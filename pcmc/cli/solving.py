@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,12 +15,12 @@ from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
-from ..base.errors import PcmcError
+from ..base.errors import FileError, PcmcError
 from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import MANY_FILES, TOML, Cache, Input, Pressures, Settings, Start, number, option
+from .arguments import MANY_FILES, Cache, Input, Pressures, Settings, Start, number, option
 from .progress import working
 from .reports import report
 
@@ -73,6 +74,8 @@ def solve_(
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
     project = replace(project, mesh_check=False)
+    if projects.is_drawing(file) and project.drawing is not None:
+        print(projects.proposal_text(project))
     with working() as say:
         retensioned = partial(arguments.retensioned, tension=tension, pressure=pressure)
         changed = retensioned if tension or pressure else None
@@ -106,10 +109,21 @@ def _project(
 ) -> projects.Project:
     """The project, with the output files of the command line if there are any."""
     arguments.check_input(file)
-    if file.suffix.lower() != TOML:
+    if not projects.is_project(file):
         return projects.Project(file, files=output or (), picture=picture, folder=folder)
     project = projects.load(file).in_folder(file.parent if folder is None else folder)
+    _keep_drawing(project, output or ())
     return replace(project, files=output or project.files, picture=picture or project.picture)
+
+
+def _keep_drawing(project: projects.Project, outputs: Sequence[Path]) -> None:
+    """Refuse to write a roof over the drawing that it is made from."""
+    if project.drawing is None:
+        return
+    for path in outputs:
+        if path.resolve() == project.drawing.path.resolve():
+            text = f"{path}: this is the drawing; name another file for the roof"
+            raise FileError(text, what=str(path))
 
 
 def certify_(

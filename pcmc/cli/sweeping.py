@@ -10,11 +10,11 @@ from typing import Annotated, Any
 import typer
 
 from ..base.errors import FileError, MissingExtra, OptionError
-from ..io import FORMATS
+from ..io import FORMATS, READ_ONLY
 from ..plot.figure import check_suffix
 from ..project import check_outputs
 from . import INTERRUPTED, NOT_CERTIFIED, OK
-from .arguments import TOML, integer, number, option, values_of
+from .arguments import DXF, TOML, integer, number, option, values_of
 from .progress import sweeping
 
 TABLES = (".csv", ".parquet")
@@ -115,7 +115,7 @@ def _cases(
     from ..sweep import Sweep, solve_case
     from ..sweep.projects import project_sweep
 
-    if Path(what).suffix.lower() in (TOML, *FORMATS):
+    if Path(what).suffix.lower() in (TOML, DXF, *FORMATS, *READ_ONLY):
         return project_sweep(what, grid, fixed, method=method, **wanted)
     if ":" not in what:
         kinds = f"a project (.toml), a surface ({' '.join(FORMATS)}), or a generator"

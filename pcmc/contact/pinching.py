@@ -19,11 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..energy.functional import energy_and_gradient
+from ..energy.functional import apply_supports, energy_and_gradient
 from ..energy.motion_space import MotionSpace, VertexClasses, vertex_classes
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
+from ..surface.supports import guides_and_points
 from ..surface.topology import topology
 from .held_bottoms import across_bottom, held_walls
 from .wall_rows import WallRows, join_rows, wall_rows
@@ -94,7 +95,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
         of_wall = np.unique(topo.edge_of_face[surface.patch_of_face == index])
         edges, top = topo.edges[of_wall], topo.edges[of_wall[roof_edge[of_wall]]]
         vertices = np.unique(edges)
-        if not surface.on_plane[vertices].any() or not len(top):
+        if not surface.on_ground[vertices].any() or not len(top):
             continue
         pinchable[index] = True
         rows.append(wall_rows(surface, vertices[~roof_vertex[vertices]], top, edges))
@@ -115,8 +116,8 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
         rows=join_rows(rows),
         top_edges=np.concatenate(top_edges),
         wall_below=np.concatenate(wall_below),
-        top_free=on_top & ~surface.fixed & ~surface.on_plane,
-        corner=on_top & surface.fixed & low,
+        top_free=on_top & ~surface.pinned & ~surface.on_ground,
+        corner=on_top & surface.pinned & low,
         side=np.where(np.where(low, _pressure_push(surface, low), height) < 0.0, -1.0, 1.0),
         pinchable=pinchable,
         foot=foot,
@@ -134,6 +135,8 @@ def place_wall_rows(surface: Surface, walls: Walls, X: Floats, space: MotionSpac
     change[rows.vertices] = rows.places(surface, X) - X[rows.vertices]
     if space is not None:
         change -= space.project(change)
+    if surface.on_planes:
+        return X + apply_supports(surface, change, X)
     change[surface.fixed] = 0.0
     return X + change
 
@@ -196,8 +199,23 @@ def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surf
     F.setflags(write=False)
     patch.setflags(write=False)
     topo, held = topology(F, patch, surface.n), resting & walls.held
+    supports: dict[str, object]
     supports = {"fixed": surface.fixed | held, "on_plane": surface.on_plane | (resting & ~held)}
-    return surface._with(vertices=X, faces=F, patch_of_face=patch, topology=topo, **supports)
+    if surface.on_planes:
+        supports |= resting_supports(surface, resting & ~held)
+    cables = tuple(filter(None, (cable.carried(owner) for cable in surface.cables)))
+    return surface._with(vertices=X, faces=F, patch_of_face=patch, topology=topo, cables=cables, **supports)
+
+
+def resting_supports(surface: Surface, resting: Bools) -> dict[str, object]:
+    """The supports with vertices that come to rest on Π, some of which slide on other planes, too."""
+    planes = ((surface.plane, surface.on_ground | resting), *surface.on_planes)
+    lines, points = guides_and_points(planes, surface.given.fixed, surface.given.on_line)
+    fixed = surface.given.fixed | points
+    for _, along in lines:
+        fixed |= along
+    sliding = (surface.on_plane | resting) & ~fixed
+    return {"fixed": fixed, "on_plane": sliding, "on_line": tuple(lines)}
 
 
 def resting_links(walls: Walls, resting: Bools) -> Ints:
@@ -344,10 +362,18 @@ def place_pinched_walls(surface: Surface, walls: Walls, resting: Bools, X: Float
     F, left = _standing_faces(surface, walls, resting, owner)
     stands[F[left]] = True
     rows = walls.rows
-    gone = (resting | walls.corner)[rows.top_ends].all(axis=1) & ~(stands | surface.fixed)[rows.vertices]
+    gone = (resting | walls.corner)[rows.top_ends].all(axis=1) & ~(stands | surface.pinned)[rows.vertices]
     X, places = X.copy(), rows.top_places(X)
     X[rows.vertices[gone]] = places[gone]
     return X[owner]
+
+
+def standing_faces(part: StandingPart, whole: Surface) -> Ints:
+    """(k,) the faces of the whole surface that are those of its standing part, in the same order."""
+    if not part.resting.any():
+        return np.arange(whole.m)
+    owner = _owners(whole.n, part.walls, part.resting)
+    return np.flatnonzero(_standing_faces(whole, part.walls, part.resting, owner)[1])
 
 
 def _standing_faces(surface: Surface, walls: Walls, resting: Bools, owner: Ints) -> tuple[Ints, Bools]:

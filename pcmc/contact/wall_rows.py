@@ -90,7 +90,7 @@ def wall_rows(
     ends, fraction = _nearest(flat, vertices, top_edges)
     zero, none = np.zeros(len(vertices)), np.zeros((len(vertices), 3))
     if foot is None:
-        feet, bottom = np.full_like(ends, -1), surface.on_plane
+        feet, bottom = np.full_like(ends, -1), surface.on_ground
         top = (1.0 - fraction) * height[ends[:, 0]] + fraction * height[ends[:, 1]]
         share, whole = height[vertices], top
     else:
@@ -145,7 +145,7 @@ def _heights_by_steps(surface: Surface, vertices: Ints, wall_edges: Ints, bottom
     """ρ (w,) by edges (k,2) of the wall: steps to the foot, over those to the foot and to the top."""
     inner = np.zeros(surface.n, dtype=bool)
     inner[vertices] = True
-    top = np.unique(wall_edges[~(inner | surface.fixed)[wall_edges]])
+    top = np.unique(wall_edges[~(inner | surface.pinned)[wall_edges]])
     foot = vertices[bottom[vertices]]
     # a corner is foot and top at once: no path may lead through it
     links = wall_edges[(inner | np.isin(np.arange(surface.n), top))[wall_edges].all(axis=1)]

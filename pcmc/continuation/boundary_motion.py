@@ -19,7 +19,7 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..energy.functional import weighted
+from ..energy.functional import energy_and_gradient
 from ..surface import Surface
 
 DIFFERENCE = 1e-5  # of the size of λ: step of the central difference for dP/dλ
@@ -59,6 +59,12 @@ class BoundaryMotion:
         if not surface.fixed.any():
             message = "BoundaryMotion: the surface has no fixed vertex that could move"
             raise OptionError(message, what="parameter", found=0)
+        if surface.rooms:
+            message = (
+                f"BoundaryMotion: room {surface.rooms[0].name!r} prescribes a volume, which is not followed"
+            )
+            hint = "as the boundary moves; remove the room, and give its pressure"
+            raise OptionError(f"{message} {hint}", what="parameter", found=surface.rooms[0].name)
         line = BoundaryLine(self.start, self.positions, int(surface.fixed.sum()))
         off = np.linalg.norm(line.boundary(self.start) - surface.vertices[surface.fixed], axis=1)
         if off.max() > SAME_PLACE * surface.size:
@@ -122,7 +128,7 @@ class BoundaryLine:
 
     def energy_derivative(self, surface: Surface, X: Floats, value: float) -> float:
         """Σ ⟨∇E, dP/dλ⟩ over the fixed vertices at X (n,3), force·length per unit of λ."""
-        forces = weighted(surface, surface.tensions, surface.pressures, X)[2]
+        forces = energy_and_gradient(surface, X, supports=False)[1]
         return float((forces[surface.fixed] * self.velocity(value)).sum())
 
     def gradient(self, surface: Surface, X: Floats) -> Floats:

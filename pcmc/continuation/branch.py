@@ -269,7 +269,7 @@ def _direction(parameter: object) -> Direction | BoundaryMotion:
         return Direction({parameter: 1.0})
     if isinstance(parameter, Parameter):
         weights = {parameter.patch: 1.0}
-        return Direction(weights) if parameter.kind == "tension" else Direction(pressures=weights)
+        return Direction(**{f"{parameter.kind}s": weights})
     validate.refuse(
         "parameter", parameter, "the name of a patch, a Parameter, a Direction or a BoundaryMotion"
     )

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
-from ..stability.modes import Stiffness, lowest
+from ..stability.modes import Stiffness, all_modes, lowest
 from .correction import BorderedMatrix
 from .state import BranchMesh, State
 
@@ -60,13 +59,15 @@ class Tangent:
 class BranchPoint:
     """A point of the branch; ``index`` is the number of its negative eigenvalues.
 
-    ``eigenvalues`` are all negative ones and at least one more, ascending, force/length³.
+    ``eigenvalues`` are all negative ones and at least one more, ascending, force/length³; ``room_rates`` (r,)
+    the derivatives of the rooms' pressures by arclength.
     """
 
     state: State
     tangent: Tangent
     eigenvalues: Floats
     index: int
+    room_rates: Floats
 
 
 def branch_point(at: State, before: Tangent | float) -> BranchPoint:
@@ -79,12 +80,14 @@ def branch_point(at: State, before: Tangent | float) -> BranchPoint:
         matrix, sense = BorderedMatrix(at, before.row, before.rate), 1.0
     else:
         matrix, sense = BorderedMatrix(at, np.zeros_like(at.X), 1.0 / scale**2), before
-    s, slope = matrix.solve(np.zeros(at.space.size), sense, TANGENT_ACCURACY)
-    direction, weights = at.motion(s, slope), at.area_weights
+    s, slope = matrix.solve(np.zeros(len(at.left)), sense, TANGENT_ACCURACY)
+    size = at.space.size
+    direction, weights = at.motion(s[:size], slope), at.area_weights
     length = Tangent(direction, slope, weights, scale).length(direction, slope)
     tangent = Tangent(direction / length, slope / length, weights, scale)
     stiffness = at.mesh.stiffness(at.space, at.X, matrix.values, matrix.factor)
-    return BranchPoint(at, tangent, _eigenvalues(stiffness), stiffness.negative)
+    rates = at.volume_units * s[size:] / length
+    return BranchPoint(at, tangent, _eigenvalues(stiffness), stiffness.negative, rates)
 
 
 def soft_modes(at: State, count: int) -> tuple[Floats, Floats]:
@@ -92,7 +95,7 @@ def soft_modes(at: State, count: int) -> tuple[Floats, Floats]:
     values, factor = at.mesh.hessian(at.surface, at.space, at.X)
     stiffness = at.mesh.stiffness(at.space, at.X, values, factor)
     if len(stiffness.mass) < DENSE:
-        every, vectors = eigh(stiffness.matrix.toarray(), np.diag(stiffness.mass))
+        every, vectors = all_modes(stiffness)
         fields = np.array([at.space.to_vectors(column) for column in vectors.T])
     else:
         every, fields = lowest(stiffness, stiffness.negative + count + 1)
@@ -112,8 +115,8 @@ def _eigenvalues(stiffness: Stiffness) -> Floats:
     """All negative eigenvalues and at least one more, ascending."""
     size = len(stiffness.mass)
     if size < DENSE:
-        mass = np.diag(stiffness.mass)
-        return np.asarray(eigh(stiffness.matrix.toarray(), mass, eigvals_only=True))
+        values = all_modes(stiffness)[0]
+        return values if len(values) else np.array([np.inf])  # nothing moves at these volumes
     count = stiffness.negative + 2
     while True:
         values = lowest(stiffness, min(count, size - 1))[0]

@@ -13,6 +13,9 @@ with it, and derivatives by λ are total ones.) A Newton step solves
 by GMRES. J is applied, not assembled: s moves the vertices by Bs, the insides of the sheets follow
 their junctions, and the bases B turn (``linearise``). The preconditioner has H = Bᵀ(∂²E)B in the place
 of J, by block elimination on a factorisation of H. At a fold J is singular; the bordered matrix is not.
+
+Rooms of prescribed volume add the unknown δ of each and the equation V(X) = V̄(λ): then s stands for both, and
+[J, -C; Cᵀ, 0] with C = Bᵀ ∂V/∂X for J.
 (Keller 1977 for the arclength; Govaerts 2000, ch. 3, for the elimination.)
 """
 
@@ -25,7 +28,8 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..base.arrays import Floats
-from ..stability.factorisation import SingularMatrix
+from ..stability.bordered import BorderedFactor
+from ..stability.factorisation import Factor, SingularMatrix
 from .state import BranchMesh, State
 
 ITERATIONS = 12  # most Newton steps of a correction
@@ -103,21 +107,24 @@ class BorderedMatrix:
             self.values, self.factor = at.mesh.hessian(at.surface, at.space, at.X)
         except SingularMatrix as error:
             raise NotOnBranch(f"the Hessian has no factorisation ({error})") from None
+        self.inverse: Factor | BorderedFactor = self.factor
+        if at.mesh.surface.rooms:
+            self.inverse = BorderedFactor(self.factor, at.room_columns)
         f = at.parameter_derivative
         size = float(np.linalg.norm(f)) or 1.0
         self.unit = size / float(np.linalg.norm(row) + abs(rate))
 
     def solve(self, right: Floats, last: float, accuracy: float) -> tuple[Floats, float]:
-        """(s, δλ) with  J s + f δλ = right,  ⟨row, motion⟩ + rate δλ = last."""
+        """(s, δλ) with  J s + f δλ = right (N+r,),  ⟨row, motion⟩ + rate δλ = last."""
         size = len(right) + 1
-        behind = self.factor.solve(self.at.parameter_derivative)
-        c = self.at.space.to_coordinates(self.row)
+        behind = self.inverse.solve(self.at.parameter_derivative)
+        c = np.append(self.at.space.to_coordinates(self.row), np.zeros(len(right) - self.at.space.size))
         pivot = self.rate - float(c @ behind)
         if not np.isfinite(pivot) or pivot == 0.0:
             raise NotOnBranch("the bordered matrix is singular: branches meet here")
 
         def eliminate(z: Floats) -> Floats:
-            s = self.factor.solve(z[:-1])
+            s = self.inverse.solve(z[:-1])
             change = (z[-1] / self.unit - float(c @ s)) / pivot
             return np.append(s - behind * change, change)
 
@@ -133,12 +140,14 @@ class BorderedMatrix:
 
     def times(self, z: Floats) -> Floats:
         """The matrix times a vector (N+1,)."""
-        at = self.at
-        d = at.moved(at.motion(z[:-1])) - at.aligned
+        at, size = self.at, self.at.space.size
+        d = at.moved(at.motion(z[:size])) - at.aligned
         along = float((self.row * d).sum())
-        return np.append(
-            at.jacobian.times(d) + at.parameter_derivative * z[-1], self.unit * (along + self.rate * z[-1])
-        )
+        change = at.jacobian.times(d)
+        if at.mesh.surface.rooms:
+            growth = np.einsum("rnd,nd->r", at.room_gradients, d)
+            change = np.append(change - at.room_columns @ z[size:-1], growth)
+        return np.append(change + at.parameter_derivative * z[-1], self.unit * (along + self.rate * z[-1]))
 
 
 def correct(start: State, constraint: Constraint, tolerance: float) -> State:
@@ -156,11 +165,12 @@ def correct(start: State, constraint: Constraint, tolerance: float) -> State:
             break
         last = size
         matrix = BorderedMatrix(at, constraint.gradient(at), constraint.rate)
-        s, change = matrix.solve(-at.forces, -g, 1e-3)
-        step = at.motion(s, change)
+        s, change = matrix.solve(-at.left, -g, 1e-3)
+        size = at.space.size
+        step = at.motion(s[:size], change)
         if not np.abs(step).max() < mesh.full.size:
             break
-        at = at.step(step, at.parameter + change, iteration + 1)
+        at = at.step(step, at.parameter + change, iteration + 1, at.with_rooms(s[size:]))
         _check_tensions(at)
         if at.quality < COLLAPSED:
             raise MeshCollapsed("triangles collapse")

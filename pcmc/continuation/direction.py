@@ -1,8 +1,9 @@
-"""A parameter λ of a surface, on which its tensions and pressures depend linearly.
+"""A parameter λ of a surface, on which its tensions, pressures and prescribed volumes depend linearly.
 
-    α_i(λ) = a_i + w_i λ,    p_i(λ) = b_i + u_i λ
+    α_i(λ) = a_i + w_i λ,    p_i(λ) = b_i + u_i λ,    V̄_r(λ) = c_r + v_r λ
 
-E is linear in tensions and pressures, so ∂E/∂λ = Σ w_i A_i - Σ u_i V_i, whatever λ is.
+and in the same way weights and the tensions of cables. E is linear in all but the volumes, so
+∂E/∂λ = Σ w_i A_i - Σ u_i V_i + Σ ẇ_i ∫ z dA + Σ τ̇_c L_c, whatever λ is.
 """
 
 from __future__ import annotations
@@ -17,23 +18,28 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..energy.functional import apply_supports, weighted
+from ..energy.rooms import prescribed_volumes, refuse_varied_pressure
 from ..surface import Surface
 from ..surface.wall_pressures import wall_pressure_changes
+from .loads import Loads
 
+KINDS = ("tensions", "pressures", "volumes", "weights", "cables")
 SAME_VALUE = 1e-9  # relative difference up to which two tensions give the same λ
 
 
 @dataclass(frozen=True)
 class Direction:
-    """Which tensions and pressures change with λ, and how fast.
+    """Which tensions, pressures and prescribed volumes change with λ, and how fast.
 
     Parameters
     ----------
     tensions : weight w_i by patch name.
     pressures : weight u_i by patch name. The pressure of a wall that is not named changes with the
         difference between its rooms, as in ``pcmc.surface.wall_pressures.with_pressures``.
+    weights : rate of the self-weight by patch name; cables : rate of the tension by the cable's name.
+    volumes : weight v_r by the name of a room of prescribed volume, whose pressure is a result.
     relative : False: α_i = w_i λ, so that with ``{"roof": 1.0}`` λ is the tension of "roof" itself.
-        True: α_i = α_i(start) + w_i λ, so that λ = 0 at the start. The same for pressures.
+        True: α_i = α_i(start) + w_i λ, so that λ = 0 at the start. The same for pressures and volumes.
 
     Examples
     --------
@@ -46,17 +52,20 @@ class Direction:
     tensions: Mapping[str, float] = field(default_factory=dict)
     pressures: Mapping[str, float] = field(default_factory=dict)
     relative: bool = False
+    volumes: Mapping[str, float] = field(default_factory=dict)
+    weights: Mapping[str, float] = field(default_factory=dict)
+    cables: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for key in ("tensions", "pressures"):
+        for key in KINDS:
             weights = getattr(self, key)
             if not isinstance(weights, Mapping):
-                validate.refuse(f"Direction.{key}", weights, "weights by patch name, such as {'roof': 1.0}")
+                validate.refuse(f"Direction.{key}", weights, "weights by name, such as {'roof': 1.0}")
             for name, weight in weights.items():
                 if validate.number(f"Direction.{key}", weight, where=name) == 0.0:
                     validate.refuse(f"Direction.{key}", weight, "a weight other than 0", name)
-        if not self.tensions and not self.pressures:
-            message = "Direction: name at least one patch whose tension or pressure varies"
+        if not any(getattr(self, key) for key in KINDS):
+            message = "Direction: name at least one patch whose tension or pressure varies, a room or a cable"
             raise OptionError(message, what="Direction")
 
     @classmethod
@@ -72,24 +81,31 @@ class Direction:
     def line(self, surface: Surface) -> ParameterLine:
         """The tensions and pressures along this direction, starting from those of a surface."""
         w, u = _rates(surface, self.tensions), _rates(surface, self.pressures)
-        value = 0.0 if self.relative else _common_value(surface, w, u)
+        v = _volume_rates(surface, self.volumes)
+        loads = Loads.of(surface, self.weights, self.cables)
+        value = 0.0 if self.relative else _common_value(surface, w, u, v, loads)
         u = u + wall_pressure_changes(surface, u, {surface.patch_index(name) for name in self.pressures})
+        refuse_varied_pressure(surface, np.flatnonzero(u))
         if not (surface.tensions[w != 0.0] > 0.0).all():
             name = surface.patches[int(np.argmax((w != 0.0) & (surface.tensions <= 0.0)))].name
             message = f"the tension of {name!r} is 0, where its triangles stop pulling; start from one > 0"
             raise OptionError(message, what="parameter", where=name, found=0.0)
-        return ParameterLine(value, surface.tensions - w * value, surface.pressures - u * value, w, u)
+        loads.check()
+        start = surface.tensions - w * value, surface.pressures - u * value
+        return ParameterLine(value, *start, w, u, prescribed_volumes(surface) - v * value, v, loads)
 
 
 @dataclass(frozen=True, eq=False)
 class ParameterLine:
-    """The tensions and pressures of a surface as functions of λ: a ``Direction`` with its start.
+    """The tensions, pressures and volumes of a surface as functions of λ: a ``Direction`` with its start.
 
     Attributes
     ----------
     value : λ of that surface.
     tensions, pressures : (k,) a and b, those at λ = 0.
     tension_rates, pressure_rates : (k,) w and u.
+    volumes, volume_rates : (r,) c, the volumes of the rooms at λ = 0, and v.
+    loads : the weights and the tensions of cables that vary.
     """
 
     value: float
@@ -97,30 +113,43 @@ class ParameterLine:
     pressures: Floats
     tension_rates: Floats
     pressure_rates: Floats
+    volumes: Floats = field(default_factory=lambda: np.zeros(0))
+    volume_rates: Floats = field(default_factory=lambda: np.zeros(0))
+    loads: Loads = field(default_factory=lambda: Loads(()))
 
     @cached_property
     def scale(self) -> float:
-        """The size of λ in the metric of arclength: the varied tensions and pressures over their weights."""
-        w, u = self.tension_rates, self.pressure_rates
+        """The size of λ in the metric of arclength: what varies over its weights."""
+        w, u, v = self.tension_rates, self.pressure_rates, self.volume_rates
         tensions = (self.tensions + w * self.value)[w != 0.0]
         pressures = (self.pressures + u * self.value)[u != 0.0]
-        size = np.linalg.norm(np.concatenate([tensions, pressures]))
-        return float(size / np.linalg.norm(np.concatenate([w, u]))) or 1.0
+        volumes = (self.volumes + v * self.value)[v != 0.0]
+        loads, rates = self.loads.starts, self.loads.rates
+        size = np.linalg.norm(np.concatenate([tensions, pressures, volumes, loads]))
+        return float(size / np.linalg.norm(np.concatenate([w, u, v, rates]))) or 1.0
 
     def allows(self, value: float) -> bool:
         """Whether every varied tension is still positive at λ."""
         w = self.tension_rates
-        return bool(((self.tensions + w * value)[w != 0.0] > 0.0).all())
+        pulling = bool(((self.tensions + w * value)[w != 0.0] > 0.0).all())
+        return pulling and self.loads.allow(value - self.value)
 
     def surface_at(self, surface: Surface, value: float) -> Surface:
-        """The surface with its tensions and pressures at λ."""
+        """The surface with its tensions, pressures and prescribed volumes at λ."""
         names = [p.name for p in surface.patches]
         w, u = self.tension_rates, self.pressure_rates
         return surface.retensioned(
             {names[i]: self.tensions[i] + w[i] * value for i in np.flatnonzero(w)},
             {names[i]: self.pressures[i] + u[i] * value for i in np.flatnonzero(u)},
             walls=[names[i] for i in np.flatnonzero(surface.walls & (u != 0.0))],
+            volumes=self._varied_volumes(surface, value),
+            **self.loads.at(value - self.value),
         )
+
+    def _varied_volumes(self, surface: Surface, value: float) -> dict[str, float]:
+        """The volumes that vary, at λ, by the names of their rooms."""
+        volumes = self.volumes + self.volume_rates * value
+        return {surface.rooms[r].name: float(volumes[r]) for r in np.flatnonzero(self.volume_rates)}
 
     def columns(self, surface: Surface, value: float) -> dict[str, float]:
         """The varied tensions and pressures at λ, as columns of a table."""
@@ -130,7 +159,9 @@ class ParameterLine:
                 columns[f"tension {patch.name}"] = self.tensions[i] + self.tension_rates[i] * value
             if self.pressure_rates[i]:
                 columns[f"pressure {patch.name}"] = self.pressures[i] + self.pressure_rates[i] * value
-        return columns
+        for name, volume in self._varied_volumes(surface, value).items():
+            columns[f"volume {name}"] = volume
+        return columns | self.loads.columns(value - self.value)
 
     def boundary(self, value: float) -> None:
         """No fixed vertex moves."""
@@ -141,11 +172,13 @@ class ParameterLine:
     def energy_derivative(self, surface: Surface, X: Floats, value: float) -> float:
         """∂E/∂λ = Σ w_i A_i - Σ u_i V_i at X (n,3)."""
         areas, volumes, _ = weighted(surface, X=X)
-        return float(self.tension_rates @ areas - self.pressure_rates @ volumes)
+        own = float(self.tension_rates @ areas - self.pressure_rates @ volumes)
+        return own + self.loads.energy_derivative(surface, X)
 
     def gradient(self, surface: Surface, X: Floats) -> Floats:
-        """∂∇E/∂λ = Σ w_i ∇A_i - Σ u_i ∇V_i (n,3), supports applied."""
-        return apply_supports(surface, weighted(surface, self.tension_rates, self.pressure_rates, X)[2], X)
+        """∂∇E/∂λ = Σ w_i ∇A_i - Σ u_i ∇V_i (n,3), with that of the loads, supports applied."""
+        own = weighted(surface, self.tension_rates, self.pressure_rates, X)[2]
+        return apply_supports(surface, self.loads.add_gradient(surface, X, own), X)
 
 
 def _rates(surface: Surface, weights: Mapping[str, float]) -> Floats:
@@ -155,13 +188,29 @@ def _rates(surface: Surface, weights: Mapping[str, float]) -> Floats:
     return rates
 
 
-def _common_value(surface: Surface, w: Floats, u: Floats) -> float:
-    """λ of the surface; every named tension and pressure must agree on it."""
-    sources = (("tension", surface.tensions, w), ("pressure", surface.pressures, u))
-    (first, value), *others = [
-        (f"{kind} of {surface.patches[i].name!r}", values[i] / rates[i])
-        for kind, values, rates in sources
+def _volume_rates(surface: Surface, weights: Mapping[str, float]) -> Floats:
+    names = [room.name for room in surface.rooms]
+    rates = np.zeros(len(names))
+    for name, weight in weights.items():
+        rates[names.index(validate.choice("room", name, names))] = weight
+    return rates
+
+
+def _common_value(surface: Surface, w: Floats, u: Floats, v: Floats, loads: Loads) -> float:
+    """λ of the surface; everything that is named must agree on it."""
+    sources = (
+        ("tension", surface.patches, surface.tensions, w),
+        ("pressure", surface.patches, surface.pressures, u),
+        ("volume", surface.rooms, prescribed_volumes(surface), v),
+    )
+    given = [
+        (f"{kind} of {parts[i].name!r}", values[i] / rates[i])
+        for kind, parts, values, rates in sources
         for i in np.flatnonzero(rates)
+    ]
+    (first, value), *others = [
+        *given,
+        *((f"{load.kind} of {load.name!r}", load.start / load.rate) for load in loads.parts),
     ]
     for name, other in others:
         if abs(other - value) > SAME_VALUE * max(abs(value), abs(other)):

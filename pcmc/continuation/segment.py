@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..energy.functional import patch_volumes
 from .branch_point import BranchPoint, branch_point
 from .state import State
 
@@ -73,7 +74,8 @@ class Segment:
             return float((state.volume_gradient * tangent.direction).sum())
         by_position = float((state.gradient * tangent.direction).sum())
         by_parameter = state.mesh.line.energy_derivative(state.surface, state.X, state.parameter)
-        return by_position + by_parameter * tangent.slope
+        cones = state.surface.room_signs @ patch_volumes(state.surface.moved(state.X))
+        return by_position + by_parameter * tangent.slope - float(cones @ at.room_rates)
 
     def turning_point(self, name: str) -> float | None:
         """t at which a quantity is extreme; None where its derivatives at the ends have one sign."""

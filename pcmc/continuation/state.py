@@ -27,10 +27,22 @@ from ..energy.functional import (
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
+from ..energy.rooms import (
+    prescribed_volumes,
+    volume_gradients_at,
+    volumes_at,
+    with_room_pressures,
+)
 from ..meshing.quality import worst_quality
 from ..solvers.smoother import HarmonicExtension
 from ..stability.factorisation import Factor, Factoriser, factoriser
-from ..stability.modes import Stiffness, full_matrix, lumped_mass
+from ..stability.modes import (
+    Stiffness,
+    excluded_columns,
+    full_matrix,
+    lumped_mass,
+    negatives_without,
+)
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.topology import SHEET
@@ -38,6 +50,7 @@ from .boundary_motion import BoundaryLine
 from .direction import ParameterLine
 
 Line = ParameterLine | BoundaryLine
+LEAST_VOLUME = 1e-3  # of the size, cubed: smaller prescribed volumes count as this large
 QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a goal may name
 
 
@@ -76,7 +89,8 @@ class BranchMesh:
     def stiffness(self, space: MotionSpace, X: Floats, values: Floats, factor: Factor) -> Stiffness:
         """The Hessian just factorised, with its mass and its inertia."""
         matrix, mass = full_matrix(self._pattern, values), lumped_mass(space, self.classes, X)
-        return Stiffness(space, matrix, mass, factor, np.zeros((space.size, 0)), factor.negative)
+        excluded = excluded_columns(self.surface, space, np.zeros((space.size, 0)), X)
+        return Stiffness(space, matrix, mass, factor, excluded, negatives_without(factor, excluded))
 
     def motion(self, space: MotionSpace, X: Floats, s: Floats) -> Floats:
         """The motion Bs (n,3), in which the insides of the sheets follow their curves."""
@@ -115,17 +129,26 @@ class BranchMesh:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Positions X (n,3) on a mesh, a value of the parameter λ, and the Newton steps that led there."""
+    """Positions X (n,3) on a mesh, a value of the parameter λ, and the Newton steps that led there.
+
+    ``room_changes`` (r,) are the pressures of rooms of prescribed volume, less those of the mesh's surface.
+    """
 
     mesh: BranchMesh
     X: Floats
     parameter: float
     iterations: int = 0
+    room_changes: tuple[float, ...] = ()
 
     @cached_property
     def surface(self) -> Surface:
         """The mesh's surface with the tensions and pressures at λ; its positions are not X."""
-        return self.mesh.line.surface_at(self.mesh.surface, self.parameter)
+        return self.at_parameter(self.mesh.surface)
+
+    def at_parameter(self, surface: Surface) -> Surface:
+        """A surface of this mesh with the tensions and pressures that it has here."""
+        surface = self.mesh.line.surface_at(surface, self.parameter)
+        return with_room_pressures(surface, np.array(self.room_changes)) if self.room_changes else surface
 
     @cached_property
     def space(self) -> MotionSpace:
@@ -143,15 +166,46 @@ class State:
         return self.space.to_coordinates(self.gradient)
 
     @cached_property
+    def scale(self) -> float:
+        """The norm of the single triangles' forces."""
+        return force_scale(self.surface, self.mesh.classes, self.X)
+
+    @cached_property
+    def volume_units(self) -> Floats:
+        """(r,) what brings the defect of a room's volume to the size of forces, force/length³."""
+        wanted = np.abs(prescribed_volumes(self.surface))
+        return self.scale / np.maximum(wanted, LEAST_VOLUME * self.mesh.full.size**3)
+
+    @cached_property
+    def left(self) -> Floats:
+        """(N+r,) r, and the defects V - V̄ of the rooms' volumes in units of force."""
+        if not self.mesh.surface.rooms:
+            return self.forces
+        defects = volumes_at(self.surface, self.X) - prescribed_volumes(self.surface)
+        return np.append(self.forces, self.volume_units * defects)
+
+    @cached_property
+    def room_gradients(self) -> Floats:
+        """(r,n,3) the gradients of the rooms' volumes, in units of force."""
+        return self.volume_units[:, None, None] * volume_gradients_at(self.surface, self.X)
+
+    @cached_property
+    def room_columns(self) -> Floats:
+        """(N,r) the same in the motion space."""
+        columns = [self.space.to_coordinates(gradient) for gradient in self.room_gradients]
+        return np.stack(columns, axis=1) if columns else np.zeros((self.space.size, 0))
+
+    @cached_property
     def residual(self) -> float:
-        """‖r‖ over the norm of the single triangles' forces."""
-        scale = force_scale(self.surface, self.mesh.classes, self.X)
-        return float(np.linalg.norm(self.forces)) / scale
+        """‖r‖, with the defects of volumes, over the norm of the single triangles' forces."""
+        return float(np.linalg.norm(self.left)) / self.scale
 
     @cached_property
     def parameter_derivative(self) -> Floats:
-        """dr/dλ = Bᵀ ∂∇E/∂λ (N,), and Bᵀ Df[v] where λ moves the boundary."""
+        """(N+r,) dr/dλ = Bᵀ ∂∇E/∂λ, and Bᵀ Df[v] where λ moves the boundary; -dV̄/dλ in units of force."""
         change = self.space.to_coordinates(self.mesh.line.gradient(self.surface, self.X))
+        if self.mesh.surface.rooms:
+            return np.append(change, -self.volume_units * self.mesh.line.volume_rates)
         return change if self.carried is None else change + self.jacobian.times(self.carried)
 
     @cached_property
@@ -222,8 +276,16 @@ class State:
         d = self.mesh.motion(self.space, self.X, s)
         return d if self.carried is None or not change else d + change * self.carried
 
-    def step(self, d: Floats, parameter: float, iterations: int = 0) -> State:
-        """The state at X + d (n,3) and λ, its boundary where λ has it."""
+    def with_rooms(self, change: Floats) -> tuple[float, ...]:
+        """The rooms' pressures after a change (r,) of them, given in units of the borders."""
+        before = np.array(self.room_changes) if self.room_changes else np.zeros(len(change))
+        return tuple((before + self.volume_units * change).tolist()) if len(change) else ()
+
+    def step(
+        self, d: Floats, parameter: float, iterations: int = 0, rooms: tuple[float, ...] | None = None
+    ) -> State:
+        """The state at X + d (n,3) and λ, its boundary where λ has it, with these ``room_changes``."""
+        rooms = self.room_changes if rooms is None else rooms
         X = self.moved(d)
         boundary = self.mesh.line.boundary(parameter)
         if boundary is not None:
@@ -231,7 +293,7 @@ class State:
             left = self.mesh.carried(boundary - X[fixed], self.X)
             X = self.moved(d + left)
             X[fixed] = boundary
-        return State(self.mesh, X, parameter, iterations)
+        return State(self.mesh, X, parameter, iterations, rooms)
 
     def moved(self, d: Floats) -> Floats:
         """X + d (n,3), with the rows of walls below their crest."""

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..base.errors import OptionError, SurfaceError
 from ..energy.rigid_motions import rigid_modes, rigid_motions
+from ..energy.rooms import room_pressures
 from ..meshing.quality import redistribute, turns_over
 from ..meshing.remeshing import remesh
 from ..solvers import solve
@@ -201,7 +202,7 @@ class Tracer:
 
     def solve_contact(self, near: State) -> State:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
-        surface = self.line.surface_at(near.mesh.surface_in_contact(near.X), near.parameter)
+        surface = near.at_parameter(near.mesh.surface_in_contact(near.X))
         tolerance, backend = self.options.tolerance, self.options.backend
         result = solve(surface, "newton", target="stationary", tolerance=tolerance, backend=backend)
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
@@ -217,7 +218,7 @@ class Tracer:
         if here.quality < wanted:
             X, quality = redistribute(here.mesh.part, here.X, wanted, slide=False)
             if quality > CLEARLY_BETTER * here.quality:
-                self.continue_from(State(here.mesh, X, here.parameter), tangent)
+                self.continue_from(replace(here, X=X, iterations=0), tangent)
         here, tangent = self.here.state, self.here.tangent
         if self.options.remesh is not None and here.quality < wanted:
             try:
@@ -315,6 +316,10 @@ class Tracer:
         return {
             "parameter": at.parameter,
             **self.line.columns(at.mesh.full, at.parameter),
+            **{
+                f"pressure {room.name}": pressure
+                for room, pressure in zip(at.surface.rooms, room_pressures(at.surface).tolist(), strict=True)
+            },
             "energy": at.energy,
             "volume": at.volume,
             "height": at.height,
@@ -322,4 +327,4 @@ class Tracer:
 
     def surface_at(self, at: State) -> Surface:
         """The whole surface at a state."""
-        return self.line.surface_at(at.mesh.full_surface(at.X), at.parameter)
+        return at.at_parameter(at.mesh.full_surface(at.X))

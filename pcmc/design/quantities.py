@@ -1,7 +1,7 @@
 """Quantities that a design can aim at, with exact derivatives.
 
 A quantity q depends on the positions X and, some of them, on the tensions and pressures themselves:
-dq = ⟨∂q/∂X, dX⟩ + Σ ∂q/∂α_i dα_i + Σ ∂q/∂p_i dp_i.
+dq = ⟨∂q/∂X, dX⟩ + Σ ∂q/∂α_i dα_i + Σ ∂q/∂p_i dp_i, and so on for weights and the tensions of cables.
 """
 
 from __future__ import annotations
@@ -12,26 +12,18 @@ from typing import Any
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..certificate.balance import held_lengths, reactions
 from ..energy import kernels
-from ..energy.functional import weighted
+from ..energy.cables import add_cable_products
+from ..energy.functional import gradient_by, weighted
+from ..energy.weight import add_weight_products
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d, vertex_sums
-
-
-@dataclass(frozen=True, eq=False)
-class Measurement:
-    """A quantity's value, and its derivatives by positions (n,3), tensions (k,) and pressures (k,).
-
-    None where it depends on tensions or pressures only through the positions.
-    """
-
-    value: float
-    by_position: Floats
-    by_tension: Floats | None = None
-    by_pressure: Floats | None = None
+from . import cable_quantities
+from .measurement import Measurement
 
 
 @dataclass(frozen=True)
@@ -103,6 +95,9 @@ def _curvature(surface: Surface, of: str) -> Measurement:
     """p / (2α), 1/length."""
     index = surface.patch_index(of)
     alpha, p = surface.tensions[index], surface.pressures[index]
+    if surface.patches[index].weight:
+        message = f"curvature of {of}: with a weight it differs from place to place; it has no single value"
+        raise OptionError(message, what="of", found=of)
     if alpha == 0.0:
         raise OptionError(f"curvature of {of}: a wall without tension has none", what="of", found=of)
     by_tension, by_pressure = np.zeros((2, len(surface.patches)))
@@ -110,15 +105,28 @@ def _curvature(surface: Surface, of: str) -> Measurement:
     return Measurement(float(p / (2.0 * alpha)), np.zeros_like(surface.vertices), by_tension, by_pressure)
 
 
+def _pressure(surface: Surface, of: str) -> Measurement:
+    """The pressure of a room of prescribed volume, force/length²."""
+    row = np.linalg.pinv(surface.room_signs.T)[room_index(surface, of)]
+    return Measurement(float(row @ surface.pressures), np.zeros_like(surface.vertices), by_pressure=row)
+
+
+def room_index(surface: Surface, name: str) -> int:
+    """Index of the room called ``name``."""
+    names = [room.name for room in surface.rooms]
+    return names.index(validate.choice("room", name, names))
+
+
 def _reaction(surface: Surface, of: str | None) -> Measurement:
     """max |f_v| / ℓ_v over the patch's held boundary, ℓ_v half the length of the held edges at v.
 
-    f_v = Σ α ∂A - ⅓ Σ p A_T ν_T over all triangles at v, as in the certificate: at a corner the
+    f_v = Σ α ∂A - ⅓ Σ p A_T ν_T over all triangles at v, and the forces of cables and weights there, as in
+    the certificate: at a corner the
     patches' pulls along their junction cancel. A vertex that slides takes only the force along Π's
     normal. Force/length.
     """
     topo = surface.topology
-    held = (surface.fixed | surface.on_plane)[topo.edges].all(axis=1)
+    held = surface.held[topo.edges].all(axis=1)
     edges = considered = np.flatnonzero(topo.boundary_edge & held)
     if of is not None:
         considered = np.intersect1d(edges, topo.edge_of_face[_faces_of(surface, of)])
@@ -137,17 +145,23 @@ def _reaction(surface: Surface, of: str | None) -> Measurement:
     np.add.at(slope, ends[:, 0], along)
     np.add.at(slope, ends[:, 1], -along)
     by_tension, by_pressure = _force_by_patch(surface, v)
-    return Measurement(value, slope, by_tension @ pull, by_pressure @ pull)
+    by_load = {}
+    for kind, count in (("weight", len(surface.patches)), ("cable", len(surface.cables))):
+        by_load[kind] = np.array([gradient_by(surface, kind, i)[v] @ pull for i in range(count)])
+    return Measurement(value, slope, by_tension @ pull, by_pressure @ pull, by_load)
 
 
 def _force_gradient(surface: Surface, v: int, pull: Floats) -> Floats:
-    """(n,3) derivative of ⟨pull, f_v⟩, f_v = Σ α ∂A - ⅓ Σ p A_T ν_T at v."""
+    """(n,3) derivative of ⟨pull, f_v⟩, f_v = Σ α ∂A - ⅓ Σ p A_T ν_T at v with cables and weights."""
     around = np.flatnonzero((surface.faces == v).any(axis=1))
     F, patch = surface.faces[around], surface.patch_of_face[around]
     blocks = np.empty((len(F), 3, 3, 3, 3))
     mesh = kernels.energy_mesh(surface, pressure=0.0 * surface.pressures)
     kernels.hessian_blocks(mesh._replace(faces=F, patch=patch), surface.vertices, blocks)
-    slope = np.zeros_like(surface.vertices)
+    slope, unit = np.zeros_like(surface.vertices), np.zeros_like(surface.vertices)
+    unit[v] = pull  # the second derivatives are symmetric
+    add_cable_products(surface, surface.vertices, unit, slope)
+    add_weight_products(surface, F, patch, surface.vertices, unit, slope)
     row, corner = np.nonzero(np.equal(F, v))
     np.add.at(slope, F[row], np.einsum("fjab,a->fjb", blocks[row, corner], pull))
     # ⅓ A ν = (q - p) × (r - p) / 6, whose part along u changes by (q - r) × u / 6 as p moves
@@ -191,5 +205,11 @@ QUANTITIES = {
     "volume": Quantity(_volume, lambda surface: surface.size**3),
     "area": Quantity(_area, lambda surface: surface.size**2),
     "curvature": Quantity(_curvature, lambda surface: 1.0 / surface.size),
+    "pressure": Quantity(_pressure, lambda surface: float(surface.tensions.max()) / surface.size),
+    "sag": Quantity(cable_quantities.sag, lambda surface: surface.size),
+    "length": Quantity(cable_quantities.length, lambda surface: surface.size),
+    "force": Quantity(
+        cable_quantities.force, lambda surface: max(cable.tension for cable in surface.cables) or 1.0
+    ),
     "reaction": Quantity(_reaction, lambda surface: float(surface.tensions.max())),
 }

@@ -30,7 +30,7 @@ from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 from .outcome import Design, DesignStatus
 from .sensitivity import sensitivities
-from .targets import Parameter, Target, as_parameters, as_targets, measure
+from .targets import KINDS, Parameter, Target, as_parameters, as_targets, measure
 
 LEAST_CHANGE = 1e-3  # part of an unknown that a step must change to be worth a solve near failing ones
 FOLD_GAP = 1e-3  # relative distance of the misfit from its value at a fold where the search ends
@@ -100,6 +100,8 @@ def meet(
         if not target.limits:
             raise OptionError(f"{target.label}: give value, at_most or at_least", what=target.label)
         measure(surface, target)
+    for parameter in parameters:
+        parameter.check(surface)
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a row")
     validate.positive("tolerance", tolerance)
@@ -211,7 +213,7 @@ class Search:
         None where no equilibrium is found, or where it is at a fold and has no derivatives.
         """
         surface = self.with_unknowns(start, x)
-        if load_ratio(surface) > 1.0 + coarseness(surface):
+        if not surface.rooms and load_ratio(surface) > 1.0 + coarseness(surface):
             self.record(x, OVERLOADED)
             return None
         result = solve(surface, "newton", **{**quality, **self.options})
@@ -226,10 +228,12 @@ class Search:
 
     def with_unknowns(self, surface: Surface, x: Floats) -> Surface:
         """The surface with the tensions and pressures that the unknowns stand for."""
-        values: dict[str, dict[str, float]] = {"tension": {}, "pressure": {}}
+        values: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
         for parameter, value in zip(self.parameters, self.converted(x).tolist(), strict=True):
             values[parameter.kind][parameter.patch] = value
-        return with_pressures(surface, values["tension"], values["pressure"])
+        changed = with_pressures(surface, values["tension"], values["pressure"])
+        others = {f"{kind}s": values[kind] for kind in ("volume", "weight", "cable") if values[kind]}
+        return changed.retensioned(**others) if others else changed
 
     def trial(self, x: Floats, result: Result) -> Trial:
         """The quantities and misfits of a solve."""
@@ -391,6 +395,6 @@ def _metric(parameters: Sequence[Parameter], reciprocal: Bools) -> Floats:
     Sheets and walls that pull at a junction stay nearly in balance while their tensions keep their
     ratios; if only some of them change, the junction moves away.
     """
-    alike = np.array([p.kind == "tension" for p in parameters]) * np.where(reciprocal, 1.0, -1.0)
+    alike = np.array([p.kind in ("tension", "cable") for p in parameters]) * np.where(reciprocal, 1.0, -1.0)
     square = max(1.0, float(alike @ alike))
     return np.eye(len(alike)) - PROPORTIONAL * np.outer(alike, alike) / square

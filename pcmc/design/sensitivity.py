@@ -7,6 +7,11 @@ At rest the residual r(X, λ) = Bᵀ∇E vanishes and stays zero along the solut
 (E is linear in tensions and pressures). J differs from Bᵀ(∂²E)B because the bases B turn while the surface
 moves (``linearise``); that part is small, so J s = b is solved by a few GMRES steps with the factor of
 Bᵀ(∂²E)B as preconditioner. A quantity q(X, λ) then changes by ⟨∂q/∂X, dX/dλ⟩ + ∂q/∂λ.
+
+Where rooms prescribe volumes, their pressures δ change with λ, too, and J is bordered:
+
+    [ J   -G ] [ s     ]     [ -Bᵀ ∂(∇E)/∂λ ]
+    [ Gᵀ   0 ] [ dδ/dλ ]  =  [  dV̄/dλ       ]        G = Bᵀ ∂V/∂X
 """
 
 from __future__ import annotations
@@ -23,14 +28,16 @@ from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
 from ..contact.pinching import StandingPart, excess_pull, place_wall_rows, standing_part
-from ..energy.functional import energy_and_gradient, weighted
+from ..energy.functional import energy_and_gradient, gradient_by
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..energy.projected_hessian import assemble, hessian_pattern
+from ..energy.rooms import prescribed_volumes, volume_defects, volume_gradients_at
+from ..stability.bordered import BorderedFactor
 from ..stability.factorisation import Factor, SingularMatrix, factoriser
 from ..surface import Surface
 from ..surface.wall_pressures import wall_pressure_changes
-from .quantities import Measurement
+from .quantities import Measurement, room_index
 from .targets import Parameter, Target, as_parameters, as_targets, measure
 
 ACCURACY = 1e-9  # relative residual to which J s = b is solved
@@ -80,32 +87,39 @@ def sensitivities(
         validate.refuse("surface", type(surface).__name__, "a Surface", error=SurfaceError)
     targets, parameters = as_targets(of), as_parameters(to)
     for parameter in parameters:
-        surface.patch_index(parameter.patch)
+        parameter.check(surface)
     response = _LinearResponse.of(surface)
     shown = response.part.surface
-    motions = np.stack([response.motion(p, parameters) for p in parameters])
-    slopes = [_slopes(shown, measure(shown, t), parameters, motions) for t in targets]
+    changes = [response.motion(p, parameters) for p in parameters]
+    slopes = [_slopes(shown, measure(shown, t), parameters, changes) for t in targets]
     rows, columns = [t.label for t in targets], [p.label for p in parameters]
     return pd.DataFrame(slopes, rows, columns, dtype=float)
 
 
 def _slopes(
-    surface: Surface, quantity: Measurement, parameters: Sequence[Parameter], motions: Floats
+    surface: Surface,
+    quantity: Measurement,
+    parameters: Sequence[Parameter],
+    changes: Sequence[tuple[Floats, Floats]],
 ) -> Floats:
-    """(parameters,) dq/dλ of a measured quantity, given dX/dλ (parameters,n,3)."""
+    """(parameters,) dq/dλ of a measured quantity, given dX/dλ (n,3) and dδ/dλ (r,) of each parameter."""
+    motions = np.stack([motion for motion, _ in changes])
     slope = np.einsum("pnd,nd->p", motions, quantity.by_position)
     for k, parameter in enumerate(parameters):
-        by_patch = quantity.by_tension if parameter.kind == "tension" else quantity.by_pressure
-        if by_patch is not None:
-            slope[k] += by_patch @ _patch_rates(surface, parameter, parameters)
+        by_part = quantity.by(parameter.kind)
+        if by_part is not None:
+            slope[k] += by_part @ _rates(surface, parameter, parameters)
+        if quantity.by_pressure is not None and surface.rooms:
+            slope[k] += quantity.by_pressure @ (changes[k][1] @ surface.room_signs)
     return slope
 
 
-def _patch_rates(surface: Surface, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
-    """(k,) d/dλ of each patch's tension or pressure; wall pressures change with those of the rooms."""
-    one = np.zeros(len(surface.patches))
-    one[surface.patch_index(parameter.patch)] = 1.0
-    if parameter.kind == "tension":
+def _rates(surface: Surface, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
+    """(k,) d/dλ of each patch's or cable's own number; wall pressures change with those of the rooms."""
+    of_cable = parameter.kind == "cable"
+    one = np.zeros(len(surface.cables) if of_cable else len(surface.patches))
+    one[surface.cable_index(parameter.patch) if of_cable else surface.patch_index(parameter.patch)] = 1.0
+    if parameter.kind != "pressure":
         return one
     named = {surface.patch_index(p.patch) for p in parameters if p.kind == "pressure"}
     return one + wall_pressure_changes(surface, one, named)
@@ -119,7 +133,9 @@ class _LinearResponse:
     walls_follow: bool
     space: MotionSpace
     jacobian: Linearisation
-    factor: Factor
+    inverse: Factor | BorderedFactor
+    volume_units: Floats
+    volume_gradients: Floats
 
     @classmethod
     def of(cls, surface: Surface) -> _LinearResponse:
@@ -130,7 +146,8 @@ class _LinearResponse:
         gradient = energy_and_gradient(shown, X)[1]
         unheld = np.linalg.norm(excess_pull(shown, walls, resting))
         left = np.hypot(np.linalg.norm(space.to_coordinates(gradient)), unheld)
-        residual = float(left) / force_scale(shown, classes, X)
+        scale = force_scale(shown, classes, X)
+        residual = float(np.hypot(left / scale, np.linalg.norm(volume_defects(shown))))
         if residual > TOLERANCE:
             message = f"sensitivities: the surface is not at rest (residual {residual:.1e}); solve it first"
             raise SurfaceError(message, what="surface", found=residual, expected=TOLERANCE)
@@ -139,24 +156,31 @@ class _LinearResponse:
             factor = factoriser(pattern).factor(assemble(shown, classes, space, pattern, X))
         except SingularMatrix:
             raise SurfaceError(AT_FOLD, what="surface") from None
+        inverse: Factor | BorderedFactor = factor
+        units = scale / np.abs(prescribed_volumes(shown))
+        gradients = units[:, None, None] * volume_gradients_at(shown, X)
+        if shown.rooms:
+            columns = np.stack([space.to_coordinates(gradient) for gradient in gradients], axis=1)
+            inverse = BorderedFactor(factor, columns)
         walls_follow = bool((walls.top_free & ~resting).any())
         jacobian = linearise(shown, classes, space, X, gradient)
-        return cls(part, walls_follow, space, jacobian, factor)
+        return cls(part, walls_follow, space, jacobian, inverse, units, gradients)
 
-    def motion(self, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
-        """dX/dλ (n,3) for one of the parameters."""
-        shown = self.part.surface
-        rates = _patch_rates(shown, parameter, parameters)
-        force = weighted(shown, rates) if parameter.kind == "tension" else weighted(shown, 0.0, rates)
-        right = -self.space.to_coordinates(force[2])
+    def motion(self, parameter: Parameter, parameters: Sequence[Parameter]) -> tuple[Floats, Floats]:
+        """dX/dλ (n,3) and dδ/dλ (r,) for one of the parameters."""
+        shown, rooms = self.part.surface, len(self.volume_units)
+        right = np.append(self._force_rates(parameter, parameters), np.zeros(rooms))
+        if parameter.kind == "volume":
+            room = room_index(shown, parameter.patch)
+            right[self.space.size + room] = self.volume_units[room]
         if not np.any(right):
-            return np.zeros_like(shown.vertices)
-        size = self.space.size
+            return np.zeros_like(shown.vertices), np.zeros(rooms)
+        size = self.space.size + rooms
         residuals: list[float] = []
-        s, _ = gmres(
-            LinearOperator((size, size), lambda s: self.jacobian.times(self._vertex_motion(s)), dtype=float),
+        z, _ = gmres(
+            LinearOperator((size, size), self._times, dtype=float),
             right,
-            M=LinearOperator((size, size), self.factor.solve, dtype=float),
+            M=LinearOperator((size, size), self.inverse.solve, dtype=float),
             rtol=ACCURACY,
             restart=40,
             maxiter=1,
@@ -165,7 +189,26 @@ class _LinearResponse:
         )
         if not residuals or residuals[-1] > NO_SOLUTION:
             raise SurfaceError(AT_FOLD, what="surface")
-        return self._vertex_motion(s)
+        return self._vertex_motion(z[: self.space.size]), self.volume_units * z[self.space.size :]
+
+    def _force_rates(self, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
+        """(N,) -Bᵀ ∂(∇E)/∂λ."""
+        shown = self.part.surface
+        if parameter.kind == "volume":
+            return np.zeros(self.space.size)
+        rates = _rates(shown, parameter, parameters)
+        force = sum(rates[i] * gradient_by(shown, parameter.kind, int(i)) for i in np.flatnonzero(rates))
+        return -self.space.to_coordinates(np.asarray(force))
+
+    def _times(self, z: Floats) -> Floats:
+        """J, or the bordered matrix, times z (N+r,)."""
+        size = self.space.size
+        motion = self._vertex_motion(z[:size])
+        change = self.jacobian.times(motion)
+        if not len(self.volume_units):
+            return change
+        push = self.space.to_coordinates(np.tensordot(z[size:], self.volume_gradients, axes=1))
+        return np.append(change - push, np.einsum("rnd,nd->r", self.volume_gradients, motion))
 
     def _vertex_motion(self, s: Floats) -> Floats:
         """B s (n,3); walls that hang from their crest follow it, as in the solver."""

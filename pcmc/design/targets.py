@@ -9,10 +9,14 @@ from typing import Any
 
 from ..base import validate
 from ..base.errors import OptionError
+from ..energy.rooms import refuse_varied_pressure
 from ..surface import Surface
-from .quantities import QUANTITIES, Measurement
+from .quantities import QUANTITIES, Measurement, room_index
 
-KINDS = ("tension", "pressure")
+KINDS = ("tension", "pressure", "volume", "weight", "cable")
+CABLE_QUANTITIES = ("sag", "length", "force")
+NAMED = {"curvature": "patch", "pressure": "room"} | dict.fromkeys(CABLE_QUANTITIES, "cable")
+"""Quantities of one patch, room or cable alone."""
 FACTOR = 20.0  # a parameter without bounds may change by this factor, up or down
 
 
@@ -25,9 +29,12 @@ class Target:
     quantity : ``"apex"``, greatest height over Π of a patch; ``"height"`` over a point of Π;
         ``"volume"`` (V_i of a patch, seen from the point of Π) and ``"area"``; ``"curvature"``,
         p / (2α), a patch's mean curvature at rest; ``"reaction"``, the greatest force per length
-        on the held boundary of a patch.
-    of : name of the patch; for ``"height"`` the point (x, y) in the coordinates of Π. None: all patches
-        under pressure together (for ``"reaction"`` the whole held boundary); not for ``"curvature"``.
+        on the held boundary of a patch; ``"pressure"`` of a room of prescribed volume; ``"sag"`` of a
+        cable, the largest distance of its vertices from the chord between its ends, its ``"length"``,
+        and its ``"force"``, which is its tension.
+    of : name of the patch, room or cable; for ``"height"`` the point (x, y) in the coordinates of Π. None:
+        all patches under pressure together (for ``"reaction"`` the whole held boundary); not for
+        ``"curvature"``, ``"pressure"`` and the quantities of cables.
     value, at_most, at_least : a value, or a limit on one side or both. Give none of them to measure the
         quantity only.
 
@@ -51,8 +58,9 @@ class Target:
         validate.choice("quantity", self.quantity, tuple(QUANTITIES))
         if self.quantity == "height":
             object.__setattr__(self, "of", _point(self.of))
-        elif not (isinstance(self.of, str) or (self.of is None and self.quantity != "curvature")):
-            message = f"{self.quantity}: expected the name of a patch, found {self.of!r}"
+        elif not (isinstance(self.of, str) or (self.of is None and self.quantity not in NAMED)):
+            kind = NAMED.get(self.quantity, "patch")
+            message = f"{self.quantity}: expected the name of a {kind}, found {self.of!r}"
             raise OptionError(message, what="of", found=self.of)
         for key in ("value", "at_most", "at_least"):
             if getattr(self, key) is not None:
@@ -91,13 +99,14 @@ class Target:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A tension or pressure that may vary.
+    """A tension, a pressure, a weight, a cable's tension, or a room's prescribed volume, that may vary.
 
     Parameters
     ----------
-    patch : name of the patch.
-    kind : ``"tension"`` or ``"pressure"``. Where the pressure of a room varies, those of its walls, the
-        differences between rooms, are updated, unless they are parameters themselves.
+    patch : name of the patch, or of the room or cable.
+    kind : ``"tension"``, ``"pressure"`` or ``"weight"`` of a patch, ``"cable"``, the tension of a cable, or
+        ``"volume"`` of a room. Where the pressure of a room varies, those of its walls, the differences
+        between rooms, are updated, unless they are parameters themselves.
     low, high : bounds; by default a twentieth of the present value and twenty times it.
 
     >>> Parameter("wall", low=0.0, high=3.0).label
@@ -120,17 +129,29 @@ class Parameter:
     @property
     def label(self) -> str:
         """The parameter in words."""
-        return f"{self.kind} of {self.patch}"
+        kind = "tension of cable" if self.kind == "cable" else f"{self.kind} of"
+        return f"{kind} {self.patch}"
 
     def value(self, surface: Surface) -> float:
         """Its value on a surface."""
-        patch = surface.patches[surface.patch_index(self.patch)]
-        return patch.tension if self.kind == "tension" else patch.pressure
+        if self.kind == "volume":
+            return surface.rooms[room_index(surface, self.patch)].volume
+        if self.kind == "cable":
+            return surface.cables[surface.cable_index(self.patch)].tension
+        return float(getattr(surface.patches[surface.patch_index(self.patch)], self.kind))
+
+    def check(self, surface: Surface) -> None:
+        """Refuse a patch or room that is not there, and a pressure that follows from a prescribed volume."""
+        self.value(surface)
+        if self.kind == "pressure":
+            refuse_varied_pressure(surface, [surface.patch_index(self.patch)])
 
     def tension_under_pressure(self, surface: Surface) -> bool:
-        """Whether it is the tension of a patch with a pressure; such a tension is never 0."""
-        loaded = surface.patches[surface.patch_index(self.patch)].pressure != 0.0
-        return loaded and self.kind == "tension"
+        """Whether it is the tension of a patch with a pressure or weight; such a tension is never 0."""
+        if self.kind != "tension":
+            return False
+        patch = surface.patches[surface.patch_index(self.patch)]
+        return patch.pressure != 0.0 or patch.weight != 0.0
 
     def bounds(self, surface: Surface) -> tuple[float, float]:
         """(low, high), with the defaults that follow from its present value."""
@@ -143,7 +164,7 @@ class Parameter:
         validate.number("high", high, above=low, where=self.label)
         if self.tension_under_pressure(surface):
             validate.number("low", low, above=0.0, where=self.label)
-        elif self.kind == "tension":
+        elif self.kind in ("tension", "cable"):
             validate.number("low", low, least=0.0, where=self.label)
         return low, high
 

@@ -11,9 +11,10 @@ from typing import Literal
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface, expect_surface
 from ..surface.geometry import vertex_area_vectors
+from ..surface.supports import symmetric_part
 from .functional import weighted
 
 Method = Literal["cotangent", "variational"]
@@ -43,6 +44,8 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
     validate.choice("method", method, METHODS)
     area_gradient = weighted(surface, np.ones(len(surface.patches)))[2]
     area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces)
+    symmetric_part(surface.on_planes, area_gradient)
+    area_vector = symmetric_part(surface.on_planes, area_vector)
     along = np.einsum("ij,ij->i", area_gradient, area_vector)
     with np.errstate(divide="ignore", invalid="ignore"):
         if method == "cotangent":
@@ -54,25 +57,57 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
 
 
 def target_curvature(surface: Surface) -> Floats:
-    """H̄ = p / (2 α) (n,) of the sheet each vertex lies in; NaN where ``mean_curvature`` is."""
+    """H̄ (n,) of the sheet each vertex lies in; NaN where ``mean_curvature`` is.
+
+    H̄ = p / (2 α), and with a weight H̄ = (p - w ⟨ν, n⟩) / (2 (α + w z)) at the vertex's height z over Π and
+    its normal ν; see ``weight``. A mesh at rest has the latter up to the square of its edge length.
+    """
     expect_surface(surface)
     patch = np.zeros(surface.n, dtype=np.int64)
     patch[surface.faces] = surface.patch_of_face[:, None]
     target = np.array([p.target_curvature for p in surface.patches])[patch]
+    if surface.weights.any():
+        heavy = surface.weights[patch] != 0.0
+        push, pull = _push_and_pull(surface, patch)
+        target[heavy] = ((surface.pressures[patch] - push) / (2.0 * pull))[heavy]
     target[~_within_one_sheet(surface)] = np.nan
     return target
+
+
+def _push_and_pull(surface: Surface, patch: Ints) -> tuple[Floats, Floats]:
+    """(n,) w ⟨ν, n⟩ and α + w z at the vertices of these patches (n,); NaN where the latter is 0."""
+    vector = vertex_area_vectors(surface.vertices, surface.faces)[0]
+    length = np.linalg.norm(vector, axis=1)
+    upright = (vector @ np.array(surface.plane.normal)) / np.where(length > 0.0, length, 1.0)
+    weight = surface.weights[patch]
+    pull = surface.tensions[patch] + weight * surface.plane.height(surface.vertices)
+    return weight * upright, np.where(pull == 0.0, np.nan, pull)
 
 
 def curvature_error(surface: Surface, method: Method = "cotangent") -> Floats:
     """(H - H̄) / H̄ (n,) at the interior vertices of patches under pressure, NaN elsewhere.
 
     Relative, with sign: 0.01 is one percent too curved. Walls, whose target is zero, have no
-    relative error; ``mean_curvature`` itself is their error.
+    relative error; ``mean_curvature`` itself is their error. With a weight the error is relative to
+    (|p| + |w|) / (2 |α + w z|), as H̄ itself may vanish somewhere.
     """
     H, target = mean_curvature(surface, method), target_curvature(surface)
-    return np.divide(H - target, target, out=np.full(surface.n, np.nan), where=target != 0.0)
+    scale = target
+    if surface.weights.any():
+        patch = np.zeros(surface.n, dtype=np.int64)
+        patch[surface.faces] = surface.patch_of_face[:, None]
+        pull = np.abs(_push_and_pull(surface, patch)[1])
+        loads = np.abs(surface.pressures[patch]) + np.abs(surface.weights[patch])
+        scale = np.where(surface.weights[patch] != 0.0, loads / (2.0 * pull), target)
+    return np.divide(H - target, scale, out=np.full(surface.n, np.nan), where=scale != 0.0)
 
 
 def _within_one_sheet(surface: Surface) -> Bools:
-    """(n,) vertices off boundaries and junctions, and where sheets do not just touch."""
-    return surface.topology.interior & (surface.topology.fans == 1)
+    """(n,) vertices off boundaries and junctions, and where sheets do not just touch.
+
+    The boundary in a mirror plane is none.
+    """
+    topo = surface.topology
+    inside = np.ones(surface.n, dtype=bool)
+    inside[topo.edges[topo.curve_edge & ~surface.mirror_edge]] = False
+    return inside & (topo.fans == 1)

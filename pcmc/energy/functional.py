@@ -1,8 +1,10 @@
 """The energy of a Surface, its gradient with the supports applied, and its Hessian.
 
-    E = Σ α_i A_i - Σ p_i V_i                     (11), (20); the paper's pressures are 1 and 0
+    E = Σ α_i A_i - Σ p_i V_i + Σ τ L + Σ w ∫ z dA   (11), (20); the paper's pressures are 1 and 0
     A_i = Σ_T ½ |(q_j - p) × (q_{j+1} - p)|        (9a), (10a)
     V_i = (1/6) Σ_T ⟨p, q_j × q_{j+1}⟩             (10b), positions seen from the point of Π
+
+τ L are the cables (``cables``), w ∫ z dA the patches' weights (``weight``); the paper has neither.
 
 V_i is the volume of the cone from the point of Π (or, far from it, ``Surface.origin``) to patch i. At a
 junction the sides of the cones meet. Where the pressures there, each counted along its patch's normal,
@@ -24,13 +26,17 @@ import numpy as np
 from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
 from . import kernels
+from .cables import add_cables, add_pull, cable_blocks
+from .flat_pieces import flat_pieces
+from .plane_pieces import add_plane_forces, add_plane_volumes, plane_hessian
+from .weight import add_weights, moments, weight_blocks
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 
 def energy(surface: Surface) -> float:
-    """E = Σ α A - Σ p V, Eq. (20), force·length.
+    """E = Σ α A - Σ p V + Σ τ L + Σ w ∫ z dA, Eq. (20) with cables and weights, force·length.
 
     >>> from pcmc import Patch, Surface
     >>> tent = Surface([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]],
@@ -45,7 +51,13 @@ def energy(surface: Surface) -> float:
 def energy_at(surface: Surface, X: Floats) -> float:
     """E of the surface with its vertices at X (n,3)."""
     areas, volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), X)
-    return total(surface.tensions, areas, surface.pressures, volumes)
+    add_plane_volumes(surface, X, volumes)
+    return total(surface.tensions, areas, surface.pressures, volumes) + add_cables_and_weights(surface, X)
+
+
+def add_cables_and_weights(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
+    """Σ τ L + Σ w ∫ z dA at X (n,3); its gradient is added to ``gradient`` (n,3) if that is given."""
+    return add_cables(surface, X, gradient) + add_weights(surface, X, gradient)
 
 
 def total(tensions: Floats, areas: Floats, pressures: Floats, volumes: Floats) -> float:
@@ -66,9 +78,12 @@ def energy_and_gradient(
     """
     X = surface.vertices if X is None else X
     areas, volumes, gradient = kernels.measure(kernels.energy_mesh(surface), X, workers)
+    add_plane_volumes(surface, X, volumes)
+    add_plane_forces(surface, surface.pressures, X, gradient)
+    further = add_cables_and_weights(surface, X, gradient)
     if supports:
         apply_supports(surface, gradient, X)
-    return total(surface.tensions, areas, surface.pressures, volumes), gradient
+    return total(surface.tensions, areas, surface.pressures, volumes) + further, gradient
 
 
 def gradient(surface: Surface) -> Floats:
@@ -93,15 +108,15 @@ def apply_supports(surface: Surface, vectors: Floats, X: Floats | None = None) -
     """Leave of vectors (n,3) what the supports allow, in place.
 
     Nothing at fixed vertices, the part along the line or circle at those that slide along one, and the part
-    along Π at those that slide there; with the vertices at X (n,3) or where the surface has them.
+    along their plane at those that slide there; with the vertices at X (n,3) or where the surface has them.
     """
     X = surface.vertices if X is None else X
     along = [line.along(vectors[vertices], X[vertices]) for line, vertices in surface.on_line]
     vectors[surface.fixed] = 0.0
     for (_, vertices), part in zip(surface.on_line, along, strict=True):
         vectors[vertices] = part
-    sliding = surface.on_plane
-    vectors[sliding] = surface.plane.along(vectors[sliding])
+    for plane, sliding in surface.sliding:
+        vectors[sliding] = plane.along(vectors[sliding])
     return vectors
 
 
@@ -129,19 +144,54 @@ def hessian(surface: Surface) -> csr_array:
     expect_surface(surface)
     blocks = np.empty((surface.m, 3, 3, 3, 3))
     kernels.hessian_blocks(kernels.energy_mesh(surface), surface.vertices, blocks)
+    if surface.weights.any():
+        blocks += weight_blocks(surface, surface.vertices)
     unknowns = 3 * surface.faces[:, :, None] + np.arange(3)
     rows = np.broadcast_to(unknowns[:, :, None, :, None], blocks.shape)
     columns = np.broadcast_to(unknowns[:, None, :, None, :], blocks.shape)
-    size = 3 * surface.n
-    return csr_array(coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
+    shape = (3 * surface.n, 3 * surface.n)
+    H = csr_array(coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=shape))
+    ends = surface.cable_edges.ends
+    if len(ends):
+        k = cable_blocks(surface, surface.vertices)
+        both = np.stack([np.stack([k, -k], axis=1), np.stack([-k, k], axis=1)], axis=1)  # (c,2,2,3,3)
+        unknowns = 3 * ends[:, :, None] + np.arange(3)
+        rows = np.broadcast_to(unknowns[:, :, None, :, None], both.shape)
+        columns = np.broadcast_to(unknowns[:, None, :, None, :], both.shape)
+        H = csr_array(H + coo_array((both.ravel(), (rows.ravel(), columns.ravel())), shape=shape))
+    return H + plane_hessian(surface) if flat_pieces(surface) else H
 
 
 def weighted(
     surface: Surface, tensions: Floats | float = 0.0, pressures: Floats | float = 0.0, X: Floats | None = None
 ) -> tuple[Floats, Floats, Floats]:
     """A_i and V_i (k,), and Σ α ∇A - p ∇V (n,3), supports not applied, with other α and p (k,)."""
-    other = (np.full(len(surface.patches), weights, dtype=float) for weights in (tensions, pressures))
-    return kernels.measure(kernels.energy_mesh(surface, *other), surface.vertices if X is None else X)
+    alpha, p = (np.full(len(surface.patches), weights, dtype=float) for weights in (tensions, pressures))
+    X = surface.vertices if X is None else X
+    areas, volumes, forces = kernels.measure(kernels.energy_mesh(surface, alpha, p), X)
+    return areas, add_plane_volumes(surface, X, volumes), add_plane_forces(surface, p, X, forces)
+
+
+def gradient_by(surface: Surface, kind: str, index: int, X: Floats | None = None) -> Floats:
+    """∂∇E/∂λ (n,3), supports not applied, λ one of the numbers that E is linear in.
+
+    ``kind`` is "tension", "pressure" or "weight" of the patch ``index``, or "cable", the tension of that
+    cable: ∇A_i, -∇V_i, ∇∫z dA, ∇L.
+    """
+    X = surface.vertices if X is None else X
+    one = np.zeros(len(surface.patches))
+    if kind != "cable":
+        one[index] = 1.0
+    if kind == "tension":
+        return weighted(surface, one, X=X)[2]
+    if kind == "pressure":
+        return weighted(surface, 0.0, one, X)[2]
+    out = np.zeros_like(X)
+    if kind == "weight":
+        moments(surface, X, one, out)
+    else:
+        add_pull(X, surface.cables[index].edges, 1.0, out)
+    return out
 
 
 def patch_areas(surface: Surface) -> Floats:
@@ -150,8 +200,12 @@ def patch_areas(surface: Surface) -> Floats:
 
 
 def patch_volumes(surface: Surface) -> Floats:
-    """(k,) signed volume V_i of each patch's cone to ``surface.origin``, length³ (10b)."""
-    return kernels.areas_and_volumes(kernels.energy_mesh(surface), surface.vertices)[1]
+    """(k,) signed volume V_i of each patch's cone to ``surface.origin``, length³ (10b).
+
+    With the flat pieces of ``plane_pieces`` where a boundary slides on a plane that misses the origin.
+    """
+    volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), surface.vertices)[1]
+    return add_plane_volumes(surface, surface.vertices, volumes)
 
 
 def volume(surface: Surface) -> float:

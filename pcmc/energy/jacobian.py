@@ -8,7 +8,7 @@ The second part vanishes at rest, but for circles. Newton's method converges qua
 
 - inside a sheet, with the area vector a = |a| n:   (∇E - n n·∇E) · Da / |a|;
 - on a curve, with the chord c = |c| t between its neighbours:   -(t·∇E) Bᵀ Dc / |c|;
-- where a curve slides on Π the same, with the chord's part along Π; where a sheet does, its normal's;
+- where a curve slides on a plane the same, with the chord's part along it; where a sheet does, its normal's;
 - along a circle, with the tangent t:   Dt · ∇E, without supports; see ``turning``.
 """
 
@@ -36,9 +36,12 @@ from ..surface.geometry import (
     vertex_area_vectors,
 )
 from ..surface.topology import SHEET
+from .cables import add_cable_products
 from .kernels import Mesh
 from .motion_space import MotionSpace, VertexClasses, curve_chords
+from .plane_pieces import add_plane_turns
 from .turning import circle_turning
+from .weight import add_weight_products
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +74,9 @@ class Linearisation:
         change = np.zeros_like(self.X)
         turn = np.zeros(len(self.X))
         _add_times(classes.mesh(surface), self.X, d, self.sheet_factor, change, turn)
+        add_cable_products(surface, self.X, d, change)
+        add_weight_products(surface, classes.faces, classes.patch_of_face, self.X, d, change)
+        add_plane_turns(surface, d, change)
         turned = curve_chords(surface, classes, d)[self.curve_rows]
         change[classes.curve[self.curve_rows]] += self.curve_factor[:, None] * turned
         out = space.to_coordinates(change)
@@ -87,10 +93,14 @@ def linearise(
     for _, along_line in surface.on_line:
         single &= ~along_line
     sheet_factor = _sheet_factor(surface, classes, single, space.basis, X, gradient)
-    slides = surface.on_plane[classes.curve]
+    slides = np.zeros(len(classes.curve), dtype=bool)
+    for _, mask in surface.sliding:
+        slides |= mask[classes.curve]
     rows = np.flatnonzero(space.dimension[classes.curve] == np.where(slides, 1, 2))
     chord = curve_chords(surface, classes, X)[rows]
-    chord[slides[rows]] = surface.plane.along(chord[slides[rows]])
+    for plane, mask in surface.sliding:
+        here = mask[classes.curve[rows]]
+        chord[here] = plane.along(chord[here])
     square = np.einsum("ij,ij->i", chord, chord)
     along = np.einsum("ij,ij->i", chord, gradient[classes.curve[rows]])
     sheet_rows = np.flatnonzero(single)
@@ -107,13 +117,13 @@ def _sheet_factor(
     out = np.zeros_like(X)
     area_vector = vertex_area_vectors(X, classes.faces)[0]
     _across_normals(area_vector, single, basis, gradient, out)
-    sliding = np.flatnonzero(single & surface.on_plane)
-    if len(sliding):
+    for plane, mask in surface.sliding:
+        sliding = np.flatnonzero(single & mask)
         length = np.linalg.norm(area_vector[sliding], axis=1)
         normal = area_vector[sliding] / length[:, None]
-        shadow = np.linalg.norm(surface.plane.along(normal), axis=1)
+        shadow = np.linalg.norm(plane.along(normal), axis=1)
         b, g = basis[sliding, 0], gradient[sliding]
-        rest = surface.plane.along(g - np.einsum("ij,ij->i", g, b)[:, None] * b)
+        rest = plane.along(g - np.einsum("ij,ij->i", g, b)[:, None] * b)
         rest -= np.einsum("ij,ij->i", rest, normal)[:, None] * normal
         out[sliding] = rest / (shadow * length)[:, None]
     return out

@@ -10,7 +10,9 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..surface import Surface
 from ..surface.topology import Topology, components
+from .cables import squared_cable_forces
 from .motion_space import VertexClasses, force_scale
+from .weight import effective_tensions
 
 
 def relative_forces(surface: Surface, classes: VertexClasses, X: Floats, left: Floats) -> float:
@@ -18,8 +20,11 @@ def relative_forces(surface: Surface, classes: VertexClasses, X: Floats, left: F
     parts = surface.topology.components
     if not parts.any():
         return float(np.linalg.norm(left)) / force_scale(surface, classes, X)
-    own = squared_forces(surface, classes, X)
-    return float(np.sqrt(ratios(left, parts, own, parts[classes.faces[:, 0]]).max(initial=0.0)))
+    own, part_of = squared_forces(surface, classes, X), parts[classes.faces[:, 0]]
+    if surface.cables:
+        own = np.append(own, squared_cable_forces(surface))
+        part_of = np.append(part_of, parts[surface.cable_edges.ends[:, 0]])
+    return float(np.sqrt(ratios(left, parts, own, part_of).max(initial=0.0)))
 
 
 def rounding_left(surface: Surface, classes: VertexClasses, X: Floats) -> float:
@@ -44,9 +49,12 @@ def rounding_left(surface: Surface, classes: VertexClasses, X: Floats) -> float:
 
 
 def squared_forces(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
-    """(m,) the squared tension forces ½ α |e| of each active triangle, added up, force²."""
+    """(m,) the squared tension forces ½ α |e| of each active triangle, added up, force².
+
+    With a weight, α + w z stands for α.
+    """
     sides = X[classes.faces[:, [1, 2, 0]]] - X[classes.faces]
-    tension = surface.tensions[classes.patch_of_face]
+    tension = effective_tensions(surface, X, classes.faces, classes.patch_of_face)
     return np.asarray(0.25 * tension**2 * np.einsum("fij,fij->f", sides, sides))
 
 

@@ -2,10 +2,11 @@
 
 - inside a sheet: the unit vertex normal (the normalised vector area);
 - on a curve where sheets meet or end: the plane perpendicular to the curve;
-- at a point where such curves meet, or which sheets share that have no edge in common there: all
-  three directions;
-- always within what the support allows: nothing where fixed, along Π where sliding, or along a
-  line or circle.
+- on a cable the same, also where it runs inside a sheet or along a free edge;
+- at a point where such curves meet, where a cable ends or its tension changes, or which sheets share that
+  have no edge in common there: all three directions;
+- always within what the support allows: nothing where fixed, along the plane where sliding, or along a
+  line or circle. In a mirror plane the sheet goes on: its boundary there is no curve.
 
 The remaining directions only slide vertices along the shape and belong to mesh quality. Faces without
 tension and pressure exert no force: they are left out, and a vertex of such faces alone has no motion.
@@ -35,6 +36,7 @@ from ..surface.geometry import (
     vector,
     vertex_area_vectors,
 )
+from ..surface.supports import mirror_edges
 from ..surface.topology import (
     CURVE,
     POINT,
@@ -45,7 +47,9 @@ from ..surface.topology import (
     topology,
     vertex_kind,
 )
+from .cables import squared_cable_forces, tensions_on
 from .kernels import Mesh, energy_mesh
+from .weight import effective_tensions
 
 PARALLEL = 1e-6  # sine below which a direction counts as parallel to another
 
@@ -134,30 +138,40 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     smooth sheet: their common curve can slide along it freely and carries no motion of its own.
     Without pressure they are so whichever way their faces run; a Möbius band keeps a curve across.
     """
-    pulls = (surface.tensions != 0.0) | (surface.pressures != 0.0)
+    in_room = surface.room_signs.any(axis=0)  # the pressure of a room may take any value
+    pulls = (surface.tensions != 0.0) | (surface.pressures != 0.0) | in_room
     active = pulls[surface.patch_of_face]
     faces, patch = surface.faces, surface.patch_of_face
     if not active.all():
         faces, patch = np.ascontiguousarray(faces[active]), np.ascontiguousarray(patch[active])
-    kinds = np.unique(np.stack([surface.tensions, surface.pressures]), axis=1, return_inverse=True)
+    laws = np.vstack([surface.tensions, surface.pressures, surface.weights, surface.room_signs])
+    kinds = np.unique(laws, axis=1, return_inverse=True)
     alike = np.asarray(kinds[1]).ravel()[patch].astype(np.int32)
     if active.all():
         topo = replace(surface.topology, patch_of_face=alike)
     else:
         topo = topology(faces, alike, surface.n)
     if (topo.one_way_edge & ~topo.seam_edge).any():
-        turned = _against_the_others(topo) & (surface.pressures[patch] == 0.0)
+        turned = _against_the_others(topo) & ((surface.pressures == 0.0) & ~in_room)[patch]
         faces = np.where(turned[:, None], faces[:, ::-1], faces)
         topo = topology(faces, alike, surface.n)
     faces.setflags(write=False)  # compiled loops then see one type of array
     patch.setflags(write=False)
-    edges = topo.edges[topo.curve_edge | topo.one_way_edge]
+    on_curve = topo.curve_edge | topo.one_way_edge
+    if surface.on_planes:
+        on_curve = on_curve & ~mirror_edges(surface.on_planes, topo)
+    pull = tensions_on(topo.edges, surface.cable_edges, surface.n) if surface.cables else None
+    if pull is not None:
+        on_curve = on_curve | (pull > 0.0)
+    edges = topo.edges[on_curve]
     links = np.concatenate([edges, edges[:, ::-1]])
     if crest is not None and len(crest):
         links = np.concatenate([links[~np.isin(links[:, 0], crest[:, 0])], crest])
     curve, beside = curve_neighbours(links, surface.n)
     kind = vertex_kind(links[:, 0], surface.n)
     shared = topo.fans > 1
+    if pull is not None:
+        shared |= _pulled_unevenly(edges, pull[on_curve], surface.n)
     if crest is not None:
         shared[crest[:, 0]] = False
     kind[shared] = POINT
@@ -165,6 +179,14 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     idle = np.bincount(faces.ravel(), minlength=surface.n) == 0
     level = np.zeros(surface.n, dtype=bool) if level is None else level
     return VertexClasses(active, faces, patch, topo, kind, curve, beside, idle, level)
+
+
+def _pulled_unevenly(edges: Ints, pull: Floats, n: int) -> Bools:
+    """(n,) vertices at which curve edges (e,2) of different line tension (e,) meet."""
+    least, most = np.full(n, np.inf), np.zeros(n)
+    np.minimum.at(least, edges, pull[:, None])
+    np.maximum.at(most, edges, pull[:, None])
+    return least < most
 
 
 def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionSpace:
@@ -190,9 +212,10 @@ def motion_space(surface: Surface, classes: VertexClasses, X: Floats) -> MotionS
     point = np.concatenate([np.flatnonzero(moving & (classes.kind == POINT)), curve[~straight]])
     basis[point], dimension[point] = np.eye(3), 3
 
-    sliding = np.flatnonzero(moving & surface.on_plane)
-    if len(sliding):
-        _within_plane(np.array(surface.plane.normal), tangent, sliding, basis, dimension)
+    for plane, mask in surface.sliding:
+        sliding = np.flatnonzero(moving & mask)
+        if len(sliding):
+            _within_plane(np.array(plane.normal), tangent, sliding, basis, dimension)
     for line, along_line in surface.on_line:
         sliding = np.flatnonzero(along_line & moving)
         if isinstance(line, Circle):
@@ -212,13 +235,22 @@ def curve_chords(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
 
 
 def force_scale(surface: Surface, classes: VertexClasses, X: Floats) -> float:
-    """The norm of the single triangles' tension forces ½ α |e|, which cancel at rest, force."""
-    return _norm_of_forces(X, classes.faces, surface.tensions[classes.patch_of_face]) or 1.0
+    """The norm of the single forces that cancel at rest: ½ α |e| of triangles, τ of cable edges, force.
+
+    With a weight, α + w z stands for α.
+    """
+    faces = classes.faces
+    sheets = _norm_of_forces(X, faces, effective_tensions(surface, X, faces, classes.patch_of_face))
+    if not surface.cables:
+        return sheets or 1.0
+    return sqrt(sheets**2 + squared_cable_forces(surface).sum()) or 1.0
 
 
 def tension_forces(surface: Surface) -> float:
-    """The same norm for all triangles of a surface, force; 0 without tension."""
-    return _norm_of_forces(surface.vertices, surface.faces, surface.tensions[surface.patch_of_face])
+    """The same norm for all triangles and cables of a surface, force; 0 without tension."""
+    X, F, patch = surface.vertices, surface.faces, surface.patch_of_face
+    sheets = _norm_of_forces(X, F, effective_tensions(surface, X, F, patch))
+    return sqrt(sheets**2 + squared_cable_forces(surface).sum()) if surface.cables else sheets
 
 
 def perpendicular(directions: Floats) -> tuple[Floats, Floats]:
@@ -244,7 +276,7 @@ def _against_the_others(topo: Topology) -> Bools:
 
 
 def _within_plane(normal: Floats, tangent: Floats, sliding: Ints, basis: Floats, dimension: Ints) -> None:
-    """Cut the basis at sliding vertices down to directions along Π, in place."""
+    """Cut the basis at sliding vertices down to directions along their plane, in place."""
     first, second = perpendicular(normal[None])
     for size in (1, 2, 3):
         chosen = sliding[dimension[sliding] == size]

@@ -21,9 +21,12 @@ from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled
 from ..surface import Surface
 from ..surface.geometry import cross, divided, dot, norm, point, scaled, sub, vector
+from .cables import assemble_cables
 from .kernels import Mesh
 from .motion_space import MotionSpace, VertexClasses
+from .plane_pieces import add_plane_hessian
 from .turning import circle_turning
+from .weight import assemble_weights
 
 
 class Pattern(NamedTuple):
@@ -73,10 +76,21 @@ def assemble(
     hessian: float = 1.0,
     stiffness: float = 0.0,
 ) -> Floats:
-    """Values of hessian · Bᵀ(∂²E)B + stiffness · Bᵀ(L_α⊗I)B in the pattern."""
+    """Values of hessian · Bᵀ(∂²E)B + stiffness · Bᵀ(L_α⊗I)B in the pattern.
+
+    Cables add τ/ℓ to the stiffness of their edges, weights the cotangents of a tension w z where z > 0.
+    """
     data = np.zeros(len(pattern.indices))
     _assemble(classes.mesh(surface), X, space, pattern, hessian, stiffness, data)
+    ends, tension = surface.cable_edges
+    if len(ends):
+        assemble_cables(X, ends, tension, *space, pattern.indptr, pattern.indices, hessian, stiffness, data)
+    if surface.weights.any():
+        faces, patch = classes.faces, classes.patch_of_face
+        into = pattern.indptr, pattern.offset
+        assemble_weights(surface, faces, patch, X, *space, *into, hessian, stiffness, data)
     if hessian:
+        add_plane_hessian(surface, classes, space, pattern.indptr, pattern.offset, hessian, data)
         rows, factor = circle_turning(surface, space, X)
         data[pattern.indptr[space.start[rows]]] += hessian * (factor * space.basis[rows, 0]).sum(axis=1)
     return data

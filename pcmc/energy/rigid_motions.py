@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Floats
-from ..surface import Surface
-from .motion_space import MotionSpace
+from ..surface import Circle, Surface
+from .motion_space import MotionSpace, perpendicular
 
 SEEN = 0.05  # part of a rigid motion in the motion space below which it only slides the surface
 
@@ -20,14 +20,19 @@ def rigid_motions(surface: Surface) -> Floats:
     size = surface.size or 1.0  # 0 where all vertices are at one point
     arm = (surface.vertices - surface.vertices.mean(axis=0)) / size
     held, free = surface.fixed, np.eye(6)
-    for _, along in surface.on_circle:
+    for _, along in surface.on_line:
         held = held & ~along
     if not surface.free.all():
         rows = [_row(arm[held], axis) for axis in np.eye(3)]
-        for circle, along in surface.on_circle:
-            outward = surface.vertices[along] - np.array(circle.centre)
-            rows += [_row(arm[along], np.array(circle.normal)), _row(arm[along], outward / circle.radius)]
-        resisted = np.concatenate([*rows, _row(arm[surface.on_plane], np.array(surface.plane.normal))])
+        for line, along in surface.on_line:
+            if isinstance(line, Circle):
+                outward = surface.vertices[along] - np.array(line.centre)
+                across = np.array(line.normal), outward / line.radius
+            else:
+                across = tuple(perpendicular(np.array([line.direction])))
+            rows += [_row(arm[along], axis) for axis in across]
+        rows += [_row(arm[mask], np.array(plane.normal)) for plane, mask in surface.sliding]
+        resisted = np.concatenate(rows)
         _, s, vt = np.linalg.svd(resisted.T @ resisted)
         free = vt[s <= 1e-10 * s[0]]
     motions = free.reshape(-1, 2, 3).copy()

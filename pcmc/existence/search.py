@@ -57,7 +57,7 @@ def _search(start: Surface, first: Result, attempts: Attempts) -> Result:
         if further.fold is not None:
             proofs.append(further.fold)
             break
-    if first.status in (Status.DIVERGED, Status.DEGENERATE) and load_ratio(start) > 1.0:
+    if first.status in (Status.DIVERGED, Status.DEGENERATE) and load_ratio(start) > 1.0 and not start.rooms:
         proofs.insert(0, Overload(load_ratio(start)))
     return _proved(first, tuple(proofs), attempts)
 
@@ -67,6 +67,8 @@ def _further_ways(start: Surface, attempts: Attempts, pinchable: Bools) -> list[
     low = low_start(start)
     if low is None:
         return []
+    if low.rooms:  # their pressures are not given, and no way begins at others
+        return [partial(Further, low, "from a lower start")]
     ways: list[Callable[[], Further]] = []
     if low.pressures.any():
         ways += [partial(Further, low, "from a lower start"), partial(raise_pressure, low, attempts)]

@@ -11,23 +11,35 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from ..base.arrays import Floats
-from ..base.errors import FileError, FileWarning, LostWarning, MissingExtra, PcmcError, unknown
+from ..base.errors import FileError, FileWarning, LostWarning, MissingExtra, PcmcError, SurfaceError, unknown
 from ..base.files import atomic_write, check_name, check_regular
 from ..base.units import MICROMETRES, Units, length_factor
 from ..base.validate import choice
 from ..contact.pinching import standing_part
-from ..surface import Plane, Surface
+from ..surface import Plane, Surface, expect_surface
 from .flat_walls import encode_walls, restore_walls
 from .import_warnings import import_warnings
 from .libraries import unreadable
 from .mesh_data import MeshData, checked, merged, to_surface, without_unused
 from .scaling import as_units, converted, scaled_surface
+
+
+class Solved(Protocol):
+    """The result of a solver."""
+
+    @property
+    def surface(self) -> Surface:
+        """The surface reached."""
+
+    @property
+    def certificate(self) -> object:
+        """Its certificate."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +51,16 @@ class Format:
     module : the module here that reads and writes it.
     scalars : "" for none, "vertices", or "both" vertices and faces.
     certificate : whether it holds the certificate.
+    colours : whether it holds colours of vertices.
     shared : whether patches certainly share their vertices, so that reading needs no merging.
     separate : whether it has a mesh per patch, which cannot have triangles without area.
     walls : whether such triangles go with a separate format as text.
     lines : whether it holds the lines and circles that vertices slide along.
+    cables : whether it holds cables.
+    rooms : whether it holds the volumes that rooms prescribe.
+    planes : whether it holds planes other than Π that vertices slide on, and mirror planes.
     loses : what it never holds.
+    reads : whether pcmc reads it, too.
     unit : the unit of length that the format prescribes; empty if a file may have any, or says none.
     units : whether a file says its units.
     """
@@ -51,29 +68,47 @@ class Format:
     module: str
     scalars: str = ""
     certificate: bool = False
+    colours: bool = False
     shared: bool = False
     separate: bool = False
     walls: bool = False
     lines: bool = False
+    cables: bool = False
+    rooms: bool = False
+    planes: bool = False
     loses: tuple[str, ...] = ()
+    reads: bool = True
     unit: str = ""
     units: bool = True
 
 
 FORMATS = {
-    ".pcmc": Format("native", scalars="both", certificate=True, shared=True, lines=True),
-    ".fe": Format("evolver", shared=True, units=False),
-    ".dmp": Format("evolver", shared=True, units=False),
+    ".pcmc": Format(
+        "native",
+        scalars="both",
+        certificate=True,
+        shared=True,
+        lines=True,
+        planes=True,
+        cables=True,
+        rooms=True,
+    ),
+    ".fe": Format("evolver", shared=True, units=False, planes=True, cables=True, rooms=True),
+    ".dmp": Format("evolver", shared=True, units=False, planes=True, cables=True, rooms=True),
     ".obj": Format("obj"),
     ".ply": Format("ply", scalars="both"),
     ".stl": Format("stl", separate=True, loses=("supports", "tensions", "pressures"), units=False),
     ".vtp": Format("vtk", scalars="both"),
     ".vtu": Format("vtk", scalars="both"),
-    ".glb": Format("gltf", scalars="vertices", separate=True, walls=True, unit="m"),
-    ".gltf": Format("gltf", scalars="vertices", separate=True, walls=True, unit="m"),
+    ".glb": Format("gltf", scalars="vertices", colours=True, separate=True, walls=True, unit="m"),
+    ".gltf": Format("gltf", scalars="vertices", colours=True, separate=True, walls=True, unit="m"),
+    ".usda": Format("usd", scalars="vertices", colours=True, separate=True, walls=True, reads=False),
     ".3dm": Format("rhino", separate=True, walls=True),
+    ".ifc": Format("ifc", certificate=True, separate=True, walls=True),
 }
 """The formats by suffix."""
+READ_ONLY = {suffix: Format("meshlab") for suffix in (".off", ".3ds", ".dae", ".x3d")}
+"""Formats that are read, by MeshLab, but not written."""
 
 NO_SUPPORTS = (
     "no supports in the file: its boundary is taken as fixed; tensions and pressures are 1 unless given"
@@ -134,7 +169,10 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
     try:
         surface = to_surface(data, *given)
     except PcmcError as error:
-        raise _in_file(path, error, type(error)) from None
+        raised = _in_file(path, error, type(error))
+        if isinstance(error, SurfaceError):
+            raised.args = (f"{raised}; or try: pcmc repair {os.fspath(path)} -o clean.obj",)
+        raise raised from None
     notes = (*data.notes, *import_warnings(data))
     if not given and data.support is None:
         notes = (*notes, NO_SUPPORTS)
@@ -147,7 +185,12 @@ def load(path: str | os.PathLike[str]) -> MeshData:
     """Everything in a file, scalars and certificate too. Errors as in ``read``."""
     path = Path(path)
     check_regular(path)
-    form = _format(path)
+    form = _format(path, {**FORMATS, **READ_ONLY})
+    if not form.reads:
+        text = (
+            f"{path}: pcmc writes {path.suffix} files and does not read them; read the surface's .pcmc file"
+        )
+        raise FileError(text, what=str(path), found=path.suffix)
     try:
         path.open("rb").close()  # the libraries' errors for a missing file differ
         data = without_unused(checked(import_module(f".{form.module}", __name__).read(path)))
@@ -171,26 +214,30 @@ def load(path: str | os.PathLike[str]) -> MeshData:
 
 def write(
     path: str | os.PathLike[str],
-    surface: Surface,
+    surface: Surface | Solved,
     *,
     scalars: Mapping[str, Floats] | None = None,
     certificate: object | None = None,
+    colour: str = "",
     units: Units | str | None = None,
 ) -> None:
     """Write a surface as the suffix says; the file appears whole or not at all.
 
     A wall below a junction on Π has triangles without area. Formats with a mesh per patch (.stl, .glb,
-    .gltf, .3dm) leave them out; .glb, .gltf and .3dm hold these walls as text, and ``read`` puts them
+    .gltf, .3dm, .ifc, .usda) leave them out; all but .stl hold these walls as text, and ``read`` puts them
     back. From .stl, and if another program changed the surface, the junction comes back sliding on Π.
 
     Parameters
     ----------
     path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
+    surface : a Surface, or the result of a solver; formats that hold a certificate then get the result's.
     scalars : (n,) or (m,) arrays by name (curvature, error, ...), for formats that hold them.
-    certificate : a Certificate, or values by name, for the format that holds it (.pcmc).
+    certificate : a Certificate, or values by name, for the formats that hold it (.pcmc, .ifc).
+    colour : the name in ``scalars`` of an (n,) array that colours the vertices, for formats that hold
+        colours (.glb, .gltf, .usda). Without it each patch has a colour.
     units : of the surface: a unit of length such as "mm", or ``pcmc.base.units.Units`` with that of forces.
         The file says them. .glb and .gltf are in metres, as glTF prescribes: the surface is converted
-        (scalars are not). Without a unit the numbers are written as they are, in .3dm as metres.
+        (scalars are not). Without a unit the numbers stay, and .3dm, .ifc and .usda files are in metres.
 
     Warns
     -----
@@ -199,7 +246,8 @@ def write(
     """
     path = Path(path)
     check_name(path)
-    form = _format(path)
+    form = _format(path, FORMATS)
+    surface, certificate = _unpacked(surface, certificate, form)
     for patch in surface.patches:
         if "\n" in patch.name or "\r" in patch.name:
             text = f"{path}: the patch name {patch.name!r} contains a line break; rename the patch"
@@ -208,10 +256,22 @@ def write(
     sizes = {"": (), "vertices": (surface.n,), "both": (surface.n, surface.m)}[form.scalars]
     units = as_units(units)
     lost = [name for name, scalar in scalars.items() if len(scalar) not in sizes]
+    if colour:
+        choice("colour", colour, [name for name, scalar in scalars.items() if len(scalar) == surface.n])
+        if not form.colours:
+            lost.append(f"colours of {colour!r}")
     if certificate is not None and not form.certificate:
         lost.append("certificate")
-    if surface.on_line and not form.lines:
+    if surface.given.on_line and not form.lines:
         lost.append("lines or circles that vertices slide along (they are fixed in it)")
+    if surface.weights.any() and "tensions" in form.loses:
+        lost.append("weights")
+    if surface.cables and not form.cables:
+        lost.append("cables")
+    if surface.rooms and not form.rooms:
+        lost.append("volumes of rooms (it has the pressures reached)")
+    if surface.on_planes and not form.planes:
+        lost.append("planes other than Π that vertices slide on, and mirror planes (fixed in it)")
     if units and not form.units:
         lost.append(f"its unit {units.length}")
     if units and form.unit:
@@ -227,7 +287,8 @@ def write(
     values = _values(certificate)
     try:
         module = import_module(f".{form.module}", __name__)
-        content = {"scalars": scalars, "certificate": values, "walls": walls, "units": units}
+        content: dict[str, Any] = {"scalars": scalars, "colour": colour, "certificate": values}
+        content |= {"walls": walls, "units": units}
         with atomic_write(path) as temporary:
             note = module.write(temporary, shown, **content)
     except OSError as error:
@@ -241,6 +302,15 @@ def write(
         warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
 
 
+def _unpacked(given: Surface | Solved, certificate: object, form: Format) -> tuple[Surface, object]:
+    """The surface, and the certificate of a solver's result if the format holds it and none is given."""
+    surface: Any = given if isinstance(given, Surface) else getattr(given, "surface", given)
+    expect_surface(surface)
+    if surface is not given and form.certificate and certificate is None:
+        certificate = getattr(given, "certificate", None)
+    return surface, certificate
+
+
 def _in_file(path: str | os.PathLike[str], error: PcmcError, kind: type[PcmcError]) -> PcmcError:
     """The error with the file's name in front, as one of this kind."""
     what = os.fspath(path) if kind is FileError else error.what
@@ -248,12 +318,13 @@ def _in_file(path: str | os.PathLike[str], error: PcmcError, kind: type[PcmcErro
     return kind(text, what=what, where=error.where, found=error.found, expected=error.expected)
 
 
-def _format(path: Path) -> Format:
+def _format(path: Path, known: Mapping[str, Format]) -> Format:
     suffix = path.suffix.lower()
-    if suffix not in FORMATS:
-        text = f"{path}: {unknown('suffix', suffix, FORMATS)}"
-        raise FileError(text, what=str(path), found=suffix, expected=list(FORMATS))
-    return FORMATS[suffix]
+    if suffix not in known:
+        readable = f"{suffix} files are read only; " if suffix in READ_ONLY else ""
+        text = f"{path}: {readable}{unknown('suffix', suffix, known)}"
+        raise FileError(text, what=str(path), found=suffix, expected=list(known))
+    return known[suffix]
 
 
 def _values(certificate: Any) -> Mapping[str, Any]:

@@ -1,14 +1,18 @@
 """Surface Evolver datafiles (.fe): the same discrete energy in another program.
 
 A patch's tension is its faces' ``tension``; the patches of one pressure p ≠ 0 are one body with
-``pressure p``; fixed vertices are ``fixed``, sliding ones lie on ``constraint 1``, the plane Π.
+``pressure p``; fixed vertices are ``fixed``, sliding ones lie on ``constraint 1``, the plane Π, and on
+``constraint 2`` and so on, the other planes; a comment names these, and says which are mirrors. Cables and
+weights are in ``evolver_forces``.
 Evolver measures volumes from the origin (``symmetric_content``: det/6 per face, Eq. 10b), so the
-coordinates are relative to the point of Π, and a comment says where that is. Then the program's
-``total_energy`` is E of Eq. (20).
+coordinates are relative to the point of Π, or with other planes to ``Surface.origin``, and a comment says
+where that is. A plane that does not pass there has the ``content`` of its flat pieces, as an integral along
+its edges: ∫ ⟨-c × x / 6, dx⟩ = -⟨c, a × b⟩ / 6; the ends of these pieces are a quantity ``corner_k`` of their
+vertex, with its pressure. Then the program's ``total_energy`` is E of Eq. (20).
 
 The reader takes datafiles of this kind, those that the program's ``dump`` writes, and others whose
-sections list elements by number. For a body with a prescribed volume the Lagrange multiplier is the
-pressure.
+sections list elements by number. A room of prescribed volume is a body with that ``volume``; its Lagrange
+multiplier is the pressure, and ``volconst`` the part of the volume that the program's cones do not see.
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,47 +28,56 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError
-from ..surface import Patch, Plane, Surface
+from ..energy.flat_pieces import flat_pieces
+from ..energy.plane_pieces import add_plane_volumes
+from ..energy.rooms import room_pressures, room_volumes
+from ..meshing.refinement import edges_on_planes
+from ..surface import Cable, Patch, Plane, Room, Surface
+from . import evolver_forces
 from .expressions import constant, linear
-from .mesh_data import FIXED, FREE, SLIDING, MeshData, support_of
+from .mesh_data import FIXED, FREE, SLIDING, MeshData, given_support
 from .polygons import triangulate
 from .text import format_rows
 
+ROUNDING = 1e-12  # of the largest pressure: what is left of differences
 HEADER = """\
 // Piecewise constant-mean-curvature surface, written by pcmc.
 // total_energy is E = sum tension * area - sum pressure * volume, volumes seen from the origin.
 // origin {origin}
-{patches}
+{names}
 SPACE_DIMENSION 3
 SYMMETRIC_CONTENT
 DEFINE FACET ATTRIBUTE patch INTEGER
 
-CONSTRAINT 1
-FORMULA: {formula} = 0
 """
 
 
 def write(path: Path, surface: Surface, **_: Any) -> None:
     """The datafile of a surface."""
-    support, tag = support_of(surface), np.array(["", " constraint 1", " fixed"])
     edges = surface.topology.edges + 1
     patches = list(enumerate(surface.patches, 1))
     face_tag = np.array([f" tension {p.tension!r} patch {k}" for k, p in patches])
-    X = surface.vertices - np.array(surface.plane.point)
-    normal = zip(surface.plane.normal, "xyz", strict=True)
+    face_tag = evolver_forces.patch_tags(surface, face_tag)
+    origin = surface.origin if surface.on_planes else np.array(surface.plane.point)
+    X = surface.vertices - origin
     sides = ((surface.topology.edge_of_face + 1) * surface.topology.sense)[:, [2, 0, 1]]
     header = HEADER.format(
-        origin=" ".join(map(repr, surface.plane.point)),
-        patches="\n".join(f"// patch {k} {p.name}" for k, p in patches),
-        formula=" + ".join(c if a == 1.0 else f"({a!r})*{c}" for a, c in normal if a != 0.0),
+        origin=" ".join(map(repr, origin.tolist())),
+        names="\n".join(
+            [f"// patch {k} {p.name}" for k, p in patches]
+            + [f"// room {k} {room.name}" for k, room in enumerate(surface.rooms, 1)]
+            + evolver_forces.names(surface)
+        ),
     )
+    vertex_tag, edge_tag = _tags(surface)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(header + "\nVERTICES\n")
-        file.write(format_rows("%d %r %r %r%s\n", _count(X), *X.T, tag[support]))
+        file.write(header + _constraints(surface, origin) + evolver_forces.definitions(surface, origin))
+        file.write("\nVERTICES\n")
+        file.write(format_rows("%d %r %r %r%s\n", _count(X), *X.T, vertex_tag))
         file.write("\nEDGES\n")
-        file.write(format_rows("%d %d %d%s\n", _count(edges), *edges.T, tag[_edge_support(surface)]))
+        file.write(format_rows("%d %d %d%s\n", _count(edges), *edges.T, edge_tag))
         file.write("\nFACES\n")
         file.write(format_rows("%d %d %d %d%s\n", _count(sides), *sides.T, face_tag[surface.patch_of_face]))
         file.write("\nBODIES\n" + _bodies(surface) + "\nREAD\n")
@@ -74,9 +87,56 @@ def _count(rows: Ints | Floats) -> Ints:
     return np.arange(1, len(rows) + 1)
 
 
+def _constraints(surface: Surface, origin: Floats) -> str:
+    """Π and the other planes as constraints 1, 2, …, the latter with the content of their flat pieces."""
+    pieces, text = flat_pieces(surface), ""
+    tail = surface.faces[pieces.face, pieces.corner]
+    head = surface.faces[pieces.face, (pieces.corner + 1) % 3]
+    for number, (plane, mask) in enumerate(((surface.plane, surface.on_plane), *surface.on_planes), 1):
+        terms = zip(plane.normal, "xyz", strict=True)
+        formula = " + ".join(c if a == 1.0 else f"({a!r})*{c}" for a, c in terms if a != 0.0)
+        if number > 1:
+            text += (
+                f"// plane {number} {'mirror' if plane.mirror else 'support'} {plane.name}".rstrip() + "\n"
+            )
+        offset = -float(plane.height(origin)) + 0.0
+        text += f"CONSTRAINT {number}\nFORMULA: {formula} = {offset!r}\n".replace("= 0.0", "= 0")
+        own = np.flatnonzero(mask[tail] & mask[head]) if number > 1 else ()
+        if len(own):
+            x, y, z = (pieces.apex[own[0]] / -6.0).tolist()
+            text += (
+                f"CONTENT\nC1: ({y!r})*z - ({z!r})*y\nC2: ({z!r})*x - ({x!r})*z\nC3: ({x!r})*y - ({y!r})*x\n"
+            )
+    for k, (patch, normal) in enumerate(zip(pieces.end_patch, pieces.normal, strict=True)):
+        x, y, z = (-surface.pressures[patch] * normal).tolist()
+        text += f"QUANTITY corner_{k} ENERGY METHOD VERTEX_SCALAR_INTEGRAL\n"
+        text += f"SCALAR_INTEGRAND: ({x!r})*x + ({y!r})*y + ({z!r})*z\n"
+    return text
+
+
+def _tags(surface: Surface) -> tuple[Any, Any]:
+    """What follows the numbers of each vertex (n,) and of each edge (e,)."""
+    kinds = np.array(["", " constraint 1", " fixed"])
+    masks = [mask for _, mask in surface.on_planes]
+    vertices = _with_constraints(kinds[given_support(surface)], masks).astype(object)
+    for k, vertex in enumerate(flat_pieces(surface).end):
+        vertices[vertex] += f" corner_{k}"
+    edges = _with_constraints(kinds[_edge_support(surface)], edges_on_planes(surface))
+    return vertices, evolver_forces.edge_tags(surface, edges)
+
+
+def _with_constraints(tags: Any, masks: Sequence[Bools]) -> Any:
+    """The tags with the numbers of the constraints 2, 3, … where each of the masks is set."""
+    for number, mask in enumerate(masks, 2):
+        first = np.strings.find(tags, "constraint") < 0
+        more = np.where(first, f" constraint {number}", f" {number}")
+        tags = np.strings.add(tags, np.where(mask, more, ""))
+    return tags
+
+
 def _edge_support(surface: Surface) -> Ints:
     """(e,) support of the boundary edges with held ends, for vertices that refinement puts there."""
-    topo, support = surface.topology, support_of(surface)
+    topo, support = surface.topology, given_support(surface)
     along = support[topo.edges].min(axis=1)
     off_plane = np.abs(surface.plane.height(surface.vertices)) > 1e-9 * surface.size
     along[(along == SLIDING) & off_plane[topo.edges].any(axis=1)] = FREE
@@ -84,13 +144,51 @@ def _edge_support(surface: Surface) -> Ints:
 
 
 def _bodies(surface: Surface) -> str:
-    text = ""
-    of_face = surface.pressures[surface.patch_of_face]
-    for body, pressure in enumerate(np.unique(of_face[of_face != 0.0]), 1):
-        members = (np.flatnonzero(of_face == pressure) + 1).astype(str)
-        lines = [" ".join(members[k : k + 15]) for k in range(0, len(members), 15)]
-        text += f"{body} " + " \\\n  ".join(lines) + f" pressure {float(pressure)!r}\n"
+    """A body for each room, with its volume, and one for each pressure that is not that of a room."""
+    text, pressures = "", surface.pressures
+    if surface.rooms:
+        multipliers, pressures = _room_pressures(surface)
+        beyond = room_volumes(surface) - surface.room_signs @ _cones(surface)
+        for k, (room, signs) in enumerate(zip(surface.rooms, surface.room_signs, strict=True)):
+            members = signs[surface.patch_of_face].astype(int) * _count(surface.faces)
+            rest = f" volume {room.volume!r} volconst {float(beyond[k])!r}"
+            text += _body(
+                k + 1, members[members != 0], f"{rest} lagrange_multiplier {float(multipliers[k])!r}"
+            )
+    of_face = pressures[surface.patch_of_face]
+    for body, pressure in enumerate(np.unique(of_face[of_face != 0.0]), 1 + len(surface.rooms)):
+        members = np.flatnonzero(of_face == pressure) + 1
+        text += _body(body, members, f" pressure {float(pressure)!r}")
     return text
+
+
+def _body(number: int, members: Ints, rest: str) -> str:
+    words = members.astype(str)
+    lines = [" ".join(words[k : k + 15]) for k in range(0, len(words), 15)]
+    return f"{number} " + " \\\n  ".join(lines) + f"{rest}\n"
+
+
+def _cones(surface: Surface) -> Floats:
+    """(k,) the volumes of the patches' cones seen from the point of Π, as the program sees them."""
+    corners = surface.vertices[surface.faces] - np.array(surface.plane.point)
+    volumes = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    of_patch = np.bincount(surface.patch_of_face, volumes, len(surface.patches))
+    return add_plane_volumes(surface, surface.vertices, of_patch)
+
+
+def _room_pressures(surface: Surface) -> tuple[Floats, Floats]:
+    """(r,) the pressures of the rooms, and (k,) those of the patches beside them."""
+    signs = surface.room_signs
+    multipliers = room_pressures(surface)
+    left = surface.pressures - multipliers @ signs
+    left[np.abs(left) <= ROUNDING * np.abs(surface.pressures).max(initial=0.0)] = 0.0
+    both = np.flatnonzero((signs > 0.0).any(axis=0) & (left != 0.0))
+    if len(both):
+        name = surface.patches[both[0]].name
+        text = f"patch {name!r} has a pressure of {left[both[0]]:g} beside that of its rooms, and a datafile"
+        text += " has one body on each side of a face; give its pressure to all patches of the room"
+        raise FileError(text, where=name, found=float(left[both[0]]))
+    return multipliers, left
 
 
 # Reading
@@ -102,16 +200,29 @@ def read(path: Path) -> MeshData:
     if "written by pcmc" in header:
         file["read"]  # its last line: without it the file is cut off
     known = _parameters(file["top"])
-    ids, X, support, constraint = _vertices(file["vertices"], known)
+    ids, X, support, constraints = _vertices(file["vertices"], known)
     face_ids, corners, counts, rest = _faces(file["edges"], file["faces"], ids)
     F, source, notes = triangulate(X, corners, counts)
-    pressure, more = _pressures(file, face_ids, known)
-    patch_of_face, patches = _patches(header, file["faces"], rest, pressure, known)
+    pressure, prescribed, more = _pressures(file, face_ids, known)
+    patch_of_face, patches = _patches(header, file["faces"], rest, (pressure, *prescribed.values()), known)
     given = re.search(r"^// origin (\S+) (\S+) (\S+)$", header, re.M)
     place = _Section(header, 1)
     origin = np.array([_numbers((c,), known, place, 0)[0] for c in given.groups()] if given else np.zeros(3))
-    plane = _plane(file["top"], constraint, origin, known)
-    return MeshData(X + origin, F, patch_of_face[source], patches, support, plane, notes=(*notes, *more))
+    plane, planes = _planes(header, file["top"], constraints, support, origin, known)
+    rooms = _rooms(header, prescribed, patch_of_face, patches)
+    X, notes = X + origin, (*notes, *more)
+    return MeshData(
+        X,
+        F,
+        patch_of_face[source],
+        patches,
+        support,
+        plane,
+        notes=notes,
+        planes=planes,
+        rooms=rooms,
+        cables=_cables(header, file["edges"], ids, known),
+    )
 
 
 @dataclass(frozen=True)
@@ -187,15 +298,16 @@ def _parameters(top: _Section) -> dict[str, float]:
     return known
 
 
-def _vertices(section: _Section, known: Mapping[str, float]) -> tuple[Ints, Floats, Ints, Ints]:
-    """Ids, positions, support, and the number of the constraint each vertex lies on (0: none)."""
+def _vertices(section: _Section, known: Mapping[str, float]) -> tuple[Ints, Floats, Ints, dict[int, Bools]]:
+    """Ids, positions, support, and by the number of each constraint the vertices that lie on it."""
     what = "a vertex number and three coordinates"
     listed = section.elements(r"(\d+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)([^\n]*)", what)
     columns = list(zip(*listed, strict=True)) or [()] * 5
     X = np.stack([_numbers(column, known, section) for column in columns[1:4]], axis=1)
     code, kinds = pd.factorize(np.array(columns[4], dtype=object))
     first = np.unique(code, return_index=True)[1]
-    support, constraint = np.zeros(len(kinds), dtype=np.int8), np.zeros(len(kinds), dtype=int)
+    support = np.zeros(len(kinds), dtype=np.int8)
+    constraints: dict[int, Bools] = {}
     for k, rest in enumerate(kinds):
         row, words = int(first[k]), rest.lower()
         if re.search(r"\bboundary\b", words):
@@ -203,11 +315,10 @@ def _vertices(section: _Section, known: Mapping[str, float]) -> tuple[Ints, Floa
         named = re.search(r"\bconstraints?((?:\s+\d+)+)", words)
         numbers = _whole(named[1].split(), section, row).tolist() if named else []
         support[k] = FIXED if re.search(r"\bfixed\b", words) else SLIDING if numbers else FREE
-        if support[k] == SLIDING:
-            if len(numbers) > 1:
-                raise section.error("a free vertex on two constraints is not supported", row)
-            constraint[k] = numbers[0]
-    return _whole(columns[0], section), X, support[code], constraint[code]
+        for number in numbers:
+            constraints.setdefault(number, np.zeros(len(kinds), dtype=bool))[k] = True
+    of_vertex = {number: mask[code] for number, mask in sorted(constraints.items())}
+    return _whole(columns[0], section), X, support[code], of_vertex
 
 
 def _faces(edges: _Section, faces: _Section, vertex_ids: Ints) -> tuple[Ints, Ints, Ints, list[str]]:
@@ -234,6 +345,20 @@ def _faces(edges: _Section, faces: _Section, vertex_ids: Ints) -> tuple[Ints, In
     return ids, tail, counts, [f[2] for f in listed]
 
 
+def _cables(header: str, edges: _Section, vertex_ids: Ints, known: Mapping[str, float]) -> tuple[Cable, ...]:
+    """The edges with a tension, as cables."""
+    if not re.search(r"\b(?:tension|density)\b", edges.text, re.I):
+        return ()
+    rows = edges.elements(r"\d+[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)([^\n]*)", "an edge number and two vertices")
+    numbers = np.stack([_whole([row[k] for row in rows], edges) for k in (0, 1)], axis=1)
+    ends = np.stack([_places(vertex_ids, column, edges, "vertex") for column in numbers.T], axis=1)
+
+    def number(word: str, row: int) -> float:
+        return float(_numbers((word,), known, edges, row)[0])
+
+    return evolver_forces.cables(header, [row[2] for row in rows], ends, number)
+
+
 def _places(ids: Ints, wanted: Ints, section: _Section, what: str, row: Ints | None = None) -> Ints:
     """Where each wanted id stands among the ids."""
     order = np.argsort(ids, kind="stable")
@@ -245,11 +370,16 @@ def _places(ids: Ints, wanted: Ints, section: _Section, what: str, row: Ints | N
     return place
 
 
-def _pressures(file: _Sections, face_ids: Ints, known: Mapping[str, float]) -> tuple[Floats, tuple[str, ...]]:
-    """(m,) pressure along each face's normal: the sum over the bodies on its two sides."""
-    pressure = np.zeros(len(face_ids))
+def _pressures(
+    file: _Sections, face_ids: Ints, known: Mapping[str, float]
+) -> tuple[Floats, dict[tuple[str, float], Ints], tuple[str, ...]]:
+    """(m,) pressure along each face's normal: the sum over the bodies on its two sides.
+
+    And the bodies of prescribed volume: by number and volume, (m,) 1 or -1 where a face bounds them.
+    """
+    pressure, prescribed = np.zeros(len(face_ids)), {}
     if "bodies" not in file:
-        return pressure, ("the file has no bodies, so no patch is under pressure",)
+        return pressure, prescribed, ("the file has no bodies, so no patch is under pressure",)
     section, without = file["bodies"], []
     listed = section.elements(r"(\d+)((?:[^\S\n]+-?\d+)*)([^\n]*)", "a body number and its faces")
     inside = np.ones(len(listed))
@@ -263,52 +393,107 @@ def _pressures(file: _Sections, face_ids: Ints, known: Mapping[str, float]) -> t
     signed = _whole(" ".join(members for _, members, _ in listed).split(), section, of_body)
     place = _places(face_ids, np.abs(signed), section, "face", of_body)
     np.add.at(pressure, place, np.sign(signed) * inside[of_body])
+    for row, (number, _, rest) in enumerate(listed):
+        given = re.search(r"\bvolume\s+(\S+)", rest, re.I)
+        if given is not None:
+            sides = np.zeros(len(face_ids), dtype=np.int64)
+            np.add.at(sides, place[of_body == row], np.sign(signed[of_body == row]))
+            prescribed[number, _numbers((given[1],), known, section, row)[0]] = sides
+    if prescribed:  # the difference of two rooms' pressures is 0 but for rounding
+        pressure[np.abs(pressure) <= ROUNDING * np.abs(pressure).max(initial=0.0)] = 0.0
     note = f"body {', '.join(without)} has no pressure in the file; 1 is used"
-    return pressure, (note,) if without else ()
+    return pressure, prescribed, (note,) if without else ()
 
 
 def _patches(
-    header: str, section: _Section, rest: list[str], pressure: Floats, known: Mapping[str, float]
+    header: str,
+    section: _Section,
+    rest: list[str],
+    of_face: Sequence[Floats | Ints],
+    known: Mapping[str, float],
 ) -> tuple[Ints, tuple[Patch, ...]]:
-    """Faces of the same patch number, tension and pressure are a patch."""
+    """Faces of one patch number, tension, weight, pressure and rooms (each (m,) ``of_face``) are a patch."""
     code, kinds = pd.factorize(np.array(rest, dtype=object))
     first = np.unique(code, return_index=True)[1]
-    number, tension = np.zeros(len(kinds)), np.ones(len(kinds))
+    number, tension, weight = np.zeros(len(kinds)), np.ones(len(kinds)), np.zeros(len(kinds))
     for k, words in enumerate(kinds):
         row = int(first[k])
-        for target, key in ((number, "patch"), (tension, "tension|density")):
+        for target, key in ((number, "patch"), (tension, "tension|density"), (weight, "weight")):
             given = re.search(rf"\b(?:{key})\s+(\S+)", words, re.I)
             if given:
                 target[k] = _numbers((given[1],), known, section, row)[0]
-    rows_, of_face = np.unique(
-        np.stack([number[code], tension[code], pressure], axis=1), axis=0, return_inverse=True
-    )
+    laws = np.stack([number[code], tension[code], weight[code], *of_face], axis=1)
+    rows_, patch_of_face = np.unique(laws, axis=0, return_inverse=True)
     names = dict(re.findall(r"^// patch (\d+) ([^\n]+)$", header, re.M))
     once = len(np.unique(rows_[:, 0])) == len(rows_)
     patches = [
-        Patch(names.get(str(int(a)), f"patch {k}") if once else f"patch {k}", t, p)
-        for k, (a, t, p) in enumerate(rows_, 1)
+        Patch(names.get(str(int(a)), f"patch {k}") if once else f"patch {k}", t, p, weight=w)
+        for k, (a, t, w, p, *_) in enumerate(rows_, 1)
     ]
-    return of_face.ravel(), tuple(patches)
+    return patch_of_face.ravel(), tuple(patches)
 
 
-def _plane(top: _Section, constraint: Ints, origin: Floats, known: Mapping[str, float]) -> Plane | None:
-    """Π: the one constraint that sliding vertices lie on, as seen from the file's origin."""
-    used = np.unique(constraint[constraint > 0])
-    if len(used) > 1:
-        text = f"sliding vertices lie on constraints {', '.join(map(str, used))}"
-        raise top.error(f"{text}; pcmc supports one plane for all of them")
-    wanted = int(used[0]) if len(used) else 1
-    pattern = rf"^[^\S\n]*constraint\s+{wanted}\b[^\n]*\s+(?:formula|function)\s*:?\s*([^\n]+)"
+def _rooms(
+    header: str, prescribed: Mapping[tuple[str, float], Ints], patch_of_face: Ints, patches: tuple[Patch, ...]
+) -> tuple[Room, ...]:
+    """The bodies of prescribed volume as rooms, with the names that pcmc has given them."""
+    names = dict(re.findall(r"^// room (\d+) ([^\n]+)$", header, re.M))
+    rooms = []
+    for (number, volume), sides in prescribed.items():
+        of_patch = np.zeros(len(patches), dtype=np.int64)
+        of_patch[patch_of_face] = sides
+        signs = {patches[k].name: int(of_patch[k]) for k in np.flatnonzero(of_patch)}
+        rooms.append(Room(names.get(number, f"body {number}"), signs, volume))
+    return tuple(rooms)
+
+
+def _planes(
+    header: str,
+    top: _Section,
+    constraints: Mapping[int, Bools],
+    support: Ints,
+    origin: Floats,
+    known: Mapping[str, float],
+) -> tuple[Plane | None, tuple[tuple[Plane, Bools], ...]]:
+    """Π and the other planes with their vertices, seen from the file's origin; ``support`` is changed to fit.
+
+    Π is constraint 1, or the first that sliding vertices lie on; sliding vertices on others alone are free of
+    it.
+    """
+    used = [number for number, mask in constraints.items() if (mask & (support == SLIDING)).any()]
+    described = {int(k): (kind, name) for k, kind, name in re.findall(DESCRIBED, header, re.M)}
+    first = 1 if described or 1 in used or not used else used[0]
+    ground = _plane(top, first, origin, known, needed=first in used)
+    if first in constraints:
+        support[(support == SLIDING) & ~constraints[first]] = FREE
+    elif used:
+        support[support == SLIDING] = FREE
+    others = []
+    for number in sorted({*used, *described} & set(constraints) - {first}):
+        kind, name = described.get(number, ("support", ""))
+        plane = _plane(top, number, origin, known, needed=True)
+        assert plane is not None
+        others.append((replace(plane, name=name.strip(), mirror=kind == "mirror"), constraints[number]))
+    return ground, tuple(others)
+
+
+DESCRIBED = r"^// plane (\d+) (mirror|support)\b([^\n]*)$"
+
+
+def _plane(
+    top: _Section, number: int, origin: Floats, known: Mapping[str, float], needed: bool
+) -> Plane | None:
+    """The plane of this constraint; None if it is not needed and not there."""
+    pattern = rf"^[^\S\n]*constraint\s+{number}\b[^\n]*\s+(?:formula|function)\s*:?\s*([^\n]+)"
     hit = re.search(pattern, top.text, re.I | re.M)
-    if hit is None and not len(used):
+    if hit is None and not needed:
         return None
     if hit is None:
-        raise top.error(f"constraint {wanted} has no formula here")
+        raise top.error(f"constraint {number} has no formula here")
     left, _, right = hit[1].partition("=")
 
     def fail(text: str) -> FileError:
-        return top.error(f"constraint {wanted} is not a plane: {text}", offset=hit.start(1))
+        return top.error(f"constraint {number} is not a plane: {text}", offset=hit.start(1))
 
     formula = linear(left, known, fail) - linear(right or "0", known, fail)
     normal = formula[1:]

@@ -1,9 +1,11 @@
 """glTF 2.0 (.glb, .gltf in one file): a mesh per patch, in single precision.
 
-In glTF y is up, in pcmc z: writer and reader rotate the coordinates. Single precision keeps seven digits
-only, so a surface far from the origin, as in a survey's coordinates, is written about its middle, and the
-nodes place it. Supports and scalars at vertices are attributes of the vertices; tensions, pressures, plane
-and walls without height are metadata of the scene.
+In glTF y is up, in pcmc z: writer and reader rotate the coordinates. Lengths are metres. Single precision
+keeps seven digits only, so a surface far from the origin, as in a survey's coordinates, is written about its
+middle, and the nodes place it. Each patch has a material of its name, in its colour. With ``colour`` the
+materials are white, and the vertices have the colours of a scalar; the metadata note its limits.
+Supports and scalars at vertices are attributes of the vertices; tensions, pressures, plane and walls without
+height are metadata of the scene.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from ..base.errors import FileError
 from ..base.files import check_regular
 from ..base.units import Units
 from ..surface import Surface
-from ..surface.colours import patch_colors
+from ..surface.colours import linear, patch_colors, scalar_colors
 from ..surface.surface import FAR
 from .flat_walls import KEY
 from .libraries import load_library, translated_errors
@@ -32,18 +34,26 @@ from .metadata import metadata_text, parse_metadata
 from .trimesh_scene import from_meshes
 
 SUPPORT = "_SUPPORT"
+NO_VALUE = float(np.finfo(np.float32).min)  # in place of NaN, which glTF does not allow
 ITEMS = 4  # of arrays, for each byte of a file; arrays may share their bytes
 
 
 def write(
-    path: Path, surface: Surface, scalars: Mapping[str, Floats], units: Units, walls: str | None, **_: Any
+    path: Path,
+    surface: Surface,
+    scalars: Mapping[str, Floats],
+    units: Units,
+    walls: str | None,
+    colour: str,
+    **_: Any,
 ) -> None:
     """One file, with its buffers inside."""
     trimesh = load_library("trimesh")
     data = {SUPPORT: support_of(surface).astype(np.float32)}
     for name, values in scalars.items():
         if len(values) == surface.n:
-            data["_" + re.sub(r"\W+", "_", name)] = values.astype(np.float32)
+            finite = np.isfinite(values) & (np.abs(values) < -NO_VALUE)
+            data["_" + re.sub(r"\W+", "_", name)] = np.where(finite, values, NO_VALUE).astype(np.float32)
     turned = surface.vertices[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
     place = np.eye(4)
     middle = turned.mean(axis=0)
@@ -51,6 +61,10 @@ def write(
         place[:3, 3] = np.round(middle)
         turned = turned - place[:3, 3]
     scene = trimesh.Scene()
+    shades = None
+    if colour:
+        shades, least, most = scalar_colors(scalars[colour])
+        scene.metadata["pcmc colours"] = {"scalar": colour, "least": least, "most": most}
     for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
         faces = surface.faces[surface.patch_of_face == k]
         if not len(faces):
@@ -59,8 +73,12 @@ def write(
         mesh = trimesh.Trimesh(turned[used], local.reshape(-1, 3), process=False)
         mesh.vertex_attributes.update({key: values[used] for key, values in data.items()})
         shine = {"metallicFactor": 0.0, "roughnessFactor": 0.9, "doubleSided": True}
-        material = trimesh.visual.material.PBRMaterial(patch.name, baseColorFactor=[*color, 1.0], **shine)
+        base = [1.0] * 4 if shades is not None else [*linear(color), 1.0]
+        material = trimesh.visual.material.PBRMaterial(patch.name, baseColorFactor=base, **shine)
         mesh.visual = trimesh.visual.TextureVisuals(material=material)
+        if shades is not None:
+            rgba = np.column_stack([linear(shades[used]), np.ones(len(used))])
+            mesh.visual.vertex_attributes["color"] = np.round(255.0 * rgba).astype(np.uint8)
         scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name, transform=place)
     scene.metadata["pcmc"] = metadata_text(surface, units)
     if walls is not None:
@@ -84,7 +102,8 @@ def read(path: Path) -> MeshData:
             raise FileError(text, where=str(error)) from None
     mesh = from_meshes(scene, path.stem, parse_metadata(scene.metadata.get("pcmc")))
     X = mesh.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
-    scalars = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_") and k != SUPPORT}
+    named = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_") and k != SUPPORT}
+    scalars = {k: np.where(v == NO_VALUE, np.nan, v) for k, v in named.items()}
     support = mesh.scalars.get(SUPPORT)
     held = None if support is None else support_kinds(support)
     return replace(mesh, vertices=X, scalars=scalars, support=held, walls=scene.metadata.get(KEY))

@@ -50,7 +50,7 @@ def _open_seam(X: Floats, outer: Ints) -> str:
     return (
         f"a seam is open: {np.count_nonzero(close)} boundary vertices are within"
         f" {apart[close].max():.2g} of another one, the first at {place}; join them in the program that"
-        " drew the mesh"
+        " drew the mesh, or with pcmc repair --weld"
     )
 
 

@@ -16,7 +16,8 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import NO_UNITS, Units
 from ..base.validate import choice
-from ..surface import Guide, Patch, Plane, Surface, checks
+from ..meshing.refinement import given_supports
+from ..surface import Cable, Guide, Patch, Plane, Room, Surface, checks
 from ..surface.geometry import bounding_size
 from ..surface.topology import topology
 
@@ -43,7 +44,7 @@ class MeshData:
         vertices at one place stay two: those of a wall without height below a junction on Π.
     walls : the text of ``flat_walls.encode_walls``, where patches are separate meshes and a wall has
         no height.
-    lines : as ``on_line`` in Surface.
+    lines, planes, cables, rooms : as ``on_line``, ``on_planes``, ``cables`` and ``rooms`` in Surface.
     units : of the numbers; no unit where the file has none.
     """
 
@@ -60,6 +61,9 @@ class MeshData:
     walls: str | None = None
     lines: tuple[tuple[Guide, Bools], ...] = ()
     units: Units = NO_UNITS
+    planes: tuple[tuple[Plane, Bools], ...] = ()
+    cables: tuple[Cable, ...] = ()
+    rooms: tuple[Room, ...] = ()
 
 
 def checked(data: MeshData) -> MeshData:
@@ -81,6 +85,10 @@ def checked(data: MeshData) -> MeshData:
             _numeric(values, f"scalar {name}", "fiub", (n,))
     for _, along in data.lines:
         _numeric(along, "on_line", "b", (n,))
+    for cable in data.cables:
+        within(cable.edges, f"cable {cable.name}", n)
+    for _, mask in data.planes:
+        _numeric(mask, "on_planes", "b", (n,))
     patch = within(patch, "patch_of_face", len(data.patches))
     scalars = {name: np.asarray(values, dtype=np.float64) for name, values in data.scalars.items()}
     return replace(data, vertices=X, faces=F, patch_of_face=patch, support=support, scalars=scalars)
@@ -113,8 +121,15 @@ def within(numbers: Any, name: str, size: int) -> Ints:
 
 
 def support_of(surface: Surface) -> Ints:
-    """(n,) int8 FREE, SLIDING or FIXED."""
-    return np.where(surface.fixed, FIXED, np.where(surface.on_plane, SLIDING, FREE)).astype(np.int8)
+    """(n,) int8 FREE, SLIDING or FIXED; FIXED also on planes other than Π, for formats without them."""
+    fixed = surface.held & ~surface.on_plane
+    return np.where(fixed, FIXED, np.where(surface.on_plane, SLIDING, FREE)).astype(np.int8)
+
+
+def given_support(surface: Surface) -> Ints:
+    """(n,) the same for formats that have all planes: the supports as given, without these planes."""
+    fixed, sliding = given_supports(surface)
+    return np.where(fixed, FIXED, np.where(sliding, SLIDING, FREE)).astype(np.int8)
 
 
 def support_kinds(values: npt.ArrayLike) -> Ints:
@@ -176,6 +191,8 @@ def _selected(data: MeshData, keep: Ints, place: Ints) -> MeshData:
         support=None if data.support is None else data.support[keep],
         scalars={k: v[keep] if len(v) == n else v for k, v in data.scalars.items()},
         lines=tuple((line, along[keep]) for line, along in data.lines),
+        planes=tuple((plane, mask[keep]) for plane, mask in data.planes),
+        cables=tuple(filter(None, (cable.carried(place) for cable in data.cables))),
     )
 
 
@@ -206,8 +223,10 @@ def to_surface(
     rounded = sliding & ~held & (np.abs(height) < ROUNDING * size) & (np.abs(height) > 1e-12 * size)
     if rounded.any():  # back onto the plane
         X = X - np.where(rounded, height, 0.0)[:, None] * np.array(plane.normal)
-    lines = data.lines if fixed is None else ()
-    return Surface(X, data.faces, data.patch_of_face, patches, held, sliding, plane, lines)
+    lines, planes = (data.lines, data.planes) if fixed is None else ((), ())
+    supports = held, sliding, plane, lines, planes
+    parts = {"cables": data.cables, "rooms": data.rooms}
+    return Surface(X, data.faces, data.patch_of_face, patches, *supports, **parts)
 
 
 def _changed(

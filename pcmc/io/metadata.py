@@ -52,7 +52,8 @@ def parse_metadata(text: str | None) -> Metadata:
     try:
         values = json.loads(text)
         patches = [Patch(*p) for p in values["patches"]]
-        plane = Plane(*(tuple(v) for v in values["plane"]))
+        point, normal = map(tuple, values["plane"])
+        plane = Plane(point, normal)
         counts = (int(values["counts"][0]), int(values["counts"][1]))
         units = Units(*values.get("units", ()))
     except (ValueError, KeyError, TypeError, IndexError):

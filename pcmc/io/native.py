@@ -2,9 +2,10 @@
 
 A zip archive of NumPy arrays (an .npz) that ``numpy.load`` opens: ``vertices``, ``faces``,
 ``patch_of_face``, ``support``; where vertices slide along lines, ``lines`` and ``on_line``, along circles,
-``circles`` and ``on_circle``; one ``scalar <name>`` per scalar, one ``certificate <name>`` per array of the
-certificate, and ``meta``, a JSON text with the format's version, the patches, the plane and the rest of the
-certificate, its tables as lists of rows.
+``circles`` and ``on_circle``, on planes other than Π, ``planes`` and ``on_planes``; for each cable
+``cable <k>``, its edges; one ``scalar <name>`` per scalar, one ``certificate <name>`` per array of the
+certificate, and ``meta``, a JSON text with the format's version, the patches, the plane, the cables, the
+rooms of prescribed volume and the rest of the certificate, its tables as lists of rows.
 """
 
 from __future__ import annotations
@@ -23,12 +24,12 @@ import pandas as pd
 from ..base.arrays import Bools, Floats
 from ..base.errors import FileError
 from ..base.units import Units
-from ..surface import Circle, Guide, Line, Surface
+from ..surface import Cable, Circle, Guide, Line, Plane, Room, Surface
 from .libraries import translated_errors
-from .mesh_data import MeshData, support_of
+from .mesh_data import MeshData, given_support
 from .metadata import metadata_text, parse_metadata
 
-VERSION = 3  # since 2 with lines, since 3 with circles; a surface is written as the oldest that can hold it
+VERSION = 4  # since 2 lines, 3 circles, 4 planes, weights, cables, rooms; written as the oldest that will do
 FORMAT = "pcmc surface"
 INFLATED = 100  # most bytes for each byte of the file; a flat grid of a million triangles has 7
 ROOM = 64_000_000  # bytes that any file may become
@@ -46,19 +47,29 @@ def write(
     tables = {k: v for k, v in certificate.items() if isinstance(v, np.ndarray) and v.dtype != object}
     meta = {
         "format": FORMAT,
-        "version": 3 if surface.on_circle else 2 if surface.on_line else 1,
+        "version": _version(surface),
         "description": metadata_text(surface, units),
         "certificate": {k: v for k, v in certificate.items() if k not in tables},
     }
+    if surface.rooms:
+        meta["rooms"] = [[room.name, room.patches, room.volume] for room in surface.rooms]
     arrays: dict[str, Any] = {f"scalar {name}": value for name, value in scalars.items()}
     arrays |= {f"certificate {name}": value for name, value in tables.items()}
-    straight = [(line, along) for line, along in surface.on_line if isinstance(line, Line)]
+    straight = [(line, along) for line, along in surface.given.on_line if isinstance(line, Line)]
+    if surface.on_planes:
+        meta["planes"] = [{"name": plane.name, "mirror": plane.mirror} for plane, _ in surface.on_planes]
+        arrays["planes"] = np.array([[plane.point, plane.normal] for plane, _ in surface.on_planes])
+        arrays["on_planes"] = np.array([mask for _, mask in surface.on_planes])
+    if surface.cables:
+        meta["cables"] = [[cable.name, cable.tension] for cable in surface.cables]
+        arrays |= {f"cable {k}": cable.edges for k, cable in enumerate(surface.cables)}
     if straight:
         arrays["lines"] = np.array([[line.point, line.direction] for line, _ in straight])
         arrays["on_line"] = np.array([along for _, along in straight])
     if surface.on_circle:
-        arrays["circles"] = np.array([[*c.centre, *c.normal, c.radius] for c, _ in surface.on_circle])
-        arrays["on_circle"] = np.array([along for _, along in surface.on_circle])
+        round_ = [(guide, along) for guide, along in surface.given.on_line if isinstance(guide, Circle)]
+        arrays["circles"] = np.array([[*c.centre, *c.normal, c.radius] for c, _ in round_])
+        arrays["on_circle"] = np.array([along for _, along in round_])
     with path.open("wb") as file:
         np.savez_compressed(
             file,
@@ -66,7 +77,7 @@ def write(
             vertices=surface.vertices,
             faces=surface.faces,
             patch_of_face=surface.patch_of_face,
-            support=support_of(surface),
+            support=given_support(surface),
             **arrays,
         )
 
@@ -96,10 +107,39 @@ def read(path: Path) -> MeshData:
             arrays.pop("support"),
             metadata.plane,
             lines=_lines(arrays) + _circles(arrays),
+            planes=_planes(arrays, meta.get("planes", [])),
+            cables=_cables(arrays, meta.get("cables", [])),
+            rooms=_rooms(meta),
             scalars=_under("scalar ", arrays),
             units=metadata.units,
             certificate={**meta["certificate"], **_under("certificate ", arrays)},
         )
+
+
+def _version(surface: Surface) -> int:
+    """The oldest version of the format that can hold a surface."""
+    if surface.rooms or surface.on_planes or surface.cables or surface.weights.any():
+        return 4
+    return 3 if surface.on_circle else 2 if surface.on_line else 1
+
+
+def _cables(arrays: dict[str, Any], rows: Any) -> tuple[Cable, ...]:
+    """The cables in the description, name and tension of each, with their edges (k,2)."""
+    fit = isinstance(rows, list) and all(isinstance(row, list) and len(row) == 2 for row in rows)
+    edges = [arrays.pop(f"cable {k}", None) for k in range(len(rows))] if fit else [None]
+    if not fit or any(ends is None for ends in edges):
+        text = "cables: expected a name, a tension and edges for each"
+        raise FileError(text, where="cables", found=str(rows)[:60])
+    return tuple(Cable(*row, ends) for row, ends in zip(rows, edges, strict=True))
+
+
+def _rooms(meta: Mapping[str, Any]) -> tuple[Room, ...]:
+    """The rooms of prescribed volume in the description."""
+    rows = meta.get("rooms", [])
+    if not all(isinstance(row, list) and len(row) == 3 for row in rows):
+        text = "rooms: expected a name, signs by patch and a volume for each"
+        raise FileError(text, where="rooms", found=str(rows)[:60])
+    return tuple(Room(*row) for row in rows)
 
 
 def _lines(arrays: dict[str, Any]) -> tuple[tuple[Guide, Bools], ...]:
@@ -119,6 +159,20 @@ def _circles(arrays: dict[str, Any]) -> tuple[tuple[Guide, Bools], ...]:
         raise FileError(text, where="circles", found=np.shape(rows), expected=(len(along), 7))
     circles = (Circle(tuple(row[:3]), tuple(row[3:6]), row[6]) for row in np.asarray(rows).tolist())
     return tuple(zip(circles, along, strict=True))
+
+
+def _planes(arrays: dict[str, Any], described: Any) -> tuple[tuple[Plane, Bools], ...]:
+    """The planes (k,2,3) of the file, point and normal, with the masks (k,n) of their vertices."""
+    rows, masks = arrays.pop("planes", ()), arrays.pop("on_planes", ())
+    alike = isinstance(described, list) and len(rows) == len(masks) == len(described)
+    if not alike or np.shape(rows)[1:] not in ((), (2, 3)):
+        text = f"planes: expected a point and a normal for each of {len(masks)} masks"
+        raise FileError(text, where="planes", found=np.shape(rows), expected=(len(masks), 2, 3))
+    planes = (
+        Plane(*map(tuple, row.tolist()), name=str(one["name"]), mirror=bool(one["mirror"]))
+        for row, one in zip(rows, described, strict=True)
+    )
+    return tuple(zip(planes, masks, strict=True))
 
 
 def _check_size(path: Path) -> None:

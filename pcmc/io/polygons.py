@@ -39,7 +39,7 @@ def triangulate(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tup
     many = np.flatnonzero(counts > LARGEST)
     if len(many):
         text = f"face {many[0]} has {counts[many[0]]} corners, more than {LARGEST}; cut it into triangles"
-        text = f"{text} in the program that wrote it"
+        text = f"{text} in the program that wrote it, or with pcmc repair"
         raise FileError(text, where=int(many[0]), found=int(counts[many[0]]), expected=LARGEST)
     if (counts == 3).all():
         return corners.reshape(-1, 3), np.arange(len(counts)), ()
@@ -77,7 +77,8 @@ def _best_fans(X: Floats, polygon: Ints, number: Ints) -> Ints:
     bad = np.flatnonzero(worst.max(axis=0) <= 0.0)
     if len(bad):
         text = f"face {number[bad[0]]} is a polygon of {k} corners that no fan of triangles fills; cut it"
-        raise FileError(f"{text} in the program that wrote it", where=int(number[bad[0]]), found=int(k))
+        text = f"{text} in the program that wrote it, or with pcmc repair"
+        raise FileError(text, where=int(number[bad[0]]), found=int(k))
     return fans[best, np.arange(len(polygon))]
 
 

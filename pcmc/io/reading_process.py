@@ -1,4 +1,4 @@
-"""A process in which VTK and rhino3dm read files: a file that is wrong can crash them, or fill the memory.
+"""A process in which VTK, rhino3dm and IfcOpenShell read files: bad ones crash them, or fill the memory.
 
 They believe the counts and offsets in a file. Checking them all beforehand means to parse the file a second
 time. So they read elsewhere, with limits of time and, on Linux, of memory. Starting the process takes as long

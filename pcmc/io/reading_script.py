@@ -1,4 +1,4 @@
-"""The script of the process in which VTK and rhino3dm read files: a path in, arrays out.
+"""The script of the process in which libraries read files that could crash them: a path in, arrays out.
 
 ``reading_process`` starts this file as a script. It imports the library that the file needs, and only those
 parts of VTK that read.
@@ -10,7 +10,9 @@ import os
 import pickle
 import re
 import sys
+from collections.abc import Callable
 from contextlib import suppress
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +97,36 @@ def rhino_arrays(path: str) -> dict[str, Any]:
     return {"layers": layers, "objects": objects, "unit": unit}
 
 
+def ifc_arrays(path: str) -> dict[str, Any]:
+    """The face sets of a roof that pcmc wrote, their names and supports, and pcmc's texts."""
+    import ifcopenshell
+    import numpy as np
+    from ifcopenshell.util import element, placement
+
+    get_pset, get_local_placement = element.get_pset, placement.get_local_placement
+    model: Any = ifcopenshell.open(path)
+    found: dict[str, Any] = {"text": None, "walls": None, "parts": []}
+    for roof in model.by_type("IfcRoof"):
+        texts = get_pset(roof, "Pcmc_Surface")
+        if not texts:
+            continue
+        found["text"], found["walls"] = texts["Description"], texts.get("Walls")
+        for part in (part for whole in roof.IsDecomposedBy for part in whole.RelatedObjects):
+            item = part.Representation.Representations[0].Items[0]
+            points = np.array(item.Coordinates.CoordList, dtype=np.float64).reshape(-1, 3)
+            place = get_local_placement(part.ObjectPlacement)
+            found["parts"].append(
+                {
+                    "name": part.Name,
+                    "points": points @ place[:3, :3].T + place[:3, 3],
+                    "faces": np.array(item.CoordIndex, dtype=np.int64).reshape(-1, 3) - 1,
+                    "supports": get_pset(part, "Pcmc_Patch", "Supports"),
+                }
+            )
+        break
+    return found
+
+
 def limit_memory(size: int) -> None:
     """On Linux, refuse memory beyond what a sound file of this size needs."""
     if sys.platform == "linux":
@@ -106,7 +138,33 @@ def limit_memory(size: int) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (most if hard < 0 else min(most, hard), hard))
 
 
-READERS = {"vtk": vtk_arrays, "rhino": rhino_arrays}
+def from_file(name: str, function: str) -> Callable[[str], dict[str, Any]]:
+    """A reader in another file beside this one, which is loaded when it is first used."""
+
+    def read(path: str) -> dict[str, Any]:
+        module = sys.modules.get(name)
+        if module is None:
+            place = Path(__file__).with_name(f"{name}.py")
+            spec = spec_from_file_location(name, place)
+            assert spec is not None
+            assert spec.loader is not None
+            module = sys.modules[name] = module_from_spec(spec)
+            spec.loader.exec_module(module)
+        arrays: dict[str, Any] = getattr(module, function)(path)
+        return arrays
+
+    return read
+
+
+READERS = {
+    "vtk": vtk_arrays,
+    "rhino": rhino_arrays,
+    "ifc": ifc_arrays,
+    "dxf drawing": from_file("reading_drawings", "dxf_entities"),
+    "3dm drawing": from_file("reading_drawings", "rhino_entities"),
+    "meshlab": from_file("reading_meshes", "meshlab_arrays"),
+    "repair": from_file("reading_meshes", "repaired_arrays"),
+}
 
 
 def main() -> None:

@@ -1,7 +1,8 @@
 """Rhino (.3dm): a layer per patch with its mesh in double precision, in the patch's colour.
 
 Tensions, pressures, plane and walls without height are the layers' user text; supports are point clouds
-on the layers "fixed" and "sliding". Scalars are lost.
+on the layers "fixed" and "sliding". Ridges, rims and wall lines are curves on layers of their own, for
+drawing; reading leaves them out. Scalars are lost.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from ..base.errors import FileError, MissingExtra
 from ..base.units import RHINO_UNITS, Units, length_factor
 from ..surface import Surface
 from ..surface.colours import patch_colors
+from ..surface.curve_kinds import curves_by_kind
 from ..surface.geometry import bounding_size
 from . import flat_walls
 from .libraries import load_library
@@ -31,6 +33,7 @@ KEY = "pcmc"
 VERSION = 7  # of Rhino's format
 UNIT = "m"  # of files whose surface has none
 SYSTEMS = {unit: name for name, unit in RHINO_UNITS.items()}
+CURVES = {"PCMC-RIDGE": (200, 0, 0, 255), "PCMC-RIM": (0, 0, 0, 255), "PCMC-WALL": (0, 128, 0, 255)}
 COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255)}
 
 
@@ -65,8 +68,23 @@ def write(path: Path, surface: Surface, walls: str | None, units: Units, **_: An
             for point in held.tolist():
                 cloud.Add(rhino.Point3d(*point))
             model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], text))
+    _add_curves(rhino, model, surface)
     if not model.Write(str(path), VERSION):
         raise FileError("rhino3dm cannot write it; check that the folder exists and the disk has space")
+
+
+def _add_curves(rhino: Any, model: Any, surface: Surface) -> None:
+    """Ridges, rims and wall lines as polylines, each kind on its layer."""
+    layers: dict[str, Any] = {}
+    for kind, curve in curves_by_kind(surface):
+        name = f"PCMC-{kind}"
+        if name not in layers:
+            layers[name] = _layer(rhino, model, name, CURVES[name], "")
+        points = surface.vertices[curve.vertices].tolist()
+        line = rhino.Polyline(len(points) + 1)
+        for point in points + points[:1] * curve.closed:
+            line.Add(*point)
+        model.Objects.AddPolyline(line, layers[name])
 
 
 def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str) -> Any:
@@ -107,7 +125,7 @@ def read(path: Path) -> MeshData:
             start += len(X[-1])
         elif "points" in item and name in HELD:
             held[HELD[name]].append(item["points"])
-        else:
+        elif name not in CURVES:
             others += 1
     if not X:
         text = f"the file has no meshes ({others} other objects); mesh the surfaces in Rhino"

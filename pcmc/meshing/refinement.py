@@ -11,7 +11,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
 from ..contact.midpoints import midpoints
-from ..surface import Circle, Guide, Surface, expect_surface
+from ..surface import Circle, Guide, Plane, Surface, expect_surface
 
 Projection = Callable[[Floats], Floats]
 
@@ -30,6 +30,7 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     - boundary edge, one end sliding and the other sliding, or fixed and on Π: sliding;
     - junction or seam edge, both ends fixed, not leading from boundary to boundary: fixed;
     - edge inside a sheet, both ends fixed and off the boundary (a held line in a patch): fixed;
+    - boundary edge in a plane of ``on_planes``: sliding there; the same for a curve in a mirror plane;
     - every other edge, such as one across a sheet between two fixed boundary vertices: free.
 
     A new vertex is the middle of its edge, except beside a junction that rests on Π: there the rows of
@@ -95,7 +96,7 @@ def prolongation(surface: Surface) -> csr_array:
 
 def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
     """(e,) masks of the edges whose midpoint is fixed, and of those whose midpoint slides on Π."""
-    topo, fixed, sliding = surface.topology, surface.fixed, surface.on_plane
+    topo, (fixed, sliding) = surface.topology, given_supports(surface)
     start, end = topo.edges.T
     boundary = topo.boundary_edge
     crossing = topo.on_boundary[start] & topo.on_boundary[end]
@@ -106,6 +107,32 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
     resting = sliding | (fixed & (np.abs(height) <= 1e-9 * surface.size))
     slides = boundary & resting[start] & resting[end] & (sliding[start] | sliding[end])
     return both_fixed, slides
+
+
+def given_supports(surface: Surface) -> tuple[Bools, Bools]:
+    """(n,) masks of vertices that are fixed or slide along a line, and of those that slide on Π, as given."""
+    fixed = surface.given.fixed.copy()
+    for _, along in surface.given.on_line:
+        fixed |= along
+    return fixed, surface.given.on_plane & ~fixed
+
+
+def carry_planes(surface: Surface, cut: Bools) -> tuple[tuple[Plane, Bools], ...]:
+    """The planes besides Π with their vertices, those on the edges ``cut`` (e,) last.
+
+    A new vertex is on a plane if its edge is part of the boundary there, or of a curve in a mirror plane.
+    """
+    pairs = zip(surface.on_planes, edges_on_planes(surface), strict=True)
+    return tuple((plane, np.concatenate([mask, along[cut]])) for (plane, mask), along in pairs)
+
+
+def edges_on_planes(surface: Surface) -> list[Bools]:
+    """For each of ``on_planes`` the (e,) edges whose new vertices slide on it."""
+    topo = surface.topology
+    return [
+        mask[topo.edges].all(axis=1) & (topo.curve_edge if plane.mirror else topo.boundary_edge)
+        for plane, mask in surface.on_planes
+    ]
 
 
 def projected(project: Projection, points: Floats) -> Floats:
@@ -131,14 +158,18 @@ def new_vertices(
 
 
 def _refine_once(surface: Surface, project: Projection | None) -> Surface:
-    middle, held, slides = new_vertices(surface, np.ones(len(surface.topology.edges), dtype=bool), project)
+    every = np.ones(len(surface.topology.edges), dtype=bool)
+    middle, held, slides = new_vertices(surface, every, project)
     a, b, c = surface.faces.T
     bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
     X, patch = np.concatenate([surface.vertices, middle]), np.repeat(surface.patch_of_face, 4)
     F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
-    fixed, sliding = np.concatenate([surface.fixed, held]), np.concatenate([surface.on_plane, slides])
-    lines = carry_lines(surface, X, fixed, surface.n)
-    return Surface(X, F, patch, surface.patches, fixed, sliding, surface.plane, lines)
+    fixed, sliding = (np.concatenate(p) for p in zip(given_supports(surface), (held, slides), strict=True))
+    lines, planes = carry_lines(surface, X, fixed, surface.n), carry_planes(surface, every)
+    edges = surface.topology.edges
+    cables = [cable.cut(edges, surface.n + np.arange(len(edges))) for cable in surface.cables]
+    supports = fixed, sliding, surface.plane, lines, planes
+    return Surface(X, F, patch, surface.patches, *supports, cables=cables, rooms=surface.rooms)
 
 
 def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tuple[tuple[Guide, Bools], ...]:
@@ -149,7 +180,7 @@ def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tup
     """
     lines: list[tuple[Guide, Bools]] = []
     near = 1e-9 * surface.size
-    for line, along in surface.on_line:
+    for line, along in surface.given.on_line:
         if isinstance(line, Circle):
             inside = fixed & (line.distance(X) <= near)
             inside[inside] = _round_edges(surface, line, along, X[inside])[0]

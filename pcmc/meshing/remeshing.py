@@ -21,6 +21,8 @@ from .quality import edge_lengths
 from .refinement import (
     Projection,
     carry_lines,
+    edges_on_planes,
+    given_supports,
     held_midpoints,
     onto_round_edges,
     projected,
@@ -120,16 +122,18 @@ def remesh(
 class _Mesh:
     """Vertices, faces with a patch each, the edges (c,2) of curves, and supports.
 
-    ``source`` (n,): the number of each vertex in the mesh before MMG, or -1.
+    ``support`` (n,2+p): whether a vertex is fixed, slides on Π, slides on each of ``Surface.on_planes``.
+    ``source`` (n,): the number of each vertex in the mesh before MMG, or -1. ``cable`` (c,): the number of
+    the cable on each of ``curves``, or -1.
     """
 
     X: Floats
     F: Ints
     patch: Ints
     curves: Ints
-    fixed: Bools
-    sliding: Bools
+    support: Bools
     source: Ints
+    cable: Ints
 
 
 def check_lengths(
@@ -164,9 +168,17 @@ def _wanted_sizes(surface: Surface, edge_length: npt.ArrayLike, growth: float) -
 
 
 def _curve_edges(surface: Surface) -> Bools:
-    """(e,) the edges that must stay: curves, and edges held inside a patch."""
+    """(e,) the edges that must stay: curves, cables, and edges held inside a patch."""
     fixed, sliding = held_midpoints(surface)
-    return surface.topology.curve_edge | fixed | sliding
+    return surface.topology.curve_edge | fixed | sliding | (_cable_of_edge(surface) >= 0)
+
+
+def _cable_of_edge(surface: Surface) -> Ints:
+    """(e,) the number of the cable on each edge; -1 for none."""
+    out = np.full(len(surface.topology.edges), -1)
+    for index, cable in enumerate(surface.cables):
+        out[surface.topology.edge_numbers(cable.edges)] = index
+    return out
 
 
 def _cut_curves(
@@ -184,11 +196,12 @@ def _cut_curves(
     topo, stay = surface.topology, _curve_edges(surface)
     fixed_edge, sliding_edge = held_midpoints(surface)
     X, F, patch, number = surface.vertices, surface.faces, surface.patch_of_face, np.arange(surface.n)
-    mesh = _Mesh(X, F, patch, topo.edges[stay], surface.fixed, surface.on_plane, number)
-    support = np.stack([fixed_edge[stay], sliding_edge[stay]], axis=1)
+    at_vertices = np.stack([*given_supports(surface), *(mask for _, mask in surface.on_planes)], axis=1)
+    mesh = _Mesh(X, F, patch, topo.edges[stay], at_vertices, number, _cable_of_edge(surface)[stay])
+    support = np.stack([fixed_edge, sliding_edge, *edges_on_planes(surface)], axis=1)[stay]
     while (counts > 1).any():
         mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
-    new = mesh.fixed & (np.arange(len(mesh.X)) >= first)
+    new = mesh.support[:, 0] & (np.arange(len(mesh.X)) >= first)
     if (project is not None or surface.on_circle) and new.any():
         X = mesh.X.copy()
         if project is not None:
@@ -252,9 +265,9 @@ def _cut_once(mesh: _Mesh, size: Floats, counts: Ints, support: Bools) -> tuple[
     X = np.concatenate([mesh.X, start + share[:, None] * (end - start)])
     size = np.concatenate([size, size_start + share * (size_end - size_start)])
     curves = np.concatenate([mesh.curves[~cut], *halves])
-    fixed = np.concatenate([mesh.fixed, support[cut, 0]])
-    sliding = np.concatenate([mesh.sliding, support[cut, 1]])
-    new = _Mesh(X, F, patch, curves, fixed, sliding, np.arange(len(X)))
+    at_vertices = np.concatenate([mesh.support, support[cut]])
+    cable = np.concatenate([mesh.cable[~cut], mesh.cable[cut], mesh.cable[cut]])
+    new = _Mesh(X, F, patch, curves, at_vertices, np.arange(len(X)), cable)
     counts = np.concatenate([counts[~cut], first, pieces - first])
     return new, size, counts, np.concatenate([support[~cut], support[cut], support[cut]])
 
@@ -317,7 +330,7 @@ def _remesh_with_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> 
         from mmgpy import MmgMeshS
     except ImportError:
         raise MissingExtra("mmgpy", "remesh") from None
-    held = np.flatnonzero(mesh.fixed | mesh.sliding)
+    held = np.flatnonzero(mesh.support.any(axis=1))
     fixed = np.unique(np.concatenate([mesh.curves.ravel(), held]))
     reference = np.zeros(len(mesh.X), dtype=np.int64)
     reference[fixed] = 1 + np.arange(len(fixed))
@@ -345,8 +358,8 @@ def _remesh_with_mmg(mesh: _Mesh, size: Floats, growth: float, chord: float) -> 
     curves = number[mesh.curves]
     _check_curves(mesh, curves, F, len(X))
     source = np.where(known, mesh.source[place], -1)
-    fixed, sliding = known & mesh.fixed[place], known & mesh.sliding[place]
-    return _Mesh(X, F.astype(np.int64), patch - 1, curves, fixed, sliding, source)
+    support = known[:, None] & mesh.support[place]
+    return _Mesh(X, F.astype(np.int64), patch - 1, curves, support, source, mesh.cable)
 
 
 def _corners_to_keep(mesh: _Mesh, size: Floats) -> Ints:
@@ -392,10 +405,13 @@ def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Sur
     used, inverse = np.unique(np.concatenate(faces), return_inverse=True)
     F, patch_of_face = inverse.reshape(-1, 3), np.concatenate(patch)
     X = np.concatenate([mesh.X for mesh in meshes])[used]
-    fixed = np.concatenate([mesh.fixed for mesh in meshes])[used]
-    sliding = np.concatenate([mesh.sliding for mesh in meshes])[used]
+    fixed, sliding, *on_planes = np.concatenate([mesh.support for mesh in meshes])[used].T
     lines = carry_lines(surface, X, fixed)
-    return Surface(X, F, patch_of_face, surface.patches, fixed, sliding, surface.plane, lines)
+    planes = [(plane, mask) for (plane, _), mask in zip(surface.on_planes, on_planes, strict=True)]
+    ends = np.searchsorted(used, old.curves)
+    cables = [replace(c, edges=ends[old.cable == index]) for index, c in enumerate(surface.cables)]
+    supports = fixed, sliding, surface.plane, lines, planes
+    return Surface(X, F, patch_of_face, surface.patches, *supports, cables=cables, rooms=surface.rooms)
 
 
 def _patch_angles(mesh: _Mesh, count: int) -> Floats:

@@ -1,11 +1,12 @@
 """A Surface with walls, from the lines of a plan or from a mesh with labelled faces.
 
 ``plan`` holds Plan, ``curves`` its curves, ``parts`` dividers, holes and patches; ``build`` makes the
-Surface from ``lines`` and their ``arrangement``, ``planar`` meshes, ``heights`` and ``walls``.
-May import ``meshing`` and the rooms below it.
+Surface from ``lines`` and their ``arrangement``, ``planar`` meshes, ``heights`` and ``walls``. ``drawing``
+reads CAD files (``strokes``, joined to ``paths``), ``proposal`` chooses what they do not say.
+May import ``io`` and the rooms below it.
 """
 
-from .curves import Curve, arc, bezier, circle, curve, join, polyline
+from .curves import Curve, arc, bezier, circle, curve, ellipse, join, polyline
 from .labelled import surface_from_labels
 from .parts import Area, Divider, Hole
 from .plan import Plan, plan_from
@@ -22,6 +23,7 @@ __all__ = [
     "bezier",
     "circle",
     "curve",
+    "ellipse",
     "join",
     "plan_from",
     "polyline",

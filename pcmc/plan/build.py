@@ -14,14 +14,16 @@ from ..base.errors import PlanError, PlanWarning, SurfaceError
 from ..meshing.angles import improve_angles
 from ..surface import Patch, Surface
 from .arrangement import Arrangement, arrange, hole_points
-from .curves import Curve, to_local, to_space
+from .curves import Curve
 from .heights import dome, harmonic_heights
 from .lines import SNAP, Kind, Line
 from .parts import EDGES, Area, PlanData
+from .pieces import to_local, to_space
 from .planar import PlanarMesh, locate, signed_areas, triangulate
 from .walls import UpperEdge, WallMesh, build_walls
 
 MAX_TRIANGLES = 5_000_000
+MAX_EDGES = 200_000  # along a line
 MAX_RISE = 10.0  # of the initial surface, over the size of the plan
 GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan
 
@@ -112,6 +114,15 @@ def _check_size(plan: PlanData) -> None:
     if plan.rise is not None and plan.rise > MAX_RISE * size:
         problem = f"is more than {MAX_RISE:g} times the plan's size, {size:.4g}; use a smaller one"
         raise error("rise", plan.rise, problem)
+    lines = {"the outline": plan.outline} | {hole.name: hole.curve for hole in plan.holes}
+    lines |= {f"divider {divider.name!r}": divider.curve for divider in plan.dividers}
+    lines |= {f"support {k}": s for k, s in enumerate(plan.supports, 1) if isinstance(s, Curve)}
+    for name, curve in lines.items():
+        if curve.length > MAX_EDGES * plan.edge_length:
+            problem = (
+                f"{name} is {curve.length:.3g} long, more than {MAX_EDGES} edges of {plan.edge_length:g}"
+            )
+            raise PlanError(f"{problem}; draw it as long as the plan", what=name, found=curve.length)
     for hole in plan.holes:
         xy = hole.curve.local(plan.plane).at(hole.curve.dense)[:, :2]
         extent = float(np.ptp(xy, axis=0).max())

@@ -1,4 +1,4 @@
-"""Curves to draw a plan with: polylines, Bézier curves, arcs, circles, and paths made of them."""
+"""Curves to draw a plan with: polylines, Bézier curves, arcs, circles, ellipses, and paths made of them."""
 
 from __future__ import annotations
 
@@ -15,63 +15,11 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..surface import Plane
+from .pieces import Piece
 
 CORNER = math.radians(10.0)  # a joint that turns by more is a corner
 EDGE_TURN = math.radians(45.0)  # largest turn of a bend along one edge
 DENSE = 64  # points per curved piece, for lengths and crossings
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """One smooth piece: a Bézier curve of any degree, or an arc if ``sweep`` is not 0.
-
-    Attributes
-    ----------
-    points : (k,d) Bézier control points; of an arc (3,d) the centre, and the vectors from there to
-        its start and to the point a quarter turn on.
-    sweep : the angle of the arc, radians.
-    """
-
-    points: Floats
-    sweep: float = 0.0
-
-    def at(self, t: Floats) -> Floats:
-        """(n,d) points at t (n,) in 0..1."""
-        if self.sweep:
-            centre, u, v = self.points
-            angle = (self.sweep * t)[:, None]
-            return centre + np.cos(angle) * u + np.sin(angle) * v
-        level = np.broadcast_to(self.points, (len(t), *self.points.shape))
-        s = t[:, None, None]
-        while level.shape[1] > 1:  # de Casteljau
-            level = (1.0 - s) * level[:, :-1] + s * level[:, 1:]
-        return level[:, 0]
-
-    def direction(self, end: int) -> Floats:
-        """(d,) unit tangent at the start (0) or at the end (1)."""
-        if self.sweep:
-            _, u, v = self.points
-            angle = self.sweep * end
-            tangent = math.copysign(1.0, self.sweep) * (v * math.cos(angle) - u * math.sin(angle))
-        else:
-            tangent = _first_step(self.points) if end == 0 else -_first_step(self.points[::-1])
-        length = float(np.linalg.norm(tangent))
-        return tangent / length if length > 0.0 else tangent
-
-    def reversed(self) -> Piece:
-        """The same piece from its end to its start."""
-        if not self.sweep:
-            return Piece(self.points[::-1])
-        centre, u, v = self.points
-        c, s = math.cos(self.sweep), math.sin(self.sweep)
-        return Piece(np.stack([centre, u * c + v * s, u * s - v * c]), self.sweep)
-
-    def local(self, plane: Plane) -> Piece:
-        """The piece in the coordinates of Π."""
-        local = to_local(self.points, plane)
-        if self.sweep and self.points.shape[1] == 3:  # the last two rows are vectors, not points
-            local[1:] = (self.points @ plane.axes.T)[1:]
-        return Piece(local, self.sweep)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +28,7 @@ class Curve:
 
     Plane points (x, y) are coordinates on Π (by default the plane z = 0); points (x, y, z) are
     positions in space. Make curves with ``polyline``, ``bezier``, ``arc``, ``circle``,
-    ``join``.
+    ``ellipse``, ``join``.
     """
 
     pieces: tuple[Piece, ...]
@@ -162,18 +110,6 @@ class Curve:
         return replace(self, pieces=tuple(piece.local(plane) for piece in self.pieces))
 
 
-def to_local(points: Floats, plane: Plane) -> Floats:
-    """(n,3) coordinates on Π and heights above it, of plane (n,2) or space points (n,3)."""
-    if points.shape[-1] == 3:
-        return plane.to_local(points)
-    return np.concatenate([points, np.zeros((*points.shape[:-1], 1))], axis=-1)
-
-
-def to_space(local: Floats, plane: Plane) -> Floats:
-    """(n,3) positions of points given by coordinates on Π and height."""
-    return local @ plane.axes + np.array(plane.point)
-
-
 def polyline(points: npt.ArrayLike, closed: bool = False) -> Curve:
     """Straight segments from point to point, (k,2) or (k,3), k ≥ 2.
 
@@ -195,16 +131,27 @@ def polyline(points: npt.ArrayLike, closed: bool = False) -> Curve:
     return _closed_if_ends_meet(Curve(pieces, closed))
 
 
-def bezier(control: npt.ArrayLike) -> Curve:
+def bezier(control: npt.ArrayLike, weights: npt.ArrayLike | None = None) -> Curve:
     """The Bézier curve with control points (k,2) or (k,3), of degree k - 1 ≥ 1.
+
+    ``weights`` (k,) > 0 make it rational, as a span of a NURBS curve is.
 
     >>> bezier([[0, 0], [1, 2], [2, 0]]).at([0.5]).tolist()
     [[1.0, 1.0]]
+    >>> quarter = bezier([[1, 0], [1, 1], [0, 1]], weights=[1, 0.5**0.5, 1])
+    >>> round(float(np.linalg.norm(quarter.at([0.3]))), 12)
+    1.0
     """
     P = _points(control, "bezier", 2)
     if np.ptp(P, axis=0).max() == 0.0:
         raise _error("bezier", f"all control points are {P[0].tolist()}")
-    return _closed_if_ends_meet(Curve((Piece(P),)))
+    if weights is None:
+        return _closed_if_ends_meet(Curve((Piece(P),)))
+    given = [validate.positive("bezier: weights", w) for w in np.ravel(np.array(weights, dtype=object))]
+    if len(given) != len(P):
+        problem = f"expected a weight for each of its {len(P)} control points, found {len(given)}"
+        raise _error("bezier", problem, found=len(given), expected=len(P))
+    return _closed_if_ends_meet(Curve((Piece(P, weights=np.array(given)),)))
 
 
 def arc(start: npt.ArrayLike, through: npt.ArrayLike, end: npt.ArrayLike) -> Curve:
@@ -243,6 +190,26 @@ def circle(centre: npt.ArrayLike, radius: float) -> Curve:
     return Curve((Piece(np.concatenate([[c], axes]), 2.0 * math.pi),), closed=True)
 
 
+def ellipse(centre: npt.ArrayLike, axes: npt.ArrayLike, sweep: float = 360.0) -> Curve:
+    """The ellipse, or an arc of it, about ``centre`` (2,) or (3,).
+
+    ``axes`` are two vectors from the centre: to the start, and to the point a quarter turn on. ``sweep`` is
+    the angle, degrees, in which these count as 0 and 90; 360 is the whole ellipse. Two axes of one length
+    at a right angle, in space, give a circle in any plane.
+
+    >>> ellipse([0, 0], [[3, 0], [0, 1]], 90).at([1.0]).round(12).tolist()
+    [[0.0, 1.0]]
+    """
+    P = np.concatenate([_points([centre], "ellipse", 1), _points(axes, "ellipse", 2, exactly=True)])
+    u, v = P[1:]
+    if (u @ u) * (v @ v) - (u @ v) ** 2 <= 1e-24 * max(u @ u, v @ v) ** 2:
+        raise _error("ellipse", "its axes lie on one line; use a polyline", found=P[1:].tolist())
+    angle = validate.number("ellipse: sweep", sweep)
+    if not 0.0 < abs(angle) <= 360.0:
+        raise _error("ellipse", f"sweep must be between 0 and 360 degrees, found {angle:g}", found=angle)
+    return Curve((Piece(P, math.radians(angle)),), closed=abs(angle) == 360.0)
+
+
 def join(*curves: Curve) -> Curve:
     """One path from several open curves, each starting where the one before ends (to 1e-9).
 
@@ -272,8 +239,9 @@ def curve(spec: Any, closed: bool = False) -> Curve:
 
     Parameters
     ----------
-    spec : a Curve; a list of points; a mapping with one of ``polyline``, ``bezier``, ``arc`` (three
-        points) or ``circle`` (``{"centre": …, "radius": …}``); or a list of such mappings, joined.
+    spec : a Curve; a list of points; a mapping with one of ``polyline``, ``bezier`` (also with
+        ``weights``), ``arc`` (three points), ``circle`` (``{"centre": …, "radius": …}``) or ``ellipse``
+        (``{"centre": …, "axes": …, "sweep": …}``); or a list of such mappings, joined.
     closed : whether a list of points is to be closed.
 
     >>> curve({"circle": {"centre": [0, 0], "radius": 1.0}}).closed
@@ -290,9 +258,14 @@ def curve(spec: Any, closed: bool = False) -> Curve:
     return polyline(spec, closed=closed)
 
 
+TABLES = {"circle": ({"centre", "radius"}, set()), "ellipse": ({"centre", "axes"}, {"sweep"})}
+"""Kinds of curves given by a table: the keys that it must have, and those that it may have."""
+
+
 def _from_mapping(spec: Mapping[str, Any]) -> Curve:
-    known = ("polyline", "bezier", "arc", "circle")
-    kinds = [key for key in spec if key != "closed"]
+    known = ("polyline", "bezier", "arc", "circle", "ellipse")
+    besides = {"closed": "polyline", "weights": "bezier"}
+    kinds = [key for key in spec if key not in besides]
     for key in kinds:
         validate.choice("curve", key, known)
     if len(kinds) != 1:
@@ -300,18 +273,23 @@ def _from_mapping(spec: Mapping[str, Any]) -> Curve:
         raise OptionError(problem, what="curve", found=list(spec), expected=known)
     (kind,) = kinds
     value = spec[kind]
-    if kind == "polyline":
+    if kind == "polyline" and "weights" not in spec:
         return polyline(value, closed=bool(spec.get("closed", False)))
-    if "closed" in spec:
-        problem = f"only a polyline has the key closed; a {kind} is closed if it ends at its start"
-        raise OptionError(problem, what="closed")
+    for key, owner in besides.items():
+        if key in spec and kind != owner:
+            problem = f"only a {owner} has the key {key}"
+            if key == "closed":
+                problem += f"; a {kind} is closed if it ends at its start"
+            raise OptionError(problem, what=key)
     if kind == "bezier":
-        return bezier(value)
+        return bezier(value, spec.get("weights"))
     if kind == "arc":
         return arc(*_points(value, "arc", 3, exactly=True))
-    if not isinstance(value, Mapping) or set(value) != {"centre", "radius"}:
-        raise _error("circle", f"expected centre and radius, found {value!r}", found=value)
-    return circle(**value)
+    needed, allowed = TABLES[kind]
+    if not isinstance(value, Mapping) or not needed <= set(value) <= needed | allowed:
+        wanted = "centre and radius" if kind == "circle" else "centre, axes and perhaps sweep"
+        raise _error(kind, f"expected {wanted}, found {value!r}", found=value)
+    return circle(**value) if kind == "circle" else ellipse(**value)
 
 
 def _closed_if_ends_meet(path: Curve) -> Curve:
@@ -346,10 +324,3 @@ def _points(points: Any, what: str, least: int, exactly: bool = False) -> Floats
     if len(bad):
         raise _error(what, f"point {bad[0]} = {P[bad[0]].tolist()} is not finite", where=int(bad[0]))
     return P
-
-
-def _first_step(control: Floats) -> Floats:
-    """From the first control point to the first one that differs from it."""
-    steps = control[1:] - control[0]
-    moved = np.flatnonzero((steps != 0.0).any(axis=1))
-    return steps[moved[0]] if len(moved) else steps[0]

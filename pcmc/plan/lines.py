@@ -44,7 +44,10 @@ class Line:
     @cached_property
     def xy(self) -> Floats:
         """(k,2) its projection on Π as a dense polyline."""
-        return self.curve.at(self.curve.dense)[:, :2]
+        xy = self.curve.at(self.curve.dense)[:, :2]
+        if self.curve.closed:
+            xy[-1] = xy[0]  # not only to rounding, so that shapely sees a ring
+        return xy
 
     @cached_property
     def reach(self) -> Floats:

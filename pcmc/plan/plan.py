@@ -12,8 +12,9 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError
 from ..surface import Plane, Surface
-from .curves import Curve, to_local, to_space
+from .curves import Curve
 from .parts import EDGES, PlanData, areas_of, check_keys, curve_of, divider_of, hole_of, support_of
+from .pieces import to_local, to_space
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +122,7 @@ def plan_from(data: Mapping[str, Any]) -> Plan:
     values = dict(data)
     check_keys(values, Plan, "plan")
     if "outline" not in values:
-        raise OptionError("a plan needs an outline", what="outline")
+        raise OptionError("a plan needs an outline, or a drawing that has one", what="outline")
     if isinstance(values.get("plane"), Mapping):
         check_keys(values["plane"], Plane, "plane")
         values["plane"] = Plane(**values["plane"])

@@ -14,7 +14,7 @@ from ..meshing.quality import edge_lengths
 from ..surface import Patch, Plane, Surface
 from ..surface.geometry import bounding_size
 from ..surface.topology import Curve
-from .curves import to_space
+from .pieces import to_space
 from .planar import triangulate
 
 BOTTOMS = ("sliding", "held")

@@ -1,12 +1,24 @@
 """Pictures of surfaces and of curves; needs the extra ``plot`` (matplotlib), no display.
 
 With a path every function writes a PNG; each returns the picture as an (h,w,3) array of bytes. May import
-``continuation`` and the rooms below it.
+``panels`` and the rooms below it.
 """
 
 from .arrows import reactions, vectors
 from .curves import convergence, heatmap, histories, lines
 from .diagrams import diagram
+from .families import families
 from .pictures import draw, panel
 
-__all__ = ["convergence", "diagram", "draw", "heatmap", "histories", "lines", "panel", "reactions", "vectors"]
+__all__ = [
+    "convergence",
+    "diagram",
+    "draw",
+    "families",
+    "heatmap",
+    "histories",
+    "lines",
+    "panel",
+    "reactions",
+    "vectors",
+]

@@ -34,22 +34,27 @@ from .cache import cached_files
 from .cache import clear as clear_cache
 from .cache import folder as cache_folder
 from .designed import designed
+from .drawn import files_of, is_drawing
 from .file import Project, build, load, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
 from .outcome import Outcome
-from .output import COLOURS, check_names, check_outputs, check_picture, paint, write_all
+from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
+from .planning import project_text, proposal_text
 from .remeshing import Remeshing
 from .running import check_of, check_project_mesh, run, run_project, solve_project, surface_files
+from .structure import Structure
 from .varied import check_varied, digest, is_project, varied
 
 __all__ = [
     "COLOURS",
     "REQUIRED",
     "Key",
+    "OnStep",
     "Outcome",
     "Project",
     "Remeshing",
     "Section",
+    "Structure",
     "build",
     "cache_folder",
     "cached_files",
@@ -62,9 +67,13 @@ __all__ = [
     "clear_cache",
     "designed",
     "digest",
+    "files_of",
+    "is_drawing",
     "is_project",
     "load",
     "paint",
+    "project_text",
+    "proposal_text",
     "reference",
     "run",
     "run_project",

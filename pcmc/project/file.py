@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tomllib
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -12,7 +13,7 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 from .. import io
-from ..base.errors import FileError, OptionError, PcmcError
+from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError
 from ..base.files import check_name, check_regular
 from ..base.units import NO_UNITS, Units
 from ..plan import Plan, plan_from
@@ -20,11 +21,14 @@ from ..solvers import find_method
 from ..surface import Surface
 from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys
+from .drawn import is_drawing, with_drawing
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
+from .structure import Structure
 
 if TYPE_CHECKING:
     from ..design import Parameter, Target
+    from ..plan.drawing import Drawing
 
 PathLike = str | os.PathLike[str]
 
@@ -49,9 +53,11 @@ class Project:
     search : whether further starts are tried where the first leads to no equilibrium.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
+    structure : of the structural model; None without [structure].
     files, picture : the output.
     folder : made for the output if it is missing; None if the names include their folders.
     view, colour : of the picture; ``colour`` is one of ``COLOURS``.
+    drawing : that the plan refers to, or that ``path`` is; None if there is none.
     """
 
     path: Path
@@ -65,11 +71,13 @@ class Project:
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
     vary: Sequence[Parameter] = ()
+    structure: Structure | None = None
     files: Sequence[PathLike] = ()
     picture: PathLike | None = None
     folder: Path | None = None
     view: Any = "diagonal"
     colour: str = "patches"
+    drawing: Drawing | None = None
 
     @property
     def outputs(self) -> list[Path]:
@@ -89,21 +97,37 @@ class Project:
 
 
 def load(path: PathLike) -> Project:
-    """Read a project file.
+    """Read a project file, or a drawing as a project without output.
 
     Raises
     ------
     FileError
         If the file cannot be read or is not TOML; for an unknown key (the message names its line and
         the nearest known key), a missing key or a bad value. ``what`` is the key.
+    PlanError
+        For a drawing that is no plan; ``what`` is its layer.
+
+    Warns
+    -----
+    FileWarning
+        For what was changed and left out of a drawing.
     """
     path = Path(path)
-    return project_of(path, read_data(path)[1])
+    project = project_of(path, read_data(path)[1])
+    if project.drawing is not None and project.drawing.notes:
+        text = f"{project.drawing.path}: {'; '.join(project.drawing.notes)}"
+        warnings.warn(text, FileWarning, stacklevel=2)
+    return project
 
 
 def read_data(path: Path) -> tuple[str, dict[str, Any]]:
-    """The text of a project file and its data, all keys checked. Errors as in ``load``."""
+    """The text of a project file and its data, all keys checked; a drawing's data refer to it.
+
+    Errors as in ``load``.
+    """
     check_regular(path)
+    if is_drawing(path):
+        return "", {"plan": {"drawing": path.name}}
     try:
         if path.stat().st_size > LARGEST:
             text = (
@@ -177,12 +201,20 @@ def start_of(project: Project) -> tuple[Surface, Units]:
     if project.plan is None:
         surface, data = io.read_bare(project.path)
         return surface, data.units
+    layers = {} if project.drawing is None else project.drawing.layers
     with in_file(project.path):
-        return project.plan.surface(), project.units
+        try:
+            return project.plan.surface(), project.units
+        except PlanError as error:
+            if error.what not in layers:
+                raise
+            text = f"{error} ({layers[str(error.what)]})"
+            raise PlanError(text, what=error.what, where=error.where, found=error.found) from None
 
 
 def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     """The project with the given data. Errors as in ``load``."""
+    data, drawing = with_drawing(path, data)
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
     method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
     files, picture = output.get("files", []), output.get("picture")
@@ -203,10 +235,12 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             mesh_check=mesh_check,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
             **(_search(data["targets"]) if "targets" in data else {}),
+            structure=Structure(**data["structure"]) if "structure" in data else None,
             files=files,
             picture=picture,
             view=tuple(view) if isinstance(view, list) else view,
             colour=colour,
+            drawing=drawing,
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cache
 from inspect import cleandoc
 from typing import Any
@@ -18,6 +18,7 @@ from ..surface import Plane
 from .accuracy import AccuracyWanted
 from .output import COLOURS
 from .remeshing import WHEN, Remeshing
+from .structure import Structure
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
 FIRST = "First lines"  # the keys before any table
@@ -35,6 +36,7 @@ class Key:
     default : the value where the key is left out; ``REQUIRED`` if it must not be, None for none.
     help : what it means.
     choices : the texts that are allowed; empty if any is.
+    unless : the key that stands for a required one; empty if none does.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Key:
     default: Any
     help: str
     choices: tuple[str, ...] = ()
+    unless: str = ""
 
 
 @dataclass(frozen=True)
@@ -113,6 +116,19 @@ def _of_class(
     )
 
 
+def _plan_keys(kinds: Mapping[str, str]) -> tuple[Key, ...]:
+    """The keys of [plan]: those of a Plan, and the drawing that may stand for its lines."""
+    outline, *others = _of_class(Plan, kinds, {"edge": EDGES})
+    drawing = "a .dxf or .3dm file beside the project: its layers are the lines, instead of ``outline``"
+    gap = "gaps between its lines up to this length are closed; by default a thousandth of its size"
+    return (
+        replace(outline, unless="drawing"),
+        Key("drawing", "a text", None, drawing),
+        Key("gap", "a number", None, gap),
+        *others,
+    )
+
+
 @cache
 def main_sections() -> tuple[Section, ...]:
     """The file itself, and all sections but [solve] and [targets]."""
@@ -132,10 +148,11 @@ def main_sections() -> tuple[Section, ...]:
                 Key("solve", "a table", None, "the solver and its options"),
                 Key("remesh", "a table or a list of tables", None, "other triangles, once or more"),
                 Key("targets", "a table", None, "heights, areas or volumes to be met"),
+                Key("structure", "a table", None, "material, thickness and loads of the structural model"),
                 Key("output", "a table", None, "the files and the picture to write"),
             ),
         ),
-        Section("plan", "The roof, by the lines of its plan.", _of_class(Plan, plan, {"edge": EDGES})),
+        Section("plan", "The roof, by the lines of its plan.", _plan_keys(plan)),
         Section(
             "plan.patches.NAME", "A patch; NAME is its name.", tuple(k for k in area if k.name != "name")
         ),
@@ -159,6 +176,11 @@ def main_sections() -> tuple[Section, ...]:
             "remesh",
             "Other triangles, before or after solving; [[remesh]] if there are several.",
             _of_class(Remeshing, choices={"when": WHEN}),
+        ),
+        Section(
+            "structure",
+            "The structural model that `pcmc structure` writes, in the units of the surface.",
+            _of_class(Structure, {"young": "a number", "wind": "a table"}),
         ),
         Section(
             "output",
@@ -213,6 +235,7 @@ def target_sections() -> tuple[Section, ...]:
     )
 
 
+ELLIPSE = "{centre = [x, y], axes = [[a, b], [c, d]], sweep = degrees}; without sweep the whole ellipse"
 _CURVE = Section(
     "CURVE",
     "Any curve is a list of points, or a table with one of these keys, or a list of such tables, each"
@@ -221,8 +244,10 @@ _CURVE = Section(
         Key("polyline", "a list of points", None, "straight segments from point to point"),
         Key("closed", "true or false", False, "whether a polyline returns to its first point"),
         Key("bezier", "a list of points", None, "the control points of a Bézier curve"),
+        Key("weights", "a value", None, "of the control points of a rational Bézier curve; each > 0"),
         Key("arc", "a list of points", None, "start, a point on the way, and end of a circular arc"),
         Key("circle", "a table", None, "{centre = [x, y], radius = r}"),
+        Key("ellipse", "a table", None, ELLIPSE),
     ),
 )  # its keys are checked where curves are made
 
@@ -231,7 +256,7 @@ def sections() -> tuple[Section, ...]:
     """Every section that a project file may have, with its keys.
 
     >>> [key.name for key in sections()[0].keys]
-    ['units', 'force', 'plan', 'solve', 'remesh', 'targets', 'output']
+    ['units', 'force', 'plan', 'solve', 'remesh', 'targets', 'structure', 'output']
     """
     solve = (solve_section(method) for method in METHODS)
     return (*main_sections(), *solve, *target_sections(), _CURVE)

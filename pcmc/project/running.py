@@ -135,12 +135,18 @@ def _solve_and_write(
         return replace(outcome, files=write_all(works, report))
 
 
-def surface_files(outcome: Outcome, files: Iterable[PathLike]) -> list[tuple[Path, Callable[[Path], None]]]:
-    """The files of a designed roof with all that their formats hold, for ``write_all``."""
+def surface_files(
+    outcome: Outcome, files: Iterable[PathLike], colour: str = ""
+) -> list[tuple[Path, Callable[[Path], None]]]:
+    """The files of a designed roof with all that their formats hold, for ``write_all``.
+
+    ``colour`` names the scalar that colours vertices.
+    """
     data: dict[str, Any] = {
         "scalars": fields(outcome.surface, outcome.certificate),
         "certificate": outcome.certificate,
         "units": outcome.units,
+        "colour": colour,
     }
     return [(Path(file), partial(io.write, surface=outcome.surface, **data)) for file in files]
 

@@ -13,6 +13,7 @@ from .. import io
 from ..base.errors import OptionError, unknown
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
+from .drawn import files_of, is_drawing
 from .file import PathLike, Project, in_file, project_of, read_data, surface_of
 
 QUANTITIES = ("tension", "pressure")
@@ -90,12 +91,15 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
 
 
 def digest(path: PathLike) -> str:
-    """SHA-256, hexadecimal, of a project file, or of the surface that any other file holds.
+    """SHA-256, hexadecimal, of a project file with its drawing, or of the surface that any other file holds.
 
     A surface may be spread over several files (a ``.gltf`` has buffers), so its data are hashed.
     """
     if is_project(path):
-        return hashlib.sha256(read_data(Path(path))[0].encode()).hexdigest()
+        sha = hashlib.sha256(read_data(Path(path))[0].encode())
+        for drawing in files_of(path)[0 if is_drawing(Path(path)) else 1 :]:
+            sha.update(drawing.read_bytes())
+        return sha.hexdigest()
     surface = io.read_bare(path)[0]
     sha = hashlib.sha256(repr((surface.patches, surface.plane)).encode())
     for name in ("vertices", "faces", "patch_of_face", "fixed", "on_plane"):
@@ -104,8 +108,8 @@ def digest(path: PathLike) -> str:
 
 
 def is_project(path: PathLike) -> bool:
-    """Whether a file is a project, by its suffix; all others hold a surface."""
-    return Path(path).suffix.lower() == ".toml"
+    """Whether a file is a project or the drawing of one; all others hold a surface."""
+    return Path(path).suffix.lower() == ".toml" or is_drawing(Path(path))
 
 
 def _unknown_number(path: Path, name: str, known: Iterable[str]) -> OptionError:

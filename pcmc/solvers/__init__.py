@@ -79,6 +79,9 @@ def solve(
     if surface.on_line and method != "newton":
         message = f"method {method!r} cannot slide vertices along lines; use method='newton'"
         raise OptionError(message, what="method", found=method, expected="newton")
+    if surface.rooms and method != "newton":
+        message = f"method {method!r} cannot keep the volume of room {surface.rooms[0].name!r}"
+        raise OptionError(f"{message}; use method='newton'", what="method", found=method, expected="newton")
     if callback is not None and not callable(callback):
         validate.refuse("callback", callback, "a function of a Progress")
     if surface.size == 0.0:

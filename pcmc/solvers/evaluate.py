@@ -10,8 +10,10 @@ import numpy as np
 from ..base.arrays import Bools, Floats
 from ..base.compiled import blocks, compiled, threads
 from ..energy import kernels
-from ..energy.functional import total
+from ..energy.flat_pieces import flat_pieces
+from ..energy.functional import add_cables_and_weights, total
 from ..energy.motion_space import tension_forces
+from ..energy.plane_pieces import add_plane_forces, add_plane_volumes
 from ..surface import Surface
 from ..surface.checks import reachable
 from ..surface.geometry import accumulate, dot, point, scaled, vector
@@ -69,6 +71,8 @@ class Evaluator:
         self.count = 0
         self._mesh = kernels.energy_mesh(surface)
         self._supports = surface.fixed, surface.on_plane, np.array(surface.plane.normal)
+        self._others = tuple((plane, mask) for plane, mask in surface.sliding if mask is not surface.on_plane)
+        self._surface = surface
         self._single = len(blocks(surface.m, threads())) == 1
 
     def __call__(self, X: Floats) -> Point:
@@ -81,9 +85,15 @@ class Evaluator:
             kernels.measure_block(self._mesh, X, 0, m, area, volume, G)
         else:
             area, volume, G = kernels.measure(self._mesh, X)
+        if flat_pieces(self._surface):
+            add_plane_volumes(self._surface, X, volume)
+            add_plane_forces(self._surface, pressure, X, G)
+        further = add_cables_and_weights(self._surface, X, G)
+        for plane, mask in self._others:
+            G[mask] = plane.along(G[mask])
         squared = _apply_supports(G, *self._supports)
         with np.errstate(all="ignore"):
-            return Point(X, total(tension, area, pressure, volume), G, squared)
+            return Point(X, total(tension, area, pressure, volume) + further, G, squared)
 
 
 @compiled

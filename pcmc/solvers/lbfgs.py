@@ -50,7 +50,7 @@ class LbfgsOptions:
 
 
 class Coordinates:
-    """The unknowns of a surface: three for a free vertex, two along Π for a sliding one.
+    """The unknowns of a surface: three for a free vertex, two along its plane for a sliding one.
 
     They are displacements divided by √(4 α), α the largest tension. L-BFGS starts with the step 1,
     here the move -∇E / (4 α): about the longest the stiffest vertex takes (Σ cot is 3.5 on an
@@ -67,14 +67,16 @@ class Coordinates:
     def __init__(self, surface: Surface) -> None:
         self.start = surface.vertices
         self.free = np.flatnonzero(surface.free)
-        self.sliding = np.flatnonzero(surface.on_plane)
         # The last two right singular vectors of nᵀ span what is perpendicular to it.
-        self.basis = np.linalg.svd(np.array([surface.plane.normal]))[2][1:]
+        self.sliding = [
+            (np.flatnonzero(mask), np.linalg.svd(np.array([plane.normal]))[2][1:])
+            for plane, mask in surface.sliding
+        ]
         stiffness = np.sqrt(surface.tensions.max() or 1.0)
         self.unit = 0.5 / stiffness
         exponent = frexp(surface.size * stiffness)[1]
         self.scale = ldexp(1.0, exponent) if abs(exponent) > ORDINARY else 1.0
-        self.count = 3 * len(self.free) + 2 * len(self.sliding)
+        self.count = 3 * len(self.free) + 2 * sum(len(vertices) for vertices, _ in self.sliding)
 
     def positions(self, s: Floats) -> Floats:
         """X (n,3) of the unknowns s (count,), which are zero at the start."""
@@ -83,13 +85,16 @@ class Coordinates:
         cut = 3 * len(self.free)
         with np.errstate(all="ignore"):  # after an overflow the energy is not finite
             X[self.free] += moves[:cut].reshape(-1, 3)
-            X[self.sliding] += moves[cut:].reshape(-1, 2) @ self.basis
+            for vertices, basis in self.sliding:
+                end = cut + 2 * len(vertices)
+                X[vertices] += moves[cut:end].reshape(-1, 2) @ basis
+                cut = end
         return X
 
     def reduce(self, gradient: Floats) -> Floats:
         """∂E/∂s (count,) of ∇E (n,3), in units of scale²."""
-        along = gradient[self.sliding] @ self.basis.T
-        return (self.unit / self.scale) * np.concatenate([gradient[self.free].ravel(), along.ravel()])
+        along = [(gradient[vertices] @ basis.T).ravel() for vertices, basis in self.sliding]
+        return (self.unit / self.scale) * np.concatenate([gradient[self.free].ravel(), *along])
 
 
 class Objective:

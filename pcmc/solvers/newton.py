@@ -21,6 +21,8 @@ from ..base.errors import SurfaceError
 from ..certificate.collapse import held_wall_down
 from ..certificate.slipping import describe_saddle, slipping_ends
 from ..contact.pinching import find_walls
+from ..energy.functional import energy
+from ..energy.rooms import check_rooms, room_pressures
 from ..meshing.refinement import refinable, refine
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import ways_down
@@ -39,22 +41,25 @@ def newton(
     """Solve with the geometric solver; see ``pcmc.solve``."""
     options = options or NewtonOptions()
     _refuse_loose_parts(surface)
+    check_rooms(surface)
     refinable("levels", options.levels, surface.m)
-    history = History(callback)
+    history, first = History(callback), surface
     for level in range(options.levels + 1):
         end = _solve_level(surface, options, history, level)
         if end.status is not Status.CONVERGED or level == options.levels:
             break
         surface = refine(end.state.result_surface())
+    reached = end.state.result_surface()
     return Result(
-        surface=end.state.result_surface(),
+        surface=reached,
         status=end.status,
         method="newton",
-        energy=end.state.energy,
+        energy=energy(reached) if reached.rooms else end.state.energy,
         iterations=len(history.rows) - 1,
         evaluations=history.evaluations,
         rows=history.rows,
         note=history.note,
+        room_changes=tuple((room_pressures(reached) - room_pressures(first)).tolist()),
     )
 
 
@@ -148,7 +153,7 @@ def _refuse_loose_parts(surface: Surface) -> None:
     """Refuse a part with an open edge and no support: nothing stops it from moving away."""
     topo = surface.topology
     open_parts = topo.components[topo.edges[topo.boundary_edge, 0]]
-    loose = np.setdiff1d(open_parts, topo.components[surface.fixed | surface.on_plane])
+    loose = np.setdiff1d(open_parts, topo.components[surface.held])
     if len(loose):
         vertex = int(np.flatnonzero(topo.components == loose[0])[0])
         face = int(np.flatnonzero((surface.faces == vertex).any(axis=1))[0])

@@ -74,6 +74,7 @@ class Result:
         ``energy`` and ``gradient_squared`` (‖∇E‖², the paper's squared sum).
     note : a further finding of the solver, shown in the message.
     proofs : why there is no equilibrium, where that was proved.
+    room_changes : δ of each room of prescribed volume, by which its pressure has changed, force/length².
     """
 
     surface: Surface
@@ -85,6 +86,7 @@ class Result:
     rows: Sequence[Mapping[str, Any]]
     note: str = ""
     proofs: tuple[Proof, ...] = ()
+    room_changes: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         """How the solver ended, above the surface it reached."""
@@ -124,6 +126,13 @@ class Result:
         import pandas as pd
 
         return pd.DataFrame(self.rows)
+
+    @cached_property
+    def rooms(self) -> pd.DataFrame:
+        """A row per room of prescribed volume: the certificate's, and the ``change`` of its pressure."""
+        from ..certificate.certificate import room_table
+
+        return room_table(self.surface).assign(change=self.room_changes)
 
     @property
     def message(self) -> str:

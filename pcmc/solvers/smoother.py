@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..energy.functional import apply_supports
 from ..energy.motion_space import MotionSpace, VertexClasses, perpendicular
 from ..energy.projected_hessian import assemble, hessian_pattern
@@ -23,14 +23,17 @@ from ..surface.topology import SHEET
 
 FLOOR = 1e-2  # of the largest tension it is connected with: the least tension of any patch in L_α
 PIN = 1e8  # of a vertex's stiffness: the weight that makes it follow its prescribed motion
+ACROSS = 1e-9  # sine or cosine of an angle up to which directions count as parallel or at right angles
 SHIFT = 1e-9  # of the diagonal, added so that L_α is regular without supports, too
 
 
 class Smoother:
     """L_α at one shape, factorised.
 
-    Fixed vertices hold all coordinates, sliding ones only that normal to Π; so the coordinates along Π
-    have one factorisation, the normal one another: ``factorisations`` counts those of each ``refresh``.
+    Fixed vertices hold all coordinates, sliding ones only that normal to their plane; so the coordinates
+    along Π have one factorisation, the normal one another: ``factorisations`` counts those of each
+    ``refresh``. Planes at right angles have coordinates of their own; on an oblique one the part along it is
+    taken.
     """
 
     def __init__(self, surface: Surface, classes: VertexClasses, backend: str | None = None) -> None:
@@ -40,12 +43,8 @@ class Smoother:
         faces = {name: getattr(surface, name) for name in ("faces", "patch_of_face", "topology")}
         all_faces = replace(classes, active=np.ones(surface.m, dtype=bool), **faces)
         used = np.bincount(surface.faces.ravel(), minlength=surface.n) > 0
-        normal = np.array(surface.plane.normal)
-        first, second = perpendicular(normal[None])
-        self._axes = np.stack([first[0], second[0], normal])
-        free = [used & ~surface.fixed]  # along Π; and across, if other vertices are free there
-        if (free[0] & surface.on_plane).any():
-            free.append(free[0] & ~surface.on_plane)
+        self._surface, self._axes = surface, _axes(surface)
+        free, self._number = _free_coordinates(surface, used, self._axes)
         self._coordinates = [_Coordinate(moderated, all_faces, mask, backend) for mask in free]
         self.factorisations = len(free)
 
@@ -58,9 +57,41 @@ class Smoother:
         """L_α⁻¹ forces (n,3), zero where a support holds the coordinate."""
         local = forces @ self._axes.T
         out = np.empty_like(local)
-        out[:, :2] = self._coordinates[0].solve(local[:, :2])
-        out[:, 2:] = self._coordinates[-1].solve(local[:, 2:])
-        return out @ self._axes
+        for number, coordinate in enumerate(self._coordinates):
+            columns = self._number == number
+            out[:, columns] = coordinate.solve(local[:, columns])
+        out = out @ self._axes
+        return apply_supports(self._surface, out) if self._surface.on_planes else out
+
+
+def _axes(surface: Surface) -> Floats:
+    """(3,3) rows: Π's normal last, and across it the normals of other sliding planes where they can be."""
+    normal = np.array(surface.plane.normal)
+    for plane, _ in surface.on_planes:
+        first = np.array(plane.normal)
+        if abs(first @ normal) <= ACROSS:
+            first -= (first @ normal) * normal
+            first /= np.linalg.norm(first)
+            return np.stack([first, np.cross(normal, first), normal])
+    first, second = perpendicular(normal[None])
+    return np.stack([first[0], second[0], normal])
+
+
+def _free_coordinates(surface: Surface, used: Bools, axes: Floats) -> tuple[list[Bools], Ints]:
+    """The masks (n,) of the vertices that are free along some axis, and (3,) which of them each axis has."""
+    held = surface.fixed.copy()
+    for _, along in surface.auto_lines:
+        held &= ~along
+    masks = []
+    for axis in axes:
+        stopped = held.copy()
+        for plane, mask in ((surface.plane, surface.on_plane | surface.given.on_plane), *surface.on_planes):
+            if np.linalg.norm(np.cross(axis, plane.normal)) <= ACROSS:
+                stopped |= mask
+        masks.append(used & ~stopped)
+    number = [next(k for k in range(3) if np.array_equal(masks[k], mask)) for mask in masks]
+    distinct = sorted(set(number))
+    return [masks[k] for k in distinct], np.array([distinct.index(k) for k in number])
 
 
 def _largest_around(surface: Surface) -> Floats:
@@ -117,7 +148,8 @@ class HarmonicExtension:
     ) -> None:
         used = ~classes.idle
         space = _one_unknown_each(used)
-        equal = surface.retensioned({p.name: 1.0 for p in surface.patches})
+        none = {cable.name: 0.0 for cable in surface.cables}
+        equal = surface.retensioned({p.name: 1.0 for p in surface.patches}, cables=none)
         pattern = hessian_pattern(classes, space)
         data = assemble(equal, classes, space, pattern, X, hessian=0.0, stiffness=1.0)
         diagonal = pattern.indptr[:-1]

@@ -27,15 +27,25 @@ from ..contact.pinching import (
 from ..energy.functional import energy_and_gradient, energy_at, onto_circles
 from ..energy.loose_parts import relative_forces, rounding_left
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
+from ..energy.rooms import (
+    closing_volumes,
+    prescribed_volumes,
+    volume_gradients_at,
+    volumes_at,
+    with_room_pressures,
+)
 from ..meshing.quality import compare, redistribute, worst_quality
 from ..surface import Surface
 from ..surface.checks import reachable
+from ..surface.geometry import vertex_area_vectors
 
 LOW = 5e-3  # height, in spacings along the junction, at which a sinking vertex is set to rest
 LIFT = 5e-2  # height, in the same, to which a resting vertex is lifted the first time
 DAMPING = 0.25  # factor on both, each time that the vertex is lifted again
 POOR = 2 / 3  # of the quality aimed at: below this redistribution is tried again after it has failed
 REDISTRIBUTIONS = 60  # the most of them
+VOLUME_STEPS = 4  # the most corrections of the volumes after a move
+VOLUME_LEFT = 1e-10  # of a volume: corrected up to here
 RELEASES = 30  # the most times that resting junctions are lifted or walls are updated
 
 
@@ -53,6 +63,12 @@ class State:
     space : the motion space there.
     energy, gradient, residual, norm, scale : E, ∇E, Bᵀ∇E, its norm, and the norm of the single
         triangles' forces to compare with. Of several loose parts the worst counts, as if it were all.
+        Where rooms prescribe volumes, E is the Lagrangian, E at the first pressures - Σ δ (V - V̄), and
+        the norm takes in the defects of the volumes, times ``volume_units``.
+    pressures : (r,) δ, the changes of the rooms' pressures since the start.
+    wanted_volumes : (r,) V̄.
+    defects, volume_gradients : (r,) V - V̄ and (r,n,3) ∂V/∂X.
+    volume_units : (r,) scale / |V̄|, which brings a defect to the size of forces.
     rounding : what rounding of the coordinates alone leaves of the relative residual, about.
     version : changes whenever the faces or the number of unknowns do.
     evaluations : passes over the triangles so far: E, ∇E or its derivative along a motion.
@@ -60,6 +76,8 @@ class State:
 
     def __init__(self, surface: Surface, min_quality: float, held: bool = False) -> None:
         self.full = surface
+        self.pressures = np.zeros(len(surface.rooms))
+        self.wanted_volumes = prescribed_volumes(surface)
         self.min_quality, self.size = min_quality, surface.size
         part = standing_part(surface)
         if held:
@@ -100,11 +118,56 @@ class State:
         if self.surface.topology.components.any():
             left = self.space.to_vectors(self.residual)
             self.norm = self.scale * relative_forces(self.surface, self.classes, self.X, left)
+        if len(self.pressures):
+            self._measure_rooms()
+
+    def _measure_rooms(self) -> None:
+        """Take the rooms' volumes into the energy and the norm."""
+        self.energy += self._multiplied()
+        self.defects = volumes_at(self.surface, self.X) - self.wanted_volumes
+        self.volume_gradients = volume_gradients_at(self.surface, self.X)
+        self.volume_units = self.scale / np.abs(self.wanted_volumes)
+        self.norm = float(np.hypot(self.norm, np.linalg.norm(self.volume_units * self.defects)))
+
+    def _multiplied(self) -> float:
+        """Σ δ V̄, without the parts of the volumes that E does not see."""
+        return float(self.pressures @ (self.wanted_volumes - closing_volumes(self.surface)))
+
+    def volume_columns(self) -> Floats:
+        """(N,r) the gradients of the volumes in the motion space, in units of force."""
+        columns = [self.space.to_coordinates(g) for g in self.volume_gradients]
+        return np.stack(columns, axis=1) * self.volume_units
 
     def energy_at(self, X: Floats) -> float:
-        """E of the standing surface at X."""
+        """E of the standing surface at X, or the Lagrangian."""
         self.evaluations += 1
-        return energy_at(self.surface, X)
+        value = energy_at(self.surface, X)
+        return value + self._multiplied() if len(self.pressures) else value
+
+    def change_pressures(self, change: Floats) -> None:
+        """Change the rooms' pressures by δ (r,); measure afterwards, or move."""
+        if not len(change):
+            return
+        self.pressures = self.pressures + change
+        self.full = with_room_pressures(self.full, change)
+        self.surface = with_room_pressures(self.surface, change)
+        self.part = replace(self.part, surface=self.surface)
+
+    def keep_volumes(self, X: Floats) -> Floats:
+        """X (n,3) moved evenly along the normals until each room has the volume that it has now."""
+        if not len(self.pressures):
+            return X
+        wanted = self.defects + self.wanted_volumes
+        area = vertex_area_vectors(X, self.classes.faces)[1]
+        for _ in range(VOLUME_STEPS):
+            left = wanted - volumes_at(self.surface, X)
+            if (np.abs(left) <= VOLUME_LEFT * np.abs(self.wanted_volumes)).all():
+                break
+            G = volume_gradients_at(self.surface, X)
+            even = G / np.where(area > 0.0, area, 1.0)[:, None]
+            small = np.einsum("rnd,snd->rs", G, even)
+            X = X + np.tensordot(np.linalg.lstsq(small, left)[0], even, axes=1)
+        return onto_circles(self.surface, X)
 
     @property
     def relative(self) -> float:

@@ -14,8 +14,17 @@ from ..energy.motion_space import MotionSpace
 from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import edge_lengths
+from ..stability.bordered import BorderedFactor
 from ..stability.factorisation import Factor, Factoriser, SingularMatrix, factoriser
-from ..stability.modes import SOFT, full_matrix, lowest, negatives_without, stiffness, strength_units
+from ..stability.modes import (
+    SOFT,
+    excluded_columns,
+    full_matrix,
+    lowest,
+    negatives_without,
+    stiffness,
+    strength_units,
+)
 from ..surface.checks import reachable
 from ..surface.geometry import vertex_area_vectors
 from .smoother import HarmonicExtension, Smoother
@@ -24,6 +33,7 @@ from .state import State
 SHIFTS = (0.0, 0.25, 1.0, 4.0)  # of the stiffness, tried in turn until the matrix is positive
 LENGTHS = (1.0, 0.5, 0.25, 0.125)  # of a Newton step, tried in turn
 REFRESH = 6  # descent steps between two factorisations of the Laplacian
+GROWTH = 0.5  # of a room's volume: the most that a step adds to it or takes away
 DRIFT = 0.1  # of an edge: the most that a step moves along a rigid motion that no support resists
 ROUNDING = 1e3 * float(np.finfo(float).eps)
 
@@ -62,6 +72,7 @@ class Stepper:
         self._factoriser: Factoriser | None = None
         self._factor: Factor | None = None
         self._added: csr_array | None = None  # stiffness of a singular matrix
+        self._bordered: BorderedFactor | None = None  # by the gradients of the rooms' volumes
         self._smoother: Smoother | None = None
         self._extension: HarmonicExtension | None = None
         self._smoother_age = REFRESH
@@ -77,7 +88,7 @@ class Stepper:
         fresh = self._factor is None
         if not self._factorise_definite():
             return False
-        d = self._direction()
+        d, pressures = self._direction()
         start, energy, norm = state.X, state.energy, state.norm
         slope = float((state.gradient * d).sum())
         for t in LENGTHS if fresh else LENGTHS[:1]:
@@ -86,6 +97,9 @@ class Stepper:
                 X, down = state.displaced(t * self._with_sheets(d))
             if state.spoils_triangles(X):
                 continue
+            if len(pressures):
+                energy, slope = self._lagrangian(d, t * pressures)
+            state.change_pressures(t * pressures)
             state.move(X, down)
             if down.any():
                 self.kind = "contact"
@@ -97,6 +111,7 @@ class Stepper:
                 return True
             if state.relative <= ROUNDING:
                 break
+            state.change_pressures(-t * pressures)
             state.move(start, np.zeros(len(start), dtype=bool))
         self._factor = None
         return not fresh
@@ -116,17 +131,51 @@ class Stepper:
             self._smoother_age = 0
         self._smoother_age += 1
         forces = state.space.to_vectors(state.residual)
-        d = -self._smoother.solve(forces)
-        slope = float((forces * d).sum())
+        d, pressures = self._smooth_direction(self._smoother, forces)
+        slope, energy = float((forces * d).sum()), state.energy
+        if len(pressures):
+            energy, slope = self._lagrangian(d, pressures, forces)
+            state.change_pressures(pressures)
         for t in 0.5 ** np.arange(12):
             X, down = state.displaced(t * d)
             value = state.energy_at(X)
-            if reachable(X) and value < state.energy + 1e-3 * t * slope:
+            if reachable(X) and value < energy + 1e-3 * t * slope:
                 state.move(X, down)
                 self._factor = None
                 self.kind = "descent"
                 return True
+        state.change_pressures(-pressures)
         return False
+
+    def _smooth_direction(self, smoother: Smoother, forces: Floats) -> tuple[Floats, Floats]:
+        """-L⁻¹(f - Σ μ g), and the pressures μ (r,) that bring the volumes nearer to those prescribed.
+
+        f (n,3) are the forces and g the gradients of the volumes, both in the motion space.
+        """
+        state = self.state
+        d = -smoother.solve(forces)
+        if not len(state.pressures):
+            return d, state.pressures
+        G = state.volume_gradients
+        inflation = np.stack([smoother.solve(state.space.project(g)) for g in G])
+        growth = -self._volumes_ahead() - np.einsum("rnd,nd->r", G, d)
+        small = np.einsum("rnd,snd->rs", G, inflation)
+        pressures = np.linalg.lstsq(small, growth)[0]
+        return d + np.tensordot(pressures, inflation, axes=1), pressures
+
+    def _volumes_ahead(self) -> Floats:
+        """(r,) the defects of the volumes that one step corrects: all of them, unless they are large."""
+        state = self.state
+        most = GROWTH * np.maximum(np.abs(state.wanted_volumes), np.abs(state.wanted_volumes + state.defects))
+        return np.clip(state.defects, -most, most)
+
+    def _lagrangian(self, d: Floats, pressures: Floats, forces: Floats | None = None) -> tuple[float, float]:
+        """The Lagrangian here and its slope along d (n,3), with the rooms' pressures changed."""
+        state = self.state
+        forces = state.gradient if forces is None else forces
+        growth = np.einsum("rnd,nd->r", state.volume_gradients, d)
+        slope = float((forces * d).sum() - pressures @ growth)
+        return state.energy - float(pressures @ state.defects), slope
 
     def saddle_near(self) -> bool:
         """Whether several Newton steps in a row had to be shifted; True at every fourth."""
@@ -166,6 +215,7 @@ class Stepper:
         t = 1e-3
         while t < 0.1:
             X, down = state.displaced(t * unit)
+            X = state.keep_volumes(X)
             value = state.energy_at(X)
             if not value < lowest_energy or down.any() or state.spoils_triangles(X):
                 break
@@ -191,16 +241,19 @@ class Stepper:
             units = strength_units(state.surface, state.classes, state.space)
             self._factoriser = factoriser(self._pattern, self.backend, units)
         rigid = rigid_modes(state.space, self._motions, state.X)
+        excluded = excluded_columns(state.surface, state.space, rigid, state.X)
         for weight in (shift, shift + SOFT):
             data = assemble(state.surface, state.classes, state.space, self._pattern, state.X, 1.0, weight)
             try:
                 factor = self._factoriser.factor(data)
-                self.negative = negatives_without(factor, rigid)
+                self.negative = negatives_without(factor, excluded)
             except SingularMatrix:
                 continue
             self.factorisations += 1
             self._factor, self._shift, self._factor_space = factor, shift, state.space
-            self._added = None
+            self._added, self._bordered = None, None
+            if len(state.pressures):
+                self._bordered = BorderedFactor(factor, state.volume_columns())
             if weight != shift:
                 soft = assemble(state.surface, state.classes, state.space, self._pattern, state.X, 0.0, SOFT)
                 self._added = full_matrix(self._pattern, soft)
@@ -214,31 +267,55 @@ class Stepper:
             return action(s)
         return now.from_other(then, action(then.from_other(now, s)))
 
-    def _direction(self) -> Floats:
+    def _inverse(self, right: Floats) -> Floats:
+        """The factor's inverse, or that of the bordered matrix, in the present basis."""
+        if self._bordered is None:
+            assert self._factor is not None
+            return self._in_factor_basis(self._factor.solve, right)
+        now, then, size = self.state.space, self._factor_space, self.state.space.size
+        if now is then:
+            return self._bordered.solve(right)
+        z = self._bordered.solve(np.append(then.from_other(now, right[:size]), right[size:]))
+        return np.append(now.from_other(then, z[:size]), z[size:])
+
+    def _direction(self) -> tuple[Floats, Floats]:
         """-B J⁻¹ r with J the derivative of r itself, by GMRES preconditioned with the factor.
 
         With a shift, J is the shifted matrix, and the factor its inverse. Stiffness added to the factor is
         added to J, too: otherwise motions that cost no energy would use up the accuracy.
+
+        Where rooms prescribe volumes, the pressures μ (r,) are unknowns, too, and J is bordered:
+
+            [ J   -G ] [ s ]     [ -r      ]
+            [ Gᵀ   0 ] [ μ ]  =  [ V̄ - V   ]        G = Bᵀ ∂V/∂X
         """
-        state, factor, added = self.state, self._factor, self._added
-        assert factor is not None
-        residual = state.residual
+        state, added = self.state, self._added
+        rooms = len(state.pressures)
+        right = -state.residual
+        if rooms:
+            columns, units = state.volume_columns(), state.volume_units
+            right = np.append(right, -units * self._volumes_ahead())
         if self._shift != 0.0:
             self._gmres_steps = 0
-            return -state.space.to_vectors(self._in_factor_basis(factor.solve, residual))
-        size = (len(residual), len(residual))
+            z = self._inverse(right)
+            return self._split(z)
+        size = (len(right), len(right))
         here = linearise(state.surface, state.classes, state.space, state.X, state.gradient)
 
         def times(s: Floats) -> Floats:
             change = here.times(state.space.to_vectors(s))
             return change if added is None else change + self._in_factor_basis(added.__matmul__, s)
 
+        def bordered(z: Floats) -> Floats:
+            s, pressures = z[:-rooms], z[-rooms:]
+            return np.append(times(s) - columns @ pressures, columns.T @ s)
+
         norms: list[float] = []
-        matrix = LinearOperator(size, times, dtype=float)
-        inverse = LinearOperator(size, lambda r: self._in_factor_basis(factor.solve, r), dtype=float)
-        s, _ = gmres(
+        matrix = LinearOperator(size, bordered if rooms else times, dtype=float)
+        inverse = LinearOperator(size, self._inverse, dtype=float)
+        z, _ = gmres(
             matrix,
-            -residual,
+            right,
             M=inverse,
             rtol=1e-3,
             restart=12,
@@ -248,7 +325,17 @@ class Stepper:
         )
         self._gmres_steps = len(norms)
         state.evaluations += len(norms)
-        return state.space.to_vectors(self._limit_drift(s) if len(self._motions) else s)
+        return self._split(z)
+
+    def _split(self, z: Floats) -> tuple[Floats, Floats]:
+        """The motion (n,3) and the pressures (r,) of a solution."""
+        state = self.state
+        s = z[: state.space.size]
+        if self._shift == 0.0 and len(self._motions):
+            s = self._limit_drift(s)
+        return state.space.to_vectors(s), z[state.space.size :] * (
+            state.volume_units if len(z) > len(s) else 1.0
+        )
 
     def _limit_drift(self, s: Floats) -> Floats:
         """s with its rigid part shortened, which only slides the mesh; the residual may rise for a while."""

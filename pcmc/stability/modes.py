@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.linalg import eigh, null_space
 from scipy.sparse import csr_array, diags_array, triu
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
@@ -19,11 +21,13 @@ from ..contact.pinching import standing_part
 from ..energy.motion_space import MotionSpace, VertexClasses, motion_space
 from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
 from ..energy.rigid_motions import rigid_modes, rigid_motions
+from ..energy.rooms import volume_columns
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from .factorisation import Factor, SingularMatrix, factoriser
 
 STRONG = 1e-6  # of the largest tension: where all are at least this, factors need no units
+TINY = float(np.finfo(float).tiny)
 SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
 
 
@@ -37,16 +41,27 @@ class Stiffness:
     matrix : (N,N) sparse symmetric Bᵀ(∂²E)B.
     mass : (N,) lumped area, length².
     factor : its factorisation.
-    rigid : (N,k) orthonormal rigid motions that no support resists.
-    negative : number of negative eigenvalues, rigid motions not counted.
+    excluded : (N,k) unit columns; only motions across all of them count. See ``excluded_columns``.
+    negative : number of negative eigenvalues among these motions.
     """
 
     space: MotionSpace
     matrix: csr_array
     mass: Floats
     factor: Factor
-    rigid: Floats
+    excluded: Floats
     negative: int
+
+    @cached_property
+    def _behind(self) -> Floats:
+        return self.factor.solve(self.excluded)
+
+    def solve(self, right: Floats) -> Floats:
+        """The inverse (N,) among the motions that count: with none of the excluded ones."""
+        y, Q = self.factor.solve(right), self.excluded
+        if Q.shape[1]:
+            y = y - self._behind @ np.linalg.solve(Q.T @ self._behind, Q.T @ y)
+        return y
 
 
 def strength_units(surface: Surface, classes: VertexClasses, space: MotionSpace) -> Floats | None:
@@ -74,16 +89,31 @@ def lumped_mass(space: MotionSpace, classes: VertexClasses, X: Floats) -> Floats
     return np.repeat(vertex_area_vectors(X, classes.faces)[1] / 3.0, space.dimension)
 
 
-def negatives_without(factor: Factor, rigid: Floats) -> int:
-    """Negative eigenvalues on the complement of the columns of ``rigid`` (N,k).
+def excluded_columns(surface: Surface, space: MotionSpace, rigid: Floats, X: Floats) -> Floats:
+    """(N,k) the rigid motions given, and the unit gradients of the volumes that rooms prescribe.
+
+    Motions that cross all of them deform the surface and keep the volumes.
+    """
+    if not surface.rooms:
+        return rigid
+    columns = volume_columns(surface, space, X)
+    length = np.linalg.norm(columns, axis=0)
+    return np.hstack([rigid, columns / np.where(length > 0.0, length, 1.0)])
+
+
+def negatives_without(factor: Factor, columns: Floats) -> int:
+    """Negative eigenvalues on the complement of the columns (N,k).
 
     Haynsworth: the bordered matrix [[H, Q], [Qᵀ, 0]] has the inertia of H restricted to the
     complement plus (k, k), and that of H plus that of -QᵀH⁻¹Q.
     """
-    k = rigid.shape[1]
+    k = columns.shape[1]
     if not k:
         return factor.negative
-    small = rigid.T @ factor.solve(rigid)
+    solved = factor.solve(columns)
+    # a rigid motion costs nothing, so its entries are far larger than those of a volume
+    size = np.sqrt(np.linalg.norm(solved, axis=0)) + TINY
+    small = (columns.T @ solved) / np.outer(size, size)
     positive = int((np.linalg.eigvalsh(0.5 * (small + small.T)) > 0.0).sum())
     return factor.negative + positive - k
 
@@ -95,6 +125,7 @@ def stiffness(
 
     Motions that cost no energy at all make it singular, such as sliding a vertex inside a flat part
     that rests on Π. Then a little of the stiffness BᵀLB is added: such motions do not lower the energy.
+    Where rooms prescribe volumes, only motions that keep them count.
 
     Raises
     ------
@@ -102,21 +133,23 @@ def stiffness(
     """
     X = surface.vertices
     pattern = hessian_pattern(classes, space)
+    excluded = excluded_columns(surface, space, rigid, X)
     solver = factoriser(pattern, backend, strength_units(surface, classes, space))
     for added in (0.0, SOFT):
         data = assemble(surface, classes, space, pattern, X, 1.0, added)
         with suppress(SingularMatrix):
             factor = solver.factor(data)
-            negative = negatives_without(factor, rigid)
+            negative = negatives_without(factor, excluded)
             mass = lumped_mass(space, classes, X)
-            return Stiffness(space, full_matrix(pattern, data), mass, factor, rigid, negative)
+            return Stiffness(space, full_matrix(pattern, data), mass, factor, excluded, negative)
     raise SingularMatrix("the second variation is singular, also with a little stiffness added")
 
 
 def morse_index(surface: Surface) -> int:
     """Number of independent motions that lower the energy of a surface at rest to second order.
 
-    Counted in the motion space, by inertia; rigid motions that no support resists are left out.
+    Counted in the motion space, by inertia; rigid motions that no support resists are left out. Where rooms
+    prescribe volumes, only motions that keep them count.
 
     Raises
     ------
@@ -161,23 +194,34 @@ def second_variation(surface: Surface) -> Stiffness:
     return stiffness(part.surface, part.classes, space, rigid)
 
 
+def all_modes(system: Stiffness) -> tuple[Floats, Floats]:
+    """All eigenvalues (k,), ascending, and their modes (N,k) of unit mass; for a few unknowns."""
+    across = np.eye(len(system.mass))
+    if system.excluded.shape[1]:
+        across = null_space(system.excluded.T)
+    if not across.shape[1]:
+        return np.empty(0), across
+    H, M = system.matrix.toarray(), np.diag(system.mass)
+    values, vectors = eigh(across.T @ H @ across, across.T @ M @ across)
+    return values, across @ vectors
+
+
 def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, ascending, and their modes (k,n,3).
 
     The search takes in all negative ones, so the first is the lowest of all. Modes have unit mass:
-    Σ M |v|² = 1. Rigid motions are left out.
+    Σ M |v|² = 1. Rigid motions are left out; rooms keep their prescribed volumes.
     """
     size = len(system.mass)
     k = min(max(count, system.negative + 2), size - 1)
     root = np.sqrt(system.mass)
-    Q = system.rigid
-    bordered = system.factor.solve(Q) if Q.shape[1] else Q
+    if size - system.excluded.shape[1] <= k < size:  # no more motions count than are wanted
+        values, columns = (part[..., :count] for part in all_modes(system))
+        fields = [system.space.to_vectors(column) for column in columns.T]
+        return values, np.array(fields).reshape(len(values), len(system.space.dimension), 3)
 
     def inverse(x: Floats) -> Floats:
-        y = system.factor.solve(root * x)
-        if Q.shape[1]:
-            y = y - bordered @ np.linalg.solve(Q.T @ bordered, Q.T @ y)
-        return root * y
+        return root * system.solve(root * x)
 
     scaled = diags_array(1.0 / root) @ system.matrix @ diags_array(1.0 / root)
     operator = LinearOperator((size, size), inverse, dtype=float)

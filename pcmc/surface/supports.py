@@ -3,19 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, Ints, read_only
 from ..base.errors import SurfaceError
 from . import checks
 from .circle import Circle, Guide
 from .line import Line
 from .plane import Plane
+from .topology import Topology
 
 FLAT = 1e-9  # sine of an angle up to which two directions count as parallel
+NEAR = 1e-9  # of the size: a vertex this near to a plane lies on it
+
+
+class Supports(NamedTuple):
+    """The supports as they were given, before vertices on several planes became those of lines and points.
+
+    Attributes
+    ----------
+    fixed, on_plane : (n,) masks, on_plane also of vertices that are fixed.
+    on_line : as in Surface, without the lines that two planes have in common.
+    """
+
+    fixed: Bools
+    on_plane: Bools
+    on_line: tuple[tuple[Guide, Bools], ...]
+
+    def frozen(self) -> Supports:
+        """The same with arrays that cannot be written to."""
+        lines = tuple((line, read_only(along)) for line, along in self.on_line)
+        return Supports(read_only(self.fixed), read_only(self.on_plane), lines)
 
 
 def plane_masks(given: Any, n: int) -> tuple[tuple[Plane, Bools], ...]:
@@ -30,6 +51,97 @@ def plane_masks(given: Any, n: int) -> tuple[tuple[Plane, Bools], ...]:
             validate.refuse("on_planes", given, expected, error=SurfaceError)
         masks.append((pair[0], checks.mask(pair[1], n, "on_planes")))
     return tuple(masks)
+
+
+def completed(
+    planes: Sequence[tuple[Plane, Bools]], X: Floats, at_end: Bools, fixed: Bools
+) -> tuple[tuple[Plane, Bools], ...]:
+    """The planes with the vertices that lie on them, and belong to them, although not given.
+
+    These are fixed vertices of the boundary (``at_end``) and, of a mirror plane, all those of the boundary.
+    """
+    near = NEAR * max(checks.bounding_size(X), 1e-300)
+    parts = []
+    for plane, mask in planes:
+        there = at_end & (np.abs(plane.height(X)) <= near)
+        parts.append((plane, mask | (there if plane.mirror else there & fixed)))
+    return tuple(parts)
+
+
+def check_mirrors(
+    planes: Sequence[tuple[Plane, Bools]], X: Floats, F: Ints, patch: Ints, names: Sequence[str]
+) -> None:
+    """Refuse a mirror plane that the surface crosses, or that one of its triangles lies in."""
+    near = NEAR * checks.bounding_size(X)
+    for plane, mask in planes:
+        if not plane.mirror:
+            continue
+        height = plane.height(X)
+        sides = before, behind = int((height > near).sum()), int((height < -near).sum())
+        if before and behind:
+            raise SurfaceError(
+                f"the surface crosses the {plane}: {before} vertices are in front of it and {behind} behind;"
+                " keep one half, as pcmc.cut(surface, plane) gives it, or leave the mirror plane out",
+                what="on_planes",
+                where=str(plane),
+                found=sides,
+            )
+        flat = np.flatnonzero(mask[F].all(axis=1))
+        if len(flat):
+            name = names[patch[flat[0]]]
+            raise SurfaceError(
+                f"patch {name!r} lies in the {plane} (triangle {flat[0]}), so it is its own mirror image;"
+                " use a mirror plane that it does not lie in, or model the whole",
+                what="on_planes",
+                where=name,
+                found=int(flat[0]),
+            )
+
+
+def common_point(point: Floats, planes: Sequence[Plane]) -> Floats:
+    """(3,) the point nearest to ``point`` that lies on the first plane and on as many more as possible.
+
+    >>> wall = Plane((2, 0, 0), (1, 0, 0))
+    >>> common_point(np.zeros(3), [Plane(), wall, Plane((5, 0, 0), (1, 0, 0))]).tolist()
+    [2.0, 0.0, 0.0]
+    """
+    chosen: list[Plane] = []
+    for plane in planes:
+        normals = np.array([p.normal for p in (*chosen, plane)])
+        away = -np.array([float(p.height(point)) for p in (*chosen, plane)])
+        move = np.linalg.lstsq(normals, away, rcond=FLAT)[0]
+        if np.abs(normals @ move - away).max() <= 1e-12 * (1.0 + np.abs(away).max()):
+            chosen.append(plane)
+            point = point + move
+    return point
+
+
+def mirror_edges(planes: Sequence[tuple[Plane, Bools]], topo: Topology) -> Bools:
+    """(e,) edges of one triangle that lie in a mirror plane."""
+    inside = np.zeros(len(topo.edges), dtype=bool)
+    for plane, mask in planes:
+        if plane.mirror:
+            inside |= mask[topo.edges].all(axis=1)
+    return topo.boundary_edge & inside
+
+
+def symmetric_part(planes: Sequence[tuple[Plane, Bools]], vectors: Floats) -> Floats:
+    """Leave of vectors (n,3) at vertices in mirror planes the part along all of these, in place.
+
+    Of the whole surface the sum over the images of a vector is this part, times their number.
+    """
+    mirrors = [(plane, mask) for plane, mask in planes if plane.mirror]
+    if not mirrors:
+        return vectors
+    on = np.array([mask for _, mask in mirrors])
+    some = np.flatnonzero(on.any(axis=0))
+    for pattern in np.unique(on[:, some], axis=1).T:
+        here = some[(on[:, some] == pattern[:, None]).all(axis=0)]
+        normals = np.array([plane.normal for (plane, _), used in zip(mirrors, pattern, strict=True) if used])
+        _, sizes, directions = np.linalg.svd(normals, full_matrices=False)
+        across = directions[sizes > FLAT]
+        vectors[here] -= vectors[here] @ across.T @ across
+    return vectors
 
 
 def guides_and_points(

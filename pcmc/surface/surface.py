@@ -15,7 +15,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
 from . import checks, supports
-from .cable import Cable, checked_cables
+from .cable import Cable, CableEdges, cable_edges, checked_cables
 from .circle import Circle, Guide
 from .geometry import bounding_size
 from .patch import Patch
@@ -35,6 +35,7 @@ FIELDS = (
     "on_planes",
     "cables",
     "rooms",
+    "given",
 )
 GROUND = Plane()
 NAMED = 6  # patches that repr names
@@ -75,6 +76,11 @@ class Surface:
     cables : sequence of Cable, names unique: edges with a line tension.
     rooms : sequence of Room, names unique: volumes that are prescribed instead of pressures.
 
+    Attributes
+    ----------
+    given : ``fixed``, ``on_plane`` and ``on_line`` as given. Those of the surface also have the vertices that
+        cannot move, or along a line only, because they slide on several planes.
+
     Raises
     ------
     SurfaceError
@@ -99,10 +105,14 @@ class Surface:
     on_planes: tuple[tuple[Plane, Bools], ...] = ()
     cables: tuple[Cable, ...] = ()
     rooms: tuple[Room, ...] = ()
+    given: supports.Supports = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.plane, Plane):
             validate.refuse("plane", self.plane, "a Plane", error=SurfaceError)
+        if self.plane.mirror:
+            message = "plane: Π cannot be a mirror plane; give that plane in on_planes= instead"
+            raise SurfaceError(message, what="plane")
         X = checks.positions(self.vertices)
         checks.large_enough(X)
         F = checks.face_array(self.faces, len(X))
@@ -114,12 +124,17 @@ class Surface:
         on_line = checks.on_line(self.on_line, X)
         on_plane = checks.mask(self.on_plane, len(X), "on_plane")
         on_planes = supports.plane_masks(self.on_planes, len(X))
+        given = supports.Supports(fixed.copy(), on_plane, tuple(on_line))
         if on_planes:
+            at_end = topology(F, patch, len(X)).on_boundary
+            on_planes = supports.completed(on_planes, X, at_end, fixed)
+            supports.check_mirrors(on_planes, X, F, patch, [p.name for p in patches])
             both = [(self.plane, on_plane), *on_planes]
             on_line, points = supports.guides_and_points(both, fixed, on_line)
             fixed |= points
         for _, along in on_line:
             fixed |= along
+        object.__setattr__(self, "given", given.frozen())
         object.__setattr__(self, "on_line", tuple((line, read_only(along)) for line, along in on_line))
         sliding = on_plane & ~fixed
         object.__setattr__(self, "on_planes", tuple((plane, read_only(mask)) for plane, mask in on_planes))
@@ -132,7 +147,7 @@ class Surface:
         height = self.plane.height(X)
         checks.mesh(X, F, patch, self.topology, self.patches, self.held, height)
         self._check_planes(X)
-        if not self.held.any():
+        if not (self.held.any() or self.rooms):
             message = "no vertex is fixed or on the plane: translations are free, so only closed surfaces"
             message += " have an equilibrium; pass fixed= or on_plane= to hold it"
             warnings.warn(message, FreeSurfaceWarning, stacklevel=3)
@@ -167,7 +182,9 @@ class Surface:
         topo = self.topology
         pressure = self.pressures[self.patch_of_face, None] * topo.sense
         left = np.bincount(topo.edge_of_face.ravel(), pressure.ravel(), len(topo.edges))
-        held = self.held[topo.edges].all(axis=1)
+        held = (self.fixed | self.on_plane)[topo.edges].all(axis=1)
+        for _, mask in self.on_planes:
+            held |= mask[topo.edges].all(axis=1)
         rounding = 1e-12 * np.abs(self.pressures).max(initial=0.0)
         return np.where(held | (np.abs(left) <= rounding), 0.0, left)
 
@@ -179,16 +196,47 @@ class Surface:
         is the point of Π below the middle of the surface, so that a volume over Π does not depend on
         where it is drawn; or the middle itself, if that is far above Π and nothing slides. Forces do not
         change as long as the pressures cancel along all edges that are not held; where they do not
-        cancel, the origin stays the point of Π.
+        cancel, the origin stays the point of Π. Else it is moved along Π to lie on as many of the planes in
+        ``on_planes`` as possible: these then add nothing to volumes (``flat_pieces``).
         """
         point, middle = np.array(self.plane.point), self.vertices.mean(axis=0)
-        near = np.linalg.norm(middle - point) <= FAR * self.size
-        if near or self.uncancelled.any():
+        if self.uncancelled.any():
             return point
-        height = float(self.plane.height(middle))
-        if self.on_plane.any() or abs(height) <= FAR * self.size:
-            middle = middle - height * np.array(self.plane.normal)
-        return np.asarray(middle)
+        if np.linalg.norm(middle - point) > FAR * self.size:
+            height = float(self.plane.height(middle))
+            if self.given.on_plane.any() or abs(height) <= FAR * self.size:
+                middle = middle - height * np.array(self.plane.normal)
+            point = middle
+        if self.on_planes:
+            point = supports.common_point(point, [self.plane, *(plane for plane, _ in self.on_planes)])
+        return np.asarray(point)
+
+    @cached_array
+    def mirror_edge(self) -> Bools:
+        """(e,) edges of the boundary in a mirror plane, where the surface goes on behind it."""
+        return supports.mirror_edges(self.on_planes, self.topology)
+
+    @cached_array
+    def pinned(self) -> Bools:
+        """(n,) ``fixed`` without the vertices that two planes let slide along their common line."""
+        pinned = self.fixed.copy()
+        for _, along in self.auto_lines:
+            pinned &= ~along
+        return pinned
+
+    @cached_array
+    def on_ground(self) -> Bools:
+        """(n,) vertices that slide on Π, also those that another plane lets slide along a line there only."""
+        sliding = self.on_plane.copy()
+        for _, along in self.auto_lines:
+            sliding |= along & self.given.on_plane
+        return sliding
+
+    @cached_property
+    def auto_lines(self) -> tuple[tuple[Guide, Bools], ...]:
+        """The part of ``on_line`` that was not given: lines that two planes have in common."""
+        given = [line for line, _ in self.given.on_line]
+        return tuple(pair for pair in self.on_line if all(pair[0] is not line for line in given))
 
     @cached_array
     def walls(self) -> Bools:
@@ -204,6 +252,16 @@ class Surface:
     def pressures(self) -> Floats:
         """(k,) pressure p of each patch."""
         return np.array([p.pressure for p in self.patches])
+
+    @cached_array
+    def weights(self) -> Floats:
+        """(k,) weight w of each patch, force/area."""
+        return np.array([p.weight for p in self.patches])
+
+    @cached_property
+    def cable_edges(self) -> CableEdges:
+        """The edges that carry a line tension, and how much."""
+        return cable_edges(self.cables)
 
     @cached_property
     def sliding(self) -> tuple[tuple[Plane, Bools], ...]:
@@ -238,6 +296,11 @@ class Surface:
         """Index of the patch called ``name``."""
         names = [p.name for p in self.patches]
         return names.index(validate.choice("patch", name, names))
+
+    def cable_index(self, name: str) -> int:
+        """Index of the cable called ``name``."""
+        names = [cable.name for cable in self.cables]
+        return names.index(validate.choice("cable", name, names))
 
     def moved(self, vertices: npt.ArrayLike) -> Surface:
         """The same surface with its vertices elsewhere, (n,3); faces, supports, patches are shared.
@@ -318,6 +381,7 @@ class Surface:
             vars(self)[name] = read_only(value) if isinstance(value, np.ndarray) else value
         for _, along in (*self.on_line, *self.on_planes):
             read_only(along)
+        self.given.frozen()
 
     def patch_faces(self, patches: Sequence[int]) -> Bools:
         """(m,) mask of the triangles of the given patches."""
@@ -336,6 +400,8 @@ class Surface:
             other.__dict__[name] = changes.get(name, getattr(self, name))
         if "patches" not in changes:  # seen from one point all along a solver's way
             other.__dict__["origin"] = self.origin
+            if "flat_pieces" in vars(self) and "faces" not in changes:
+                vars(other)["flat_pieces"] = vars(self)["flat_pieces"]
         return other
 
 

@@ -138,6 +138,20 @@ class Topology:
         boundary = self.edges[self.boundary_edge]
         return self._curves(self.boundary_edge, vertex_kind(boundary, self.vertex_count) == POINT)
 
+    def edge_numbers(self, ends: Ints) -> Ints:
+        """(k,) the numbers of the edges that join pairs of vertices (k,2); -1 where none does."""
+        weights = np.array([self.vertex_count, 1])
+        keys = self.edges.astype(np.int64) @ weights
+        wanted = np.sort(ends, axis=1).astype(np.int64) @ weights
+        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        return np.asarray(np.where(keys[place] == wanted, place, -1))
+
+    def chains(self, ends: Ints, stop: Bools) -> tuple[Curve, ...]:
+        """The curves that edges (k,2) form, cut where they branch and at the vertices ``stop`` (n,)."""
+        mask = np.zeros(len(self.edges), dtype=bool)
+        mask[self.edge_numbers(ends)] = True
+        return self._curves(mask, stop | (vertex_kind(ends, self.vertex_count) == POINT))
+
     @cached_array
     def components(self) -> Ints:
         """(n,) int: label of the connected part that each vertex belongs to."""

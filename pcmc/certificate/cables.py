@@ -1,0 +1,91 @@
+"""Cables: their balance with the sheets along them, and the forces at their ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from ..base.arrays import Bools, Floats
+from ..energy.cables import directions
+from ..surface import Surface
+from ..surface.cable import Cable
+from ..surface.topology import Curve
+from .balance import conormal_sum, middle, segments
+
+
+def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
+    """A row per cable, or per part of it between supports, branches and ends.
+
+    At rest a cable of tension τ and curvature vector κ balances the sheets along it: Σ α n + τ κ = 0 with
+    their outward co-normals n; so along the free edge of a flat sheet α = τ κ. Of triangles this holds in
+    the mean over a cable's edges up to what the mesh leaves.
+
+    Columns: ``cable``, ``tension`` (its force) and ``length``; the middle of the part; ``sheet_pull``, the
+    mean of |Σ α n| and ``cable_pull``, that of τ |κ|, force/length; ``force_left`` per length in the motion
+    space, of ``left`` (n,3).
+    """
+    rows, sheets = [], np.linalg.norm(conormal_sum(surface), axis=1) if surface.cables else np.empty(0)
+    for cable, curve in _parts(surface):
+        pairs, lengths = segments(surface, curve)
+        total, t = float(lengths.sum()), directions(surface.vertices, pairs)[0]
+        turns = np.linalg.norm(t - np.roll(t, 1, axis=0) if curve.closed else np.diff(t, axis=0), axis=1)
+        weight = 0.5 * (lengths + np.roll(lengths, 1)) if curve.closed else 0.5 * (lengths[1:] + lengths[:-1])
+        edges = surface.topology.edge_numbers(pairs)
+        inner = curve.vertices if curve.closed else curve.vertices[1:-1]
+        rows.append(
+            {
+                "cable": cable.name,
+                "tension": cable.tension,
+                "length": total,
+                **middle(surface, curve),
+                "sheet_pull": float(sheets[edges] @ lengths) / (total or 1.0),
+                "cable_pull": cable.tension * float(turns.sum()) / (float(weight.sum()) or 1.0),
+                "force_left": float(np.linalg.norm(left[inner], axis=1).max(initial=0.0))
+                / (float(lengths.mean()) or 1.0),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def cable_end_table(surface: Surface) -> pd.DataFrame:
+    """A row per end of each part of a cable: where it is, whether a support holds it, and the force.
+
+    ``force_x``, ``force_y``, ``force_z`` is what a support there exerts on the cable: -τ t, with t the
+    direction from the end along the cable. Where several cables end, their support carries the sum.
+    """
+    rows = []
+    for cable, curve in _parts(surface):
+        if curve.closed:
+            continue
+        for end, beside in ((0, 1), (-1, -2)):
+            pair = curve.vertices[[end, beside]]
+            force = -cable.tension * directions(surface.vertices, pair[None])[0][0]
+            place = surface.vertices[pair[0]]
+            rows.append(
+                {
+                    "cable": cable.name,
+                    "vertex": int(pair[0]),
+                    **{axis: float(c) for axis, c in zip("xyz", place, strict=True)},
+                    "held": bool(surface.held[pair[0]]),
+                    **{f"force_{axis}": float(c) for axis, c in zip("xyz", force, strict=True)},
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def _parts(surface: Surface) -> list[tuple[Cable, Curve]]:
+    """The parts of each cable of tension > 0 between its ends, branches and the supports in between."""
+    parts = []
+    for cable in surface.cables:
+        if cable.tension > 0.0:
+            curves = surface.topology.chains(cable.edges, _supported(surface, cable))
+            parts += [(cable, curve) for curve in curves]
+    return parts
+
+
+def _supported(surface: Surface, cable: Cable) -> Bools:
+    """(n,) fixed vertices of a cable beside one that moves: a mast that it runs over."""
+    mask = np.zeros(surface.n, dtype=bool)
+    leading = cable.edges[surface.fixed[cable.edges].sum(axis=1) == 1]
+    mask[leading] = surface.fixed[leading]
+    return mask

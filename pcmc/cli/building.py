@@ -1,0 +1,182 @@
+"""The commands panels and draw: from the shape to what is built. Each returns the exit code."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .. import project as projects
+from ..base import validate
+from ..base.errors import FileError
+from ..drawings import drawing_set
+from ..drawings.drawing_set import check_name
+from ..io import FORMATS, write
+from ..panels import Panels, fewer_families, panels
+from ..panels.schedule import MIRROR_IMAGES
+from ..surface import Surface
+from . import NOT_CERTIFIED, OK, arguments
+from .arguments import MANY_FILES, TOML, Input, ViewName, number, option
+from .progress import working
+
+CSV = ".csv"
+CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."
+ANYWAY = "Accept a surface that is not certified."
+MARKED = "Draw a surface that is not certified; every sheet is marked."
+TOLERANCE = "Largest difference of edges within a family of panels; adds the schedule."
+TRUE_SIZE = "Draw every panel at true size; needs --tolerance."
+Anyway = Annotated[bool, typer.Option("--anyway", help=ANYWAY)]
+
+
+def panels_(
+    file: Input,
+    tolerance: Annotated[
+        float, option("LENGTH", "Largest difference of edges within a family.", parser=number)
+    ],
+    output: Annotated[list[Path] | None, MANY_FILES] = None,
+    picture: Annotated[Path | None, option("PNG", "Picture to draw, coloured by family.")] = None,
+    view: ViewName = "diagonal",
+    change: Annotated[float | None, option("LENGTH", CHANGE, parser=number)] = None,
+    mirror_images: Annotated[
+        str, option("NAME", "alike: of one family; or apart.", "--mirror-images")
+    ] = MIRROR_IMAGES[0],
+    walls: Annotated[bool, typer.Option("--walls", help="Triangles of walls are panels, too.")] = False,
+    anyway: Anyway = False,
+) -> int:
+    """Sort the panels of a roof into families of congruent triangles; write a schedule.
+
+    A .csv has a row per panel; beside it come NAME-families.csv and NAME-edges.csv. Other suffixes are
+    formats of surfaces, for the surface that --change gives.
+
+    \b
+    Examples:
+      pcmc panels roof.toml --tolerance 0.005 -o schedule.csv
+      pcmc panels roof.pcmc --tolerance 0.005 --change 0.02 -o schedule.csv -o fewer.pcmc
+    """
+    seen, files = arguments.view_of(view), output or []
+    validate.positive("--tolerance", tolerance)
+    if change is not None:
+        validate.positive("--change", change)
+    projects.check_names([], picture)
+    projects.check_picture(seen, "patches")
+    projects.check_outputs([path for one in files for path in _paths(one)] + ([picture] if picture else []))
+    options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": anyway}
+    with working() as say:
+        surface = settled(file, say)
+        say("sorting panels")
+        if change is None:
+            schedule = panels(surface, tolerance, **options)
+        else:
+
+            def callback(made: int, count: int) -> None:
+                say(f"round {made}: {count} families")
+
+            fewer = fewer_families(surface, tolerance, change, callback=callback, **options)
+            schedule = fewer.after
+        works = [work for path in files for work in _works(path, schedule)]
+        if picture is not None:
+            works.append((picture, partial(_paint, schedule, seen)))
+        written = projects.write_all(works, say)
+    print(schedule)
+    if change is not None:
+        print(f"\n{fewer}")
+    if written:
+        print(f"written: {', '.join(map(str, written))}")
+    return OK if schedule.certificate.certified else NOT_CERTIFIED
+
+
+def draw_(
+    file: Input,
+    output: Annotated[list[Path], MANY_FILES],
+    units: Annotated[str | None, option("NAME", "Unit of the lengths: m, cm, mm, ft or in.")] = None,
+    sheet: Annotated[str, option("NAME", "Format of the sheets: A4, A3, A2, A1 or A0.")] = "A1",
+    scale: Annotated[
+        int | None, option("NUMBER", "1 to this; by default it fits.", parser=arguments.integer)
+    ] = None,
+    height: Annotated[
+        list[str] | None, option("Z", "Section at this height; may be repeated.", "--height")
+    ] = None,
+    line: Annotated[list[str] | None, option("X,Y,X,Y", "Section along this line; may be repeated.")] = None,
+    tolerance: Annotated[float | None, option("LENGTH", TOLERANCE, parser=number)] = None,
+    panel_sheets: Annotated[bool, typer.Option("--panel-sheets", help=TRUE_SIZE)] = False,
+    anyway: Annotated[bool, typer.Option("--anyway", help=MARKED)] = False,
+) -> int:
+    """Draw a roof: plan, elevations, sections, setting-out points, panels; in .dxf, .pdf or .svg.
+
+    \b
+    Examples:
+      pcmc draw roof.toml --units m -o roof.dxf -o roof.pdf
+      pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
+    """
+    for path in output:
+        check_name(path)
+    projects.check_outputs(output)
+    heights = None if height is None else [number(text) for text in height]
+    lines = None if line is None else [_ends(text) for text in line]
+    arguments.check_input(file)
+    with working() as say:
+        surface = settled(file, say)
+        say("drawing")
+        drawings = drawing_set(
+            surface,
+            units or "",
+            sheet=sheet,
+            scale=scale,
+            heights=heights,
+            lines=lines,
+            tolerance=tolerance,
+            panel_sheets=panel_sheets,
+            name=file.stem,
+            anyway=anyway,
+        )
+        written = projects.write_all(drawings.files(*output), say)
+    print(f"{len(drawings.sheets)} sheets {sheet}; written: {', '.join(map(str, written))}")
+    return OK if drawings.certificate.certified else NOT_CERTIFIED
+
+
+def _ends(text: str) -> Any:
+    """Two points from X,Y,X,Y."""
+    try:
+        a, b, c, d = (float(part) for part in text.split(","))
+    except ValueError:
+        validate.refuse("--line", text, "four numbers X,Y,X,Y")
+    return (a, b), (c, d)
+
+
+def settled(file: Path, say: projects.OnStep) -> Surface:
+    """The surface in a file, or that of a project, solved."""
+    arguments.check_input(file)
+    if file.suffix.lower() != TOML:
+        return arguments.given(file, say).surface
+    return projects.designed(file, say).surface
+
+
+def _paths(path: Path) -> list[Path]:
+    """The files that the name of an output stands for."""
+    suffix = path.suffix.lower()
+    if suffix not in (CSV, *FORMATS):
+        text = f"{path}: expected {CSV} for a schedule, or a format of surfaces: {', '.join(FORMATS)}"
+        raise FileError(text, what=str(path), found=suffix)
+    return [path] if suffix != CSV else [path, *(_beside(path, name) for name in ("families", "edges"))]
+
+
+def _beside(path: Path, name: str) -> Path:
+    return path.with_name(f"{path.stem}-{name}{path.suffix}")
+
+
+def _works(path: Path, schedule: Panels) -> list[Any]:
+    """Each file with the function that writes it."""
+    if path.suffix.lower() != CSV:
+        return [(path, partial(write, surface=schedule.surface))]
+    tables = (schedule.panels, schedule.families, schedule.edges)
+    return [
+        (one, partial(table.to_csv, index=False)) for one, table in zip(_paths(path), tables, strict=True)
+    ]
+
+
+def _paint(schedule: Panels, view: Any, path: Path) -> None:
+    from ..plot import families
+
+    families(schedule, path, view=view)

@@ -1,0 +1,10 @@
+"""Surfaces as COMPAS meshes, for Rhino, Grasshopper and Blender.
+
+Gives ``to_meshes``, ``from_meshes`` and functions of meshes and plain data for ``compas.rpc.Proxy``. May
+import ``existence``, ``certificate``, ``io`` and the rooms below them.
+"""
+
+from .meshes import from_meshes, to_meshes
+from .service import certify, read, solve, write
+
+__all__ = ["certify", "from_meshes", "read", "solve", "to_meshes", "write"]

@@ -1,0 +1,213 @@
+"""Surface to COMPAS meshes, one per patch, and back.
+
+The names of attributes are those of COMPAS packages where they have one: ``is_support``, and ``rx``, ``ry``,
+``rz`` for reactions.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..base.errors import FileWarning, SurfaceError
+from ..certificate.balance import reactions
+from ..contact.pinching import standing_part
+from ..energy.curvature import mean_curvature
+from ..io.import_warnings import import_warnings
+from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of
+from ..surface import Surface, expect_surface
+from ..surface.topology import topology
+from . import mesh_arrays
+from .mesh_arrays import CABLE, GUIDE, PLANES, SLIDES, TENSION
+from .whole import KEY, Whole, read_whole
+
+MARKS: dict[str, Any] = {"is_support": False, SLIDES: False, GUIDE: None, PLANES: None}
+QUANTITIES = dict.fromkeys(("mean_curvature", "rx", "ry", "rz"))
+CARRIED = {"vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane", "on_line"}
+CARRIED |= {"on_planes", "cables", "rooms"}
+
+
+def to_meshes(surface: Surface) -> list[Any]:
+    """A ``compas.datastructures.Mesh`` per patch. Patches share the keys of their common vertices.
+
+    The key of a vertex is its index in the surface, that of a face likewise, so ``from_meshes`` restores the
+    surface to the last bit.
+
+    Returns
+    -------
+    list of Mesh : named after their patches, with
+
+        - ``mesh.attributes``: ``tension`` α (force/length), ``pressure`` p (force/area), ``wall``, and on the
+          first mesh ``"pcmc"`` with the plane Π and the lines and circles that vertices slide along;
+        - at vertices: ``is_support`` (fixed), ``is_sliding`` (on Π), ``guide`` (the number of the line or
+          circle in ``attributes["pcmc"]["guides"]``, or None), ``mean_curvature`` H (1/length; None on
+          junctions and boundaries), and ``rx``, ``ry``, ``rz``, the force of the support on the surface.
+
+    Raises
+    ------
+    SurfaceError : for a surface with a property that meshes do not carry.
+    MissingExtra : without COMPAS.
+
+    Examples
+    --------
+    >>> from pcmc import Patch, Surface
+    >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
+    ...                  [0, 0], [Patch("floor", 2.0)], fixed=range(4))
+    >>> mesh, = to_meshes(square)
+    >>> mesh.name, mesh.attributes["tension"], mesh.vertex_attribute(3, "is_support")
+    ('floor', 2.0, True)
+    """
+    mesh_class = mesh_arrays.mesh_class()
+    expect_surface(surface)
+    _check_carried(surface)
+    rows = _vertex_attributes(surface)
+    meshes = []
+    for index, patch in enumerate(surface.patches):
+        mesh = mesh_class(default_vertex_attributes=MARKS | QUANTITIES, name=patch.name)
+        mesh.attributes.update({f.name: getattr(patch, f.name) for f in fields(patch) if f.name != "name"})
+        mine = np.flatnonzero(surface.patch_of_face == index)
+        for key in np.unique(surface.faces[mine]).tolist():
+            mesh.add_vertex(key, attr_dict=dict(rows[key]))
+        for key, face in zip(mine.tolist(), surface.faces[mine].tolist(), strict=True):
+            mesh.add_face(face, fkey=key)
+        meshes.append(mesh)
+    for cable in surface.cables:
+        for edge in map(tuple, cable.edges.tolist()):
+            for mesh in (mesh for mesh in meshes if mesh.has_edge(edge)):
+                mesh.edge_attributes(edge, [CABLE, TENSION], [cable.name, cable.tension])
+    meshes[0].attributes[KEY] = Whole.of(surface).plain()
+    return meshes
+
+
+def from_meshes(
+    meshes: Any,
+    *,
+    tensions: Mapping[str, float] | float | None = None,
+    pressures: Mapping[str, float] | float | None = None,
+    weld: bool = False,
+) -> Surface:
+    """The surface of COMPAS meshes, one per patch.
+
+    Two meshes meet where they share the keys of vertices. Vertices and faces are numbered in the order of
+    their keys; if two meshes have a face of the same key, faces are numbered mesh by mesh.
+
+    Parameters
+    ----------
+    meshes : a Mesh, or a list of them. A mesh's name is the patch's; a mesh must have the attribute
+        ``tension``, and may have ``pressure`` (otherwise 1) and ``wall``. A vertex is fixed if one of
+        ``is_support``, ``is_anchor`` and ``is_fixed`` is true, and slides on Π if ``is_sliding`` is. If no
+        mesh has any of these attributes, the boundary is fixed. Polygons are cut into triangles.
+    tensions, pressures : by mesh name, or one number for all, in place of the attributes.
+    weld : join vertices at one place, for meshes that do not share keys. The keys then have no meaning.
+
+    Warns
+    -----
+    FileWarning : once, if polygons are cut, the boundary is taken as fixed, or the meshes probably do not
+        form the surface that was meant (an open seam, patches turned against each other).
+
+    Raises
+    ------
+    SurfaceError : for anything that is not such a mesh, or if the meshes form no surface; ``where`` is the
+        mesh's name, or the number of the vertex or face in the surface.
+    MissingExtra : without COMPAS.
+
+    Examples
+    --------
+    >>> from pcmc import Patch, Surface
+    >>> square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]],
+    ...                  [0, 0], [Patch("floor", 2.0)], fixed=range(4))
+    >>> from_meshes(to_meshes(square)).patches
+    (Patch(name='floor', tension=2.0, pressure=1.0),)
+    """
+    named = mesh_arrays.named_meshes(meshes)
+    patches = tuple(mesh_arrays.read_patches(named, tensions, pressures))
+    whole, vertices = read_whole(named), mesh_arrays.read_vertices(named)
+    keep, places = mesh_arrays.shared_vertices(vertices, named, weld)
+    X, n = vertices.X[keep], len(keep)
+    F, patch, notes = mesh_arrays.read_faces(named, X, places)
+    if vertices.unused:
+        notes = (*notes, f"{vertices.unused} vertices that no face uses were left out")
+    place = np.array([k for of_mesh in places.values() for k in of_mesh.values()])
+    support, guide = np.zeros(n, dtype=np.int8), np.full(n, -1)
+    np.maximum.at(guide, place, vertices.guide)
+    on_planes = [np.zeros(n, dtype=bool) for _ in whole.planes]
+    _check_numbers(GUIDE, vertices.guide.tolist(), len(whole.guides))
+    _check_numbers(PLANES, [number for numbers in vertices.planes for number in numbers], len(whole.planes))
+    for vertex, numbers in zip(place.tolist(), vertices.planes, strict=True):
+        for number in numbers:
+            on_planes[number][vertex] = True
+    held = None
+    if vertices.support is not None:
+        np.maximum.at(support, place, vertices.support)
+        held = support
+    else:
+        support = np.where(topology(F, patch, n).on_boundary, FIXED, support)
+        notes = (*notes, "no vertex has the attribute is_support, so the boundary is taken as fixed")
+    notes = (*notes, *import_warnings(MeshData(X, F, patch, patches, held)))
+    if notes:
+        warnings.warn(f"meshes: {'; '.join(notes)}", FileWarning, stacklevel=2)
+    along = tuple((one, guide == number) for number, one in enumerate(whole.guides))
+    return Surface(
+        X,
+        F,
+        patch,
+        patches,
+        support == FIXED,
+        support == SLIDING,
+        whole.plane,
+        along,
+        tuple(zip(whole.planes, on_planes, strict=True)),
+        mesh_arrays.read_cables(named, places, whole.cables),
+        whole.rooms,
+    )
+
+
+def _check_carried(surface: Surface) -> None:
+    """Refuse a surface with a property, other than at its default, that meshes do not carry."""
+    for field in fields(surface):
+        value = getattr(surface, field.name)
+        empty = not value.any() if isinstance(value, np.ndarray) else value == field.default
+        if field.name not in CARRIED and not empty:
+            text = f"surface.{field.name}: COMPAS meshes do not carry it; write the surface as .pcmc"
+            raise SurfaceError(text, what=field.name, found=value)
+
+
+def _check_numbers(name: str, numbers: list[int], listed: int) -> None:
+    """Refuse a vertex attribute that names a line or plane beyond those listed."""
+    largest = max(numbers, default=-1)
+    if largest >= listed:
+        text = f"a vertex has {name!r} {largest}, but attributes[{KEY!r}] lists only {listed} of them"
+        text = f"{text}; keep the mesh that has this attribute, or remove {name!r} from the vertices"
+        raise SurfaceError(text, what=name, found=largest, expected=listed)
+
+
+def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
+    """A row per vertex: coordinates, support, curvature and reaction."""
+    support, standing = support_of(surface), standing_part(surface).surface
+    guide = np.full(surface.n, None)
+    for number, (_, along) in enumerate(surface.on_line):
+        guide[along] = number
+    planes: list[list[int]] = [[] for _ in range(surface.n)]
+    for number, (_, mask) in enumerate(surface.on_planes):
+        for vertex in np.flatnonzero(mask):
+            planes[vertex].append(number)
+    columns: dict[str, list[Any]] = {
+        **dict(zip("xyz", surface.vertices.T.tolist(), strict=True)),
+        "is_support": (support == FIXED).tolist(),
+        SLIDES: (support == SLIDING).tolist(),
+        GUIDE: guide.tolist(),
+        PLANES: planes,
+        "mean_curvature": _none_for_nan(mean_curvature(standing, "variational")),
+        **dict(zip(("rx", "ry", "rz"), reactions(standing).T.tolist(), strict=True)),
+    }
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _none_for_nan(values: Floats) -> list[float | None]:
+    """The numbers, and None where there is none: JSON has no NaN."""
+    return [value if value == value else None for value in values.tolist()]

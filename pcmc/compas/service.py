@@ -1,0 +1,121 @@
+"""Functions of meshes and plain data, which ``compas.rpc.Proxy("pcmc.compas")`` can call from any Python."""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from collections.abc import Mapping
+from enum import Enum
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from .. import certificate, existence, io
+from ..certificate import Certificate
+from ..surface import Surface
+from .meshes import from_meshes, to_meshes
+
+Values = Mapping[str, float] | float | None
+
+
+def solve(
+    meshes: Any, tensions: Values = None, pressures: Values = None, weld: bool = False, **options: Any
+) -> dict[str, Any]:
+    """Solve the surface of COMPAS meshes.
+
+    Parameters
+    ----------
+    meshes, tensions, pressures, weld : as in ``from_meshes``.
+    options : as in ``pcmc.solve``; over RPC plain data, such as ``method="lbfgs"``.
+
+    Returns
+    -------
+    dict : ``meshes`` of the surface reached, ``converged``, ``status`` (the name of the Status), ``message``,
+        ``energy``, ``iterations``, ``certificate`` as ``certify`` returns it, and ``warnings``, sentences.
+
+    Examples
+    --------
+    >>> from pcmc import Patch, Surface
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.1]]
+    >>> tent = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("roof", 1.0)], fixed=range(4))
+    >>> answer = solve(to_meshes(tent))
+    >>> round(answer["meshes"][0].vertex_attribute(4, "z"), 6), answer["certificate"]["verdict"]
+    (0.353553, 'stable')
+    """
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        result = existence.solve(
+            from_meshes(meshes, tensions=tensions, pressures=pressures, weld=weld), **options
+        )
+        return {
+            "meshes": to_meshes(result.surface),
+            "converged": result.converged,
+            "status": result.status.name.lower(),
+            "message": result.message,
+            "energy": result.energy,
+            "iterations": result.iterations,
+            "certificate": _plain_certificate(result.certificate),
+            "warnings": [str(one.message) for one in caught],
+        }
+
+
+def certify(
+    meshes: Any, tensions: Values = None, pressures: Values = None, weld: bool = False, **options: Any
+) -> dict[str, Any]:
+    """The certificate of the surface of COMPAS meshes, as plain data.
+
+    Parameters
+    ----------
+    meshes, tensions, pressures, weld : as in ``from_meshes``.
+    options : as in ``pcmc.certify``.
+
+    Returns
+    -------
+    dict : ``certified``, ``verdict``, ``detail``, the numbers of ``Certificate.numbers``, the tables
+        ``patches``, ``junctions`` and ``boundaries`` as lists of rows, and ``warnings``. None stands for NaN.
+    """
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        surface = from_meshes(meshes, tensions=tensions, pressures=pressures, weld=weld)
+        values = _plain_certificate(certificate.certify(surface, **options))
+    return {**values, "warnings": [str(one.message) for one in caught]}
+
+
+def read(path: str | os.PathLike[str], **options: Any) -> list[Any]:
+    """The meshes of the surface in a file that pcmc reads; options as in ``pcmc.read``.
+
+    Over RPC the path is one of the server's.
+    """
+    surface: Surface = io.read(path, **options)
+    return to_meshes(surface)
+
+
+def write(path: str | os.PathLike[str], meshes: Any, weld: bool = False, **options: Any) -> None:
+    """Write the surface of COMPAS meshes to a file, as its suffix says; options as in ``pcmc.write``.
+
+    Over RPC the path is one of the server's.
+    """
+    io.write(path, from_meshes(meshes, weld=weld), **options)
+
+
+def _plain_certificate(found: Certificate) -> dict[str, Any]:
+    """Its findings as JSON has them."""
+    tables = {name: getattr(found, name) for name in ("patches", "junctions", "boundaries")}
+    values = {"certified": found.certified, **found.numbers(), "detail": found.detail, **tables}
+    return {name: _plain(value) for name, value in values.items()}
+
+
+def _plain(value: Any) -> Any:
+    """The value in the types of JSON, which has no NaN and no infinity."""
+    if isinstance(value, pd.DataFrame):
+        return [{k: _plain(v) for k, v in row.items()} for row in value.to_dict(orient="records")]
+    if isinstance(value, np.ndarray | list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, Enum):
+        return value.name.lower()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

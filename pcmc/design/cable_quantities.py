@@ -1,0 +1,59 @@
+"""Quantities of cables: sag, length and force, with exact derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.arrays import Floats, Ints
+from ..base.errors import OptionError
+from ..energy.cables import add_pull
+from ..surface import Surface
+from .measurement import Measurement
+
+
+def sag(surface: Surface, of: str) -> Measurement:
+    """The largest distance of a cable's vertices from its chord, the straight line between its two ends.
+
+    With the chord from a to b and x at the share s of it, the distance along the unit vector e changes by
+    ⟨e, dx - (1 - s) da - s db⟩.
+    """
+    order = _ends_last(surface, of)
+    X = surface.vertices[order]
+    a, b = X[-2], X[-1]
+    chord = b - a
+    share = (X - a) @ chord / (chord @ chord)
+    out = X - a - share[:, None] * chord
+    distance = np.linalg.norm(out, axis=1)
+    top = int(distance.argmax())
+    slope = np.zeros_like(surface.vertices)
+    direction = out[top] / (distance[top] or 1.0)
+    slope[order[top]] = direction
+    slope[order[-2]] -= (1.0 - share[top]) * direction
+    slope[order[-1]] -= share[top] * direction
+    return Measurement(float(distance[top]), slope)
+
+
+def length(surface: Surface, of: str) -> Measurement:
+    """The length L of a cable."""
+    slope = np.zeros_like(surface.vertices)
+    lengths = add_pull(surface.vertices, surface.cables[surface.cable_index(of)].edges, 1.0, slope)
+    return Measurement(float(lengths.sum()), slope)
+
+
+def force(surface: Surface, of: str) -> Measurement:
+    """τ, the force in a cable: the same all along it."""
+    index = surface.cable_index(of)
+    by_cable: Floats = np.zeros(len(surface.cables))
+    by_cable[index] = 1.0
+    return Measurement(
+        surface.cables[index].tension, np.zeros_like(surface.vertices), by_load={"cable": by_cable}
+    )
+
+
+def _ends_last(surface: Surface, of: str) -> Ints:
+    """The vertices of a cable, its two ends last."""
+    vertices, count = np.unique(surface.cables[surface.cable_index(of)].edges, return_counts=True)
+    if (count > 2).any() or (count == 1).sum() != 2:
+        message = f"sag of {of}: the cable is closed, branched or in several parts, so it has no chord"
+        raise OptionError(f"{message}; give each span a cable of its own", what="of", found=of)
+    return np.asarray(vertices[np.argsort(count == 1, kind="stable")])

@@ -1,0 +1,279 @@
+"""The drawings of a roof: a model in three dimensions and sheets of paper, written together."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..base import validate
+from ..base.arrays import Floats
+from ..base.errors import FileError, OptionError, unknown
+from ..base.files import atomic_writes
+from ..base.units import LENGTHS, length_factor
+from ..certificate import Certificate
+from ..panels import Panels, panels
+from ..panels.schedule import certified
+from ..surface import Surface, expect_surface
+from . import dxf, pdf, views
+from .panel_sheets import panel_sheets as panels_at_true_size
+from .sections import Polyline, section
+from .sheet import FORMATS, Sheet, add_frames, table_sheets
+
+SUFFIXES = (".dxf", ".pdf", ".svg")
+DECIMALS = {"m": 3, "cm": 1, "mm": 0, "ft": 4, "in": 2}  # about a millimetre or better
+Ends = tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class DrawingSet:
+    """The drawings of a roof.
+
+    Attributes
+    ----------
+    surface, units : the roof, and the unit of its lengths.
+    certificate : of the surface.
+    curves : ridges, rims and wall lines, with their layers.
+    sections : the lines in which each plane cuts the roof.
+    points : setting-out points: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim, wall or cable).
+    schedule : the panels, if a tolerance was given; else None.
+    sheets : the sheets of paper, in order.
+    """
+
+    surface: Surface
+    units: str
+    certificate: Certificate
+    curves: Sequence[views.Curve]
+    sections: Sequence[Polyline]
+    points: pd.DataFrame
+    schedule: Panels | None
+    sheets: Sequence[Sheet]
+
+    def files(self, *paths: str | os.PathLike[str]) -> list[tuple[Path, Callable[[Path], None]]]:
+        """Each file that ``write`` would write, with the function that writes it."""
+        works: list[tuple[Path, Callable[[Path], None]]] = []
+        document: Any = None
+        for path in map(Path, paths):
+            suffix = check_name(path)
+            if document is None:
+                model = dxf.Model(self.surface, self.curves, self.sections, self.points)
+                document = dxf.document(model, self.units, self.sheets)
+            if suffix == ".dxf":
+                works.append((path, partial(dxf.write_dxf, document)))
+            elif suffix == ".pdf":
+                works.append((path, partial(pdf.write_pdf, self.sheets)))
+            else:
+                many = len(self.sheets) > 1
+                for k in range(len(self.sheets)):
+                    one = path.with_name(f"{path.stem}-{k + 1}{path.suffix}") if many else path
+                    works.append((one, partial(dxf.write_svg, document, k)))
+        return works
+
+    def write(self, *paths: str | os.PathLike[str]) -> list[Path]:
+        """Write .dxf, .pdf (a page per sheet) and .svg (a file NAME-1.svg and so on per sheet).
+
+        All files appear together, or none.
+
+        Raises
+        ------
+        FileError : for another suffix, or a file that cannot be written.
+        """
+        works = self.files(*paths)
+        with atomic_writes([path for path, _ in works]) as temporaries:
+            for (path, write), temporary in zip(works, temporaries, strict=True):
+                try:
+                    write(temporary)
+                except OSError as error:
+                    text = f"{path}: cannot be written ({error.strerror or error})"
+                    raise FileError(text, what=str(path)) from None
+        return [path for path, _ in works]
+
+
+def drawing_set(
+    surface: Surface,
+    units: str,
+    *,
+    sheet: str = "A1",
+    scale: int | None = None,
+    heights: Sequence[float] | None = None,
+    lines: Sequence[Ends] | None = None,
+    tolerance: float | None = None,
+    panel_sheets: bool = False,
+    mirror_images: str = "alike",
+    name: str = "",
+    anyway: bool = False,
+) -> DrawingSet:
+    """Draw a roof: plan, elevations, sections, setting-out points, schedule, panels at true size.
+
+    Parameters
+    ----------
+    surface : a certified surface, z up.
+    units : of its lengths: "m", "cm", "mm", "ft" or "in".
+    sheet : format of the sheets, "A4" to "A0".
+    scale : of plan, elevations and sections, 1 to this; by default the largest usual one that fits.
+    heights : z of horizontal sections; by default at a quarter, half and three quarters of the height.
+    lines : pairs of points (x, y) in the plan, for vertical sections; by default through the middle of
+        the plan, along x and along y.
+    tolerance : of the panels' families; None for no schedule.
+    panel_sheets : whether to draw every panel at true size; needs a tolerance.
+    mirror_images : as in ``pcmc.panels``.
+    name : of the roof, in the title strips.
+    anyway : draw a surface that is not certified; every sheet is marked.
+
+    Raises
+    ------
+    SurfaceError : the surface is not certified.
+    OptionError : for units that are missing; a section that misses the roof; a view or a panel that does
+        not fit the sheet, with the smallest format that holds it.
+
+    Examples
+    --------
+    >>> from pcmc import Patch
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
+    >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("roof", 1.0)], fixed=range(4))
+    >>> drawings = drawing_set(roof, "m", sheet="A3")
+    >>> [sheet.title for sheet in drawings.sheets]
+    ['Plan', 'Elevations', 'Sections at heights', 'Sections along lines', 'Setting-out points']
+    >>> drawings.sheets[0].scale
+    '1:10'
+    """
+    expect_surface(surface)
+    millimetres = _millimetres(units)
+    validate.choice("sheet", sheet, tuple(FORMATS))
+    if scale is not None:
+        validate.integer("scale", scale, least=1)
+    validate.flag("panel_sheets", panel_sheets)
+    if panel_sheets and tolerance is None:
+        text = "panel_sheets: needs the tolerance of the panels' families; add tolerance="
+        raise OptionError(text, what="tolerance", expected="a length")
+    certificate = certified(surface, anyway)
+    schedule = None
+    if tolerance is not None:
+        schedule = panels(surface, tolerance, mirror_images=mirror_images, anyway=anyway)
+    curves = views.model_curves(surface)
+    points = _setting_out(curves)
+    named = [(str(row.point), np.array([row.x, row.y, row.z])) for row in points.itertuples()]
+    levels = _levels(surface, heights)
+    profiles = _profiles(surface, lines)
+    size: dict[str, Any] = {"name": sheet, "millimetres": millimetres, "scale": scale}
+    sheets = [
+        views.placed([views.plan(surface, curves, named)], "Plan", **size),
+        views.placed(views.elevations(surface, curves), "Elevations", **size),
+    ]
+    if levels:
+        sheets.append(views.placed([views.contours(surface, curves, levels)], "Sections at heights", **size))
+    if profiles:
+        sheets.append(views.placed([view for view, _ in profiles], "Sections along lines", **size))
+    sheets += [
+        *table_sheets("Setting-out points", *_point_rows(points, DECIMALS[units]), sheet),
+    ]
+    if schedule is not None:
+        sheets += table_sheets("Families of panels", *_family_rows(schedule, DECIMALS[units]), sheet)
+    if schedule is not None and panel_sheets:
+        sheets += panels_at_true_size(schedule, sheet, millimetres)
+    mark = "" if certificate.certified else f"NOT CERTIFIED: {certificate.verdict.value.split(':')[0]}"
+    add_frames(sheets, name, units, mark)
+    cut = [one for _, group in levels for one in group] + [one for _, group in profiles for one in group]
+    return DrawingSet(surface, units, certificate, curves, cut, points, schedule, sheets)
+
+
+def check_name(path: Path) -> str:
+    """The suffix of a drawing's file; another is refused."""
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise FileError(f"{path}: {unknown('suffix', suffix, SUFFIXES)}", what=str(path), found=suffix)
+    return suffix
+
+
+def _millimetres(units: object) -> float:
+    """Millimetres in the unit of length."""
+    if units is None or units == "":
+        text = 'units: a drawing needs the unit of its lengths; say units="m" (cm, mm, ft, in)'
+        raise OptionError(text, what="units", found=units, expected=LENGTHS)
+    return length_factor(validate.choice("units", units, LENGTHS), "mm")
+
+
+def _setting_out(curves: Sequence[views.Curve]) -> pd.DataFrame:
+    """Vertices of the curves, each once: the ends of curves first, then along them."""
+    order: dict[int, tuple[Floats, str]] = {}
+    open_ended = [c for c in curves if not (c.closed or c.layer == "PCMC-CABLE")]
+    ends = [(c, k) for c in open_ended for k in (0, -1)]
+    along = [(c, k) for c in curves for k in range(len(c.vertices))]
+    for curve, k in [*ends, *along]:
+        order.setdefault(curve.vertices[k], (curve.points[k], curve.layer.removeprefix("PCMC-").lower()))
+    at = np.array([point for point, _ in order.values()]).reshape(-1, 3)
+    names = [f"P{k + 1}" for k in range(len(order))]
+    where = [on for _, on in order.values()]
+    return pd.DataFrame({"point": names, "x": at[:, 0], "y": at[:, 1], "z": at[:, 2], "on": where})
+
+
+def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[float, list[Polyline]]]:
+    """Each height with the lines of its section."""
+    z = surface.vertices[:, 2]
+    if heights is None:
+        low, high = float(z.min()), float(z.max())
+        chosen = [low + part * (high - low) for part in (0.25, 0.5, 0.75)] if high > low else []
+        cuts = [(h, _cut(surface, [0.0, 0.0, h], [0.0, 0.0, 1.0])) for h in chosen]
+        return [cut for cut in cuts if cut[1]]
+    levels = []
+    for height in heights:
+        h = validate.number("heights", height)
+        found = _cut(surface, [0.0, 0.0, h], [0.0, 0.0, 1.0])
+        if not found:
+            text = f"heights: z = {h:g} misses the roof, which lies between {z.min():g} and {z.max():g}"
+            raise OptionError(text, what="heights", found=h, expected=(float(z.min()), float(z.max())))
+        levels.append((h, found))
+    return levels
+
+
+def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[views.View, list[Polyline]]]:
+    """Each vertical section as a view, with its lines."""
+    if lines is None:
+        low, high = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
+        x, y = map(float, 0.5 * (low + high))
+        lines = [((float(low[0]), y), (float(high[0]), y)), ((x, float(low[1])), (x, float(high[1])))]
+    profiles = []
+    for line in lines:
+        ends = np.asarray(line, dtype=float)
+        along = ends[1] - ends[0] if ends.shape == (2, 2) else np.zeros(2)
+        length = float(np.linalg.norm(along))
+        if not (np.isfinite(ends).all() and length > 0.0):
+            validate.refuse("lines", line, "two different points (x, y)")
+        along /= length
+        found = _cut(surface, [*ends[0], 0.0], [-along[1], along[0], 0.0])
+        start, end = (f"({x:.6g}, {y:.6g})" for x, y in ends)
+        title = f"from {start} towards {end}"
+        if not found:
+            text = f"lines: the section {title} misses the roof"
+            raise OptionError(text, what="lines", found=line)
+        profiles.append((views.profile(surface, title, ends[0], along, found), found))
+    return profiles
+
+
+def _cut(surface: Surface, point: Sequence[float], normal: Sequence[float]) -> list[Polyline]:
+    return section(surface, np.array(point), np.array(normal))
+
+
+def _point_rows(points: pd.DataFrame, decimals: int) -> tuple[list[str], list[list[str]]]:
+    head = ["point", "x", "y", "z", "on"]
+    rows = [
+        [point, *(f"{c:.{decimals}f}" for c in at), on]
+        for point, *at, on in points[head].to_numpy(dtype=object).tolist()
+    ]
+    return head, rows
+
+
+def _family_rows(schedule: Panels, decimals: int) -> tuple[list[str], list[list[str]]]:
+    keys = ["family", "count", "mirrored", "a", "b", "c", "area"]
+    rows = [
+        [f"F{family}", str(count), str(mirrored), *(f"{x:.{decimals}f}" for x in sides), f"{area:.4g}"]
+        for family, count, mirrored, *sides, area in schedule.families[keys].to_numpy(dtype=object).tolist()
+    ]
+    return ["family", "panels", "turned over", "a", "b", "c", "area"], rows

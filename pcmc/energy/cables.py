@@ -1,0 +1,141 @@
+"""Cables: the part Σ τ ℓ of E, over edges with a line tension τ, and its derivatives.
+
+An edge from a to b has the length ℓ = |b - a| and the direction t = (b - a) / ℓ. Then
+
+    ∂ℓ/∂b = t = -∂ℓ/∂a,    ∂²ℓ/∂b∂b = ∂²ℓ/∂a∂a = -∂²ℓ/∂a∂b = (1 - t tᵀ) / ℓ
+
+An edge without length has no direction and contributes neither. Nothing is computed where no cable pulls.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.arrays import Floats, Ints
+from ..base.compiled import compiled
+from ..base.errors import SurfaceError
+from ..surface import Surface
+from ..surface.cable import CableEdges
+from ..surface.geometry import dot, norm, point, scaled, sub, vector
+
+
+def add_cables(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
+    """Σ τ ℓ at X (n,3), force·length; its gradient is added to ``gradient`` (n,3) if that is given.
+
+    >>> from pcmc import Cable, Patch
+    >>> right = Surface([[0, 0, 0], [4, 0, 0], [0, 3, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], [0],
+    ...                 cables=[Cable("edge", 2.0, [[1, 2]])])
+    >>> forces = np.zeros((3, 3))
+    >>> add_cables(right, right.vertices, forces), forces.tolist()[1]
+    (10.0, [1.6, -1.2, 0.0])
+    """
+    ends, tension = surface.cable_edges
+    if not len(ends):
+        return 0.0
+    length = add_pull(X, ends, tension, gradient)
+    return float((tension * length).sum())
+
+
+def add_pull(X: Floats, ends: Ints, tension: Floats | float, gradient: Floats | None = None) -> Floats:
+    """(c,) lengths of edges (c,2); the gradient of Σ τ ℓ is added to ``gradient`` (n,3) if that is given."""
+    t, length = directions(X, ends)
+    if gradient is not None:
+        pull = np.broadcast_to(tension, len(ends))[:, None] * t
+        np.add.at(gradient, ends[:, 1], pull)
+        np.add.at(gradient, ends[:, 0], -pull)
+    return length
+
+
+def directions(X: Floats, ends: Ints) -> tuple[Floats, Floats]:
+    """Unit directions (c,3) and lengths (c,) of edges (c,2) at X (n,3); zero without length."""
+    side = X[ends[:, 1]] - X[ends[:, 0]]
+    length = np.sqrt(np.einsum("ij,ij->i", side, side))
+    return side / np.where(length > 0.0, length, 1.0)[:, None], length
+
+
+def cable_blocks(surface: Surface, X: Floats) -> Floats:
+    """(c,3,3) the matrix τ/ℓ (1 - t tᵀ) of each edge that pulls, force/length."""
+    ends, tension = surface.cable_edges
+    t, length = directions(X, ends)
+    stiffness = np.divide(tension, length, out=np.zeros_like(length), where=length > 0.0)
+    return np.asarray(stiffness[:, None, None] * (np.eye(3) - t[:, :, None] * t[:, None, :]))
+
+
+def add_cable_products(surface: Surface, X: Floats, d: Floats, change: Floats) -> None:
+    """Add the change of the cables' gradient along the motion d (n,3) to ``change`` (n,3)."""
+    ends = surface.cable_edges.ends
+    if not len(ends):
+        return
+    turned = np.einsum("cij,cj->ci", cable_blocks(surface, X), d[ends[:, 1]] - d[ends[:, 0]])
+    np.add.at(change, ends[:, 1], turned)
+    np.add.at(change, ends[:, 0], -turned)
+
+
+def squared_cable_forces(surface: Surface) -> Floats:
+    """(c,) τ² at both ends of each edge that pulls, added up, force²."""
+    return np.asarray(2.0 * surface.cable_edges.tension**2)
+
+
+def tensions_on(edges: Ints, cables: CableEdges, n: int) -> Floats:
+    """(e,) the line tension on each of the edges (e,2) of a mesh with n vertices, force.
+
+    Raises
+    ------
+    SurfaceError : a cable runs along an edge that is not among them, so that nothing else acts there.
+    """
+    keys = edges.astype(np.int64) @ np.array([n, 1])
+    wanted = cables.ends.astype(np.int64) @ np.array([n, 1])
+    order = np.argsort(keys)
+    place = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
+    alone = np.flatnonzero(keys[place] != wanted)
+    if len(alone):
+        i, j = (int(v) for v in cables.ends[alone[0]])
+        message = (
+            f"the cable from vertex {i} to {j} runs where no patch has a tension or a pressure;"
+            " give the patches there a tension, or remove the cable"
+        )
+        raise SurfaceError(message, what="cables", where=(i, j))
+    return np.bincount(place, cables.tension, len(edges))
+
+
+@compiled
+def assemble_cables(
+    X: Floats,
+    ends: Ints,
+    tension: Floats,
+    basis: Floats,
+    dimension: Ints,
+    start: Ints,
+    indptr: Ints,
+    indices: Ints,
+    hessian: float,
+    stiffness: float,
+    data: Floats,
+) -> None:
+    """Add hessian · τ/ℓ (1 - t tᵀ) + stiffness · τ/ℓ of each edge to the upper triangle of BᵀHB."""
+    for e in range(len(ends)):
+        i, j = min(ends[e, 0], ends[e, 1]), max(ends[e, 0], ends[e, 1])
+        side = sub(point(X, j), point(X, i))
+        length = norm(side)
+        if length == 0.0:
+            continue
+        t, k = scaled(1.0 / length, side), tension[e] / length
+        for v in (i, j):
+            for r in range(dimension[v]):
+                at = indptr[start[v] + r] - r
+                for s in range(r, dimension[v]):
+                    b, c = vector(basis[v, r]), vector(basis[v, s])
+                    product = dot(b, c)
+                    turning = product - dot(b, t) * dot(c, t)
+                    data[at + s] += k * (hessian * turning + stiffness * product)
+        if dimension[j] == 0:
+            continue
+        for r in range(dimension[i]):
+            row = start[i] + r
+            low, high = indptr[row], indptr[row + 1]
+            at = low + np.searchsorted(indices[low:high], start[j])
+            for s in range(dimension[j]):
+                b, c = vector(basis[i, r]), vector(basis[j, s])
+                product = dot(b, c)
+                turning = product - dot(b, t) * dot(c, t)
+                data[at + s] -= k * (hessian * turning + stiffness * product)

@@ -1,0 +1,249 @@
+"""Self-weight: the part Σ w ∫ z dA of E, with z the height over Π, and its derivatives.
+
+Over a flat triangle of area A and corners at heights z_a, z_b, z_c the integral is A z̄, z̄ = (z_a+z_b+z_c)/3.
+With n the normal of Π and g_i = ∂A/∂i,
+
+    ∂(A z̄)/∂i = z̄ g_i + A n/3,    ∂²(A z̄)/∂i∂j = z̄ ∂²A/∂i∂j + (g_i nᵀ + n g_jᵀ)/3
+
+So a sheet of weight w acts like one of tension α + w z, pushed by w n per area: at rest
+
+    H = (p - w ⟨ν, n⟩) / (2 (α + w z))
+
+from δ∫z dA = ∫ (2 H z + ⟨ν, n⟩) φ dA for a displacement φ along the normal ν. Where α + w z ≤ 0 the sheet is
+under compression. Nothing is computed where no patch weighs anything.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.arrays import Bools, Floats, Ints
+from ..base.compiled import compiled
+from ..surface import Surface
+from ..surface.geometry import (
+    Vector,
+    accumulate,
+    add,
+    area_vectors,
+    cross,
+    cross_sum,
+    dot,
+    edge_vectors,
+    norm,
+    point,
+    scaled,
+    sub,
+    vector,
+)
+from . import kernels
+
+
+def add_weights(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
+    """Σ w ∫ z dA at X (n,3), force·length; its gradient is added to ``gradient`` (n,3) if that is given.
+
+    >>> from pcmc import Patch
+    >>> table = Surface([[0, 0, 2], [1, 0, 2], [0, 1, 2]], [[0, 1, 2]], [0],
+    ...                 [Patch("a", 1.0, weight=3.0)], fixed=[0])
+    >>> add_weights(table, table.vertices)
+    3.0
+    """
+    if not surface.weights.any():
+        return 0.0
+    moment = moments(surface, X, surface.weights, gradient)
+    return float((surface.weights * moment).sum())
+
+
+def moments(surface: Surface, X: Floats, weights: Floats, gradient: Floats | None = None) -> Floats:
+    """(k,) ∫ z dA of each patch, length³; the gradient of Σ w ∫ z dA is added to ``gradient`` (n,3)."""
+    moment = np.zeros(len(surface.patches))
+    out = np.empty((0, 3)) if gradient is None else gradient
+    _measure(surface.faces, surface.patch_of_face, X, weights, *_plane(surface), moment, out)
+    return moment
+
+
+def weight_blocks(surface: Surface, X: Floats) -> Floats:
+    """(m,3,3,3,3): entry (f,i,j) is the 3×3 block w ∂²(A z̄)/∂x_i∂x_j of triangle f."""
+    blocks = np.empty((surface.m, 3, 3, 3, 3))
+    one = np.ones(len(surface.patches))
+    kernels.hessian_blocks(kernels.energy_mesh(surface, one, 0.0 * one), X, blocks)
+    corners, n = X[surface.faces], np.array(surface.plane.normal)
+    vector = area_vectors(corners)
+    nu = vector / np.linalg.norm(vector, axis=1)[:, None]
+    g = 0.5 * np.cross(nu[:, None], edge_vectors(corners))
+    mean = surface.plane.height(corners).mean(axis=1)
+    blocks *= mean[:, None, None, None, None]
+    blocks += g[:, :, None, :, None] * n / 3.0
+    blocks += (n[:, None] * g[:, None, :, None, :]) / 3.0
+    return np.asarray(surface.weights[surface.patch_of_face][:, None, None, None, None] * blocks)
+
+
+def add_weight_products(
+    surface: Surface, faces: Ints, patch: Ints, X: Floats, d: Floats, change: Floats
+) -> None:
+    """Add the change of the weights' gradient along the motion d (n,3) to ``change`` (n,3)."""
+    if surface.weights.any():
+        _add_products(faces, patch, X, d, surface.weights, *_plane(surface), change)
+
+
+def effective_tensions(surface: Surface, X: Floats, faces: Ints, patch: Ints) -> Floats:
+    """(m,) α + w z̄ of triangles (m,3) at X (n,3), force/length; below 0 under compression."""
+    tension = surface.tensions[patch]
+    if not surface.weights.any():
+        return np.asarray(tension)
+    return np.asarray(tension + surface.weights[patch] * surface.plane.height(X)[faces].mean(axis=1))
+
+
+def compressed(surface: Surface) -> Bools:
+    """(m,) triangles with a weight where α + w z̄ ≤ 0."""
+    pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)
+    return np.asarray((surface.weights[surface.patch_of_face] != 0.0) & (pull <= 0.0))
+
+
+def assemble_weights(
+    surface: Surface,
+    faces: Ints,
+    patch: Ints,
+    X: Floats,
+    basis: Floats,
+    dimension: Ints,
+    start: Ints,
+    indptr: Ints,
+    offset: Ints,
+    hessian: float,
+    stiffness: float,
+    data: Floats,
+) -> None:
+    """Add hessian · Bᵀ ∂²(Σ w A z̄) B + stiffness · Bᵀ (L_(wz) ⊗ I) B to the upper triangle ``data``.
+
+    L_(wz) is the cotangent Laplacian with the weights max(w z̄, 0), which the tension w z adds to.
+    """
+    arguments = basis, dimension, start, indptr, offset, hessian, stiffness, data
+    _assemble(faces, patch, X, surface.weights, *_plane(surface), *arguments)
+
+
+def _plane(surface: Surface) -> tuple[Floats, Floats]:
+    return np.array(surface.plane.point), np.array(surface.plane.normal)
+
+
+@compiled
+def _measure(
+    F: Ints, patch: Ints, X: Floats, weight: Floats, at: Floats, normal: Floats, moment: Floats, out: Floats
+) -> None:
+    origin, n = vector(at), vector(normal)
+    for f in range(len(F)):
+        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+        twice = cross(sub(b, a), sub(c, a))
+        twice_area = norm(twice)
+        mean = dot(sub(scaled(1.0 / 3.0, add(add(a, b), c)), origin), n)
+        moment[patch[f]] += 0.5 * twice_area * mean
+        w = weight[patch[f]]
+        if len(out) == 0 or w == 0.0 or twice_area == 0.0:
+            continue
+        half_nu = scaled(0.5 * w * mean / twice_area, twice)
+        down = scaled(w * twice_area / 6.0, n)
+        accumulate(out, F[f, 0], add(cross(half_nu, sub(c, b)), down))
+        accumulate(out, F[f, 1], add(cross(half_nu, sub(a, c)), down))
+        accumulate(out, F[f, 2], add(cross(half_nu, sub(b, a)), down))
+
+
+@compiled
+def _add_products(
+    F: Ints, patch: Ints, X: Floats, D: Floats, weight: Floats, at: Floats, normal: Floats, change: Floats
+) -> None:
+    """With ν = m/|m| of m = u × v, two edges: ν changes by (Dm - ν ⟨ν, Dm⟩) / |m|, and |m| by ⟨ν, Dm⟩."""
+    origin, n = vector(at), vector(normal)
+    for f in range(len(F)):
+        w = weight[patch[f]]
+        if w == 0.0:
+            continue
+        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+        Da, Db, Dc = point(D, F[f, 0]), point(D, F[f, 1]), point(D, F[f, 2])
+        u, v, Du, Dv = sub(b, a), sub(c, a), sub(Db, Da), sub(Dc, Da)
+        m, Dm = cross(u, v), cross_sum(Du, v, u, Dv)
+        length = norm(m)
+        if length == 0.0:
+            continue
+        mean = dot(sub(scaled(1.0 / 3.0, add(add(a, b), c)), origin), n)
+        Dmean = dot(add(add(Da, Db), Dc), n) / 3.0
+        nu = scaled(1.0 / length, m)
+        Dnu = scaled(1.0 / length, sub(Dm, scaled(dot(nu, Dm), nu)))
+        half, Dhalf = scaled(0.5 * w * mean, nu), scaled(0.5 * w * mean, Dnu)
+        Dhalf = add(Dhalf, scaled(0.5 * w * Dmean, nu))
+        down = scaled(w * dot(nu, Dm) / 6.0, n)
+        accumulate(change, F[f, 0], add(cross_sum(Dhalf, sub(c, b), half, sub(Dc, Db)), down))
+        accumulate(change, F[f, 1], add(cross_sum(Dhalf, sub(a, c), half, sub(Da, Dc)), down))
+        accumulate(change, F[f, 2], add(cross_sum(Dhalf, sub(b, a), half, sub(Db, Da)), down))
+
+
+@compiled
+def _entry(
+    weight: float,
+    mean: float,
+    bending: float,
+    nu: Vector,
+    after: float,
+    n: Vector,
+    g_i: Vector,
+    g_j: Vector,
+    b_i: Vector,
+    b_j: Vector,
+) -> float:
+    """⟨b_i, w ∂²(A z̄)/∂i∂j b_j⟩; ``bending`` is (e_i·e_j)/(4A), ``after`` 1 if j follows i, 0 if it is i."""
+    curved = bending * dot(b_i, nu) * dot(b_j, nu) - 0.5 * after * dot(nu, cross(b_j, b_i))
+    slope = dot(b_i, g_i) * dot(n, b_j) + dot(b_i, n) * dot(g_j, b_j)
+    return weight * (mean * curved + slope / 3.0)
+
+
+@compiled
+def _assemble(
+    F: Ints,
+    patch: Ints,
+    X: Floats,
+    weight: Floats,
+    at_plane: Floats,
+    normal: Floats,
+    basis: Floats,
+    dimension: Ints,
+    start: Ints,
+    indptr: Ints,
+    offset: Ints,
+    hessian: float,
+    stiffness: float,
+    data: Floats,
+) -> None:
+    origin, n = vector(at_plane), vector(normal)
+    for f in range(len(F)):
+        wt = weight[patch[f]]
+        if wt == 0.0:
+            continue
+        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+        edge = (sub(c, b), sub(a, c), sub(b, a))
+        twice = cross(edge[1], edge[2])
+        length = norm(twice)
+        if length == 0.0:
+            continue
+        nu = scaled(1.0 / length, twice)
+        mean = dot(sub(scaled(1.0 / 3.0, add(add(a, b), c)), origin), n)
+        half = scaled(0.5, nu)
+        g = (cross(half, edge[0]), cross(half, edge[1]), cross(half, edge[2]))
+        added = stiffness * max(wt * mean, 0.0) * 0.5 / length
+        for i in range(3):
+            j = (i + 1) % 3
+            v, w = F[f, i], F[f, j]
+            square, product = dot(edge[i], edge[i]), dot(edge[i], edge[j])
+            for r in range(dimension[v]):
+                b_r = vector(basis[v, r])
+                at = indptr[start[v] + r] - r
+                for s in range(r, dimension[v]):
+                    b_s = vector(basis[v, s])
+                    value = _entry(wt, mean, 0.5 * square / length, nu, 0.0, n, g[i], g[i], b_r, b_s)
+                    data[at + s] += hessian * value + added * square * dot(b_r, b_s)
+                for s in range(dimension[w]):
+                    b_s = vector(basis[w, s])
+                    value = _entry(wt, mean, 0.5 * product / length, nu, 1.0, n, g[i], g[j], b_r, b_s)
+                    value = hessian * value + added * product * dot(b_r, b_s)
+                    if v < w:
+                        at_w = indptr[start[v] + r] + dimension[v] - r + offset[f, i] + s
+                    else:
+                        at_w = indptr[start[w] + s] + dimension[w] - s + offset[f, i] + r
+                    data[at_w] += value

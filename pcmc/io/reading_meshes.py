@@ -1,0 +1,206 @@
+"""The part of the reading process that uses MeshLab: it reads meshes, and repairs them.
+
+``reading_script`` loads this file by its path, so it imports nothing of pcmc. MeshLab's code is native, and a
+mesh that is wrong can crash it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+FLAT = 1e-12  # area over the squared longest edge: a triangle below has none
+T_VERTEX = 1e6  # longest edge over height: such a triangle is taken out by flipping its longest edge
+ROUNDS = 10  # of isotropic remeshing
+
+
+def meshlab_arrays(path: str) -> dict[str, Any]:
+    """The meshes in a file that MeshLab reads: points, triangles and a name each."""
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet()
+    meshes.load_new_mesh(path)
+    parts = [meshes.mesh(k) for k in range(meshes.mesh_number())] if meshes.mesh_number() else []
+    return {
+        "meshes": [
+            {"points": part.transformed_vertex_matrix(), "faces": part.face_matrix(), "name": part.label()}
+            for part in parts
+        ]
+    }
+
+
+def repaired_arrays(path: str) -> dict[str, Any]:
+    """The repaired mesh of an .npz with points, faces, patch and options, and what was changed."""
+    with np.load(path, allow_pickle=False) as data:
+        X, F, patch = data["points"], data["faces"], data["patch"]
+        weld, holes, edge_length = float(data["weld"]), int(data["holes"]), float(data["edge_length"])
+    changes: dict[str, int] = {}
+    X, F, patch = _cleaned(X, F, patch, weld, changes)
+    single = _edges_of_one_face(F)
+    n, points, faces, owner = len(X), [X], [], []
+    for number in np.unique(patch):
+        local, vertex = _repaired_patch(X, F[patch == number], single, holes, changes)
+        if edge_length > 0.0:  # the only patch: the curves between patches would tear
+            local, X = _remeshed(X, vertex[local], edge_length)
+            return {"points": X, "faces": local, "patch": np.full(len(local), number), "changes": changes}
+        first = np.zeros(len(vertex), dtype=bool)
+        first[np.unique(vertex, return_index=True)[1]] = True
+        new = np.where(first, vertex, 0)
+        new[~first] = n + np.arange(np.count_nonzero(~first))  # copies where an edge was split
+        points.append(X[vertex[~first]])
+        n += int(np.count_nonzero(~first))
+        faces.append(new[local])
+        owner.append(np.full(len(local), number))
+    everything = np.concatenate(faces)
+    used, inverse = np.unique(everything, return_inverse=True)
+    return {
+        "points": np.concatenate(points)[used],
+        "faces": inverse.reshape(-1, 3),
+        "patch": np.concatenate(owner),
+        "changes": changes,
+    }
+
+
+def _meshset(X: Any, F: Any, **data: Any) -> Any:
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet()
+    meshes.add_mesh(pymeshlab.Mesh(np.ascontiguousarray(X), np.ascontiguousarray(F, dtype=np.int32), **data))
+    return meshes
+
+
+def _cleaned(X: Any, F: Any, patch: Any, weld: float, changes: dict[str, int]) -> Any:
+    """Without points that are no numbers, near copies of vertices, and repeated triangles."""
+    import pymeshlab
+
+    sound = np.isfinite(X).all(axis=1)
+    known = sound[F].all(axis=1)
+    changes["triangles at points that are no numbers left out"] = int(np.count_nonzero(~known))
+    X, label = np.where(sound[:, None], X, 0.0), patch[known].astype(float)
+    meshes = _meshset(X, F[known], f_scalar_array=label)
+    before = len(np.unique(F[known]))
+    meshes.meshing_remove_unreferenced_vertices()
+    if weld > 0.0:
+        meshes.meshing_merge_close_vertices(threshold=pymeshlab.PureValue(weld))
+    mesh = meshes.current_mesh()
+    changes["vertices welded"] = before - mesh.vertex_number()
+    faces = mesh.face_matrix()
+    whole = (faces != faces[:, [1, 2, 0]]).all(axis=1)
+    changes["triangles without area left out"] = len(label) - int(np.count_nonzero(whole))
+    meshes = _meshset(mesh.vertex_matrix(), faces[whole], f_scalar_array=mesh.face_scalar_array()[whole])
+    before = meshes.current_mesh().face_number()
+    meshes.meshing_remove_duplicate_faces()
+    mesh = meshes.current_mesh()
+    changes["repeated triangles left out"] = before - mesh.face_number()
+    if not mesh.face_number():
+        raise RuntimeError("no triangle is left; is its weld distance larger than its triangles?")
+    return mesh.vertex_matrix(), mesh.face_matrix(), mesh.face_scalar_array().astype(np.int64)
+
+
+def _edge_keys(F: Any, n: int) -> Any:
+    """(m,3) a number for each edge of each face."""
+    ends = np.stack([F, np.roll(F, -1, axis=1)])
+    return ends.min(axis=0).astype(np.int64) * n + ends.max(axis=0)
+
+
+def _edges_of_one_face(F: Any) -> Any:
+    """A function that tells which edges of faces belong to one face of the whole mesh."""
+    n = int(F.max()) + 1
+    keys, count = np.unique(_edge_keys(F, n), return_counts=True)
+    single = keys[count == 1]
+    return lambda faces: np.isin(_edge_keys(faces, n), single)
+
+
+def _area_vectors(X: Any, F: Any) -> Any:
+    a, b, c = (X[F[:, k]] for k in range(3))
+    return 0.5 * np.cross(b - a, c - a)
+
+
+def _repaired_patch(X: Any, F: Any, single: Any, holes: int, changes: dict[str, int]) -> tuple[Any, Any]:
+    """Triangles (m,3) of a patch, and the vertex of the whole mesh (n,) that each of its vertices is."""
+
+    def add(what: str, number: Any) -> None:
+        changes[what] = changes.get(what, 0) + int(number)
+
+    used, local = np.unique(F, return_inverse=True)
+    meshes = _meshset(X[used], local.reshape(-1, 3), v_scalar_array=used.astype(float))
+    before = _flat(X, F)
+    if before.any():
+        meshes.meshing_remove_t_vertices(method="Edge Flip", threshold=T_VERTEX, repeat=True)
+        mesh = meshes.current_mesh()
+        vertex, faces = _vertices(mesh), mesh.face_matrix()
+        flat = _flat(mesh.vertex_matrix(), faces)
+        add("triangles without area left out", np.count_nonzero(flat))
+        add("triangles without area flipped away", max(np.count_nonzero(before) - np.count_nonzero(flat), 0))
+        meshes = _meshset(mesh.vertex_matrix(), faces[~flat], v_scalar_array=vertex.astype(float))
+    mesh = meshes.current_mesh()
+    count = np.unique(_edge_keys(mesh.face_matrix(), mesh.vertex_number()), return_counts=True)[1]
+    add("edges of three or more triangles of one patch split", np.count_nonzero(count > 2))
+    if (count > 2).any():
+        meshes.meshing_repair_non_manifold_edges(method="Split Vertices")
+    old = _area_vectors(meshes.current_mesh().vertex_matrix(), meshes.current_mesh().face_matrix())
+    meshes.meshing_re_orient_faces_coherently()
+    mesh = meshes.current_mesh()
+    turned = np.einsum("ij,ij->i", old, _area_vectors(mesh.vertex_matrix(), mesh.face_matrix())) < 0.0
+    add("triangles turned", min(np.count_nonzero(turned), np.count_nonzero(~turned)))
+    faces = mesh.face_matrix()
+    size = len(faces)
+    if holes >= 3:
+        meshes.meshing_close_holes(maxholesize=holes, newfaceselected=True, selfintersection=False)
+        mesh = meshes.current_mesh()
+        faces = _without_large_fills(mesh, size, _vertices(mesh), single, add)
+    points = meshes.current_mesh().vertex_matrix()
+    up = _area_vectors(points, faces)[:, 2]
+    if abs(up.sum()) > 0.01 * np.abs(up).sum() and up.sum() < 0.0:  # a roof that looks down
+        faces = faces[:, ::-1]
+    return faces, _vertices(meshes.current_mesh())
+
+
+def _vertices(mesh: Any) -> Any:
+    return np.rint(mesh.vertex_scalar_array()).astype(np.int64)
+
+
+def _flat(X: Any, F: Any) -> Any:
+    """(m,) triangles without area."""
+    corner = X[F]
+    edges = np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2)
+    return np.linalg.norm(_area_vectors(X, F), axis=1) <= FLAT * edges.max(axis=1) ** 2
+
+
+def _without_large_fills(mesh: Any, size: int, vertex: Any, single: Any, add: Any) -> Any:
+    """The faces without fills of what is no small hole: a curve where another patch is, an outer edge."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    X, faces = mesh.vertex_matrix(), mesh.face_matrix()
+    fill = faces[size:]
+    if not len(fill):
+        return faces
+    keys = _edge_keys(fill, len(X))
+    order = np.argsort(keys, axis=None, kind="stable")
+    flat, owner = keys.ravel()[order], order // 3
+    pair = np.flatnonzero(flat[1:] == flat[:-1])
+    graph = coo_array((np.ones(len(pair)), (owner[pair], owner[pair + 1])), shape=(len(fill), len(fill)))
+    count, part = connected_components(graph, directed=False)
+    rim = ~np.isin(keys, flat[pair])
+    whole = np.where(rim, single(vertex[fill]), True).all(axis=1)
+    length = np.where(rim, np.linalg.norm(X[fill] - X[np.roll(fill, -1, axis=1)], axis=2), 0.0).sum(axis=1)
+    reach = np.sqrt(np.linalg.norm(_area_vectors(X, faces[:size]), axis=1).sum())
+    good = (np.bincount(part, ~whole, count) == 0) & (np.bincount(part, length, count) <= reach)
+    add("holes closed", np.count_nonzero(good))
+    add("triangles added in holes", np.count_nonzero(good[part]))
+    return np.concatenate([faces[:size], fill[good[part]]])
+
+
+def _remeshed(X: Any, F: Any, edge_length: float) -> tuple[Any, Any]:
+    """Triangles of an edge length; faces and points."""
+    import pymeshlab
+
+    meshes = _meshset(X, F)
+    meshes.meshing_remove_unreferenced_vertices()
+    meshes.meshing_isotropic_explicit_remeshing(
+        iterations=ROUNDS, targetlen=pymeshlab.PureValue(edge_length), checksurfdist=False
+    )
+    mesh = meshes.current_mesh()
+    return mesh.face_matrix(), mesh.vertex_matrix()

@@ -1,0 +1,116 @@
+"""Universal Scene Description (.usda), written only: a mesh per patch, in single precision.
+
+z is up, and the file names the unit of length (metres if the surface has none). Each patch is a mesh with a
+material of its name, in its colour; with ``colour`` the vertices have the colours of a scalar. A surface far
+from the origin is written about its middle, and the transform of the roof places it. Supports and scalars are
+primvars; tensions, pressures, plane and walls without height are custom data of the roof.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..base.errors import MissingExtra
+from ..base.units import Units, length_factor
+from ..surface import Surface
+from ..surface.colours import linear, patch_colors, scalar_colors
+from ..surface.surface import FAR
+from .mesh_data import support_of
+from .metadata import metadata_text
+
+ROOF = "/Roof"
+SUPPORT = "support"
+
+
+def write(
+    path: Path,
+    surface: Surface,
+    scalars: Mapping[str, Floats],
+    walls: str | None,
+    units: Units,
+    colour: str,
+    **_: Any,
+) -> None:
+    """One layer."""
+    try:
+        from pxr import Usd, UsdGeom, Vt
+    except ImportError:
+        raise MissingExtra("usd-core", "usd") from None
+
+    stage: Any = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, length_factor(units.length, "m"))
+    roof: Any = UsdGeom.Xform.Define(stage, ROOF)
+    stage.SetDefaultPrim(roof.GetPrim())
+    roof.GetPrim().SetCustomDataByKey("pcmc", metadata_text(surface, units))
+    if walls is not None:
+        roof.GetPrim().SetCustomDataByKey("walls", walls)
+    middle = surface.vertices.mean(axis=0)
+    if np.linalg.norm(middle) <= FAR * surface.size:
+        middle = np.zeros(3)
+    middle = np.round(middle)
+    if middle.any():
+        roof.AddTranslateOp().Set(tuple(middle.tolist()))
+    at_vertices = {SUPPORT: support_of(surface).astype(float)}
+    at_vertices |= {name: values for name, values in scalars.items() if len(values) == surface.n}
+    shades = linear(scalar_colors(scalars[colour])[0]) if colour else None
+    for k, color in enumerate(linear(patch_colors(surface))):
+        faces = surface.faces[surface.patch_of_face == k]
+        if not len(faces):
+            continue
+        used, local = np.unique(faces, return_inverse=True)
+        mesh: Any = UsdGeom.Mesh.Define(stage, f"{ROOF}/patch_{k}")
+        mesh.GetPrim().SetDisplayName(surface.patches[k].name)
+        points = Vt.Vec3fArray.FromNumpy((surface.vertices[used] - middle).astype(np.float32))
+        mesh.CreatePointsAttr(points)
+        mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
+        mesh.CreateFaceVertexCountsAttr([3] * len(faces))
+        mesh.CreateFaceVertexIndicesAttr(local.ravel().tolist())
+        mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+        mesh.CreateDoubleSidedAttr(True)
+        shown = color[None] if shades is None else shades[used]
+        interpolation = UsdGeom.Tokens.constant if shades is None else UsdGeom.Tokens.vertex
+        colors = mesh.CreateDisplayColorPrimvar(interpolation)
+        colors.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(shown, dtype=np.float32)))
+        primvars = UsdGeom.PrimvarsAPI(mesh)
+        for name, values in at_vertices.items():
+            primvar = _primvar(primvars, re.sub(r"\W+", "_", name))
+            primvar.Set(Vt.FloatArray.FromNumpy(values[used].astype(np.float32)))
+        _bind_material(stage, mesh, k, color, vertex_colors=shades is not None)
+    path.write_text(stage.GetRootLayer().ExportToString(), encoding="utf-8")
+
+
+def _primvar(primvars: Any, name: str) -> Any:
+    """An array of numbers at vertices."""
+    from pxr import Sdf, UsdGeom
+
+    return primvars.CreatePrimvar(name, Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.vertex)
+
+
+def _bind_material(stage: Any, mesh: Any, k: int, color: Floats, vertex_colors: bool) -> None:
+    """A material of the patch's name, in its colour or in the colours of the vertices."""
+    from pxr import Gf, Sdf, UsdShade
+
+    types: Any = Sdf.ValueTypeNames
+    place = f"{ROOF}/Materials/material_{k}"
+    material: Any = UsdShade.Material.Define(stage, place)
+    material.GetPrim().SetDisplayName(mesh.GetPrim().GetDisplayName())
+    shader: Any = UsdShade.Shader.Define(stage, f"{place}/surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    shader.CreateInput("roughness", types.Float).Set(0.9)
+    diffuse = shader.CreateInput("diffuseColor", types.Color3f)
+    if vertex_colors:
+        reader: Any = UsdShade.Shader.Define(stage, f"{place}/colors")
+        reader.CreateIdAttr("UsdPrimvarReader_float3")
+        reader.CreateInput("varname", types.String).Set("displayColor")
+        diffuse.ConnectToSource(reader.CreateOutput("result", types.Float3))
+    else:
+        diffuse.Set(Gf.Vec3f(*color.tolist()))
+    material.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", types.Token))
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)

@@ -1,0 +1,261 @@
+"""The schedule of a roof's panels: families, sizes, angles, areas, edge totals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from ..base import validate
+from ..base.arrays import Floats, Ints
+from ..base.errors import SurfaceError
+from ..certificate import Certificate, certify
+from ..surface import Surface, expect_surface
+from ..surface.geometry import edge_vectors, face_areas, segment_lengths
+from .families import families
+from .unfolding import joints, unfolded
+
+MIRROR_IMAGES = ("alike", "apart")
+SHOWN = 12  # families that ``print`` shows
+
+
+@dataclass(frozen=True, eq=False)
+class Panels:
+    """The panels of a surface: its triangles, in families. ``print`` shows the table.
+
+    Panels and families are numbered from 1; larger families first. Lengths are in the surface's unit, angles
+    in degrees.
+
+    Attributes
+    ----------
+    surface : the surface.
+    tolerance : corresponding edges of every two panels of a family differ in length by at most this.
+    mirror_images : "alike", one family holds a panel and its mirror image; or "apart".
+    certificate : of the surface.
+    families : a row per family, with the columns
+
+        - ``family``, ``count``: its number, and the number of its panels;
+        - ``mirrored``: how many of them are mirror images of the others, turned over;
+        - ``a``, ``b``, ``c``: the middle of the range of each edge's length, ascending;
+        - ``spread``: the largest difference of corresponding edges, at most ``tolerance``;
+        - ``area``: of its panels together, length².
+    panels : a row per panel, with the columns
+
+        - ``panel``, ``face``: its number, and its row in ``surface.faces``;
+        - ``patch``, ``family``; ``mirrored``: whether it is a mirror image of most others of its family;
+        - ``a``, ``b``, ``c``: its edges' lengths in the order of its family;
+        - ``edge_a``, ``edge_b``, ``edge_c``: their rows in ``surface.topology.edges``;
+        - ``area``, length².
+    edges : a row per pair of neighbours, and per edge of a single panel, with the columns
+
+        - ``edge``: its row in ``surface.topology.edges``;
+        - ``kind``: "inside" a patch, "junction" (also a seam between patches) or "boundary";
+        - ``length``;
+        - ``panel``, ``neighbour``: numbers of panels, 0 for none;
+        - ``dihedral``: the angle between both on the inner side of the first: 180 where they are flat, less
+          at a ridge, more at a valley; NaN with one panel. Where more than two panels meet, the edge has a
+          row for each pair, in turn around it.
+    flat : (k,3,2) the panels laid flat, outside up, corners as in ``surface.faces``: the longest edge lies on
+        the x axis and starts at the origin.
+    at_least : no partition of these panels within the tolerance has fewer families.
+    """
+
+    surface: Surface
+    tolerance: float
+    mirror_images: str
+    certificate: Certificate
+    families: pd.DataFrame
+    panels: pd.DataFrame
+    edges: pd.DataFrame
+    flat: Floats
+    at_least: int
+
+    @property
+    def count(self) -> int:
+        """Number of families."""
+        return len(self.families)
+
+    @property
+    def area(self) -> float:
+        """Area of all panels, length²."""
+        return float(self.panels["area"].sum())
+
+    @property
+    def largest(self) -> pd.Series:
+        """The row of the panel with the largest area."""
+        return self.panels.iloc[int(self.panels["area"].to_numpy().argmax())]
+
+    @property
+    def smallest(self) -> pd.Series:
+        """The row of the panel with the smallest area."""
+        return self.panels.iloc[int(self.panels["area"].to_numpy().argmin())]
+
+    @property
+    def edge_totals(self) -> pd.DataFrame:
+        """``kind``, ``count``, ``length``: of all edges, each once."""
+        once = self.edges.drop_duplicates("edge")
+        totals = once.groupby("kind")["length"].agg(["size", "sum"])
+        return totals.set_axis(["count", "length"], axis=1).reset_index()
+
+    @property
+    def family_of_face(self) -> Floats:
+        """(m,) the family of each face of the surface, NaN for walls that are no panels: for pictures."""
+        family = np.full(self.surface.m, np.nan)
+        family[self.panels["face"]] = self.panels["family"]
+        return family
+
+    def __str__(self) -> str:
+        total = self.edge_totals
+        lengths = ", ".join(f"{r.kind} {r.length:.6g} ({r['count']})" for _, r in total.iterrows())
+        angles = self.edges["dihedral"].dropna()
+        rows = [
+            ("panels", f"{len(self.panels)} in {self.count} families, at least {self.at_least} are needed"),
+            ("tolerance", f"{self.tolerance:g}, mirror images {self.mirror_images}"),
+            ("area", f"{self.area:.8g}"),
+            ("largest panel", _described(self.largest)),
+            ("smallest panel", _described(self.smallest)),
+            ("edges", f"{total['length'].sum():.6g} long: {lengths}"),
+        ]
+        if len(angles):
+            rows.append(("angles", f"{angles.min():.1f} to {angles.max():.1f} degrees between neighbours"))
+        if not self.certificate.certified:
+            rows.insert(0, ("not certified", self.certificate.verdict.value))
+        head = "\n".join(f"{name:>14}  {text}" for name, text in rows)
+        table = self.families.head(SHOWN).to_string(index=False, float_format=lambda x: f"{x:.5g}")
+        rest = self.count - SHOWN
+        return f"{head}\n\n{table}" + (f"\n... {rest} more families" if rest > 0 else "")
+
+
+def panels(
+    surface: Surface,
+    tolerance: float,
+    *,
+    mirror_images: str = "alike",
+    walls: bool = False,
+    anyway: bool = False,
+) -> Panels:
+    """The panels of a roof, in as few families of congruent triangles as a search finds.
+
+    Parameters
+    ----------
+    surface : a certified surface.
+    tolerance : largest difference between corresponding edges of two panels of a family, length, > 0.
+    mirror_images : "alike": a panel that is turned over fits, as where both sides are the same; "apart":
+        mirror images are of different families.
+    walls : whether triangles of walls are panels, too.
+    anyway : accept a surface that is not certified.
+
+    Raises
+    ------
+    SurfaceError : the surface is not certified, or has no panels.
+
+    Examples
+    --------
+    >>> from pcmc import Patch, Surface
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
+    >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("roof", 1.0)], fixed=range(4))
+    >>> schedule = panels(roof, tolerance=0.01)
+    >>> schedule.families[["count", "a", "b", "c"]].round(9).to_numpy().tolist()
+    [[4.0, 1.457737974, 1.457737974, 2.0]]
+    """
+    expect_surface(surface)
+    tolerance = validate.positive("tolerance", tolerance)
+    validate.choice("mirror_images", mirror_images, MIRROR_IMAGES)
+    validate.flag("walls", walls)
+    certificate = certified(surface, anyway)
+    faces = np.flatnonzero(~surface.walls[surface.patch_of_face] | walls)
+    if not len(faces):
+        hint = "; pass walls=True to count walls as panels" if surface.m else ""
+        text = f"surface: no panels: every patch is a wall{hint}"
+        raise SurfaceError(text, what="surface", found=0, expected="a patch that is no wall")
+    corners = surface.vertices[surface.faces[faces]]
+    lengths = np.linalg.norm(edge_vectors(corners), axis=2)
+    parts = families(lengths, tolerance, mirror_images == "apart")
+    table = _panel_table(surface, faces, lengths, parts.family, parts.order)
+    return Panels(
+        surface=surface,
+        tolerance=tolerance,
+        mirror_images=mirror_images,
+        certificate=certificate,
+        families=_family_table(table),
+        panels=table,
+        edges=_edge_table(surface, faces),
+        flat=unfolded(corners),
+        at_least=parts.at_least,
+    )
+
+
+def certified(surface: Surface, anyway: bool) -> Certificate:
+    """The certificate of a surface; refuses one that is not certified, unless ``anyway``."""
+    validate.flag("anyway", anyway)
+    certificate = certify(surface)
+    if not (certificate.certified or anyway):
+        verdict = certificate.verdict
+        text = f"surface: not certified ({verdict.value}); solve it first, or accept it with"
+        text += " anyway=True (--anyway)"
+        raise SurfaceError(text, what="surface", found=verdict, expected="a certified surface")
+    return certificate
+
+
+def _panel_table(surface: Surface, faces: Ints, lengths: Floats, family: Ints, order: Ints) -> pd.DataFrame:
+    aligned = np.take_along_axis(lengths, order, axis=1)
+    mean = np.stack([np.bincount(family, column) for column in aligned.T], axis=1)
+    ascending = np.argsort(mean, axis=1, kind="stable")[family]  # the families' edges by length
+    order = np.take_along_axis(order, ascending, axis=1)
+    aligned = np.take_along_axis(aligned, ascending, axis=1)
+    over = (order[:, 1] - order[:, 0]) % 3 == 2  # its edges ascend clockwise
+    more = np.bincount(family, over) > 0.5 * np.bincount(family)
+    edge = np.take_along_axis(surface.topology.edge_of_face[faces], order, axis=1)
+    names = np.array([patch.name for patch in surface.patches], dtype=object)
+    return pd.DataFrame(
+        {
+            "panel": np.arange(len(faces)) + 1,
+            "face": faces,
+            "patch": names[surface.patch_of_face[faces]],
+            "family": family + 1,
+            "mirrored": over != more[family],
+            **{name: aligned[:, k] for k, name in enumerate("abc")},
+            **{f"edge_{name}": edge[:, k] for k, name in enumerate("abc")},
+            "area": face_areas(surface.vertices[surface.faces[faces]]),
+        }
+    )
+
+
+def _family_table(table: pd.DataFrame) -> pd.DataFrame:
+    groups = table.groupby("family")
+    least, most = groups[["a", "b", "c"]].min(), groups[["a", "b", "c"]].max()
+    middle = 0.5 * (least + most)
+    return pd.DataFrame(
+        {
+            "family": least.index,
+            "count": groups.size().to_numpy(),
+            "mirrored": groups["mirrored"].sum().to_numpy(),
+            **{name: middle[name].to_numpy() for name in "abc"},
+            "spread": (most - least).max(axis=1).to_numpy(),
+            "area": groups["area"].sum().to_numpy(),
+        }
+    )
+
+
+def _edge_table(surface: Surface, faces: Ints) -> pd.DataFrame:
+    topo = surface.topology
+    pairs = joints(surface.vertices, surface.faces[faces], topo.edge_of_face[faces])
+    edge = pairs["edge"].to_numpy()
+    junction, boundary = (topo.junction_edge | topo.seam_edge)[edge], topo.boundary_edge[edge]
+    return pd.DataFrame(
+        {
+            "edge": edge,
+            "kind": np.where(junction, "junction", np.where(boundary, "boundary", "inside")),
+            "length": segment_lengths(surface.vertices, topo.edges[edge]),
+            "panel": pairs["first"] + 1,
+            "neighbour": pairs["second"] + 1,
+            "dihedral": pairs["dihedral"],
+        }
+    )
+
+
+def _described(panel: pd.Series) -> str:
+    sizes = " × ".join(f"{panel[name]:.4g}" for name in "abc")
+    return f"{panel['panel']} of patch {panel['patch']!r}: {sizes}, area {panel['area']:.4g}"

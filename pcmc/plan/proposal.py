@@ -1,0 +1,230 @@
+"""Values that a first roof succeeds with, for what a drawing does not say: edge length, tensions, walls."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import shapely
+
+from ..base.errors import OptionError, PlanError, unknown
+from .curves import Curve
+from .drawing import Drawing, Label
+from .parts import Area, Divider, Hole, check_keys
+
+TRIANGLES = 1500  # of a first roof, about
+FINEST = 6000  # triangles at most, where a part is small
+ACROSS = 2.5  # edges from the middle of the smallest part to its edge, at least
+ROOM = 1.6  # tension, over the least at which a roof over the plan exists
+WALL_ROOM = 0.3  # of the smaller tension: a wall's tension above the difference of its neighbours'
+SAMPLES = 16  # points of a divider at which its neighbours are looked up
+NEAR = 1e-4  # of the plan's size: a part this near to a point of a divider is beside it
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of the plan: its polygon, the point farthest from its edge, and its distance from there."""
+
+    area: Any
+    middle: tuple[float, float]
+    radius: float
+
+
+def parts_of(drawing: Drawing) -> list[Part]:
+    """The parts into which the dividers cut the plan, from left to right."""
+    holes = [_line(curve) for curve in drawing.holes.values()]
+    lines = [_line(drawing.outline), *holes, *(_line(curve) for curve in drawing.dividers.values())]
+    noded = shapely.set_precision(shapely.union_all(lines, grid_size=1e-3 * drawing.gap), 0.0)
+    roof = roof_area(drawing)
+    polygons = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
+    inside = [p for p in polygons if shapely.contains_xy(roof, *_middle(p)[0])]
+    parts = [Part(p, *_middle(p)) for p in inside]
+    return sorted(parts, key=lambda part: (round(part.area.centroid.x, 6), round(part.area.centroid.y, 6)))
+
+
+def roof_area(drawing: Drawing) -> Any:
+    """The plan without its holes, as a polygon."""
+    holes = [curve.at(curve.dense)[:, :2] for curve in drawing.holes.values()]
+    outline = shapely.Polygon(drawing.outline.at(drawing.outline.dense)[:, :2])
+    for hole in holes:
+        outline = shapely.difference(shapely.make_valid(outline), shapely.make_valid(shapely.Polygon(hole)))
+    return outline
+
+
+def _line(curve: Curve) -> Any:
+    xy = curve.at(curve.dense)[:, :2]
+    return shapely.LineString(xy)
+
+
+def _middle(area: Any) -> tuple[tuple[float, float], float]:
+    """The centre and radius of the largest circle in a polygon."""
+    radius_line = shapely.maximum_inscribed_circle(area, tolerance=0.01 * math.sqrt(area.area))
+    x, y = radius_line.coords[0]
+    return (x, y), float(radius_line.length)
+
+
+def least_tension(area: Any, pressure: float = 1.0) -> float:
+    """The tension below which no roof over the area is in equilibrium, force/length.
+
+    Over every part D of the plan the pressure p |D| is carried by the tension along its edge, at most
+    α |∂D|, so α ≥ p sup |D| / |∂D| = p / h with Cheeger's constant h. In a convex plan 1/h is the r at which
+    the plan made narrower by r all around has the area π r² (Kawohl and Lachand-Robert, 2006); in others this
+    is an estimate.
+
+    >>> round(least_tension(shapely.Point(0, 0).buffer(4.0, quad_segs=64)), 2)
+    2.0
+    """
+    low, high = 0.0, math.sqrt(area.area / math.pi)
+    for _ in range(30):
+        r = 0.5 * (low + high)
+        low, high = (r, high) if shapely.buffer(area, -r).area > math.pi * r * r else (low, r)
+    return pressure * low
+
+
+def edge_length_for(parts: Sequence[Part], drawing: Drawing) -> float:
+    """An edge length that gives about 1500 triangles, more where parts or holes are small; two digits."""
+    area = sum(part.area.area for part in parts)
+    least, most = (math.sqrt(area / (count * math.sqrt(0.1875))) for count in (FINEST, TRIANGLES))
+    holes = [curve.length / 12.0 for curve in drawing.holes.values()]
+    wanted = min([most, *(part.radius / ACROSS for part in parts), *holes])
+    return float(f"{max(wanted, least):.2g}")
+
+
+def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """The keys of a plan for a drawing: those ``given``, and values for all others.
+
+    ``given`` may have every key of a plan but the outline. Its ``patches`` need no ``at`` where they have the
+    names of the drawing, or those given here. An entry of its ``dividers`` or ``holes`` with the ``name`` of
+    a drawn one and no curve changes that one; others are added.
+
+    Raises
+    ------
+    PlanError, OptionError : for a name that the drawing does not have, or has outside the plan.
+    """
+    values = dict(given or {})
+    parts = parts_of(drawing)
+    areas = _areas(parts, drawing, values.pop("patches", {}), values.pop("tension", None))
+    tensions = [area["tension"] for area in areas]
+    dividers = _changed(drawing.dividers, values.pop("dividers", []), "divider", Divider)
+    for entry in dividers:
+        if isinstance(entry, dict) and entry.get("name") in drawing.dividers:
+            entry.setdefault("bottom", "held" if drawing.flat else "sloped")
+            entry.setdefault("wall", wall_tension(entry["curve"], parts, tensions, drawing.outline.length))
+    patches: dict[str, dict[str, Any]] = {}
+    for area in areas:
+        name = area.pop("name")
+        if name in patches:  # several parts of one name are one patch
+            patches[name]["at"] = [*_as_points(patches[name]["at"]), *_as_points(area["at"])]
+        else:
+            patches[name] = area
+    plan: dict[str, Any] = {
+        "outline": drawing.outline,
+        "edge_length": edge_length_for(parts, drawing),
+        "holes": _changed(drawing.holes, values.pop("holes", []), "hole", Hole),
+        "dividers": dividers,
+        "supports": [*drawing.supports, *values.pop("supports", [])],
+        "patches": patches,
+    }
+    if drawing.level != 0.0:
+        plan["plane"] = {"point": [0.0, 0.0, drawing.level]}
+    return plan | values
+
+
+def _areas(
+    parts: Sequence[Part], drawing: Drawing, given: Mapping[str, Any], tension: float | None
+) -> list[dict[str, Any]]:
+    """For each part its patch's name, point and values: given, of the drawing, or proposed."""
+    if not parts:
+        text = f"{drawing.path}: the outline encloses no area in plan; draw it around the roof"
+        raise PlanError(text, what="outline")
+    least = least_tension(roof_area(drawing))
+    default = float(f"{ROOM * least:.2g}") if tension is None else tension
+    names = _names(parts, drawing)
+    areas = []
+    for k, part in enumerate(parts):
+        point = [float(f"{value:.5g}") for value in part.middle]
+        point = point if shapely.contains_xy(part.area, *point) else list(part.middle)
+        label = names.get(k)
+        name = label.name if label else "roof" if len(parts) == 1 else f"patch {k + 1}"
+        own = default if label is None or label.tension is None else label.tension
+        areas.append({"name": name, "tension": own, "at": point})
+    for name, attributes in given.items():
+        check_keys(attributes, Area, f"patch {name!r}")
+        if attributes.get("at") is not None:
+            at = [part for part in parts if _contains(part, attributes["at"])]
+            chosen = [area for part, area in zip(parts, areas, strict=True) if part in at]
+        else:
+            chosen = [area for area in areas if area["name"] == name]
+        if not chosen:
+            problem = unknown(
+                "patch of the drawing", name, dict.fromkeys(str(area["name"]) for area in areas)
+            )
+            raise OptionError(f"{drawing.path}: {problem}", what="patches", where=name)
+        for area in chosen:
+            area |= {"name": name} | {key: value for key, value in attributes.items() if key != "at"}
+    return areas
+
+
+def _contains(part: Part, at: Any) -> bool:
+    return any(shapely.contains_xy(part.area, *point) for point in _as_points(at))
+
+
+def _as_points(at: Any) -> list[Any]:
+    return list(at) if isinstance(at[0], list | tuple) else [at]
+
+
+def _names(parts: Sequence[Part], drawing: Drawing) -> dict[int, Label]:
+    """The names that the drawing gives to parts."""
+    owner: dict[int, Label] = {}
+    for label in drawing.labels:
+        inside = [k for k, part in enumerate(parts) if shapely.contains_xy(part.area, *label.point)]
+        if not inside:
+            x, y = label.point
+            problem = f"{drawing.path}: the name {label.name!r} at ({x:.6g}, {y:.6g}) is outside the plan"
+            raise PlanError(f"{problem}; move it into the part that it names", what="patch", where=label.name)
+        if inside[0] in owner and owner[inside[0]].name != label.name:
+            problem = (
+                f"{drawing.path}: {owner[inside[0]].name!r} and {label.name!r} name one part of the plan"
+            )
+            problem += "; draw a divider between them, or delete one"
+            raise PlanError(problem, what="patch", where=label.name)
+        owner[inside[0]] = label
+    return owner
+
+
+def _changed(drawn: Mapping[str, Curve], given: Sequence[Any], what: str, kind: Any) -> list[Any]:
+    """The drawn curves by name with the values given for them, and further entries."""
+    entries: dict[str, dict[str, Any]] = {
+        name: {"curve": curve, "name": name} for name, curve in drawn.items()
+    }
+    more = []
+    for entry in given:
+        keys = entry.keys() if isinstance(entry, Mapping) else set()
+        if "name" not in keys or "curve" in keys:
+            more.append(entry)
+            continue
+        if entry["name"] not in entries:
+            problem = f"{unknown(f'{what} of the drawing', entry['name'], entries)}; add one with curve = ..."
+            raise OptionError(problem, what=f"{what}s", found=entry["name"], expected=tuple(entries))
+        check_keys(entry, kind, f"{what} {entry['name']!r}")
+        entries[entry["name"]] |= entry
+    return [*entries.values(), *more]
+
+
+def wall_tension(curve: Curve, parts: Sequence[Part], tensions: Sequence[float], size: float) -> float:
+    """The tension of a wall: the difference of its neighbours' and 0.3 of the smaller one; two digits.
+
+    A junction balances if the wall's tension is between the difference and the sum. Of several neighbours
+    along the divider the largest value counts.
+    """
+    wanted = [0.0]
+    for t in (len(curve.pieces) * (k + 0.5) / SAMPLES for k in range(SAMPLES)):
+        point = shapely.Point(curve.at([t])[0, :2])
+        near = [
+            a for part, a in zip(parts, tensions, strict=True) if part.area.distance(point) <= NEAR * size
+        ]
+        if near:
+            wanted.append(max(near) - min(near) + WALL_ROOM * min(near))
+    return float(f"{max(wanted):.2g}")

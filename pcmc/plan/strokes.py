@@ -1,0 +1,185 @@
+"""The strokes of a drawing: points, texts and curves with their layers, from a .dxf or .3dm.
+
+Both are read in a process of their own, with limits of time and memory. Arcs, circles, ellipses and Bézier
+curves stay what they are; a NURBS curve becomes its spans, which are rational Bézier curves.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..base.errors import FileError, MissingExtra, unknown
+from ..base.files import check_regular
+from ..io.reading_process import read_arrays
+from .curves import Curve
+from .pieces import Piece
+
+LIBRARIES = {".dxf": "ezdxf", ".3dm": "rhino3dm"}
+"""The suffixes of drawings, and the libraries that read them."""
+LARGEST = 1e12  # of a coordinate; beyond, the digits of a double are too few for a roof
+HIGHEST_DEGREE = 11  # of a NURBS curve, in Rhino
+ROUNDING = 1e-9  # of a stroke's length: pieces nearer to each other than this are joined
+
+
+@dataclass(frozen=True, eq=False)
+class Stroke:
+    """An entity of a drawing.
+
+    Attributes
+    ----------
+    layer : its name in the drawing.
+    label : what to look for in the drawing: kind and handle, such as "LINE 2F".
+    curve : None for a point or a text.
+    point : (3,) of a point or a text.
+    text : None for a curve or a point.
+    """
+
+    layer: str
+    label: str
+    curve: Curve | None = None
+    point: Floats | None = None
+    text: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """The strokes of a drawing, the name of its unit ("" for none), and what no plan uses, by layer."""
+
+    unit: str
+    strokes: Sequence[Stroke]
+    others: Mapping[str, Mapping[str, int]]
+    hidden: Mapping[str, int]
+
+
+def read_strokes(path: Path) -> Strokes:
+    """All strokes of a drawing.
+
+    Raises
+    ------
+    FileError : for a file that is no drawing, damaged or too large, and for coordinates that are no numbers.
+    MissingExtra : without the library that reads it.
+    """
+    check_regular(path)
+    suffix = path.suffix.lower()
+    if suffix not in LIBRARIES:
+        text = f"{path}: {unknown('suffix of a drawing', suffix, LIBRARIES)}"
+        raise FileError(text, what=str(path), found=suffix, expected=tuple(LIBRARIES))
+    if find_spec(LIBRARIES[suffix]) is None:
+        raise MissingExtra(LIBRARIES[suffix], "cad")
+    try:
+        path.open("rb").close()
+        contents = read_arrays(f"{suffix[1:]} drawing", path)
+        strokes = [stroke for entity in contents["entities"] for stroke in _strokes(entity)]
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
+    except FileError as error:
+        raise FileError(f"{path}: {error}", what=str(path), where=error.where) from None
+    return Strokes(contents["unit"] or "", strokes, contents["others"], contents["hidden"])
+
+
+def _strokes(entity: Mapping[str, Any]) -> list[Stroke]:
+    """The strokes of an entity: one, or several where its pieces do not follow each other."""
+    label, layer = f"{entity['kind']} {entity['handle']}", entity["layer"]
+    if "point" in entity:
+        point = _coordinates([entity["point"]], layer, label)[0]
+        text = entity.get("text")
+        return [Stroke(layer, label, point=point, text=None if text is None else _plain(text))]
+    pieces = [piece for raw in entity["pieces"] for piece in _pieces(raw, layer, label)]
+    runs: list[list[Piece]] = []
+    for piece in pieces:
+        ends = piece.at(np.array([0.0, 1.0]))
+        size = float(np.linalg.norm(piece.points, axis=1).max())
+        if not piece.sweep and np.ptp(piece.points, axis=0).max() <= 1e-14 * size:
+            continue  # a point drawn twice in a polyline
+        if runs and _gap(runs[-1][-1], ends[0]) <= ROUNDING * (size + 1.0):
+            runs[-1].append(piece)
+        else:
+            runs.append([piece])
+    return [Stroke(layer, label, Curve(tuple(run))) for run in runs]
+
+
+def _gap(piece: Piece, point: Floats) -> float:
+    return float(np.linalg.norm(piece.at(np.array([1.0]))[0] - point))
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"\s+", " ", text).strip()[:200]
+
+
+def _coordinates(points: Any, layer: str, label: str) -> Floats:
+    """(k,3) the points, all of them numbers of a size that a roof may have."""
+    P = np.array(points, dtype=np.float64).reshape(-1, 3)
+    bad = np.flatnonzero(~(np.abs(P) <= LARGEST).all(axis=1))
+    if len(bad):
+        found = P[bad[0]].tolist()
+        text = f"layer {layer!r}, {label}: its point {found} is not a number up to {LARGEST:g}; draw it again"
+        raise FileError(text, where=layer, found=found)
+    return P
+
+
+def _pieces(raw: tuple[Any, ...], layer: str, label: str) -> list[Piece]:
+    """The pieces of a raw piece of ``reading_drawings``."""
+    kind, *values = raw
+    if kind == "bezier":
+        return [Piece(_coordinates(values[0], layer, label))]
+    if kind == "arc":
+        return [Piece(_coordinates(values[0], layer, label), float(values[1]))]
+    degree, knots, points, weights = values
+    P = _coordinates(points, layer, label)
+    t = np.array(knots, dtype=np.float64)
+    w = np.ones(len(P)) if weights is None else np.array(weights, dtype=np.float64)
+    sound = 1 <= degree <= HIGHEST_DEGREE and len(t) == len(P) + degree + 1 and len(w) == len(P) > degree
+    if not sound or not np.isfinite(t).all() or (np.diff(t) < 0.0).any() or not (w > 0.0).all():
+        text = (
+            f"layer {layer!r}, {label}: its knots, weights and degree {degree} make no spline; draw it again"
+        )
+        raise FileError(text, where=layer)
+    return [
+        Piece(points, weights=None if weights is None else weight)
+        for points, weight in bezier_spans(degree, t, P, w)
+    ]
+
+
+def bezier_spans(degree: int, knots: Floats, points: Floats, weights: Floats) -> list[tuple[Floats, Floats]]:
+    """Control points (degree + 1, d) and weights (degree + 1,) of each span of a NURBS curve.
+
+    Control point i of the span [a, b] is the value of its blossom at degree - i times a and i times b
+    (Ramshaw), by de Boor's algorithm.
+
+    >>> square = np.array([[0.0, 0], [1, 2], [2, 0], [3, 2]])
+    >>> spans = bezier_spans(2, np.array([0, 0, 0, 1, 2, 2, 2.0]), square, np.ones(4))
+    >>> [points.tolist() for points, _ in spans]
+    [[[0.0, 0.0], [1.0, 2.0], [1.5, 1.0]], [[1.5, 1.0], [2.0, 0.0], [3.0, 2.0]]]
+    """
+    control = np.column_stack([points * weights[:, None], weights])
+    spans = []
+    for last, (a, b) in enumerate(pairwise(knots.tolist())):
+        if a == b or not degree <= last < len(points):
+            continue
+        values = [
+            _blossom(degree, last, knots, control, [a] * (degree - i) + [b] * i) for i in range(degree + 1)
+        ]
+        homogeneous = np.array(values)
+        weight = homogeneous[:, -1]
+        spans.append((homogeneous[:, :-1] / weight[:, None], weight))
+    return spans
+
+
+def _blossom(degree: int, last: int, knots: Floats, control: Floats, at: list[float]) -> Floats:
+    """The blossom of the span that begins at the knot ``last``."""
+    d = control[last - degree : last + 1].copy()
+    for r in range(1, degree + 1):
+        for k in range(degree, r - 1, -1):
+            low, high = knots[k + last - degree], knots[k + 1 + last - r]
+            share = (at[r - 1] - low) / (high - low)
+            d[k] = (1.0 - share) * d[k - 1] + share * d[k]
+    return d[degree]

@@ -1,0 +1,118 @@
+"""Projects whose plan is a drawing: ``[plan] drawing = "hall.dxf"``, or the drawing itself as a project."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path, PureWindowsPath
+from typing import TYPE_CHECKING, Any
+
+from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
+from ..base.files import check_name
+from ..base.units import LENGTHS
+
+if TYPE_CHECKING:
+    from ..plan.drawing import Drawing
+
+DXF, RHINO = ".dxf", ".3dm"
+FALLBACK = "m"  # the unit of a project whose drawing has one that projects do not have
+
+
+def is_drawing(path: Path) -> bool:
+    """Whether a file is the drawing of a plan: a .dxf, or a .3dm with curves on a layer "outline"."""
+    suffix = path.suffix.lower()
+    if suffix != RHINO:
+        return suffix == DXF
+    from ..plan.layers import layer_of
+    from ..plan.strokes import read_strokes
+
+    with suppress(PcmcError, MissingExtra, OSError):  # the reader of surfaces has the better error
+        for stroke in read_strokes(path).strokes:
+            layer = layer_of(stroke.layer)
+            if stroke.curve is not None and layer is not None and layer.role == "outline":
+                return True
+    return False
+
+
+def files_of(path: str | os.PathLike[str]) -> list[Path]:
+    """The files that a project depends on: itself, and the drawing that its plan refers to.
+
+    A project that cannot be read depends on itself alone, so that a page which follows these files sees it
+    mended.
+
+    >>> files_of("notebooks/roof.toml")
+    [PosixPath('notebooks/roof.toml')]
+    """
+    path = Path(path)
+    with suppress(OSError, ValueError):  # of TOML, of UTF-8
+        if path.suffix.lower() == ".toml":
+            plan = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("plan")
+            name = plan.get("drawing") if isinstance(plan, Mapping) else None
+            return [path] if not isinstance(name, str) else [path, path.parent / name]
+    return [path]
+
+
+def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any], Drawing | None]:
+    """The data of a project with its drawing's lines in them, and the drawing, if its plan refers to one.
+
+    What neither the project nor the drawing says, such as tensions, is proposed. Points of the layer "height"
+    become targets where the project has none. A project without units takes those of the drawing.
+
+    Raises
+    ------
+    FileError : for a drawing outside the project's folder, and one that cannot be read.
+    PlanError, OptionError : for a drawing that is no plan, and for values that do not fit it.
+    """
+    plan = dict(data["plan"])
+    name = plan.pop("drawing", None)
+    gap = plan.pop("gap", None)
+    if name is None:
+        if gap is not None:
+            raise FileError(f"{path}: plan.gap is for a drawing; add drawing = or remove it", what="plan.gap")
+        return data, None
+    if "outline" in plan:
+        text = f"{path}: a plan has an outline or a drawing, not both; remove one of them"
+        raise FileError(text, what="plan.outline")
+    check_name(Path(name))
+    windows = PureWindowsPath(name)  # knows both kinds of slashes
+    if windows.drive or windows.root or ".." in windows.parts:
+        text = f"{path}: the drawing {name!r} is outside the project's folder; put it beside the project"
+        raise FileError(text, what="plan.drawing", found=name)
+    drawing = read(path.parent / name, str(data.get("units", "")), gap)
+    from ..plan.proposal import proposed
+
+    try:
+        lines = proposed(drawing, plan)
+    except OptionError as error:
+        raise FileError(f"{path}: {error}", what=error.what, where=error.where) from None
+    full = {**data, "plan": lines}
+    if drawing.units:
+        full["units"] = drawing.units
+    if len(drawing.heights) and "targets" not in data:
+        points = (drawing.heights - [0.0, 0.0, drawing.level]).tolist()
+        meet = [{"quantity": "height", "of": [x, y], "value": z} for x, y, z in points]
+        full["targets"] = {"meet": meet, "vary": list(lines["patches"])}
+    return full, drawing
+
+
+def read(path: Path, units: str, gap: float | None) -> Drawing:
+    """The drawing in a project's unit of length; one without units takes the drawing's, or metres."""
+    try:
+        state = path.stat()
+    except OSError as error:
+        text = f"{path}: the drawing cannot be read ({error.strerror or error})"
+        raise FileError(text, what="plan.drawing", found=str(path)) from None
+    return _read(path, units, gap, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=8)  # a sweep loads its project for each case
+def _read(path: Path, units: str, gap: float | None, time: int, size: int) -> Drawing:
+    from ..plan.drawing import read_drawing
+
+    drawing = read_drawing(path, units, gap)
+    if drawing.units and drawing.units not in LENGTHS:
+        return read_drawing(path, FALLBACK, gap)
+    return drawing

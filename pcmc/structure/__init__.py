@@ -1,0 +1,22 @@
+"""Structural models: a surface as prestressed membranes with loads, and a finite-element program's answer.
+
+Gives ``StructuralModel``, ``Material``, the loads, ``write_structure`` and ``read_results``. Imports
+``solvers``, ``certificate``, ``contact`` and the rooms below.
+"""
+
+from .inp import write_structure
+from .loads import SelfWeight, Snow, Step, Wind
+from .model import Material, StructuralModel
+from .results import StepResults, read_results
+
+__all__ = [
+    "Material",
+    "SelfWeight",
+    "Snow",
+    "Step",
+    "StepResults",
+    "StructuralModel",
+    "Wind",
+    "read_results",
+    "write_structure",
+]

@@ -1,0 +1,76 @@
+"""Cables of a structural model: beams of a square section with the tension of the cable."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from ..base import validate
+from ..base.arrays import Floats, Ints
+from ..io.text import format_rows
+from ..surface import Surface
+from ..surface.geometry import segment_lengths
+
+POINTS = 8  # integration points of a B31 element
+
+
+def short(value: float) -> str:
+    """A number in at most 20 characters, the field of an input file.
+
+    >>> short(-1e-5 / 3)
+    '-3.33333333333e-06'
+    """
+    return f"{value:.12g}"
+
+
+def checked_areas(given: object, surface: Surface) -> tuple[float, ...]:
+    """The area of each cable's section, from one number or one by name."""
+    names = [cable.name for cable in surface.cables]
+    if given is None and names:
+        hint = "give the area of the cables' sections"
+        validate.refuse("cable_area", None, "a finite number > 0", names[0], hint)
+    if isinstance(given, Mapping):
+        for name in given:
+            validate.choice("cable", name, names)
+        return tuple(validate.number("cable_area", given.get(name), above=0.0, where=name) for name in names)
+    return tuple(validate.number("cable_area", given, above=0.0, where=name) for name in names)
+
+
+def directions(surface: Surface, edges: Ints) -> Floats:
+    """(k,3) unit vectors along edges (k,2)."""
+    along = surface.vertices[edges[:, 1]] - surface.vertices[edges[:, 0]]
+    return np.asarray(along / segment_lengths(surface.vertices, edges)[:, None])
+
+
+def cable_elements(surface: Surface, areas: tuple[float, ...], first: int) -> Iterator[str]:
+    """Elements from number ``first`` on, sections, and the set CABLES of all.
+
+    A section needs a direction across the beam: the axis of space farthest from it, so a set for each axis.
+    """
+    if not surface.cables:
+        return
+    sets = []
+    for k, (cable, area) in enumerate(zip(surface.cables, areas, strict=True), 1):
+        numbers = first + np.arange(len(cable.edges))
+        first += len(cable.edges)
+        across = np.abs(directions(surface, cable.edges)).argmin(axis=1)
+        for axis in np.unique(across):
+            name, mine = f"CABLE_{k}_{'XYZ'[axis]}", across == axis
+            sets.append(name)
+            yield f"*ELEMENT, TYPE=B31, ELSET={name}\n"
+            yield format_rows("%d,%d,%d\n", numbers[mine], *(cable.edges[mine].T + 1))
+            yield f"*BEAM SECTION, ELSET={name}, MATERIAL=CABLE, SECTION=RECT\n"
+            yield (
+                f"{short(area**0.5)},{short(area**0.5)}\n"
+                + ",".join(f"{c:.1f}" for c in np.eye(3)[axis])
+                + "\n"
+            )
+    yield "*ELSET, ELSET=CABLES\n" + "".join(f"{name},\n" for name in sets)
+
+
+def cable_stress(surface: Surface, areas: tuple[float, ...]) -> Floats:
+    """(k,3,3) the stress τ/a along each edge of all cables, one after the other."""
+    along = [directions(surface, cable.edges) for cable in surface.cables]
+    stress = [cable.tension / area for cable, area in zip(surface.cables, areas, strict=True)]
+    return np.concatenate([s * t[:, :, None] * t[:, None, :] for s, t in zip(stress, along, strict=True)])

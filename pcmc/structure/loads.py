@@ -1,0 +1,182 @@
+"""Loads on a structural model, and the steps that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base import validate
+from ..base.arrays import Floats
+from ..surface import Surface
+from ..surface.geometry import area_vectors, face_areas, vertex_sums
+
+
+@dataclass(frozen=True)
+class SelfWeight:
+    """The weight of the elements, ρ t g per area, against Π's normal; it stays in all later steps.
+
+    Parameters
+    ----------
+    gravity : g > 0, length/time²; 9.81 in metres and seconds.
+    name : of its step.
+    """
+
+    gravity: float = 9.81
+    name: str = "self-weight"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gravity", validate.positive("SelfWeight.gravity", self.gravity))
+        _check_name(self.name)
+
+
+@dataclass(frozen=True)
+class Snow:
+    """A load per plan area, against Π's normal. It keeps its size and direction while the surface deforms.
+
+    Parameters
+    ----------
+    load : s, force per area of the plan; negative for a lift.
+    patches : names of the patches that carry it; by default all that are not walls.
+    name : of its step.
+    """
+
+    load: float
+    patches: Sequence[str] = ()
+    name: str = "snow"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "load", validate.number("Snow.load", self.load))
+        if isinstance(self.patches, str) or not isinstance(self.patches, Sequence):
+            validate.refuse("Snow.patches", self.patches, "a sequence of patch names")
+        object.__setattr__(self, "patches", tuple(self.patches))
+        _check_name(self.name)
+
+
+@dataclass(frozen=True)
+class Wind:
+    """Pressures of wind zones, which are patches. They add to the patches' own pressures.
+
+    Parameters
+    ----------
+    pressures : force per area by patch name, along the patch's positive normal as ``Patch.pressure``: above
+        0 for suction on a roof. The load follows the normal while the surface deforms.
+    name : of its step.
+    """
+
+    pressures: Mapping[str, float]
+    name: str = "wind"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.pressures, Mapping) or not self.pressures:
+            validate.refuse(
+                "Wind.pressures", self.pressures, "pressures by patch name, such as {'roof': 0.5}"
+            )
+        checked = {
+            zone: validate.number("Wind.pressures", value, where=str(zone))
+            for zone, value in self.pressures.items()
+        }
+        object.__setattr__(self, "pressures", checked)
+        _check_name(self.name)
+
+
+Load = SelfWeight | Snow | Wind
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """All loads at the end of a step of the analysis.
+
+    Attributes
+    ----------
+    name : "form pressure", or the names of its loads.
+    pressures : (k,) force per area on each patch along its normal.
+    forces : (n,3) forces on the vertices that keep their direction.
+    gravity : length/time², 0 without self-weight.
+    """
+
+    name: str
+    pressures: Floats
+    forces: Floats
+    gravity: float = 0.0
+
+
+def load_steps(surface: Surface, loads: Sequence[Load | Sequence[Load]]) -> tuple[Step, ...]:
+    """The form-finding load first, then a step for each load; loads in one tuple act together.
+
+    >>> from pcmc import Patch
+    >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
+    ...                  [0, 0], [Patch("roof", 1.0)], fixed=range(4))
+    >>> form, both = load_steps(square, [(Snow(0.5), Wind({"roof": 2.0}))])
+    >>> both.name, both.pressures.tolist(), both.forces.sum(axis=0).round(9).tolist()
+    ('snow and wind', [3.0], [0.0, 0.0, -2.0])
+    """
+    form = Step("form pressure", surface.pressures, _dead_weight(surface))
+    permanent, steps = form, [form]
+    for entry in loads:
+        together = entry if isinstance(entry, tuple) else (entry,)
+        step = replace(permanent, name=" and ".join(load.name for load in together))
+        for load in together:
+            step = _added(step, load, surface)
+            if isinstance(load, SelfWeight):
+                permanent = replace(permanent, gravity=load.gravity)
+        steps.append(step)
+    return tuple(steps)
+
+
+def _added(step: Step, load: Load, surface: Surface) -> Step:
+    """The step with one more load."""
+    if isinstance(load, SelfWeight):
+        return replace(step, gravity=load.gravity)
+    if isinstance(load, Snow):
+        return replace(step, forces=step.forces + _snow(surface, load))
+    pressures = step.pressures.copy()
+    for zone, value in load.pressures.items():
+        pressures[surface.patch_index(zone)] += value
+    return replace(step, pressures=pressures)
+
+
+def _snow(surface: Surface, snow: Snow) -> Floats:
+    """(n,3) a third of each triangle's load at each of its corners; triangles below others carry none."""
+    named = [surface.patch_index(name) for name in snow.patches]
+    carrying = named or np.flatnonzero(~surface.walls).tolist()
+    if not carrying:
+        hint = "all patches are walls; name those that carry snow"
+        validate.refuse("Snow.patches", snow.patches, "names of patches", hint=hint)
+    normal = np.array(surface.plane.normal)
+    plan = area_vectors(surface.vertices[surface.faces]) @ normal
+    side = np.sign(np.bincount(surface.patch_of_face, plan, len(surface.patches)))
+    plan = np.maximum(plan * side[surface.patch_of_face], 0.0)
+    plan[~np.isin(surface.patch_of_face, carrying)] = 0.0
+    return -snow.load / 3.0 * vertex_sums(plan[:, None] * normal, surface.faces, surface.n)
+
+
+def _dead_weight(surface: Surface) -> Floats:
+    """(n,3) forces of the patches' own weights per area, which belong to the form-finding load."""
+    weights = np.array([patch.weight for patch in surface.patches])[surface.patch_of_face]
+    per_face = weights * face_areas(surface.vertices[surface.faces])
+    downwards = -np.array(surface.plane.normal) / 3.0
+    return vertex_sums(per_face[:, None] * downwards, surface.faces, surface.n)
+
+
+def check_loads(loads: object, surface: Surface) -> tuple[Load | tuple[Load, ...], ...]:
+    """Loads, or tuples of them, whose patches are there."""
+    expected = "a sequence of SelfWeight, Snow or Wind, or of tuples of these"
+    if isinstance(loads, Load) or not isinstance(loads, Sequence):
+        validate.refuse("loads", loads, expected)
+    for entry in loads:
+        together = entry if isinstance(entry, tuple) and entry else (entry,)
+        for load in together:
+            if not isinstance(load, Load):
+                validate.refuse("loads", load, expected)
+            named = load.pressures if isinstance(load, Wind) else getattr(load, "patches", ())
+            for name in named:
+                surface.patch_index(name)
+    return tuple(loads)
+
+
+def _check_name(name: object) -> None:
+    """A name is a line of text."""
+    if not isinstance(name, str) or not name.strip() or "\n" in name:
+        validate.refuse("name of a load", name, "a line of text")

@@ -1,0 +1,239 @@
+"""The structural model: a surface with a material, a thickness and loads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..base import validate
+from ..base.arrays import Bools, Floats, Ints, cached_array
+from ..base.errors import SurfaceError
+from ..certificate.certificate import certify
+from ..contact.pinching import standing_faces, standing_part
+from ..energy.functional import apply_supports
+from ..solvers.result import Result
+from ..surface import Surface, expect_surface
+from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
+from .cables import checked_areas
+from .loads import Load, SelfWeight, Step, check_loads, load_steps
+
+
+@dataclass(frozen=True)
+class Material:
+    """A linear elastic, isotropic material.
+
+    Parameters
+    ----------
+    young : E > 0, force per area.
+    poisson : ν, 0 ≤ ν < 0.5.
+    density : ρ ≥ 0, mass per volume, in a unit of mass that fits the others: with kN and m, tonnes per m³.
+
+    >>> Material(young=1e6)
+    Material(young=1000000.0, poisson=0.3, density=0.0)
+    """
+
+    young: float
+    poisson: float = 0.3
+    density: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "young", validate.positive("Material.young", self.young))
+        poisson = validate.number("Material.poisson", self.poisson, least=0.0, below=0.5)
+        object.__setattr__(self, "poisson", poisson)
+        density = validate.number("Material.density", self.density, least=0.0)
+        object.__setattr__(self, "density", density)
+
+
+@dataclass(frozen=True, eq=False)
+class StructuralModel:
+    """A surface at rest as a membrane: each patch prestressed with α/t, which balances its pressure.
+
+    Parameters
+    ----------
+    surface : a certified surface, or the result of a solver.
+    material : of all patches.
+    thickness : t > 0, length, or one for each patch, by name.
+    loads : a step of the analysis for each; a tuple of loads acts in one step. The form-finding pressure is
+        the first step and acts in all others, too, as self-weight does once it has come.
+    anyway : take a surface that is not certified, too; the file's heading tells it.
+    elements : "membrane", without bending stiffness, or "shell". CalculiX's shells of three nodes are too
+        stiff in bending where triangles are much wider than thick: their deflections are too small.
+    cable_area : length², of the sections of the surface's cables, or one for each, by name.
+    cable_material : of the cables; by default that of the patches.
+
+    Raises
+    ------
+    OptionError : for a material, thickness or load that is not allowed or names no patch.
+    SurfaceError : for a surface that is not certified.
+
+    Examples
+    --------
+    >>> from pcmc import Patch, Surface
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
+    >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("roof", 1.0)], fixed=range(4))
+    >>> model = StructuralModel(roof, Material(young=1e6), thickness=0.001)
+    >>> model.prestress.tolist(), [step.name for step in model.steps]
+    ([1000.0], ['form pressure'])
+    """
+
+    surface: Surface
+    material: Material
+    thickness: float | Mapping[str, float]
+    loads: Sequence[Load | tuple[Load, ...]] = ()
+    anyway: bool = False
+    elements: str = "membrane"
+    cable_area: float | Mapping[str, float] | None = None
+    cable_material: Material | None = None
+    verdict: str = field(init=False, repr=False)
+    certified: bool = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        given: Any = self.surface
+        solved = given if isinstance(given, Result) else None
+        object.__setattr__(self, "surface", given if solved is None else solved.surface)
+        expect_surface(self.surface)
+        if not isinstance(self.material, Material):
+            hint = "give Material(young=..., poisson=...)"
+            validate.refuse("material", self.material, "a Material", hint=hint)
+        object.__setattr__(self, "thickness", checked_thickness(self.thickness, self.surface))
+        validate.choice("elements", self.elements, ("membrane", "shell"))
+        checked_areas(self.cable_area, self.surface)
+        if not isinstance(self.cable_material, Material | None):
+            validate.refuse("cable_material", self.cable_material, "a Material or None")
+        object.__setattr__(self, "loads", check_loads(self.loads, self.surface))
+        if self.material.density == 0.0 and any(
+            isinstance(load, SelfWeight) for load in self._single_loads()
+        ):
+            hint = "SelfWeight needs it"
+            validate.refuse("Material.density", 0.0, "a finite number > 0", hint=hint)
+        certificate = certify(self.surface, modes=0) if solved is None else solved.certify(modes=0)
+        object.__setattr__(self, "verdict", certificate.verdict.value)
+        object.__setattr__(self, "certified", certificate.certified)
+        if not (certificate.certified or validate.flag("anyway", self.anyway)):
+            text = f"the surface is not certified ({self.verdict}); solve it first, or use anyway=True"
+            raise SurfaceError(text, what="surface", found=certificate.verdict)
+
+    def _single_loads(self) -> list[Load]:
+        return [load for entry in self.loads for load in (entry if isinstance(entry, tuple) else (entry,))]
+
+    @cached_array
+    def thicknesses(self) -> Floats:
+        """(k,) thickness t of each patch."""
+        given = self.thickness
+        names = [patch.name for patch in self.surface.patches]
+        return np.array([given[name] if isinstance(given, Mapping) else given for name in names], dtype=float)
+
+    @cached_array
+    def prestress(self) -> Floats:
+        """(k,) the membrane stress α/t of each patch under the form-finding load, force/area."""
+        return self.surface.tensions / self.thicknesses
+
+    @cached_property
+    def cable_areas(self) -> tuple[float, ...]:
+        """The area of each cable's section, length²."""
+        return checked_areas(self.cable_area, self.surface)
+
+    @cached_property
+    def standing(self) -> Surface:
+        """The surface without pinched walls: its vertices, and the faces that are elements."""
+        return standing_part(self.surface).surface
+
+    @cached_array
+    def active(self) -> Ints:
+        """(e,) the faces of the standing surface with a tension or a pressure: the others carry nothing."""
+        pulls = (self.surface.tensions != 0.0) | (self.surface.pressures != 0.0)
+        return np.flatnonzero(pulls[self.standing.patch_of_face])
+
+    @cached_array
+    def faces(self) -> Ints:
+        """(e,) the face of the surface that each element is; the element's number is one more."""
+        return standing_faces(standing_part(self.surface), self.surface)[self.active]
+
+    @cached_array
+    def nodes(self) -> Bools:
+        """(n,) the vertices of elements."""
+        used = np.zeros(self.surface.n, dtype=bool)
+        used[self.standing.faces[self.active]] = True
+        for cable in self.standing.cables:
+            used[cable.edges] = True
+        return used
+
+    @cached_array
+    def allowed(self) -> Floats:
+        """(n,3,3) the projection onto the directions in which the supports let each vertex move."""
+        columns = [apply_supports(self.standing, np.tile(axis, (self.surface.n, 1))) for axis in np.eye(3)]
+        return np.stack(columns, axis=2)
+
+    @cached_array
+    def held(self) -> Bools:
+        """(n,) the nodes that a support holds."""
+        return self.nodes & self.standing.held
+
+    @cached_array
+    def freedom(self) -> Ints:
+        """(n,) the number of directions in which each vertex can move: 0 fixed, 1 on a line, 2 on a plane."""
+        return np.rint(np.trace(self.allowed, axis1=1, axis2=2)).astype(np.int64)
+
+    @cached_array
+    def axes(self) -> Floats:
+        """(n,3,3) rows: the axes in which supports hold a vertex, those of space where none guides it.
+
+        On a plane the first axis is its normal, and held; along a line it is the line, and the others are
+        held.
+        """
+        axes = np.tile(np.eye(3), (self.surface.n, 1, 1))
+        guided = np.flatnonzero(self.held & (self.freedom > 0))
+        along = self.allowed[guided]
+        first = np.where((self.freedom[guided] == 2)[:, None, None], np.eye(3) - along, along)
+        longest = np.linalg.norm(first, axis=1).argmax(axis=1)  # all columns are multiples of one direction
+        first = np.take_along_axis(first, longest[:, None, None], axis=2)[:, :, 0]
+        first /= np.linalg.norm(first, axis=1)[:, None]
+        second = np.cross(np.eye(3)[np.abs(first).argmin(axis=1)], first)
+        second /= np.linalg.norm(second, axis=1)[:, None]
+        axes[guided] = np.stack([first, second, np.cross(first, second)], axis=1)
+        return axes
+
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """The steps of the analysis, the form-finding load first."""
+        return load_steps(self.standing, self.loads)
+
+    def nodal_loads(self, step: Step, displacements: Floats | None = None) -> Floats:
+        """(n,3) the loads of a step as forces on the vertices, a third of each triangle's at its corners.
+
+        ``displacements`` (n,3) turn the pressures with the surface.
+        """
+        s = self.standing
+        X = s.vertices if displacements is None else s.vertices + displacements
+        per_face = step.pressures[s.patch_of_face, None] * area_vectors(X[s.faces])
+        mass = self.material.density * self.thicknesses[s.patch_of_face] * face_areas(s.vertices[s.faces])
+        per_face -= step.gravity * mass[:, None] * np.array(s.plane.normal)
+        shares = per_face[self.active] / 3.0
+        return step.forces + vertex_sums(shares, s.faces[self.active], s.n) + self._cable_weights(step)
+
+    def _cable_weights(self, step: Step) -> Floats:
+        """(n,3) half of each cable edge's weight at each of its ends."""
+        surface, forces = self.standing, np.zeros((self.surface.n, 3))
+        density = (self.cable_material or self.material).density
+        for cable, area in zip(surface.cables, self.cable_areas, strict=True):
+            half = 0.5 * density * area * step.gravity * segment_lengths(surface.vertices, cable.edges)
+            at_vertex = np.bincount(cable.edges.ravel(), np.repeat(half, 2), surface.n)
+            forces -= at_vertex[:, None] * np.array(surface.plane.normal)
+        return forces
+
+
+def checked_thickness(given: object, surface: Surface) -> float | dict[str, float]:
+    """A number > 0, or one for each patch of the surface."""
+    if not isinstance(given, Mapping):
+        return validate.positive("thickness", given)
+    for name in given:
+        surface.patch_index(name)
+    return {
+        patch.name: validate.number("thickness", given.get(patch.name), above=0.0, where=patch.name)
+        for patch in surface.patches
+    }

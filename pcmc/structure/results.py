@@ -1,0 +1,208 @@
+"""Read what CalculiX computed, as arrays on the surface's vertices and faces."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from ..base import validate
+from ..base.arrays import Floats, Ints, cached_array
+from ..base.errors import FileError, unknown
+from ..base.files import check_regular
+from ..surface.geometry import area_vectors
+from . import dat, frd
+from .blocks import TENSOR, Block
+from .cables import directions
+from .inp import first_cable
+from .model import StructuralModel
+
+READERS = {".dat": dat.read, ".frd": frd.read}
+FAR = 1e-4  # of the size: a node farther from its vertex belongs to another surface
+
+
+@dataclass(frozen=True, eq=False)
+class StepResults:
+    """The end of one step of the analysis. Vertices and faces that are not in the model have NaN.
+
+    Attributes
+    ----------
+    name : of the step.
+    model : the structural model.
+    displacements : (n,3) length.
+    reactions : (n,3) forces of the supports on the structure; zero at vertices that nothing holds.
+    stresses : (m,3,3) stress tensors in the axes of space, force/area, the mean over the thickness. From an
+        .frd file they are the mean of a triangle's corners, where all elements around have been averaged,
+        those of other patches too.
+    cable_tensions : the tension (k,) of the edges of each cable, force, by its name; from a .dat file alone.
+    """
+
+    name: str
+    model: StructuralModel
+    displacements: Floats
+    reactions: Floats
+    stresses: Floats
+    cable_tensions: Mapping[str, Floats]
+
+    @cached_array
+    def deflections(self) -> Floats:
+        """(n,) displacement along Π's normal, length: negative downwards."""
+        return self.displacements @ np.array(self.model.surface.plane.normal)
+
+    @cached_array
+    def principal_stresses(self) -> Floats:
+        """(m,2) the two principal membrane stresses in each face's plane, ascending, force/area."""
+        shown = np.flatnonzero(np.isfinite(self.stresses).all(axis=(1, 2)))
+        surface = self.model.surface
+        P = surface.vertices[surface.faces[shown]]
+        first = P[:, 1] - P[:, 0]
+        first /= np.linalg.norm(first, axis=1)[:, None]
+        normal = area_vectors(P)
+        second = np.cross(normal / np.linalg.norm(normal, axis=1)[:, None], first)
+        plane = np.stack([first, second], axis=1)
+        values = np.full((surface.m, 2), np.nan)
+        values[shown] = np.linalg.eigvalsh(plane @ self.stresses[shown] @ plane.transpose(0, 2, 1))
+        return values
+
+    @cached_property
+    def largest_displacement(self) -> float:
+        """The largest displacement of a vertex, length."""
+        return float(np.nanmax(np.linalg.norm(self.displacements, axis=1)))
+
+
+def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[StepResults, ...]:
+    """Displacements, reactions and stresses of each step, from CalculiX's ``.dat`` or ``.frd`` file.
+
+    The program's force at a held node is that of the elements alone; the load that acts on the node itself
+    (a third of its triangles' pressures, its weight and snow) is added here, so that the reactions are those
+    of ``pcmc.certify``.
+
+    Parameters
+    ----------
+    path : the file that ``ccx`` wrote for the model's input file; .dat has the stresses by element.
+    model : the structural model that was written.
+
+    Raises
+    ------
+    FileError : for a file that is missing, damaged, incomplete, or of another model.
+    """
+    path = Path(path)
+    if not isinstance(model, StructuralModel):
+        validate.refuse("model", type(model).__name__, "a StructuralModel")
+    check_regular(path)
+    suffix = path.suffix.lower()
+    if suffix not in READERS:
+        text = f"{path}: {unknown('suffix', suffix, READERS)}"
+        raise FileError(text, what=str(path), found=suffix, expected=list(READERS))
+    try:
+        text = path.read_text(encoding="ascii")
+        steps = READERS[suffix](text)
+        _check(steps, model)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
+    except UnicodeDecodeError as error:
+        message = f"{path}: byte {error.start} is not text; the file is damaged"
+        raise FileError(message, what=str(path), where=error.start) from None
+    except FileError as error:
+        text = f"{path}: {error}"
+        raise FileError(
+            text, what=str(path), where=error.where, found=error.found, expected=error.expected
+        ) from None
+    return tuple(_results(model, k, blocks) for k, blocks in enumerate(steps))
+
+
+def _results(model: StructuralModel, k: int, blocks: dict[str, Block]) -> StepResults:
+    """The arrays of step k on the surface's vertices and faces."""
+    step, n = model.steps[k], model.surface.n
+    displacements = np.full((n, 3), np.nan)
+    displacements[blocks["displacements"].ids - 1] = blocks["displacements"].values
+    reactions = np.zeros((n, 3))
+    if "forces" in blocks:
+        reactions[blocks["forces"].ids - 1] = blocks["forces"].values
+        reactions -= model.nodal_loads(step, np.nan_to_num(displacements))
+        reactions[~model.held] = 0.0
+        reactions -= np.einsum("nij,nj->ni", model.allowed, reactions)
+    tensions = _cable_tensions(model, blocks["cables"]) if "cables" in blocks else {}
+    stresses = _on_faces(model, blocks["stresses"])
+    return StepResults(step.name, model, displacements, reactions, stresses, tensions)
+
+
+def _cable_tensions(model: StructuralModel, stress: Block) -> dict[str, Floats]:
+    """The stress along each edge of a cable times its section, the mean over the section; by name."""
+    surface, first, tensions = model.standing, first_cable(model), {}
+    for cable, area in zip(surface.cables, model.cable_areas, strict=True):
+        numbers = first + np.arange(len(cable.edges))
+        mine = stress.means(numbers)[:, TENSOR]
+        along = directions(surface, cable.edges)
+        tensions[cable.name] = area * np.einsum("ki,kij,kj->k", along, mine, along)
+        first += len(cable.edges)
+    return tensions
+
+
+def _on_faces(model: StructuralModel, stress: Block) -> Floats:
+    """(m,3,3) for the faces of the surface, whose standing ones are the elements; NaN elsewhere."""
+    surface, faces = model.standing, model.faces
+    if stress.by_node:
+        at_vertex = np.full((surface.n, 6), np.nan)
+        at_vertex[stress.ids - 1] = stress.values
+        values = at_vertex[surface.faces[model.active]].mean(axis=1)
+    else:
+        values = stress.means(faces + 1)
+    tensors = np.full((model.surface.m, 3, 3), np.nan)
+    tensors[faces] = values[:, TENSOR]
+    return tensors
+
+
+def _check(steps: list[dict[str, Block]], model: StructuralModel) -> None:
+    """Refuse results with other nodes, elements or steps than the model's."""
+    nodes = np.flatnonzero(model.nodes) + 1
+    for number, blocks in enumerate(steps[: len(model.steps)], 1):
+        for kind in ("displacements", "stresses", *(("forces",) if model.held.any() else ())):
+            if kind not in blocks:
+                raise FileError(
+                    f"step {number} has no {kind}; run ccx on the model's file again", where=number
+                )
+        moved, stress = blocks["displacements"], blocks["stresses"]
+        _same("nodes", moved.ids, nodes)
+        if stress.by_node:
+            _same("nodes with stresses", stress.ids, nodes)
+        else:
+            _same("elements", np.unique(stress.ids), model.faces + 1)
+        if "cables" in blocks:
+            edges = sum(len(cable.edges) for cable in model.standing.cables)
+            _same("cable elements", np.unique(blocks["cables"].ids), first_cable(model) + np.arange(edges))
+        if "forces" in blocks:
+            held = np.flatnonzero(model.held) + 1
+            _same("held nodes", np.intersect1d(blocks["forces"].ids, held), held)
+            _same("nodes", np.union1d(blocks["forces"].ids, nodes), nodes)
+        if moved.places is not None:
+            gap = np.abs(moved.places - model.standing.vertices[nodes - 1]).max(initial=0.0)
+            if gap > FAR * model.surface.size:
+                text = (
+                    f"its nodes are up to {gap:.3g} from the model's vertices; they belong to another surface"
+                )
+                raise FileError(text, found=float(gap))
+    if len(steps) != len(model.steps):
+        names = [step.name for step in model.steps]
+        state = f"{len(steps)} of the model's {len(names)} steps"
+        hint = (
+            f"ccx stopped in step {names[len(steps)]!r}"
+            if len(steps) < len(names)
+            else "is it another model's?"
+        )
+        raise FileError(f"has {state}; {hint}", found=len(steps), expected=len(names))
+
+
+def _same(what: str, found: Ints, expected: Ints) -> None:
+    """Refuse other numbers of nodes or elements than those expected."""
+    if len(found) != len(expected):
+        text = f"has {len(found)} {what}, the model {len(expected)}; they belong to different surfaces"
+        raise FileError(text, found=len(found), expected=len(expected))
+    other = np.flatnonzero(found != expected)
+    if len(other):
+        text = f"its {what} are numbered otherwise than the model's ({found[other[0]]} is not there)"
+        raise FileError(text, where=int(found[other[0]]))

@@ -1,0 +1,455 @@
+"""A surface that ends at mirror planes, and the whole that it stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ..base import validate
+from ..base.arrays import Bools, Floats, Ints
+from ..base.errors import SurfaceError
+from .cable import Cable
+from .circle import Circle, Guide
+from .line import Line
+from .plane import Plane
+from .room import Room
+from .supports import NEAR
+from .surface import Surface, expect_surface
+from .topology import topology
+
+MOST_IMAGES = 120  # of the planes through one point no more are possible, but of a prism
+ALIKE = 1e-9  # two matrices or unit vectors this near are the same
+
+
+class Image(NamedTuple):
+    """The isometry x → R x + t."""
+
+    R: Floats
+    t: Floats
+
+    def points(self, X: Floats) -> Floats:
+        """(…,3) where points (…,3) go."""
+        return X @ self.R.T + self.t
+
+    def after(self, other: Image) -> Image:
+        """First ``other``, then this one."""
+        return Image(self.R @ other.R, self.R @ other.t + self.t)
+
+
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """The whole surface with where its parts come from; a field is carried over by indexing.
+
+    Attributes
+    ----------
+    surface : the whole.
+    vertex, face : (n,), (m,) int: the vertex and the face of the piece that each of the whole is an image of.
+    images : how often the piece is in the whole.
+    """
+
+    surface: Surface
+    vertex: Ints
+    face: Ints
+    images: int
+
+
+def mirrored(surface: Surface, planes: Sequence[Plane | str] | None = None) -> Surface:
+    """The whole surface of which this one is the piece between its mirror planes.
+
+    The vertices in mirror planes are shared by the images; the faces of reflected images are turned over, so
+    that each patch keeps its positive side. A patch continues under its name in its images, unless more than
+    two of its triangles would meet at an edge, or it bounds a room that is separate from its images: then
+    images that do not touch it are numbered, "wall (2)". Supports, weights, cables and rooms are carried
+    over; a room that a plane cuts has the volume of its parts together, and a cable in a mirror plane the
+    tension of its images together.
+
+    Parameters
+    ----------
+    planes : which mirror planes, or their names; by default all. The others remain mirror planes.
+
+    Raises
+    ------
+    SurfaceError
+        Without mirror planes, if the images never end, as between parallel planes, or if they overlap.
+
+    >>> from pcmc import Patch
+    >>> wall = Plane(normal=(1, 0, 0), mirror=True)
+    >>> half = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 1]], [[0, 1, 2]], [0], [Patch("tent", 1.0)], fixed=[1],
+    ...                on_planes={wall: [0, 2]})
+    >>> whole = mirrored(half)
+    >>> whole.vertices.tolist(), whole.faces.tolist()
+    ([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [-1.0, 0.0, 0.0]], [[0, 1, 2], [2, 3, 0]])
+    """
+    return unfolded(surface, planes).surface
+
+
+def unfolded(surface: Surface, planes: Sequence[Plane | str] | None = None) -> Whole:
+    """As ``mirrored``, with the vertex and the face that each of the whole is an image of."""
+    expect_surface(surface)
+    mirrors = _chosen(surface, planes)
+    generators = [_reflection(plane) for plane, _ in mirrors]
+    images, next_to = _group(generators, surface.size)
+    _refuse_overlap(surface, mirrors, images)
+    n, m, k = surface.n, surface.m, len(images)
+    links = [np.empty((2, 0), dtype=np.int64)]
+    for (_, mask), other in zip(mirrors, next_to, strict=True):
+        there = np.flatnonzero(mask)
+        links.append(
+            np.stack([(n * np.arange(k)[:, None] + there).ravel(), (n * other[:, None] + there).ravel()])
+        )
+    place, first = _joined(np.concatenate(links, axis=1), n * k)
+    X = np.concatenate([image.points(surface.vertices) for image in images])[first]
+    F = place[(surface.faces[None] + n * np.arange(k)[:, None, None])]
+    turned = np.array([np.linalg.det(image.R) < 0.0 for image in images])
+    F[turned] = F[turned][:, :, ::-1]
+    F = F.reshape(-1, 3)
+    place = place.reshape(k, n)
+    patch_label, patch_names = _patches(surface, mirrors, next_to, F)
+    patch = patch_label[:, surface.patch_of_face].ravel()
+    patches = [replace(surface.patches[p], name=name) for p, name in patch_names]
+    supports = _supports(surface, mirrors, images, place, len(X))
+    whole = Surface(
+        X,
+        F,
+        patch,
+        patches,
+        plane=surface.plane,
+        cables=_cables(surface, place),
+        rooms=_rooms(surface, mirrors, next_to, patch_label, [name for _, name in patch_names]),
+        **supports,
+    )
+    return Whole(whole, first % n, np.tile(np.arange(m), k), k)
+
+
+def _chosen(surface: Surface, planes: Sequence[Plane | str] | None) -> list[tuple[Plane, Bools]]:
+    """The mirror planes to unfold at, each with its vertices."""
+    mirrors = [(plane, mask) for plane, mask in surface.on_planes if plane.mirror]
+    if not mirrors:
+        text = "the surface has no mirror plane; give it one: on_planes={Plane(…, mirror=True): vertices}"
+        raise SurfaceError(text, what="on_planes")
+    if planes is None:
+        return mirrors
+    chosen = []
+    for wanted in planes:
+        if isinstance(wanted, str):
+            validate.choice("planes", wanted, [plane.name for plane, _ in mirrors])
+        hits = [pair for pair in mirrors if wanted in (pair[0].name, pair[0])]
+        if not hits:
+            known = ", ".join(str(plane) for plane, _ in mirrors)
+            text = f"planes: {wanted} is no mirror plane of the surface; it has: {known}"
+            raise SurfaceError(text, what="planes", found=str(wanted), expected=known)
+        chosen.append(hits[0])
+    return chosen
+
+
+def _reflection(plane: Plane) -> Image:
+    normal = np.array(plane.normal)
+    return Image(np.eye(3) - 2.0 * np.outer(normal, normal), 2.0 * np.dot(normal, plane.point) * normal)
+
+
+def _group(generators: Sequence[Image], size: float) -> tuple[list[Image], list[Ints]]:
+    """All images of the piece, itself first, and for each generator g the number (k,) of image · g."""
+    images, next_to = [Image(np.eye(3), np.zeros(3))], [[] for _ in generators]
+    for number in count():
+        if number == len(images):
+            break
+        for generator, numbers in zip(generators, next_to, strict=True):
+            new = images[number].after(generator)
+            same = [
+                np.abs(new.R - old.R).max() <= ALIKE and np.abs(new.t - old.t).max() <= 1e3 * NEAR * size
+                for old in images
+            ]
+            if not any(same):
+                images.append(new)
+                same.append(True)
+            numbers.append(same.index(True))
+        if len(images) > MOST_IMAGES:
+            text = (
+                "the images in the mirror planes never end: some planes are parallel, or no whole number of"
+            )
+            text += " images fits around their line; name those to unfold at: mirrored(surface, planes=[…])"
+            raise SurfaceError(text, what="planes", found=len(images))
+    return images, [np.array(numbers) for numbers in next_to]
+
+
+def _refuse_overlap(
+    surface: Surface, mirrors: Sequence[tuple[Plane, Bools]], images: Sequence[Image]
+) -> None:
+    """Refuse mirror planes whose images cross the piece: there the whole would cover itself."""
+    near = 1e2 * NEAR * surface.size
+    for image in images:
+        for plane, _ in mirrors:
+            height = _moved_plane(plane, image).height(surface.vertices)
+            if (height > near).any() and (height < -near).any():
+                text = f"the images overlap: an image of the {plane} cuts through the surface; mirror planes"
+                text += " must meet at 180° over a whole number, with the surface between them"
+                raise SurfaceError(text, what="planes", where=str(plane))
+
+
+def _moved_plane(plane: Plane, image: Image) -> Plane:
+    point, normal = image.points(np.array(plane.point)), image.R @ np.array(plane.normal)
+    return replace(plane, point=tuple(point.tolist()), normal=tuple(normal.tolist()))
+
+
+def _joined(links: Ints, size: int) -> tuple[Ints, Ints]:
+    """The new number (size,) of each element where linked ones are one, and the first element of each."""
+    graph = coo_array((np.ones(links.shape[1], dtype=bool), tuple(links)), shape=(size, size))
+    group = connected_components(graph, directed=False)[1]
+    first, place = np.unique(group, return_index=True)[1], group
+    order = np.argsort(first, kind="stable")
+    number = np.empty(len(first), dtype=np.int64)
+    number[order] = np.arange(len(first))
+    return number[place], first[order]
+
+
+def _meets(surface: Surface, mirrors: Sequence[tuple[Plane, Bools]]) -> Bools:
+    """(planes, patches): whether the patch goes on behind the plane, at edges in no other chosen plane."""
+    topo = surface.topology
+    inside = np.array([mask[topo.edges].all(axis=1) for _, mask in mirrors]) & topo.boundary_edge
+    inside &= inside.sum(axis=0) == 1
+    meets = np.zeros((len(mirrors), len(surface.patches)), dtype=bool)
+    for row, edges in zip(meets, inside, strict=True):
+        row[surface.patch_of_face[edges[topo.edge_of_face].any(axis=1)]] = True
+    return meets
+
+
+def _across(meets: Bools, next_to: Sequence[Ints]) -> Ints:
+    """(k,q) labels: which of the k images of each of q parts are one with each other."""
+    k, q = len(next_to[0]), meets.shape[1]
+    links = [
+        np.stack([(q * np.arange(k)[:, None] + parts).ravel(), (q * other[:, None] + parts).ravel()])
+        for parts, other in zip(map(np.flatnonzero, meets), next_to, strict=True)
+    ]
+    return _joined(np.concatenate(links, axis=1), k * q)[0].reshape(k, q)
+
+
+def _patches(
+    surface: Surface, mirrors: Sequence[tuple[Plane, Bools]], next_to: Sequence[Ints], F: Ints
+) -> tuple[Ints, list[tuple[int, str]]]:
+    """(images, patches) the patch of the whole; and of each patch there, where it comes from and its name."""
+    k, q = len(next_to[0]), len(surface.patches)
+    label = _across(_meets(surface, mirrors), next_to)
+    source = np.tile(surface.patch_of_face, k)
+    topo = topology(F, source, int(F.max()) + 1)
+    key = topo.edge_of_face.astype(np.int64) * q + source[:, None]
+    crowded = np.bincount(key.ravel(), minlength=q * len(topo.edges)).reshape(-1, q) > 2
+    apart = crowded.any(axis=0)
+    for room in surface.rooms:
+        apart[[surface.patch_index(name) for name, _ in room.patches]] = True
+    out, names = np.empty((k, q), dtype=np.int64), []
+    taken = {patch.name for patch in surface.patches}
+    for p, patch in enumerate(surface.patches):
+        parts = np.unique(label[:, p]) if apart[p] else label[:1, p]
+        for part in parts:
+            name = patch.name if part == label[0, p] else _unused(patch.name, taken)
+            taken.add(name)
+            out[(label[:, p] == part) | (not apart[p]), p] = len(names)
+            names.append((p, name))
+    return out, names
+
+
+def _unused(name: str, taken: set[str]) -> str:
+    return next(f"{name} ({k})" for k in count(2) if f"{name} ({k})" not in taken)
+
+
+def _supports(
+    surface: Surface,
+    mirrors: Sequence[tuple[Plane, Bools]],
+    images: Sequence[Image],
+    place: Ints,
+    n: int,
+) -> dict[str, object]:
+    """The supports of the whole: those of the piece in all images, but for the planes unfolded at."""
+    given, size = surface.given, surface.size
+    fixed = np.zeros(n, dtype=bool)
+    fixed[place[:, given.fixed]] = True
+    kept = [(surface.plane, given.on_plane)]
+    kept += [pair for pair in surface.on_planes if all(pair[0] is not plane for plane, _ in mirrors)]
+    planes: list[tuple[Plane, Bools]] = [(surface.plane, np.zeros(n, dtype=bool))]
+    lines: list[tuple[Guide, Bools]] = []
+    for image, row in zip(images, place, strict=True):
+        for plane, mask in kept:
+            new = _moved_plane(plane, image)
+            _merge(planes, new, row[mask], lambda old, new: _same_plane(old, new, size), n)
+        for guide, mask in given.on_line:
+            _merge(
+                lines, _moved_guide(guide, image), row[mask], lambda old, new: _same_guide(old, new, size), n
+            )
+    if lines:
+        double = np.sum([mask for _, mask in lines], axis=0) > 1
+        fixed |= double
+        lines = [(guide, mask & ~double) for guide, mask in lines]
+    return {"fixed": fixed, "on_plane": planes[0][1], "on_planes": planes[1:], "on_line": lines}
+
+
+def _merge(parts: list, new, vertices: Ints, same, n: int) -> None:
+    """Add the vertices to the part of this plane or line, or as a new part."""
+    for old, mask in parts:
+        if same(old, new):
+            mask[vertices] = True
+            return
+    mask = np.zeros(n, dtype=bool)
+    mask[vertices] = True
+    if mask.any():
+        parts.append((new, mask))
+
+
+def _same_plane(one: Plane, other: Plane, size: float) -> bool:
+    parallel = np.linalg.norm(np.cross(one.normal, other.normal)) <= ALIKE
+    return bool(parallel and abs(one.height(other.point)) <= 1e2 * NEAR * size) and one.mirror == other.mirror
+
+
+def _moved_guide(guide: Guide, image: Image) -> Guide:
+    if isinstance(guide, Circle):
+        centre, normal = image.points(np.array(guide.centre)), image.R @ np.array(guide.normal)
+        return Circle(tuple(centre.tolist()), tuple(normal.tolist()), guide.radius)
+    point, direction = image.points(np.array(guide.point)), image.R @ np.array(guide.direction)
+    return Line(tuple(point.tolist()), tuple(direction.tolist()))
+
+
+def _same_guide(one: Guide, other: Guide, size: float) -> bool:
+    if type(one) is not type(other):
+        return False
+    near = 1e2 * NEAR * size
+    if isinstance(one, Circle) and isinstance(other, Circle):
+        parallel = np.linalg.norm(np.cross(one.normal, other.normal)) <= ALIKE
+        apart = np.linalg.norm(np.subtract(one.centre, other.centre)) + abs(one.radius - other.radius)
+        return bool(parallel and apart <= near)
+    assert isinstance(one, Line)
+    assert isinstance(other, Line)
+    parallel = np.linalg.norm(np.cross(one.direction, other.direction)) <= ALIKE
+    return bool(parallel and float(one.distance(np.array(other.point))) <= near)
+
+
+def _cables(surface: Surface, place: Ints) -> list[Cable]:
+    """The cables with their images; in a mirror plane the tensions of coinciding images add up."""
+    cables = []
+    for cable in surface.cables:
+        edges = np.sort(place[:, cable.edges].reshape(-1, 2), axis=1)
+        edges, times = np.unique(edges, axis=0, return_counts=True)
+        if times.min() != times.max():
+            text = f"cable {cable.name!r} lies in a mirror plane in part; make that part a cable of its own"
+            raise SurfaceError(text, what="cables", where=cable.name)
+        cables.append(Cable(cable.name, int(times[0]) * cable.tension, edges))
+    return cables
+
+
+def _rooms(
+    surface: Surface,
+    mirrors: Sequence[tuple[Plane, Bools]],
+    next_to: Sequence[Ints],
+    patch_label: Ints,
+    patch_names: Sequence[str],
+) -> list[Room]:
+    """The rooms: images of one that meet across a plane are one room, with the volume of all."""
+    if not surface.rooms:
+        return []
+    bounds = surface.room_signs != 0.0
+    meets = (_meets(surface, mirrors)[:, None, :] & bounds[None]).any(axis=2)
+    label = _across(meets, next_to)
+    taken, rooms = {room.name for room in surface.rooms}, []
+    for r, room in enumerate(surface.rooms):
+        for part in np.unique(label[:, r]):
+            images = np.flatnonzero(label[:, r] == part)
+            name = room.name if part == label[0, r] else _unused(room.name, taken)
+            taken.add(name)
+            patches = {
+                patch_names[patch_label[image, surface.patch_index(patch)]]: sign
+                for image in images
+                for patch, sign in room.patches
+            }
+            rooms.append(Room(name, patches, len(images) * room.volume))
+    return rooms
+
+
+def cut(surface: Surface, plane: Plane) -> Surface:
+    """The part of a symmetric surface in front of a plane, which becomes a mirror plane of it.
+
+    The mesh must have edges along the plane, as a symmetric mesh can. A room that the plane cuts keeps half
+    of its volume, and a cable in the plane half of its tension, so that ``mirrored`` gives the whole back.
+
+    Parameters
+    ----------
+    plane : its normal points to the part that stays.
+
+    Raises
+    ------
+    SurfaceError
+        If a triangle crosses the plane, or nothing lies on one side of it.
+
+    >>> from pcmc import Patch
+    >>> square = Surface([[-1, 0, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3], [1, 2, 3]], [0, 0],
+    ...                  [Patch("floor", 1.0)], fixed=range(4))
+    >>> half = cut(square, Plane(normal=(1, 0, 0)))
+    >>> half.vertices.tolist(), mirrored(half).m
+    ([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 2)
+    """
+    expect_surface(surface)
+    if not isinstance(plane, Plane):
+        validate.refuse("plane", plane, "a Plane", error=SurfaceError)
+    plane = replace(plane, mirror=True)
+    height = plane.height(surface.vertices)
+    side = np.where(np.abs(height) <= NEAR * surface.size, 0, np.sign(height)).astype(int)
+    corners = side[surface.faces]
+    crossing = np.flatnonzero((corners > 0).any(axis=1) & (corners < 0).any(axis=1))
+    if len(crossing):
+        text = f"triangle {crossing[0]} crosses the {plane} ({len(crossing)} such triangles); the mesh must"
+        raise SurfaceError(f"{text} have edges along the plane", what="plane", where=int(crossing[0]))
+    stays = (corners > 0).any(axis=1)
+    if stays.all() or not stays.any():
+        where = "in front of" if stays.all() else "behind"
+        raise SurfaceError(f"all of the surface is {where} the {plane}", what="plane", where=where)
+    vertices = np.unique(surface.faces[stays])
+    number = np.full(surface.n, -1)
+    number[vertices] = np.arange(len(vertices))
+    patches, patch = np.unique(surface.patch_of_face[stays], return_inverse=True)
+    given, X = surface.given, surface.vertices[vertices]
+    X = X - (height[vertices] * (side[vertices] == 0))[:, None] * np.array(plane.normal)
+    planes = [(other, mask[vertices]) for other, mask in surface.on_planes if mask[vertices].any()]
+    return Surface(
+        X,
+        number[surface.faces[stays]],
+        patch,
+        [surface.patches[p] for p in patches],
+        given.fixed[vertices],
+        given.on_plane[vertices],
+        surface.plane,
+        [(guide, mask[vertices]) for guide, mask in given.on_line if mask[vertices].any()],
+        [*planes, (plane, side[vertices] == 0)],
+        _cut_cables(surface, side, number),
+        _cut_rooms(surface, stays),
+    )
+
+
+def _cut_cables(surface: Surface, side: Ints, number: Ints) -> list[Cable]:
+    """The cables of the part that stays; of one in the plane, half the tension."""
+    cables = []
+    for cable in surface.cables:
+        ends = side[cable.edges]
+        inside, stays = (ends == 0).all(axis=1), (ends >= 0).all(axis=1)
+        if inside.any() and not inside[stays].all():
+            text = f"cable {cable.name!r} lies in the plane in part; make that part a cable of its own"
+            raise SurfaceError(text, what="cables", where=cable.name)
+        if stays.any():
+            share = 0.5 if inside.any() else 1.0
+            cables.append(Cable(cable.name, share * cable.tension, number[cable.edges[stays]]))
+    return cables
+
+
+def _cut_rooms(surface: Surface, stays: Bools) -> list[Room]:
+    """The rooms of the part that stays; of one that the plane cuts, half the volume."""
+    left = {surface.patches[p].name for p in np.unique(surface.patch_of_face[stays])}
+    gone = {surface.patches[p].name for p in np.unique(surface.patch_of_face[~stays])}
+    rooms = []
+    for room in surface.rooms:
+        patches = {name: sign for name, sign in room.patches if name in left}
+        if patches:
+            halved = any(name in gone for name, _ in room.patches)
+            rooms.append(Room(room.name, patches, room.volume * (0.5 if halved else 1.0)))
+    return rooms

@@ -1,0 +1,212 @@
+"""What IfcOpenShell reads in an .ifc file, and that its own validator accepts the file."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import ifcopenshell
+import numpy as np
+import pytest
+from ifcopenshell.util.element import get_container, get_pset, get_psets
+from ifcopenshell.util.placement import get_local_placement
+from ifcopenshell.util.unit import calculate_unit_scale, get_project_unit
+from refusals import refused
+from tents import tent
+
+import pcmc
+from pcmc.base.errors import FileError, LostWarning, MissingExtra, OptionError
+from pcmc.base.units import FORCES, LENGTHS, Units
+from pcmc.energy.functional import patch_areas
+
+
+def roof_of(path):
+    """The file, which must live as long as its entities, its roof, and the roof's parts by name."""
+    model = ifcopenshell.open(path)
+    roof = model.by_type("IfcRoof")[0]
+    return model, roof, {part.Name: part for part in roof.IsDecomposedBy[0].RelatedObjects}
+
+
+@pytest.mark.slow
+def test_the_validator_of_ifcopenshell_accepts_it(tmp_path):
+    """With the rules of the schema; and it refuses a file in which a rule is broken."""
+    from generators import two_squares
+
+    surface = tent(names=("Süd/Ost", "a.b", "κ_1 (2)"))
+    pcmc.write(tmp_path / "a.ifc", surface, certificate=pcmc.certify(surface), units=Units("mm", "kN"))
+    pcmc.write(tmp_path / "b.ifc", two_squares(4, alpha_aux=1.0), units=Units("ft", "kip"))
+    text = (tmp_path / "b.ifc").read_text().replace(",.ROOF.)", ",.USERDEFINED.)")  # without an ObjectType
+    (tmp_path / "wrong.ifc").write_text(text)
+    command = [
+        sys.executable,
+        "-m",
+        "ifcopenshell.validate",
+        "--rules",
+        "--json",
+        "a.ifc",
+        "b.ifc",
+        "wrong.ifc",
+    ]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
+    lines = run.stdout.splitlines()
+    assert lines[:2] == ["No validation issues found."] * 2
+    assert "CorrectPredefinedType" in lines[2]
+
+
+def test_the_hierarchy_is_whole(tmp_path):
+    path, surface = tmp_path / "a.ifc", tent(names=("Süd/Ost", "a.b", "κ_1 (2)"))
+    certificate = pcmc.certify(surface)
+    pcmc.write(path, surface, certificate=certificate)
+    model, roof, parts = roof_of(path)
+    assert model.schema == "IFC4"
+    above, chain = get_container(roof), []
+    while above:
+        chain.append(above.is_a())
+        above = above.Decomposes[0].RelatingObject if above.Decomposes else None
+    assert chain == ["IfcBuildingStorey", "IfcBuilding", "IfcSite", "IfcProject"]
+    assert list(parts) == [patch.name for patch in surface.patches]
+    found = get_pset(roof, "Pcmc_Certificate")
+    assert found["Verdict"] == certificate.verdict.name.lower()
+    assert found["Residual"] == certificate.residual
+    assert found["Detail"] == certificate.detail
+
+
+def test_each_patch_is_a_mesh_with_its_properties(tmp_path):
+    from generators import two_squares
+
+    path, surface = tmp_path / "a.ifc", two_squares(4, alpha_aux=1.0)
+    pcmc.write(path, surface, units=Units("m", "kN"))
+    areas = patch_areas(surface)
+    _model, roof, parts = roof_of(path)
+    assert [e.is_a() for e in parts.values()] == ["IfcSlab", "IfcSlab", "IfcWall"]
+    for k, (patch, element) in enumerate(zip(surface.patches, parts.values(), strict=True)):
+        assert element.Name == patch.name
+        mesh = element.Representation.Representations[0].Items[0]
+        assert mesh.is_a("IfcTriangulatedFaceSet")
+        points, corners = np.array(mesh.Coordinates.CoordList), np.array(mesh.CoordIndex) - 1
+        np.testing.assert_array_equal(
+            points[corners], surface.vertices[surface.faces[surface.patch_of_face == k]]
+        )
+        values = get_psets(element)["Pcmc_Patch"]
+        assert (values["Tension"], values["Pressure"]) == (patch.tension, patch.pressure)
+        assert values["Area"] == pytest.approx(areas[k], rel=1e-14)
+        assert values.get("TargetMeanCurvature") == patch.target_curvature
+        style = mesh.StyledByItem[0].Styles[0]
+        assert style.Name == patch.name
+    assert "Pcmc_Certificate" not in get_psets(roof)
+
+
+def test_a_result_brings_its_certificate(tmp_path):
+    from generators import spherical_cap
+
+    result = pcmc.solve(spherical_cap(4))
+    pcmc.write(tmp_path / "a.ifc", result)
+    _model, roof, _parts = roof_of(tmp_path / "a.ifc")
+    found = get_pset(roof, "Pcmc_Certificate")
+    assert (found["Verdict"], found["MorseIndex"]) == ("stable", 0)
+    assert found["LowestEigenvalue"] == result.certificate.eigenvalues[0] > 0.0
+    pcmc.write(tmp_path / "a.obj", result)  # without a warning that it is lost
+    assert pcmc.read(tmp_path / "a.obj").n == result.surface.n
+
+
+METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "ft": 0.3048, "in": 0.0254}
+
+
+@pytest.mark.parametrize("length", LENGTHS)
+def test_units_are_those_of_the_surface(tmp_path, length):
+    path, surface = tmp_path / "a.ifc", tent()
+    pcmc.write(path, surface, units=length)
+    model, _roof, parts = roof_of(path)
+    assert calculate_unit_scale(model) == pytest.approx(METRES[length], rel=1e-15)
+    assert get_project_unit(model, "FORCEUNIT") is None
+    area = get_psets(parts["east"])["Pcmc_Patch"]["Area"]  # always in m²
+    again = pcmc.read(path, units=length)
+    assert np.abs(np.sort(again.vertices, axis=0) - np.sort(surface.vertices, axis=0)).max() == 0.0
+    assert again.tensions.tolist() == surface.tensions.tolist()
+    assert area == pytest.approx(METRES[length] ** 2 * patch_areas(surface)[1], rel=1e-14)
+
+
+@pytest.mark.parametrize("force", FORCES)
+def test_forces_have_units_if_they_are_given(tmp_path, force):
+    path = tmp_path / "a.ifc"
+    pcmc.write(path, tent(), units=Units("ft", force))
+    model = ifcopenshell.open(path)
+    newtons = {"N": 1.0, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605, "kip": 4448.2216152605}[force]
+    assert calculate_unit_scale(model, "FORCEUNIT") == pytest.approx(newtons, rel=1e-15)
+    values = {v.Name: v for v in model.by_type("IfcPropertySingleValue") if v.Name in ("Tension", "Pressure")}
+    assert values["Tension"].NominalValue.is_a("IfcLinearForceMeasure")
+    assert values["Pressure"].NominalValue.is_a("IfcPlanarForceMeasure")
+    powers = {
+        unit.UnitType: [element.Exponent for element in unit.Elements]
+        for unit in model.by_type("IfcDerivedUnit")
+    }
+    assert powers == {"LINEARFORCEUNIT": [1, -1], "PLANARFORCEUNIT": [1, -2]}
+
+
+def test_unknown_units_are_refused(tmp_path):
+    with refused(OptionError, what="units", found="furlong"):
+        pcmc.write(tmp_path / "a.ifc", tent(), units="furlong")
+    assert not list(tmp_path.iterdir())
+
+
+def test_far_from_the_origin_the_roof_is_placed(tmp_path):
+    near, shift = tent(tilted=False), np.array([5e5, 5e6, 100.0])
+    plane = pcmc.Plane(tuple(shift))
+    held = {"fixed": near.fixed, "on_plane": near.on_plane, "plane": plane}
+    far = pcmc.Surface(near.vertices + shift, near.faces, near.patch_of_face, near.patches, **held)
+    pcmc.write(tmp_path / "a.ifc", far)
+    _model, _roof, parts = roof_of(tmp_path / "a.ifc")
+    element = parts["east"]
+    points = np.array(element.Representation.Representations[0].Items[0].Coordinates.CoordList)
+    assert np.abs(points).max() < 10.0
+    place = get_local_placement(element.ObjectPlacement)[:3, 3]
+    np.testing.assert_array_equal(points + place, far.vertices[np.unique(far.faces[4:8])])
+    assert pcmc.read(tmp_path / "a.ifc").n == far.n
+
+
+def test_other_files_are_refused(tmp_path):
+    path = tmp_path / "a.ifc"
+    pcmc.write(path, tent())
+    foreign = path.read_text().replace("Pcmc_Surface", "Other")
+    path.write_text(foreign)
+    with refused(FileError, what=str(path), where="Pcmc_Surface"):
+        pcmc.read(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("((1,3,5)", "((1,3,9999)"),
+        ("((1,3,5)", "((0,3,7)"),
+        ("((1,3,5)", "((1,3)"),
+        ("IFCTEXT('22", "IFCTEXT('2x"),
+        ("IFCTEXT('22", "IFCTEXT('2"),
+        ("IFCTEXT('22", "IFCTEXT('72"),
+        ('"counts"', '"count"'),
+        ("IFCTRIANGULATEDFACESET(", "IFCPOLYGONALFACESET("),
+        ("#29,(#45,", "#29,(#99999,"),
+    ],
+)
+def test_damaged_files_are_refused_in_one_line(tmp_path, old, new):
+    path = tmp_path / "a.ifc"
+    pcmc.write(path, tent())
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(FileError) as caught:
+        pcmc.read(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_it_cannot_carry_is_named(tmp_path):
+    with pytest.warns(LostWarning, match=r"a \.ifc file cannot carry height"):
+        pcmc.write(tmp_path / "a.ifc", tent(), scalars={"height": tent().vertices[:, 2]})
+
+
+def test_without_ifcopenshell(tmp_path, monkeypatch):
+    pcmc.write(tmp_path / "a.ifc", tent())
+    monkeypatch.setitem(sys.modules, "ifcopenshell", None)
+    for act in (lambda: pcmc.write(tmp_path / "b.ifc", tent()), lambda: pcmc.read(tmp_path / "a.ifc")):
+        with pytest.raises(MissingExtra, match=r"ifcopenshell is not installed.*pcmc-surfaces\[ifc\]"):
+            act()
+    assert [p.name for p in tmp_path.iterdir()] == ["a.ifc"]

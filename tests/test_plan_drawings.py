@@ -1,0 +1,428 @@
+"""Plans from drawings: layers, gaps, exact curves, wrong drawings, and one command from start to end."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+from refusals import refused
+
+import pcmc
+from pcmc import cli, project
+from pcmc.base.errors import FileError, FileWarning, OptionError, PlanError, SurfaceError
+from pcmc.io.reading_process import read_arrays
+from pcmc.plan import bezier, circle, curve, ellipse, join, plan_from, polyline
+from pcmc.plan.curve_data import curve_data
+from pcmc.plan.curves import arc
+from pcmc.plan.drawing import read_drawing
+from pcmc.plan.proposal import ROOM, least_tension, proposed
+from pcmc.plan.strokes import bezier_spans, read_strokes
+
+pytest.importorskip("ezdxf")
+pytest.importorskip("tomlkit")
+rhino3dm = pytest.importorskip("rhino3dm")
+shapely = pytest.importorskip("shapely")
+
+import drawn  # noqa: E402 — needs ezdxf
+
+BOX = [(0, 0), (10, 0), (10, 6), (0, 6)]
+
+
+def drawing(path, *calls, outline=True, unit=6):
+    """A drawing with a box as outline, and calls of the modelspace: name, layer, arguments."""
+    document, space = drawn.new(unit)
+    if outline:
+        space.add_lwpolyline(BOX, close=True, dxfattribs=drawn.on("outline"))
+    for name, layer, *arguments in calls:
+        entity = getattr(space, f"add_{name}")(*arguments, dxfattribs=drawn.on(layer))
+        if name == "text":
+            entity.set_placement((5, 3))
+    file = path / "hall.dxf"
+    document.saveas(file)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("name", "patches", "least"), [("nave", 3, 1.2), ("pavilion", 1, 3.0), ("flower", 5, 1.2)]
+)
+def test_from_a_drawing_to_a_certified_roof_in_one_command(tmp_path, capsys, name, patches, least):
+    file = getattr(drawn, name)(tmp_path / f"{name}.dxf")
+    roof = tmp_path / "roof.3dm"
+    assert cli.main(["solve", str(file), "-o", str(roof), "--no-mesh-check"]) == 0
+    printed = capsys.readouterr()
+    assert "stable" in printed.out
+    surface = pcmc.read(roof)
+    loaded = [patch for patch in surface.patches if not patch.auxiliary]
+    assert len(loaded) == patches
+    assert surface.vertices[:, 2].max() > least
+    assert pcmc.certify(surface).certified
+
+
+def test_the_l_shape_and_its_written_project_give_the_same_roof(tmp_path):
+    file = drawn.corner(tmp_path / "corner.dxf")
+    text, _ = project.project_text(file)
+    (tmp_path / "roof.toml").write_text(text)
+    one, two = (project.load(path) for path in (file, tmp_path / "roof.toml"))
+    first, second = (project.surface_of(p) for p in (one, two))
+    assert [p.name for p in first.patches] == [p.name for p in second.patches]
+    np.testing.assert_allclose(first.vertices, second.vertices, atol=1e-8)
+    assert pcmc.certify(pcmc.solve(first).surface).certified
+
+
+def test_a_project_that_refers_to_its_drawing_follows_it(tmp_path):
+    file = drawn.nave(tmp_path / "nave.dxf")
+    path = tmp_path / "roof.toml"
+    path.write_text(
+        '[plan]\ndrawing = "nave.dxf"\nedge_length = 1.0\n[plan.patches]\napse = {tension = 9.0}\n'
+        '[[plan.dividers]]\nname = "chancel"\nwall = 4.5\n'
+    )
+    assert project.files_of(path) == [path, file]
+    before = project.digest(path)
+    with pytest.warns(FileWarning, match="annotation"):
+        loaded = project.load(path)
+    surface = project.surface_of(loaded)
+    tension = {patch.name: patch.tension for patch in surface.patches}
+    assert (tension["apse"], tension["chancel"], loaded.plan.edge_length) == (9.0, 4.5, 1.0)
+    assert tension["east"] == tension["west"] != 9.0
+    drawn.nave(file, scale=2.0)
+    assert project.digest(path) != before
+    with pytest.warns(FileWarning):
+        assert project.build(path).size > 1.9 * surface.size
+
+
+def test_millimetres_and_metres_give_the_same_plan(tmp_path):
+    metres = read_drawing(drawn.nave(tmp_path / "m.dxf"))
+    small = drawn.nave(tmp_path / "mm.dxf", scale=1000.0, unit=4)
+    same, own = read_drawing(small, "m"), read_drawing(small)
+    assert (metres.unit, same.unit, same.units, own.units) == ("m", "mm", "m", "mm")
+    assert same.notes[0] == "lengths converted from mm to m (1 mm = 0.001 m)"
+    assert own.outline.length == pytest.approx(1000.0 * metres.outline.length, rel=1e-12)
+    values = [proposed(plan) for plan in (metres, same)]
+    assert values[0]["patches"].keys() == values[1]["patches"].keys()
+    assert values[0]["edge_length"] == values[1]["edge_length"]
+
+
+def test_small_gaps_are_closed_and_said_and_arcs_stay_arcs(tmp_path):
+    plan = read_drawing(drawn.nave(tmp_path / "nave.dxf", gap=0.01))
+    assert plan.outline.closed
+    assert "1 gap closed, up to 0.01 long" in plan.notes[0]
+    assert f"up to {plan.gap:.3g}" in plan.notes[0]
+    whole = read_drawing(drawn.nave(tmp_path / "whole.dxf"))
+    for one in (plan, whole):
+        (half,) = [piece for piece in one.outline.pieces if piece.sweep]
+        assert np.linalg.norm(half.points[1]) == pytest.approx(4.0, rel=1e-12)
+    with refused(PlanError, what="layer 'OUTLINE'") as caught:
+        read_drawing(tmp_path / "nave.dxf", gap=0.001)
+    assert caught.value.found == pytest.approx(0.01)
+    assert len(caught.value.where) == 2
+
+
+def test_ends_of_dividers_that_just_miss_their_line_are_moved_to_it(tmp_path):
+    file = drawing(tmp_path, ("line", "divider a", (5, 0.006), (5, 6.004)))
+    plan = read_drawing(file)
+    np.testing.assert_allclose(plan.dividers["a"].at([0.0, 1.0]), [[5, 0], [5, 6]], atol=1e-9)
+    assert "2 ends of dividers moved by up to 0.006" in plan.notes[0]
+
+
+def test_strokes_drawn_twice_count_once(tmp_path):
+    lines = ("line", "divider a", (5, 0), (5, 6)), ("line", "divider a", (5, 6), (5, 0))
+    plan = read_drawing(drawing(tmp_path, *lines))
+    assert list(plan.dividers) == ["a"]
+    assert "drawn twice" in plan.notes[0]
+
+
+WRONG = {
+    "empty": ({"outline": False}, [], "outline", None),
+    "only faces": (
+        {"outline": False},
+        [("3dface", "roof", [(0, 0), (1, 0), (1, 1), (0, 1)])],
+        "outline",
+        None,
+    ),
+    "misspelt": ({"outline": False}, [("circle", "outlne", (0, 0), 3)], "outline", None),
+    "an open outline": (
+        {"outline": False},
+        [("lwpolyline", "outline", [*BOX, (0, 0.3)])],
+        "layer 'outline'",
+        ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0)),
+    ),
+    "a fork": (
+        {"outline": False},
+        [("line", "outline", (0, 0), end) for end in ((4, 0), (0, 4), (4, 4))],
+        "layer 'outline'",
+        (0.0, 0.0, 0.0),
+    ),
+    "a stray line": ({}, [("line", "outline", (20, 0), (24, 0))], "layer 'outline'", (20.0, 0.0, 0.0)),
+    "two outlines": ({}, [("circle", "outline", (5, 3), 1)], "layer 'outline'", None),
+    "an open hole": (
+        {},
+        [("line", "hole a", (2, 2), (3, 3))],
+        "layer 'hole a'",
+        ((2.0, 2.0, 0.0), (3.0, 3.0, 0.0)),
+    ),
+    "a leaning mast": ({}, [("line", "mast", (5, 3, 0), (6, 3, 2))], "layer 'mast'", (5.0, 3.0, 0.0)),
+    "a height without a number": ({}, [("text", "height", "high")], "layer 'height'", None),
+    "a patch without a name": ({}, [("point", "patch", (5, 3))], "layer 'patch'", None),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_drawings_are_refused_with_layer_and_place(tmp_path, case):
+    options, calls, what, where = WRONG[case]
+    file = drawing(tmp_path, *calls, **options)
+    with refused(PlanError, what=what, where=where) as caught:
+        read_drawing(file)
+    assert str(file) in str(caught.value)
+
+
+BAD_LINES = {
+    "crosses itself": ("lwpolyline", [(2, 0), (8, 6), (8, 0), (2, 6)], (5.0, 3.0)),
+    "ends inside": ("line", (5, 0), (5, 5), (5.0, 5.0)),
+    "outside": ("line", (25, 0), (25, 6), None),
+}
+
+
+@pytest.mark.parametrize("case", BAD_LINES)
+def test_errors_of_the_plan_name_the_layer_and_the_entity(tmp_path, case):
+    kind, *arguments, where = BAD_LINES[case]
+    loaded = project.load(drawing(tmp_path, (kind, "divider north", *arguments)))
+    with refused(PlanError, what="divider 'north'", where=where) as caught:
+        project.surface_of(loaded)
+    assert f"layer 'divider north': {'LWPOLYLINE' if kind == 'lwpolyline' else 'LINE'}" in str(caught.value)
+
+
+def test_names_that_do_not_fit_the_drawing_are_refused(tmp_path):
+    file = drawing(tmp_path, ("text", "patch", "nave = 7.5"))
+    plan = read_drawing(file)
+    assert proposed(plan)["patches"]["nave"]["tension"] == 7.5
+    with refused(OptionError, what="patches", where="nve"):
+        proposed(plan, {"patches": {"nve": {"tension": 1.0}}})
+    with refused(OptionError, what="dividers", found="a"):
+        proposed(plan, {"dividers": [{"name": "a", "wall": 1.0}]})
+    for line, what in (
+        ("gap = 1\noutline = [[0, 0], [1, 0], [0, 1]]", "plan.gap"),
+        ('drawing = "../a.dxf"', "plan.drawing"),
+    ):
+        (tmp_path / "p.toml").write_text(f"[plan]\n{line}\n")
+        with refused(FileError, what=what):
+            project.load(tmp_path / "p.toml")
+
+
+def test_heights_masts_and_levels(tmp_path):
+    file = drawing(
+        tmp_path,
+        ("point", "heights", (2, 3, 1.1)),
+        ("text", "height", "h = 1,2 m"),
+        ("line", "mast", (8, 3, 0), (8, 3, 2)),
+        ("circle", "mast ring", (7, 2, 1.5), 0.4),
+    )
+    plan = read_drawing(file)
+    np.testing.assert_allclose(plan.heights, [[2, 3, 1.1], [5, 3, 1.2]])
+    np.testing.assert_allclose(plan.supports, [[8, 3, 2]])
+    assert list(plan.holes) == ["ring"]
+    assert not plan.flat
+    with pytest.warns(FileWarning, match="draw a mast's top as a ring"):
+        loaded = project.load(file)
+    assert [(t.quantity, t.of, t.value) for t in loaded.targets] == [
+        ("height", (2.0, 3.0), 1.1),
+        ("height", (5.0, 3.0), 1.2),
+    ]
+    document, space = drawn.new()
+    space.add_lwpolyline(BOX, close=True, dxfattribs={"layer": "outline", "elevation": 105.0})
+    document.saveas(tmp_path / "high.dxf")
+    surface = project.build(tmp_path / "high.dxf")
+    assert surface.plane.point == (0.0, 0.0, 105.0)
+    assert surface.vertices[:, 2].min() == 105.0
+
+
+def test_a_height_in_the_drawing_is_met(tmp_path):
+    file = drawing(tmp_path, ("point", "height", (5, 3, 1.25)))
+    outcome = project.run(file)
+    assert outcome.good
+    assert outcome.surface.vertices[:, 2].max() == pytest.approx(1.25, abs=0.02)
+
+
+def test_blocks_layers_that_are_off_and_other_entities(tmp_path):
+    document, space = drawn.new()
+    bay = document.blocks.new("BAY")
+    bay.add_circle((0, 0), 5)
+    space.add_blockref("BAY", (3, 3), dxfattribs={"layer": "outline", "xscale": 2.0, "yscale": 1.0})
+    document.layers.add("divider old").off()
+    space.add_line((3, -2), (3, 8), dxfattribs=drawn.on("divider old"))
+    document.saveas(tmp_path / "hall.dxf")
+    plan = read_drawing(tmp_path / "hall.dxf")
+    (piece,) = plan.outline.pieces
+    assert np.linalg.norm(piece.points[1:], axis=1).tolist() == pytest.approx([10.0, 5.0])
+    assert not plan.dividers
+    assert "'divider old' (1)" in plan.notes[0]
+
+
+def test_curves_of_rhino_stay_exact(tmp_path):
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters
+
+    def on(name):
+        layer = rhino3dm.Layer()
+        layer.Name = name
+        attributes = rhino3dm.ObjectAttributes()
+        attributes.LayerIndex = model.Layers.Add(layer)
+        return attributes
+
+    def at(*points):
+        return [rhino3dm.Point3d(1000.0 * x, 1000.0 * y, 1000.0 * z) for x, y, z in points]
+
+    edge = on("Outline")
+    model.Objects.AddPolyline(rhino3dm.Polyline(at((8, 18, 0), (8, 0, 0), (0, 0, 0), (0, 18, 0))), edge)
+    model.Objects.AddArc(rhino3dm.Arc(*at((0, 18, 0), (4, 22, 0), (8, 18, 0))), edge)
+    model.Objects.AddLine(*at((0, 18, 0), (8, 18, 0)), on("divider chancel"))
+    eye = rhino3dm.Circle(*at((4, 9, 2)), 1200.0)
+    model.Objects.AddCurve(rhino3dm.NurbsCurve.CreateFromCircle(eye), on("hole eye"))
+    model.Objects.AddTextDot("nave", *at((4, 5, 0)), on("patch"))
+    path = tmp_path / "hall.3dm"
+    model.Write(str(path), 7)
+    assert project.is_drawing(path)
+    plan = read_drawing(path, "m")
+    assert (plan.unit, plan.units) == ("mm", "m")
+    (half,) = [piece for piece in plan.outline.pieces if piece.sweep]
+    assert np.linalg.norm(half.points[1]) == pytest.approx(4.0, rel=1e-12)
+    assert abs(half.sweep) == pytest.approx(math.pi, rel=1e-12)
+    assert curve_data(plan.holes["eye"]) == {"circle": {"centre": [4.0, 9.0, 2.0], "radius": 1.2}}
+    assert {name: d["bottom"] for d in proposed(plan)["dividers"] for name in [d["name"]]} == {
+        "chancel": "sloped"
+    }
+    with refused(FileError, what=str(path)):
+        raise_for_overwriting(path)
+    pcmc.write(tmp_path / "roof.3dm", plan_from(proposed(plan)).surface())
+    assert not project.is_drawing(tmp_path / "roof.3dm")
+
+
+def raise_for_overwriting(path):
+    from pcmc.cli.solving import _project
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        _project(path, None, [path], None)
+
+
+def test_spans_of_a_nurbs_circle_are_on_the_circle():
+    corner = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0)]
+    weights = np.array([1, 0.5**0.5] * 4 + [1])
+    knots = np.array([0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4.0])
+    spans = bezier_spans(2, knots, np.array(corner, dtype=float), weights)
+    assert len(spans) == 4
+    for points, w in spans:
+        on_circle = bezier(points, w).at(np.linspace(0, 1, 9))
+        np.testing.assert_allclose(np.linalg.norm(on_circle, axis=1), 1.0, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        circle([3, 4], 2.0),
+        ellipse([1, 2, 3], [[2, 0, 0], [0, 0, 1.5]], -200.0),
+        ellipse([0, 0, 1], [[0, 2, 0], [0, 0, 2]]),
+        bezier([[0, 0], [1, 3], [4, 0]], [1.0, 0.3, 2.0]),
+        join(polyline([[0, 0], [8, 0]]), arc([8, 0], [10, 2], [8, 4]), polyline([[8, 4], [0, 4], [0, 0]])),
+    ],
+    ids=["circle", "arc of an ellipse", "upright circle", "rational", "joined"],
+)
+def test_plain_data_of_a_curve_give_it_again(path):
+    again = curve(curve_data(path))
+    t = np.linspace(0, len(path.pieces), 33)
+    np.testing.assert_allclose(again.at(t), path.at(t), atol=1e-10)
+    assert again.closed == path.closed
+    np.testing.assert_allclose(path.reversed().at(t[::-1]), path.at(t), atol=1e-12)
+
+
+def test_the_least_tension_is_that_of_the_paper_for_round_and_long_plans():
+    """α = p R / 2 over a circle, p R over a barrel of half-width R; the proposal has room above it."""
+    barrel = shapely.box(0, 0, 2, 200)
+    assert least_tension(shapely.Point(0, 0).buffer(3.0, quad_segs=200)) == pytest.approx(1.5, rel=1e-3)
+    assert least_tension(barrel) == pytest.approx(1.0, rel=0.02)
+    side = 1.0 / (2.0 + math.sqrt(math.pi))  # a unit square's Cheeger constant is 2 + √π
+    assert least_tension(shapely.box(0, 0, 1, 1)) == pytest.approx(side, rel=1e-6)
+    assert ROOM > 1.0
+
+
+def test_ellipses_are_refused_by_name():
+    for spec, what in (
+        ({"ellipse": {"centre": [0, 0]}}, "ellipse"),
+        ({"ellipse": {"centre": [0, 0], "axes": [[1, 0], [2, 0]]}}, "ellipse"),
+        ({"ellipse": {"centre": [0, 0], "axes": [[1, 0], [0, 2]], "sweep": 400}}, "ellipse"),
+        ({"bezier": [[0, 0], [1, 1]], "weights": [1.0]}, "bezier"),
+        ({"bezier": [[0, 0], [1, 1]], "weights": [1.0, -1.0]}, "bezier: weights"),
+        ({"polyline": [[0, 0], [1, 1]], "weights": [1.0, 1.0]}, "weights"),
+    ):
+        with refused(OptionError, what=what):
+            curve(spec)
+
+
+def test_hostile_drawings_are_refused_in_one_line(tmp_path):
+    file = tmp_path / "a.dxf"
+    for content in (
+        b"",
+        b"\x00" * 3000,
+        b"0\nSECTION\n2\nENTITIES\n0\nLINE\n8\n",
+        b"AutoCAD Binary DXF\r\n\x1a\x00",
+    ):
+        file.write_bytes(content)
+        with pytest.raises((FileError, PlanError)) as caught:
+            read_drawing(file)
+        assert "\n" not in str(caught.value)
+    far = drawing(tmp_path, ("line", "divider a", (1e300, 0), (5, 6)))
+    with refused(FileError, where="divider a"):
+        read_drawing(far)
+
+
+def test_a_line_far_longer_than_the_plan_is_refused(tmp_path):
+    loaded = project.load(drawing(tmp_path, ("line", "divider a", (5, 0), (5, 5e9))))
+    with refused(PlanError, what="divider 'a'", found=5e9):
+        project.surface_of(loaded)
+
+
+@pytest.mark.slow
+def test_blocks_of_blocks_of_blocks_end(tmp_path):
+    file = tmp_path / "a.dxf"
+    document, space = drawn.new()
+    inner = document.blocks.new("B0")
+    inner.add_line((0, 0), (1, 0))
+    for level in range(1, 8):  # ten copies of ten copies ...
+        block = document.blocks.new(f"B{level}")
+        for k in range(10):
+            block.add_blockref(f"B{level - 1}", (k, 0))
+    space.add_blockref("B7", (0, 0), dxfattribs=drawn.on("outline"))
+    document.saveas(file)
+    with refused(FileError, what=str(file)) as caught:
+        read_strokes(file)
+    assert "entities" in str(caught.value)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FileWarning")
+def test_flipped_bits_of_a_drawing_raise_our_errors_only(tmp_path):
+    data = drawn.corner(tmp_path / "corner.dxf").read_bytes()
+    begin = data.index(b"ENTITIES")
+    end = data.index(b"ENDSEC", begin)
+    random = np.random.default_rng(5)
+    file = tmp_path / "flipped.dxf"
+    outcomes = set()
+    for _ in range(25):
+        flipped = bytearray(data)
+        for place in random.integers(begin, end, 3):
+            flipped[place] ^= 1 << int(random.integers(8))
+        file.write_bytes(bytes(flipped))
+        try:
+            project.surface_of(project.load(file))
+            outcomes.add("read")
+        except (FileError, PlanError, OptionError, SurfaceError) as error:
+            outcomes.add("refused" if "\n" not in str(error) else "in several lines")
+    assert outcomes == {"read", "refused"}
+
+
+def test_the_reading_process_gives_plain_values(tmp_path):
+    content = read_arrays("dxf drawing", drawing(tmp_path))
+    assert content["unit"] == "m"
+    assert [entity["layer"] for entity in content["entities"]] == ["outline"]
+    assert len(content["entities"][0]["pieces"]) == 4

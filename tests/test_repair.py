@@ -1,0 +1,237 @@
+"""Dirty meshes repaired with MeshLab: each fault alone, all together, and what stays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from refusals import refused
+
+import pcmc
+from pcmc import cli
+from pcmc.base.errors import FileError, FileWarning, OptionError, SurfaceError
+from pcmc.surface.geometry import area_vectors
+
+pytest.importorskip("pymeshlab")
+
+N = 9
+
+
+def sheet(n=N, x=0.0):
+    """Points and triangles of a bulging square of n by n points, 1 by 1, from x on."""
+    u = np.linspace(0.0, 1.0, n)
+    points = [[x + a, b, 2.0 * a * (1 - a) * b * (1 - b)] for a in u for b in u]
+    corner = np.arange(n * n).reshape(n, n)
+    quads = [(i, j) for i in range(n - 1) for j in range(n - 1)]
+    a, b, c, d = (
+        np.array([corner[i + p, j + q] for i, j in quads]) for p, q in ((0, 0), (1, 0), (1, 1), (0, 1))
+    )
+    return np.array(points), np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+
+
+def obj(path, X, groups):
+    """An .obj with a group per entry: name and faces."""
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in X.tolist()]
+    for name, faces in groups.items():
+        lines += [f"g {name}", *("f " + " ".join(str(v + 1) for v in face) for face in faces)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def changed(path, **options):
+    """The repaired surface and the number of changes by their first words."""
+    before = path.read_bytes()
+    repaired = pcmc.repair(path, **options)
+    assert path.read_bytes() == before
+    return repaired.surface, dict(repaired.changes)
+
+
+def area(X, F):
+    return np.linalg.norm(area_vectors(X[F]), axis=1).sum()
+
+
+def test_a_clean_mesh_stays_as_it_is(tmp_path):
+    X, F = sheet()
+    surface, changes = changed(obj(tmp_path / "a.obj", X, {"roof": F}))
+    assert changes == {}
+    assert str(pcmc.repair(tmp_path / "a.obj")) == "nothing to repair"
+    np.testing.assert_allclose(area(surface.vertices, surface.faces), area(X, F), rtol=1e-14)
+    assert surface.m == len(F)
+
+
+def test_open_seams_are_welded(tmp_path):
+    X, F = sheet()
+    soup = X[F].reshape(-1, 3) + np.random.default_rng(1).uniform(-1e-7, 1e-7, (3 * len(F), 3))
+    path = obj(tmp_path / "a.obj", soup, {"roof": np.arange(3 * len(F)).reshape(-1, 3)})
+    surface, changes = changed(path)
+    assert (surface.n, surface.m) == (len(X), len(F))
+    assert changes == {"vertices welded": 3 * len(F) - len(X)}
+    loose, _ = changed(path, weld=0.0)
+    assert loose.n == 3 * len(F)
+
+
+def test_repeated_and_flat_triangles_are_left_out(tmp_path):
+    X, F = sheet()
+    wrong = [F[0], F[3][::-1], [F[5][0], F[5][1], F[5][1]]]
+    surface, changes = changed(obj(tmp_path / "a.obj", X, {"roof": [*F, *wrong[:2], wrong[2]]}))
+    assert surface.m == len(F)
+    assert changes["repeated triangles left out"] == 2
+    assert changes["triangles without area left out"] == 1
+
+
+def test_a_flat_triangle_inside_leaves_no_crack(tmp_path):
+    """A vertex on the side of its neighbour: the flat triangle is flipped away."""
+    X = np.array([[0, 0, 0], [2, 0, 0], [1, 1, 0], [1, -1, 0], [1, 0, 0]], dtype=float)
+    F = [[0, 4, 2], [4, 1, 2], [0, 1, 4], [1, 0, 3]]
+    surface, _ = changed(obj(tmp_path / "a.obj", X, {"roof": F}), holes=0)
+    assert surface.m == 4
+    assert area(surface.vertices, surface.faces) == pytest.approx(2.0, rel=1e-12)
+    assert surface.topology.boundary_edge.sum() == 4
+
+
+def test_edges_of_three_triangles_are_split_unless_they_are_junctions(tmp_path):
+    X, F = sheet()
+    flap = np.array([[0.5, 0.5, 1.0]])
+    edge = F[np.flatnonzero((F == 4 * N + 4).any(axis=1))[0]][:2]
+    points = np.concatenate([X, flap])
+    fin = [[edge[0], edge[1], len(X)]]
+    path = obj(tmp_path / "one.obj", points, {"roof": [*F, *fin]})
+    with pytest.raises((SurfaceError, FileError)):
+        pcmc.read(path)
+    surface, changes = changed(path)
+    assert changes["edges of three or more triangles of one patch split"] == 1
+    assert surface.m == len(F) + 1
+    junction, changes = changed(obj(tmp_path / "two.obj", points, {"roof": F, "wall": fin}))
+    assert changes == {}
+    assert [patch.name for patch in junction.patches] == ["roof", "wall"]
+    assert junction.topology.junctions
+
+
+def test_small_holes_are_closed_and_openings_and_junctions_stay(tmp_path):
+    X, F = sheet(13)
+    middle = X[F].mean(axis=1)[:, :2]
+    small = np.abs(middle - [0.29, 0.29]).max(axis=1) < 0.05
+    large = np.abs(middle - [0.7, 0.7]).max(axis=1) < 0.2
+    inner = np.abs(middle - [0.29, 0.71]).max(axis=1) < 0.05
+    assert (small.sum(), inner.sum()) == (2, 2)
+    groups = {"roof": F[~(small | large | inner)], "eye": F[inner]}
+    surface, changes = changed(obj(tmp_path / "a.obj", X, groups))
+    assert changes == {"holes closed": 1, "triangles added in holes": 2}
+    assert surface.m == len(F) - large.sum()
+    assert [patch.name for patch in surface.patches] == ["roof", "eye"]
+    _, changes = changed(tmp_path / "a.obj", holes=0)
+    assert changes == {}
+    surface, changes = changed(obj(tmp_path / "b.obj", *_square()))
+    assert (changes, surface.m) == ({}, 2)
+
+
+def _square():
+    return np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]]), {"roof": [[0, 1, 2], [0, 2, 3]]}
+
+
+def test_triangles_are_turned_alike_and_up(tmp_path):
+    X, F = sheet()
+    mixed = F.copy()
+    mixed[::3] = mixed[::3, ::-1]
+    surface, changes = changed(obj(tmp_path / "a.obj", X, {"roof": mixed}))
+    assert changes["triangles turned"] == len(F[::3])
+    assert (area_vectors(surface.vertices[surface.faces])[:, 2] > 0.0).all()
+
+
+def test_points_that_are_no_numbers_and_polygons(tmp_path):
+    X, F = sheet()
+    X[0] = np.nan
+    quads = [[F[k][0], F[k][1], F[k][2], F[len(F) // 2 + k][2]] for k in range(len(F) // 2)]
+    path = obj(tmp_path / "a.obj", X, {"roof": F})
+    _, changes = changed(path)
+    assert changes["triangles at points that are no numbers left out"] == 2
+    X[0] = 0.0
+    _, changes = changed(obj(tmp_path / "b.obj", X, {"roof": quads}))
+    assert changes == {f"{len(quads)} quads were cut into triangles": 1}
+
+
+def test_a_polygon_that_read_refuses_is_read_by_meshlab(tmp_path):
+    turn = np.linspace(0, 2 * np.pi, 300, endpoint=False)
+    X = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    path = obj(tmp_path / "a.obj", X, {"disc": [range(300)]})
+    with pytest.raises(FileError, match="pcmc repair"):
+        pcmc.read(path)
+    surface, _ = changed(path)
+    assert area(surface.vertices, surface.faces) == pytest.approx(np.pi, rel=1e-3)
+
+
+def test_a_scan_is_simplified_to_an_edge_length(tmp_path):
+    X, F = sheet(61)
+    X[:, 2] += np.random.default_rng(2).normal(0, 1e-4, len(X))
+    surface, changes = changed(obj(tmp_path / "a.obj", X, {"scan": F}), edge_length=0.1)
+    lengths = np.linalg.norm(np.diff(surface.vertices[surface.topology.edges], axis=1), axis=2)
+    assert lengths.mean() == pytest.approx(0.1, rel=0.25)
+    assert changes == {f"triangles became {surface.m}": len(F)}
+    assert area(surface.vertices[:, :2] @ np.eye(2, 3), surface.faces) == pytest.approx(1.0, rel=1e-2)
+
+
+def test_the_command_says_what_it_changed_and_writes_a_roof_that_solves(tmp_path, capsys):
+    X, F = sheet()
+    path = obj(tmp_path / "a.obj", X, {"roof": [*F, F[0]]})
+    out = tmp_path / "clean.obj"
+    assert cli.main(["repair", str(path), "-o", str(out)]) == 0
+    assert "1 repeated triangles left out" in capsys.readouterr().out
+    assert cli.main(["solve", str(out), "--tension", "4", "--no-mesh-check"]) == 0
+    capsys.readouterr()
+    assert cli.main(["repair", str(path), "-o", str(path)]) == 2
+    assert "name another file" in capsys.readouterr().err
+    for option in (["--weld", "-1"], ["--holes", "-1"], ["--edge-length", "0"]):
+        assert cli.main(["repair", str(path), "-o", str(out), *option]) == 2
+    assert "edge_length" in capsys.readouterr().err
+
+
+OFF = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
+X3D = """<?xml version="1.0" encoding="UTF-8"?><X3D profile="Interchange" version="3.0"><Scene><Shape>
+<IndexedFaceSet coordIndex="0 1 2 -1 0 2 3 -1"><Coordinate point="0 0 0 1 0 0 1 1 0 0 1 0"/></IndexedFaceSet>
+</Shape></Scene></X3D>"""
+
+
+@pytest.mark.parametrize(("suffix", "content"), [(".off", OFF), (".x3d", X3D)])
+def test_formats_of_meshlab_are_read(tmp_path, suffix, content):
+    path = tmp_path / f"roof{suffix}"
+    path.write_text(content)
+    surface = pcmc.read(path, fixed="boundary")
+    assert (surface.n, surface.m) == (4, 2)
+    with refused(FileError, found=suffix):
+        pcmc.write(path, surface)
+    path.write_text(content[: len(content) // 2])
+    with refused(FileError, what=str(path)):
+        pcmc.read(path)
+    assert cli.main(["solve", str(path), "-o", str(path)]) == 2
+
+
+def test_what_cannot_be_repaired_is_refused_by_name(tmp_path):
+    X, F = sheet()
+    with refused(FileError, what=str(tmp_path / "none.obj")):
+        pcmc.repair(tmp_path / "none.obj")
+    path = obj(tmp_path / "a.obj", X, {"roof": F})
+    with refused(FileError) as caught:
+        pcmc.repair(path, weld=100.0)
+    assert "weld" in str(caught.value)
+    for options in ({"weld": -1.0}, {"holes": 2.5}, {"edge_length": 0.0}):
+        with pytest.raises(OptionError):
+            pcmc.repair(path, **options)
+
+
+@pytest.mark.slow
+def test_flipped_bits_never_crash_the_repair(tmp_path):
+    X, F = sheet()
+    data = obj(tmp_path / "a.obj", X, {"roof": F}).read_bytes()
+    random = np.random.default_rng(3)
+    file = tmp_path / "flipped.obj"
+    outcomes = set()
+    for _ in range(60):
+        flipped = bytearray(data)
+        for place in random.integers(0, len(flipped), 5):
+            flipped[place] ^= 1 << int(random.integers(8))
+        file.write_bytes(bytes(flipped))
+        try:
+            pcmc.repair(file)
+            outcomes.add("repaired")
+        except (FileError, SurfaceError, OptionError, FileWarning) as error:
+            outcomes.add(type(error).__name__)
+    assert "repaired" in outcomes

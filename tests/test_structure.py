@@ -1,0 +1,417 @@
+"""Structural models as files: what is written, what is read back, what is refused."""
+
+import re
+import tomllib
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from refusals import refused
+from shapes import rotation
+from starts import stationary, two_squares
+from structures import FABRIC, dat_text, frd_text, model_of, pyramid, square
+
+import pcmc
+from pcmc import Material, Patch, SelfWeight, Snow, StructuralModel, Surface, Wind, cli
+from pcmc.base.errors import FileError, OptionError, SurfaceError
+from pcmc.certificate.balance import load, reactions
+from pcmc.project import Structure
+from pcmc.surface.geometry import face_areas
+
+LOADS = [SelfWeight(), Snow(0.5), (Snow(0.2), Wind({"roof": 0.3}))]
+
+
+def sections(path):
+    """The data lines of an input file by keyword line, those of equal ones together; no comments."""
+    found, key = {}, ""
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if line.startswith("**"):
+            continue
+        if line.startswith("*"):
+            key = line
+            found.setdefault(key, [])
+        else:
+            found[key].append([word for word in line.split(",") if word])
+    return found
+
+
+def written(folder, model):
+    path = folder / "model.inp"
+    pcmc.write_structure(path, model)
+    return sections(path)
+
+
+def test_nodes_and_elements_are_the_vertices_and_faces(tmp_path):
+    surface = pyramid()
+    material = Material(1e6 / 3, 0.1 / 3, 0.1 / 3)
+    found = written(tmp_path, model_of(surface, material=material, thickness=1e-5 / 3))
+    nodes = np.array(found["*NODE, NSET=NALL"], dtype=float)
+    np.testing.assert_allclose(nodes[:, 1:], surface.vertices, rtol=1e-12)
+    elements = np.array(found["*ELEMENT, TYPE=M3D3, ELSET=PATCH_1"], dtype=int)
+    np.testing.assert_array_equal(elements - 1, np.column_stack([range(4), surface.faces]))
+    assert found["*BOUNDARY"] == [["FIXED", "1", "3"]]
+    assert found["*NSET, NSET=FIXED"] == [["1", "2", "3", "4"]]
+    assert found["*NSET, NSET=SUPPORT_1"] == [["1", "2", "3", "4"]]
+    found.pop("*HEADING")
+    assert all(len(field) <= 20 for rows in found.values() for row in rows for field in row)
+
+
+def test_the_prestress_is_uniform_in_each_face(tmp_path):
+    """σ ν = 0, and both other principal stresses are α/t."""
+    surface = pyramid()
+    model = model_of(surface, thickness={"roof": 0.002})
+    rows = np.array(written(tmp_path, model)["*INITIAL CONDITIONS, TYPE=STRESS"], dtype=float)
+    assert rows[:, :2].astype(int).tolist() == [[f, p] for f in range(1, 5) for p in (1, 2)]
+    tensors = rows[:, 2:][:, [[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
+    np.testing.assert_allclose(np.linalg.eigvalsh(tensors), [[0, 500, 500]] * 8, atol=1e-9)
+    P = surface.vertices[surface.faces]
+    normal = np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0])
+    np.testing.assert_allclose(tensors[::2] @ normal[:, :, None], 0.0, atol=1e-9)
+
+
+def test_loads_balance_their_totals():
+    """The pressure's force is ours; snow weighs s times the plan, self-weight ρ t g times the area."""
+    surface = pyramid()
+    model = model_of(surface, loads=LOADS)
+    form, weight, snow, both = model.steps
+    assert [step.name for step in model.steps] == ["form pressure", "self-weight", "snow", "snow and wind"]
+    assert model.nodal_loads(form).sum(axis=0) == pytest.approx([0, 0, load(surface)])
+    own = 0.1 * 1e-3 * 9.81 * face_areas(surface.vertices[surface.faces]).sum()
+    assert model.nodal_loads(weight).sum(axis=0) == pytest.approx([0, 0, load(surface) - own])
+    assert model.nodal_loads(snow).sum(axis=0) == pytest.approx([0, 0, 4.0 - own - 0.5 * 4.0])
+    assert model.nodal_loads(both).sum(axis=0) == pytest.approx([0, 0, 1.3 * 4.0 - own - 0.2 * 4.0])
+    np.testing.assert_allclose(model.nodal_loads(form)[4], [0, 0, 4 / 3])
+
+
+def test_snow_does_not_fall_on_what_is_below(tmp_path):
+    """A bulge wider than its base carries snow on the plan of its upper side alone."""
+    X = [
+        [1, 1, 0],
+        [-1, 1, 0],
+        [-1, -1, 0],
+        [1, -1, 0],
+        [2, 2, 1],
+        [-2, 2, 1],
+        [-2, -2, 1],
+        [2, -2, 1],
+        [0, 0, 2],
+    ]
+    side = [[a, (a + 1) % 4, 4 + (a + 1) % 4] for a in range(4)] + [
+        [a, 4 + (a + 1) % 4, 4 + a] for a in range(4)
+    ]
+    top = [[4 + a, 4 + (a + 1) % 4, 8] for a in range(4)]
+    bulge = Surface(X, side + top, [0] * 12, [Patch("bulge", 1.0)], fixed=range(4))
+    model = model_of(bulge, loads=[Snow(2.0)], anyway=True)
+    assert model.steps[1].forces.sum(axis=0) == pytest.approx([0, 0, -2.0 * 16.0])
+
+
+def test_patch_weights_belong_to_the_form_finding_load():
+    surface = pyramid().retensioned(weights={"roof": 0.1})
+    (form,) = model_of(surface, anyway=True).steps
+    area = face_areas(surface.vertices[surface.faces]).sum()
+    assert form.forces.sum(axis=0) == pytest.approx([0, 0, -0.1 * area])
+
+
+def test_sliding_vertices_are_held_across_their_plane(tmp_path):
+    """Their own first axis is the plane's normal; loads on them are given in their own axes."""
+    given, turn = two_squares(4, alpha_aux=1.0), rotation(2)
+    surface = Surface(
+        given.vertices @ turn.T, given.faces, given.patch_of_face, given.patches,
+        fixed=given.fixed, on_plane=given.on_plane, plane=pcmc.Plane(normal=turn[:, 2]),
+    )  # fmt: skip
+    model = model_of(surface, loads=[Snow(0.5)], anyway=True)
+    found = written(tmp_path, model)
+    axes = np.array(found["*TRANSFORM, NSET=GUIDE_1, TYPE=R"], dtype=float).reshape(2, 3)
+    np.testing.assert_allclose(np.cross(axes[0], turn[:, 2]), 0.0, atol=1e-12)
+    assert axes[0] @ axes[1] == pytest.approx(0.0, abs=1e-12)
+    assert ["GUIDE_1", "1", "1"] in found["*BOUNDARY"]
+    guided = [int(v) - 1 for row in found["*NSET, NSET=GUIDE_1"] for v in row]
+    np.testing.assert_array_equal(guided, np.flatnonzero(model.held & ~surface.fixed))
+    np.testing.assert_allclose(
+        model.axes @ model.axes.transpose(0, 2, 1), np.tile(np.eye(3), (surface.n, 1, 1)), atol=1e-12
+    )
+    forces = np.zeros((surface.n, 3))
+    for vertex, axis, value in found["*CLOAD, OP=NEW"]:
+        forces[int(vertex) - 1, int(axis) - 1] = float(value)
+    np.testing.assert_allclose(np.einsum("nij,ni->nj", model.axes, forces), model.steps[1].forces, atol=1e-11)
+
+
+def test_pinched_walls_are_left_out(tmp_path):
+    """Elements keep the numbers of their faces; the junction that rests on Π slides there."""
+    surface = stationary(partial(two_squares, 8, alpha_aux=3.0)).surface
+    model = model_of(surface, anyway=True)
+    wall = surface.patch_of_face == surface.patch_index("wall")
+    np.testing.assert_array_equal(model.faces, np.flatnonzero(~wall))
+    resting = pcmc.certify(surface).pinched
+    assert model.held[resting].all()
+    assert not model.nodes[np.setdiff1d(surface.faces[wall], surface.faces[~wall])].any()
+    assert "*ELEMENT, TYPE=M3D3, ELSET=PATCH_3" not in written(tmp_path, model)
+
+
+def test_cables_have_their_tension_and_need_an_area(tmp_path):
+    surface = square(4, cable=3.0, turn=rotation(1))
+    with refused(OptionError, what="cable_area", where="tie"):
+        model_of(surface, anyway=True)
+    with refused(OptionError, what="cable_area", where="tie"):
+        model_of(surface, anyway=True, cable_area={})
+    with refused(OptionError, what="cable"):
+        model_of(surface, anyway=True, cable_area={"tye": 1.0})
+    found = written(tmp_path, model_of(surface, anyway=True, cable_area=1e-4))
+    stress = np.array(found["*INITIAL CONDITIONS, TYPE=STRESS"], dtype=float)
+    cable = stress[stress[:, 0] > surface.m]
+    assert len(cable) == 4 * 8
+    np.testing.assert_allclose(cable[:, 2:5].sum(axis=1), 3e4)
+
+
+@pytest.mark.parametrize("text_of", [dat_text, frd_text])
+def test_results_are_read_exactly(text_of, tmp_path):
+    model = model_of(pyramid(), loads=LOADS)
+    text, steps = text_of(model)
+    path = tmp_path / ("model.dat" if text_of is dat_text else "model.frd")
+    path.write_text(text)
+    results = pcmc.read_results(path, model)
+    assert [result.name for result in results] == [step.name for step in model.steps]
+    for result, step, expected in zip(results, model.steps, steps, strict=True):
+        np.testing.assert_array_equal(result.displacements, expected["displacements"])
+        np.testing.assert_array_equal(result.deflections, expected["displacements"][:, 2])
+        own = model.nodal_loads(step, result.displacements)[:4]
+        np.testing.assert_allclose(result.reactions[:4], expected["forces"][:4] - own, atol=1e-12)
+        assert not result.reactions[4].any()
+        xx, yy, zz, xy, *other = (
+            expected["stresses"].reshape(4, 2, 6).mean(axis=1)
+            if text_of is dat_text
+            else expected["stresses"][model.surface.faces].mean(axis=1)
+        ).T
+        xz, yz = other if text_of is dat_text else other[::-1]
+        tensors = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
+        np.testing.assert_allclose(result.stresses, tensors, atol=1e-12)
+
+
+def test_principal_stresses_lie_in_the_faces():
+    """Of α/t in the plane of each face and anything across it they are α/t."""
+    model = model_of(pyramid())
+    P = model.surface.vertices[model.surface.faces]
+    normal = np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    across = normal[:, :, None] * normal[:, None, :]
+    stresses = 7.0 * (np.eye(3) - across) - 100.0 * across
+    result = pcmc.structure.StepResults("form", model, np.zeros((5, 3)), np.zeros((5, 3)), stresses, {})
+    np.testing.assert_allclose(result.principal_stresses, 7.0)
+
+
+@pytest.mark.parametrize(("suffix", "text_of"), [(".dat", dat_text), (".frd", frd_text)])
+def test_damaged_results_are_refused_in_one_line(suffix, text_of, tmp_path):
+    model, path = model_of(pyramid(), loads=LOADS), tmp_path / f"model{suffix}"
+    text = text_of(model)[0]
+    lines = text.splitlines()
+    numbers = [k for k, line in enumerate(lines) if line.count("E") >= 3]
+    last = lines[numbers[-1]]
+    wrong = [
+        "",
+        "nonsense\n" * 9,
+        "\n".join(lines[: len(lines) // 2]),
+        text.replace(last, last[:-14]),
+        text.replace(last, last[:-12] + "         NaN"),
+        text.replace(last, last.replace("E", "?")),
+        "\n".join(line for k, line in enumerate(lines) if k != numbers[6]),
+    ]
+    for content in wrong:
+        path.write_text(content)
+        with refused(FileError, what=str(path)) as caught:
+            pcmc.read_results(path, model)
+        assert "\n" not in str(caught.value)
+    path.write_bytes(b"\xff" + text.encode())
+    with refused(FileError, what=str(path), where=0):
+        pcmc.read_results(path, model)
+
+
+@pytest.mark.parametrize(("suffix", "text_of"), [(".dat", dat_text), (".frd", frd_text)])
+def test_results_of_another_surface_or_analysis_are_refused(suffix, text_of, tmp_path):
+    path = tmp_path / f"model{suffix}"
+    path.write_text(text_of(model_of(pyramid()))[0])
+    with refused(FileError, found=5, expected=25):
+        pcmc.read_results(path, model_of(square(), anyway=True))
+    with refused(FileError, found=1, expected=4) as caught:
+        pcmc.read_results(path, model_of(pyramid(), loads=LOADS))
+    assert "self-weight" in str(caught.value)
+    path.write_text(text_of(model_of(pyramid(), loads=LOADS))[0])
+    with refused(FileError, found=4, expected=1):
+        pcmc.read_results(path, model_of(pyramid()))
+
+
+def test_nodes_elsewhere_are_those_of_another_surface(tmp_path):
+    path, surface = tmp_path / "model.frd", pyramid()
+    path.write_text(frd_text(model_of(surface))[0])
+    moved = surface.moved(surface.vertices + np.array([0, 0, 0.01]))
+    with refused(FileError, what=str(path)):
+        pcmc.read_results(path, model_of(moved, anyway=True))
+
+
+def test_numbers_with_long_exponents_are_read():
+    text = " displacements (vx,vy,vz) for set NALL and time  0.1000000E+01\n\n 1 -1.5-120 0. 2.0E+00\n"
+    assert pcmc.structure.dat.read(text)[0]["displacements"].values.tolist() == [[-1.5e-120, 0.0, 2.0]]
+
+
+@pytest.mark.parametrize(
+    ("given", "what"),
+    [
+        ({"material": None}, "material"),
+        ({"material": 3.0}, "material"),
+        ({"thickness": 0.0}, "thickness"),
+        ({"thickness": -1.0}, "thickness"),
+        ({"thickness": None}, "thickness"),
+        ({"thickness": {}}, "thickness"),
+        ({"thickness": {"rof": 1.0}}, "patch"),
+        ({"loads": [Wind({"rof": 1.0})]}, "patch"),
+        ({"loads": [Snow(1.0, patches=["rof"])]}, "patch"),
+        ({"loads": Snow(1.0)}, "loads"),
+        ({"loads": [1.0]}, "loads"),
+        ({"loads": [()]}, "loads"),
+        ({"material": Material(1.0), "loads": [SelfWeight()]}, "Material.density"),
+        ({"cable_material": 1}, "cable_material"),
+    ],
+)
+def test_bad_models_are_refused(given, what):
+    with refused(OptionError, what=what):
+        model_of(pyramid(), **given)
+
+
+@pytest.mark.parametrize(
+    ("make", "what"),
+    [
+        (partial(Material, 0.0), "Material.young"),
+        (partial(Material, 1.0, 0.5), "Material.poisson"),
+        (partial(Material, 1.0, 0.3, -1.0), "Material.density"),
+        (partial(SelfWeight, 0.0), "SelfWeight.gravity"),
+        (partial(Snow, float("nan")), "Snow.load"),
+        (partial(Snow, 1.0, "roof"), "Snow.patches"),
+        (partial(Snow, 1.0, (), "two\nlines"), "name of a load"),
+        (partial(Wind, {}), "Wind.pressures"),
+        (partial(Wind, {"roof": "1"}), "Wind.pressures"),
+        (partial(Structure, thickness=1.0), "young"),
+        (partial(Structure, young=1.0), "thickness"),
+    ],
+)
+def test_bad_materials_and_loads_are_refused(make, what):
+    with refused(OptionError, what=what):
+        make()
+
+
+def test_snow_on_walls_alone_names_its_patches():
+    with refused(OptionError, what="Snow.patches"):
+        model_of(square(), loads=[Snow(1.0)], anyway=True).steps  # noqa: B018
+    model = model_of(square(), loads=[Snow(1.0, patches=["film"])], anyway=True)
+    assert model.steps[1].forces.sum(axis=0) == pytest.approx([0, 0, -1.0])
+
+
+def test_a_surface_that_is_not_certified_is_refused_or_marked(tmp_path):
+    surface = pyramid().retensioned(tensions={"roof": 2.0})
+    with refused(SurfaceError, what="surface"):
+        model_of(surface)
+    with refused(OptionError, what="anyway"):
+        model_of(surface, anyway=1)
+    heading = written(tmp_path, model_of(surface, anyway=True))["*HEADING"]
+    assert "NOT CERTIFIED" in heading[0][0] + heading[0][-1]
+    assert "NOT CERTIFIED" not in str(written(tmp_path, model_of(pyramid()))["*HEADING"])
+    with refused(SurfaceError, what="surface"):
+        StructuralModel(None, FABRIC, 1.0)
+
+
+def test_nothing_is_written_half(tmp_path):
+    model = model_of(pyramid())
+    for path in (tmp_path / "model.txt", tmp_path / "missing" / "model.inp", tmp_path / "a\0.inp"):
+        with pytest.raises(FileError):
+            pcmc.write_structure(path, model)
+    with refused(OptionError, what="model"):
+        pcmc.write_structure(tmp_path / "model.inp", pyramid())
+    with refused(OptionError, what="model"):
+        pcmc.read_results(tmp_path / "model.dat", pyramid())
+    with pytest.raises(FileError):
+        pcmc.read_results(tmp_path / "model.dat", model)
+    with pytest.raises(FileError):
+        pcmc.read_results(tmp_path / "model.vtk", model)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_writes_a_model(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    pcmc.write("roof.pcmc", pyramid())
+    given = ["structure", "roof.pcmc", "-o", "roof.inp", "--young", "1e6"]
+    assert (
+        cli.main([*given, "--thickness", "0.001", "--snow", "0.5", "--wind", "roof=-0.2", "--density", "0.1"])
+        == 0
+    )
+    assert "form pressure, self-weight, snow, wind" in capsys.readouterr().out
+    assert ["PATCH_1", "P1", "0.8"] in sections(tmp_path / "roof.inp")["*DLOAD, OP=NEW"]
+    (tmp_path / "roof.inp").unlink()
+    for more in ([], ["--thickness", "0"], ["--thickness", "rof=1"], ["--thickness", "1", "--wind", "rof=1"]):
+        assert cli.main([*given, *more]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    assert cli.main([*given[:3], "roof.txt", "--young", "1", "--thickness", "1"]) == 2
+    pcmc.write("other.pcmc", pyramid().retensioned(tensions={"roof": 2.0}))
+    other = ["structure", "other.pcmc", "-o", "roof.inp", "--young", "1e6", "--thickness", "roof=0.001"]
+    assert cli.main(other) == 2
+    assert not (tmp_path / "roof.inp").exists()
+    assert cli.main([*other, "--anyway"]) == 1
+    assert (tmp_path / "roof.inp").exists()
+
+
+PROJECT = """
+[plan]
+edge_length = 1.0
+outline = [[0, 0], [4, 0], [4, 3], [0, 3]]
+patches = {roof = {tension = 4.0}}
+[structure]
+young = 1e6
+thickness = 0.001
+wind = {roof = 0.5}
+"""
+
+
+def test_a_project_is_solved_and_has_the_values(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "roof.toml").write_text(PROJECT)
+    assert cli.main(["structure", "roof.toml", "-o", "roof.inp", "--poisson", "0.1"]) == 0
+    found = sections(tmp_path / "roof.inp")
+    assert found["*ELASTIC"] == [["1000000", "0.1"]]
+    assert ["PATCH_1", "P1", "1.5"] in found["*DLOAD, OP=NEW"]
+    monkeypatch.setattr("pcmc.project.running.solve", None)  # what follows is refused before solving
+    assert cli.main(["structure", "roof.toml", "-o", "roof.inp", "--wind", "rof=1"]) == 2
+    (tmp_path / "roof.toml").write_text(PROJECT.replace("young", "yung"))
+    assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
+    assert "young" in capsys.readouterr().err
+    (tmp_path / "roof.toml").write_text(PROJECT.replace("1e6", "-1.0"))
+    assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
+
+
+def test_reactions_of_an_exact_answer_are_ours(tmp_path):
+    """The elements' force at a held node, Σ α ∂A, less the load on the node itself is the reaction."""
+    surface = pyramid()
+    model, ours = model_of(surface), reactions(surface)
+    blocks = ours + model.nodal_loads(model.steps[0])
+    text = dat_text(model)[0]
+    head, tail = text.index(" forces"), text.index(" stresses")
+    rows = "".join(f"{v + 1:10d}" + "".join(f" {c:13.6E}" for c in blocks[v]) + "\n" for v in range(4))
+    text = text[:head] + text[head:].split("\n", 1)[0] + "\n\n" + rows + "\n" + text[tail:]
+    start = text.index("\n\n") + 2
+    still = "".join(f"{v:10d}  0.000000E+00  0.000000E+00  0.000000E+00\n" for v in range(1, 6))
+    text = text[:start] + still + "\n" + text[text.index(" forces") :]
+    (tmp_path / "model.dat").write_text(text)
+    (result,) = pcmc.read_results(tmp_path / "model.dat", model)
+    np.testing.assert_allclose(result.reactions, ours, atol=1e-6)
+
+
+def test_the_how_to_page_has_the_keys_of_the_section():
+    page = (Path(__file__).resolve().parent.parent / "docs/how-to/structural-model.md").read_text(
+        encoding="utf-8"
+    )
+    text = re.search(r"```toml\n(.*?)```", page, re.S)[1]
+    wanted = Structure(**tomllib.loads(text)["structure"])
+    assert [load.name for load in wanted.loads] == ["self-weight", "snow", "wind"]
+    example = re.search(r"```python\n(.*?)pcmc.write_structure", page, re.S)[1]
+    named = pyramid().retensioned()
+    surface = Surface(named.vertices, named.faces, [0] * 4, [Patch("north", 1.0)], fixed=range(4))
+    names = {"result": pcmc.solve(surface)}
+    exec(compile(example, "structural-model.md", "exec"), names)
+    assert len(names["model"].steps) == 4
