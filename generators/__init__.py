@@ -1,7 +1,8 @@
 """Starting surfaces: the paper's examples, and surfaces with a closed form."""
 
-from .barrel import catenary, hanging_barrel
+from .barrel import barrel
 from .bezier_hall import bezier_hall
+from .catenary import catenary
 from .delaunay import delaunay, delaunay_exact, delaunay_force, delaunay_limit, unduloid_length
 from .double_bubble import double_bubble, double_bubble_exact
 from .enneper import enneper, enneper_exact, enneper_wire
@@ -9,6 +10,7 @@ from .fans import four_fans, three_patches
 from .hypar_roof import hypar_roof, hypar_roof_edge
 from .joined_caps import joined_caps, joined_caps_exact
 from .lens import hemisphere, hemisphere_exact, lens, lens_circle, lens_exact
+from .schwarz_p import schwarz_p
 from .sphere import sphere, sphere_exact
 from .spherical_cap import spherical_cap, spherical_cap_exact
 from .tetrahedron import (
@@ -23,6 +25,7 @@ from .two_caps import two_caps
 from .two_squares import two_squares
 
 __all__ = [
+    "barrel",
     "bezier_hall",
     "catenary",
     "catenoid",
@@ -41,7 +44,6 @@ __all__ = [
     "enneper_exact",
     "enneper_wire",
     "four_fans",
-    "hanging_barrel",
     "hemisphere",
     "hemisphere_exact",
     "hypar_roof",
@@ -51,6 +53,7 @@ __all__ = [
     "lens",
     "lens_circle",
     "lens_exact",
+    "schwarz_p",
     "skew_quadrilateral",
     "skew_quadrilateral_exact",
     "sphere",

@@ -10,7 +10,7 @@ from pcmc.base.arrays import Floats
 
 from .grid import grid_faces
 
-DEEPEST = 0.25  # of the chord: sag that an edge starts with at most
+DEEPEST = 0.15  # of the chord: sag that an edge starts with at most
 
 
 def hypar_roof(
@@ -20,20 +20,19 @@ def hypar_roof(
     height: float = 4.0,
     tension: float = 1.0,
     cable: float = 10.0,
-    pressure: float = 0.0,
     weight: float = 0.0,
 ) -> Surface:
     """A square roof whose corners are fixed, two of them at ``height`` and two on Π, with four edge cables.
 
     The edges start as arcs of radius τ/α, seen from above; the membrane between them is ruled. With
-    ``height`` 0 and without pressure and weight it is flat, and each edge at rest is such an arc
+    ``height`` 0 and without weight it is flat, and each edge at rest is such an arc
     (``hypar_roof_edge``); this needs 2 τ > α · side.
 
     Parameters
     ----------
     squares : along each edge, ≥ 2.
     side, height : length.
-    tension, pressure, weight : of the patch "roof".
+    tension, weight : of the patch "roof".
     cable : τ of the cables "south", "east", "north" and "west", force.
 
     >>> roof = hypar_roof(4)
@@ -61,7 +60,7 @@ def hypar_roof(
         X,
         grid_faces(squares, squares),
         np.zeros(2 * squares**2, dtype=int),
-        [Patch("roof", tension, pressure, weight=weight)],
+        [Patch("roof", tension, 0.0, weight=weight)],
         fixed=number[[0, 0, -1, -1], [0, -1, 0, -1]],
         cables=[Cable.along(name, cable, vertices) for name, vertices in edges.items()],
     )

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..certificate import Certificate
+from ..certificate.balance import load_is_given
 from ..contact.pinching import standing_part
 from ..energy.functional import energy_and_gradient
 from ..energy.motion_space import motion_space
@@ -74,7 +75,7 @@ def lost(start: Surface, result: Result) -> Finding:
     reason = f"on {surface.m} triangles the solver finds no equilibrium near this one: {what}"
     reason += f", most near {_text(place)}" if result.status in RUNNING_AWAY else f" near {_text(place)}"
     certificate = result.certificate
-    if certificate.load_ratio > 1.0:
+    if certificate.load_ratio > 1.0 and load_is_given(surface):
         reason += (
             f"; the pressure is {certificate.load_ratio:.3f} times what the boundary's tension could carry"
         )

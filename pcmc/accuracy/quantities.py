@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..certificate import Certificate
-from ..certificate.balance import boundary_table
+from ..certificate.balance import boundary_table, held_curves
 from ..surface import Surface
 
 ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open
@@ -87,8 +87,8 @@ def _boundaries(
     table = boundary_table(surface, certificate.reactions)
     if not len(table):
         return
-    held = surface.held
-    curves = [c for c in surface.topology.boundary_loops if held[c.vertices].any()]
+    curves = held_curves(surface)
+    table = table.iloc[: len(curves)]  # without the pulls across mirror planes
     names = table["boundary"].astype(str).tolist()
     middles = table[["middle_x", "middle_y", "middle_z"]].to_numpy()
     pulls = table[["reaction_x", "reaction_y", "reaction_z"]].to_numpy()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
@@ -11,7 +13,7 @@ from ..energy import kernels
 from ..energy.functional import add_cables_and_weights, apply_supports
 from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths, vertex_sums
-from ..surface.supports import common_point
+from ..surface.supports import common_point, symmetric_part
 from ..surface.topology import Curve
 from .proof import UnbalancedJunction, Unheld
 
@@ -52,6 +54,17 @@ def load_ratio(surface: Surface) -> float:
     ends, tension = surface.cable_edges
     capacity += float(tension[supports[ends].sum(axis=1) == 1].sum())
     return abs(load(surface)) / capacity if capacity > 0.0 else 0.0
+
+
+def load_is_given(surface: Surface) -> bool:
+    """Whether a ``load_ratio`` above 1 says something about every shape of the surface, not about this one.
+
+    The load depends on the shape where patches weigh something, where the surface has free edges, as between
+    cables, and where rooms prescribe volumes instead of pressures.
+    """
+    topo = surface.topology
+    free = topo.boundary_edge & ~surface.held[topo.edges].all(axis=1)
+    return not (surface.rooms or surface.weights.any() or free.any())
 
 
 def load(surface: Surface) -> float:
@@ -216,15 +229,20 @@ def conormal_sum(surface: Surface) -> Floats:
 
 
 def held_lengths(surface: Surface) -> Floats:
-    """(n,) half the length of the boundary edges at each vertex that are held at both ends, length."""
-    ends = surface.topology.edges[surface.topology.boundary_edge]
+    """(n,) half the length of the boundary edges at each vertex that are held at both ends, length.
+
+    In a mirror plane nothing is held.
+    """
+    ends = surface.topology.edges[surface.topology.boundary_edge & ~surface.mirror_edge]
     ends = ends[surface.held[ends].all(axis=1)]
     half = 0.5 * segment_lengths(surface.vertices, ends)
     return np.asarray(np.bincount(ends.ravel(), np.repeat(half, 2), surface.n), dtype=float)
 
 
 def reactions(surface: Surface) -> Floats:
-    """(n,3) forces of the supports: the whole force where fixed, its part normal to Π where sliding.
+    """(n,3) forces of the supports: the whole force where fixed, its part normal to the plane where sliding.
+
+    In a mirror plane this part is the pull of the image.
 
     The force at a vertex is Σ α ∂A - ⅓ Σ p A_T ν_T, with a third of each triangle's pressure, and the
     forces of cables and weights. At a boundary this is not ∇E: there the volume is that of a cone to the
@@ -243,7 +261,7 @@ def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floa
     """(n,3) the reactions over the length of held boundary at each vertex; NaN where there is none.
 
     Each end of a held boundary edge gets half of its length. ``forces`` (n,3) are by default the
-    reactions of the part of the surface that stands.
+    reactions of the part of the surface that stands. The pull of images in mirror planes is left out.
 
     >>> from pcmc import Patch
     >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
@@ -254,6 +272,7 @@ def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floa
     share = held_lengths(surface)[:, None]
     if forces is None:
         forces = reactions(standing_part(surface).surface)
+    forces = symmetric_part(surface.on_planes, forces.copy())
     return np.divide(forces, share, out=np.full((surface.n, 3), np.nan), where=share > 0.0)
 
 
@@ -282,30 +301,66 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
 
 
 def boundary_table(surface: Surface, forces: Floats) -> pd.DataFrame:
-    """One row per held boundary curve: where it is, its share of the reactions (n,3), most per length."""
-    held = surface.held
-    loops = surface.topology.boundary_loops
-    # the reaction of a corner is shared equally by its curves, so that the rows add up to the total
+    """One row per held boundary curve: where it is, its share of the reactions (n,3), most per length.
+
+    Then one per curve in a mirror plane, named after it: there the image pulls, across the plane.
+    """
+    curves = held_curves(surface)
+    carried = symmetric_part(surface.on_planes, forces.copy())
+    per_length = np.linalg.norm(np.nan_to_num(reactions_per_length(surface, forces)), axis=1)
+    rows = _boundary_rows(surface, curves, ["" for _ in curves], carried, per_length)
+    for plane, mask in surface.on_planes:
+        if plane.mirror:
+            edges = surface.mirror_edge & mask[surface.topology.edges].all(axis=1)
+            curves = _curves_by_patch(surface, edges)
+            half = 0.5 * np.repeat(segment_lengths(surface.vertices, surface.topology.edges[edges]), 2)
+            share = np.bincount(surface.topology.edges[edges].ravel(), half, surface.n)
+            pull = (forces @ np.array(plane.normal)) * mask
+            per_length = np.divide(np.abs(pull), share, out=np.zeros(surface.n), where=share > 0.0)
+            across = pull[:, None] * np.array(plane.normal)
+            rows += _boundary_rows(surface, curves, [f" in the {plane}"] * len(curves), across, per_length)
+    return pd.DataFrame(rows)
+
+
+def _curves_by_patch(surface: Surface, edges: Bools) -> list[Curve]:
+    """The curves of boundary edges (e,), each in one patch."""
+    topo, curves = surface.topology, []
+    patch = np.empty(len(topo.edges), dtype=np.int64)
+    patch[topo.edge_of_face] = surface.patch_of_face[:, None]
+    for p in np.unique(patch[edges]):
+        curves += topo.curves_among(edges & (patch == p))
+    return curves
+
+
+def held_curves(surface: Surface) -> list[Curve]:
+    """The boundary curves with a held vertex, but for those in mirror planes."""
+    curves = surface.topology.boundary_loops
+    if surface.mirror_edge.any():
+        curves = surface.topology.curves_among(surface.topology.boundary_edge & ~surface.mirror_edge)
+    return [curve for curve in curves if surface.held[curve.vertices].any()]
+
+
+def _boundary_rows(
+    surface: Surface, curves: Sequence[Curve], places: Sequence[str], forces: Floats, per_length: Floats
+) -> list[dict[str, object]]:
+    """The rows of curves; they share the force of a corner equally, so that they add up to the total."""
     count = np.zeros(surface.n)
-    for curve in loops:
+    for curve in curves:
         count[curve.vertices] += 1.0
     parts = forces / np.maximum(count, 1.0)[:, None]
-    per_length = np.linalg.norm(np.nan_to_num(reactions_per_length(surface, forces)), axis=1)
     rows = []
-    for curve in loops:
-        if not held[curve.vertices].any():
-            continue
+    for curve, place in zip(curves, places, strict=True):
         total = parts[curve.vertices].sum(axis=0).tolist()
         rows.append(
             {
-                "boundary": " | ".join(surface.patches[i].name for i in curve.sheets),
+                "boundary": " | ".join(surface.patches[i].name for i in curve.sheets) + place,
                 "length": float(segments(surface, curve)[1].sum()),
                 **middle(surface, curve),
                 **dict(zip(("reaction_x", "reaction_y", "reaction_z"), total, strict=True)),
                 "per_length_max": float(per_length[curve.vertices].max()),
             }
         )
-    return pd.DataFrame(rows)
+    return rows
 
 
 def segments(surface: Surface, curve: Curve) -> tuple[Ints, Floats]:

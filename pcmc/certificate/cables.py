@@ -73,6 +73,25 @@ def cable_end_table(surface: Surface) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def too_long(surface: Surface) -> str:
+    """Names a cable along a free edge whose chord is over 2 τ/α, the diameter of its arc; or empty.
+
+    In a plane no arc is as wide, so a flat sheet is not at rest there; another one hardly.
+    """
+    for cable, curve in _parts(surface):
+        if curve.closed or len(curve.sheets) != 1:
+            continue
+        chord = float(np.linalg.norm(np.diff(surface.vertices[curve.vertices[[0, -1]]], axis=0)))
+        tension = float(surface.tensions[curve.sheets[0]])
+        widest = 2.0 * cable.tension
+        if chord * tension > widest:
+            return (
+                f"cable {cable.name!r} spans {chord:.4g}, more than 2 τ/α = {widest / tension:.4g},"
+                " the diameter of the arc along a flat edge; raise its tension, or put a support between"
+            )
+    return ""
+
+
 def _parts(surface: Surface) -> list[tuple[Cable, Curve]]:
     """The parts of each cable of tension > 0 between its ends, branches and the supports in between."""
     parts = []

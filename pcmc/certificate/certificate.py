@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -25,7 +26,7 @@ from ..energy.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest, stiffness
-from ..surface import Surface, expect_surface
+from ..surface import Plane, Surface, expect_surface, mirrored
 from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
 from .balance import boundary_table, junction_table, load, load_ratio, pressures_left_over, reactions
@@ -50,6 +51,8 @@ class Certificate:
     energy, volume : E (force·length) and the volume under the roof (length³).
     index : Morse index; None where the surface is not at rest. Rigid motions are not counted, nor motions
         that change a prescribed volume.
+    symmetric_in : the mirror planes of the surface. Index, eigenvalues and verdict are about motions that are
+        symmetric in these; ``certify(surface, whole=True)`` is about all.
     eigenvalues : lowest second variations per unit area and displacement, force/length³, ascending.
     modes : (k,n,3) their displacement fields, unit mass.
     curvature_error : largest |H - H̄|/H̄ by the variational definition.
@@ -98,6 +101,7 @@ class Certificate:
     cables: pd.DataFrame = field(default_factory=pd.DataFrame)
     cable_ends: pd.DataFrame = field(default_factory=pd.DataFrame)
     rooms: pd.DataFrame = field(default_factory=pd.DataFrame)
+    symmetric_in: tuple[str, ...] = ()
 
     @property
     def certified(self) -> bool:
@@ -134,6 +138,7 @@ class Certificate:
             ("energy", f"{self.energy:.10g}"),
             ("volume", f"{self.volume:.6g}"),
             ("Morse index", "-" if self.index is None else str(self.index)),
+            ("of motions", "" if not self.symmetric_in else f"symmetric in {', '.join(self.symmetric_in)}"),
             ("lowest eigenvalue", f"{self.eigenvalues[0]:.4g}" if len(self.eigenvalues) else "-"),
             ("curvature error", f"{self.curvature_error:.2e}"),
             ("triangle quality", f"{self.quality:.3f} (sliding walls {self.walls_quality:.3f})"),
@@ -156,6 +161,7 @@ def certify(
     tolerance: float = TOLERANCE,
     evidence: Evidence | None = None,
     proofs: tuple[Proof, ...] = (),
+    whole: bool | Sequence[str | Plane] = False,
 ) -> Certificate:
     """Examine a surface.
 
@@ -166,6 +172,8 @@ def certify(
     tolerance : relative residual, > 0, up to which it counts as at rest.
     evidence, proofs : what happened to it while it was solved, and what that proves.
         ``Result.certify`` passes them on.
+    whole : of a surface between mirror planes, examine ``mirrored`` of it: all its motions count for the
+        index then, and not only those symmetric in these planes. True, or the planes to unfold at.
 
     Examples
     --------
@@ -182,6 +190,8 @@ def certify(
     validate.number("tolerance", tolerance, above=0.0)
     if not isinstance(evidence, Evidence | None):
         validate.refuse("evidence", evidence, "an Evidence or None")
+    if whole is not False:
+        surface = mirrored(surface, None if whole is True else whole)
     part = standing_part(surface)
     standing, classes, X = part.surface, part.classes, part.surface.vertices
     unheld = excess_pull(standing, part.walls, part.resting)
@@ -255,6 +265,7 @@ def certify(
         cables=cable_table(standing, left),
         cable_ends=cable_end_table(standing),
         rooms=rooms,
+        symmetric_in=tuple(str(plane) for plane, _ in surface.on_planes if plane.mirror),
     )
 
 

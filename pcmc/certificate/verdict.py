@@ -12,7 +12,8 @@ import numpy as np
 from ..base.arrays import Bools, Floats
 from ..energy.weight import compressed, effective_tensions
 from ..surface import Surface
-from .balance import coarseness, hardly_balanced, unbalanced, unheld
+from .balance import coarseness, hardly_balanced, load_is_given, unbalanced, unheld
+from .cables import too_long
 from .collapse import held_wall_down, where_collapsed
 from .neck import Neck, pinched_neck
 from .proof import Overload, Proof
@@ -111,10 +112,10 @@ class Findings:
     def overloaded(self) -> bool:
         """Whether the pressure is more than the boundary can carry, beyond what the mesh leaves open.
 
-        Where a solver saw the surface inflate or collapse, the mesh leaves nothing open. Where rooms
-        prescribe volumes, the pressure is not given, and proves nothing.
+        Where a solver saw the surface inflate or collapse, the mesh leaves nothing open. Where the load
+        depends on the shape (``load_is_given``), the ratio proves nothing.
         """
-        if self.surface.rooms:
+        if not load_is_given(self.surface):
             return False
         settled = self.evidence in (Evidence.INFLATED, Evidence.COLLAPSED)
         return self.load_ratio > 1.0 + (0.0 if settled else coarseness(self.surface))
@@ -149,23 +150,25 @@ def _ran_away(f: Findings) -> str:
     if f.neck is not None:
         return f"{f.neck}; bring the held curves nearer to each other, or raise the pressure"
     if f.evidence is Evidence.INFLATED:
-        return (
+        reason = (
             "it grew without bound; start lower, raise the tensions or lower the pressures, or follow the"
             " pressure from a lower one (pcmc.follow)"
         )
+        return "; ".join(filter(None, (reason, _compressed(f))))
     return "it shrank to nothing; hold it with fixed= or on_plane=, raise the pressure, or start larger"
 
 
 def _collapse(f: Findings) -> str:
-    return "; ".join(filter(None, (f.hardly_balanced, where_collapsed(f.surface, f.pinchable))))
+    reasons = f.hardly_balanced, too_long(f.surface), where_collapsed(f.surface, f.pinchable)
+    return "; ".join(filter(None, reasons))
 
 
 def _forces_left(f: Findings) -> str:
     reason = f"relative residual {f.residual:.1e}, tolerance {f.tolerance:.0e}"
     if f.hardly_balanced:
         reason += f"; {f.hardly_balanced}"
-    reason = "; ".join(filter(None, (reason, _compressed(f))))
-    if f.load_ratio > 1.0:
+    reason = "; ".join(filter(None, (reason, too_long(f.surface), _compressed(f))))
+    if f.load_ratio > 1.0 and load_is_given(f.surface):
         reason += (
             f"; the pressure is {f.load_ratio:.3f} times what the boundary's tension could carry:"
             " only a mesh as coarse as this may come to rest, a finer one cannot"

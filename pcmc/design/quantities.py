@@ -22,6 +22,7 @@ from ..energy.functional import gradient_by, weighted
 from ..energy.weight import add_weight_products
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d, vertex_sums
+from ..surface.supports import symmetric_part
 from . import cable_quantities
 from .measurement import Measurement
 
@@ -127,13 +128,13 @@ def _reaction(surface: Surface, of: str | None) -> Measurement:
     """
     topo = surface.topology
     held = surface.held[topo.edges].all(axis=1)
-    edges = considered = np.flatnonzero(topo.boundary_edge & held)
+    edges = considered = np.flatnonzero(topo.boundary_edge & held & ~surface.mirror_edge)
     if of is not None:
         considered = np.intersect1d(edges, topo.edge_of_face[_faces_of(surface, of)])
     if not len(considered):
         raise OptionError(f"reaction of {of}: nothing holds the boundary of that patch", what="of", found=of)
     ends, share = topo.edges[edges], held_lengths(surface)
-    force = reactions(surface)
+    force = symmetric_part(surface.on_planes, reactions(surface))
     vertices = np.unique(topo.edges[considered])
     size = np.linalg.norm(force[vertices], axis=1) / share[vertices]
     v, value = int(vertices[size.argmax()]), float(size.max())

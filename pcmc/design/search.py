@@ -23,7 +23,7 @@ from scipy.optimize import lsq_linear
 from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError, SurfaceError
-from ..certificate.balance import coarseness, load_ratio
+from ..certificate.balance import coarseness, load_is_given, load_ratio
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
@@ -213,7 +213,7 @@ class Search:
         None where no equilibrium is found, or where it is at a fold and has no derivatives.
         """
         surface = self.with_unknowns(start, x)
-        if not surface.rooms and load_ratio(surface) > 1.0 + coarseness(surface):
+        if load_is_given(surface) and load_ratio(surface) > 1.0 + coarseness(surface):
             self.record(x, OVERLOADED)
             return None
         result = solve(surface, "newton", **{**quality, **self.options})

@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..surface import Surface
+from ..surface import Plane, Surface
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,7 +97,9 @@ class Result:
         """Whether the solver met its tolerance."""
         return self.status is Status.CONVERGED
 
-    def certify(self, *, modes: int = 1, tolerance: float | None = None) -> Certificate:
+    def certify(
+        self, *, modes: int = 1, tolerance: float | None = None, whole: bool | Sequence[str | Plane] = False
+    ) -> Certificate:
         """The certificate of ``surface``, which also takes into account how the solver ended.
 
         Parameters as for ``pcmc.certify``.
@@ -113,7 +115,14 @@ class Result:
             Status.PINCHED: Evidence.COLLAPSED,
         }.get(self.status)
         tolerance = TOLERANCE if tolerance is None else tolerance
-        return certify(self.surface, modes=modes, tolerance=tolerance, evidence=evidence, proofs=self.proofs)
+        return certify(
+            self.surface,
+            modes=modes,
+            tolerance=tolerance,
+            evidence=evidence,
+            proofs=self.proofs,
+            whole=whole,
+        )
 
     @cached_property
     def certificate(self) -> Certificate:

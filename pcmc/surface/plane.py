@@ -57,7 +57,10 @@ class Plane:
 
     def __str__(self) -> str:
         kind = "mirror plane" if self.mirror else "plane"
-        return f"{kind} {self.name!r}" if self.name else f"{kind} through {self.point} across {self.normal}"
+        if self.name:
+            return f"{kind} {self.name!r}"
+        point, normal = (", ".join(f"{c + 0.0:.4g}" for c in v) for v in (self.point, self.normal))
+        return f"{kind} through ({point}) across ({normal})"
 
     @cached_array
     def axes(self) -> Floats:

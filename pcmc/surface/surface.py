@@ -21,24 +21,12 @@ from .geometry import bounding_size
 from .patch import Patch
 from .plane import Plane
 from .room import Room, checked_rooms, room_signs
+from .summary import summary
 from .topology import Topology, topology
 
-FIELDS = (
-    "vertices",
-    "faces",
-    "patch_of_face",
-    "patches",
-    "fixed",
-    "on_plane",
-    "plane",
-    "on_line",
-    "on_planes",
-    "cables",
-    "rooms",
-    "given",
-)
+MESH = ("vertices", "faces", "patch_of_face", "patches")
+FIELDS = (*MESH, "fixed", "on_plane", "plane", "on_line", "on_planes", "cables", "rooms", "given")
 GROUND = Plane()
-NAMED = 6  # patches that repr names
 FAR = 30.0  # sizes from the point of Π: farther, volumes seen from it lose over three digits
 
 
@@ -350,19 +338,51 @@ class Surface:
 
     def __repr__(self) -> str:
         """Size, patches, walls and supports, a line each."""
-        height = self.plane.height(self.vertices)
-        parts = {True: "walls", False: "patches"}
-        lines = [f"Surface of {self.m} triangles and {self.n} vertices, {self.size:.4g} across"]
-        for wall, name in sorted(parts.items()):
-            kept = [p for p in self.patches if p.auxiliary == wall]
-            if kept:
-                named = (f"{p.name} (tension {p.tension:g}, pressure {p.pressure:g})" for p in kept[:NAMED])
-                more = f", and {len(kept) - NAMED} more" if len(kept) > NAMED else ""
-                lines.append(f"  {name}: {', '.join(named)}{more}")
-        sliding = np.count_nonzero(self.held & ~self.fixed)
-        lines.append(f"  supports: {np.count_nonzero(self.fixed)} vertices fixed, {sliding} sliding")
-        lines.append(f"  heights over the plane: {height.min():.4g} to {height.max():.4g}")
-        return "\n".join(lines)
+        return summary(self)
+
+    def with_snow(self, snow: float, patches: Iterable[str] | None = None) -> Surface:
+        """The same surface under snow, by lower pressures: p - s for p.
+
+        A load s on the plan area has the potential s ∫ z dA_plan = s V, V the volume over Π; so E changes by
+        s V, as it does when the pressure falls by s. This holds where the boundary of the patches is held,
+        lies on Π, or meets other patches: at a free edge V is that of cones to Π's point, whose sides would
+        carry snow, too.
+
+        Parameters
+        ----------
+        snow : s, force per area of the plan; Π's normal points up.
+        patches : names of the patches that it lies on; by default all under pressure, or all if none is.
+
+        Raises
+        ------
+        SurfaceError
+            Where an edge of these patches is free. There a weight per area of the patch itself can stand for
+            snow: ``retensioned(weights={"roof": s})``.
+
+        Examples
+        --------
+        >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        >>> roof = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 2.0, 1.0)], fixed=range(3))
+        >>> roof.with_snow(0.25).pressures.tolist()
+        [0.75]
+        """
+        snow = validate.number("snow", snow, error=SurfaceError)
+        pressed = [patch.name for patch in self.patches if not patch.auxiliary]
+        names = list(patches) if patches is not None else pressed or [patch.name for patch in self.patches]
+        given = {name: self.pressures[self.patch_index(name)] - snow for name in names}
+        kept = [patch.name for patch in self.patches if patch.auxiliary]
+        loaded = self.retensioned(pressures=given, walls=set(kept) - set(names))
+        edges = np.flatnonzero(loaded.uncancelled)
+        if snow != 0.0 and len(edges):
+            i, j = (int(v) for v in self.topology.edges[edges[0]])
+            message = (
+                f"snow: {len(edges)} edges are free, the first from vertex {i} to {j}, and there a change of"
+            )
+            message += " pressure is not the same as snow; give a weight instead, as in"
+            raise SurfaceError(
+                f"{message} retensioned(weights={{{names[0]!r}: {snow:g}}})", what="snow", where=(i, j)
+            )
+        return loaded
 
     def __copy__(self) -> Surface:
         """The surface itself: it never changes."""

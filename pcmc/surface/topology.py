@@ -135,11 +135,16 @@ class Topology:
     @cached_property
     def boundary_loops(self) -> tuple[Curve, ...]:
         """Boundary curves of each patch's outline, cut where more than two boundary edges meet."""
-        boundary = self.edges[self.boundary_edge]
-        return self._curves(self.boundary_edge, vertex_kind(boundary, self.vertex_count) == POINT)
+        return self.curves_among(self.boundary_edge)
+
+    def curves_among(self, chosen: Bools) -> tuple[Curve, ...]:
+        """The curves of the chosen edges (e,), cut where other than two of them meet."""
+        return self._curves(chosen, vertex_kind(self.edges[chosen], self.vertex_count) == POINT)
 
     def edge_numbers(self, ends: Ints) -> Ints:
         """(k,) the numbers of the edges that join pairs of vertices (k,2); -1 where none does."""
+        if not len(self.edges):
+            return np.full(len(ends), -1)
         weights = np.array([self.vertex_count, 1])
         keys = self.edges.astype(np.int64) @ weights
         wanted = np.sort(ends, axis=1).astype(np.int64) @ weights

@@ -1,0 +1,46 @@
+"""A surface in a few lines of text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+NAMED = 6  # patches, cables or rooms that are named
+
+
+def summary(surface: Any) -> str:
+    """Of a Surface: size, patches, walls, cables, rooms, supports and heights, a line each."""
+    patches = {
+        wall: [
+            f"{p.name} (tension {p.tension:g}, pressure {p.pressure:g})"
+            for p in surface.patches
+            if p.auxiliary == wall
+        ]
+        for wall in (False, True)
+    }
+    parts = {
+        "patches": patches[False],
+        "walls": patches[True],
+        "cables": [f"{cable.name} (tension {cable.tension:g})" for cable in surface.cables],
+        "rooms": [f"{room.name} (volume {room.volume:g})" for room in surface.rooms],
+        "planes": [str(plane) for plane, _ in surface.on_planes],
+    }
+    height = surface.plane.height(surface.vertices)
+    fixed = np.count_nonzero(surface.pinned)
+    sliding = np.count_nonzero(surface.held & ~surface.pinned)
+    return "\n".join(
+        [
+            f"Surface of {surface.m} triangles and {surface.n} vertices, {surface.size:.4g} across",
+            *(f"  {name}: {_listed(texts)}" for name, texts in parts.items() if texts),
+            f"  supports: {fixed} vertices fixed, {sliding} sliding",
+            f"  heights over the plane: {height.min():.4g} to {height.max():.4g}",
+        ]
+    )
+
+
+def _listed(texts: Sequence[str]) -> str:
+    """The first few, and how many more there are."""
+    more = f", and {len(texts) - NAMED} more" if len(texts) > NAMED else ""
+    return ", ".join(texts[:NAMED]) + more
