@@ -18,7 +18,7 @@ from ..panels import Panels, fewer_families, panels
 from ..panels.schedule import MIRROR_IMAGES
 from ..surface import Surface
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import MANY_FILES, TOML, Input, ViewName, number, option
+from .arguments import MANY_FILES, Input, ViewName, number, option
 from .progress import working
 
 CSV = ".csv"
@@ -146,13 +146,8 @@ def _ends(text: str) -> Any:
 
 
 def settled(file: Path, say: projects.OnStep) -> Surface:
-    """The surface in a file, or that of a project, solved."""
-    arguments.check_input(file)
-    if file.suffix.lower() != TOML:
-        return arguments.surface_in(file)
-    project = projects.load(file)
-    say("meshing the plan")
-    return projects.solve_project(project, projects.surface_of(project), say).surface
+    """The surface in a file, or the designed roof of a project or a drawing."""
+    return arguments.given(file, say).surface
 
 
 def _paths(path: Path) -> list[Path]:
