@@ -226,8 +226,14 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
         np.add.at(net, a, -n)
         tips = np.flatnonzero(net)  # where it comes down to Π: closed straight from tip to tip
         if not grounded[tips].all():
-            bad = off[np.isin(edges[off], tips[~grounded[tips]]).any(axis=1)]
-            _refuse_open(surface, room, bad)
+            place = surface.vertices[tips[~grounded[tips]][0]].round(4).tolist()
+            raise SurfaceError(
+                f"room {room.name!r} does not close: its fixed boundary ends at {place}, off Π; fix it down to"
+                " Π, or choose Π (plane=) through it",
+                what="rooms",
+                where=room.name,
+                found=place,
+            )
         if len(tips):
             yield float((net[tips] * _cones(middle, X[tips].mean(axis=0), X[tips])).sum())
 
