@@ -2,19 +2,37 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
+from refusals import refused
 
+import pcmc
+from generators import schwarz_p, spherical_cap
 from pcmc import Patch, Plane, Surface
+from pcmc.base.errors import LostWarning, SurfaceError
+from pcmc.certificate.balance import unheld
 from pcmc.energy.flat_pieces import flat_pieces
-from pcmc.energy.functional import apply_supports, energy_and_gradient, energy_at, hessian, weighted
+from pcmc.energy.functional import (
+    apply_supports,
+    energy_and_gradient,
+    energy_at,
+    hessian,
+    patch_volumes,
+    weighted,
+)
 from pcmc.energy.jacobian import linearise
 from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.energy.projected_hessian import assemble, hessian_pattern
+from pcmc.meshing.local_refinement import refine_faces
+from pcmc.meshing.refinement import refine
+from pcmc.meshing.remeshing import remesh
 from pcmc.stability.modes import full_matrix
 from pcmc.surface.geometry import vertex_area_vectors
+from studies import evolver
 
-BOTTOM, TOP = Plane(), Plane((0, 0, 2), (0, 0, 1), name="top")
+TOP = Plane((0, 0, 2), (0, 0, 1), name="top")
 
 
 def tube(rings=8, around=12, radius=1.0, tension=1.0, pressure=1.0, length=2.0, **supports):
@@ -128,3 +146,143 @@ def test_linearised_forces(case):
     t = 1e-5
     numeric = space.to_coordinates((forces(X + t * d) - forces(X - t * d)) / (2 * t))
     assert np.abs(here.times(d) - numeric).max() < 1e-8
+
+
+@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@pytest.mark.parametrize("case", CASES)
+def test_evolver_agrees(case):
+    """Energy and forces with constraints, the content of the flat pieces and the corners between them."""
+    surface = CASES[case]()
+    assert evolver.energy(surface) == pytest.approx(pcmc.energy(surface), rel=1e-12)
+    expected = pcmc.gradient(surface)
+    np.testing.assert_allclose(evolver.gradient(surface), expected, rtol=0, atol=1e-12 * abs(expected).max())
+
+
+def test_moving_sideways_changes_no_energy():
+    """Between plates the tube may go anywhere: neither energy nor volume depends on where the origin is."""
+    surface = tube(rings=3, around=7)
+    shifted = surface.moved(surface.vertices + np.array([0.7, -0.4, 0.0]))
+    assert pcmc.energy(shifted) == pytest.approx(pcmc.energy(surface), rel=1e-13)
+    assert patch_volumes(surface)[0] == pytest.approx(7 * np.sin(2 * np.pi / 7), rel=1e-13)
+
+
+def test_planes_through_the_origin_cost_nothing():
+    walls = {Plane(normal=(1, 0, 0)): [0, 2], Plane(normal=(0, 1, 0)): [1, 2]}
+    corner = Surface(
+        [[0, 1, 0], [1, 0, 0], [0, 0, 1]],
+        [[0, 1, 2]],
+        [0],
+        [Patch("a", 1.0)],
+        on_plane=[0, 1],
+        on_planes=walls,
+    )
+    assert not flat_pieces(corner)
+    aside = Surface(
+        corner.vertices + np.array([5, 6, 0]),
+        corner.faces,
+        [0],
+        corner.patches,
+        on_plane=[0, 1],
+        on_planes={Plane((5, 0, 0), (1, 0, 0)): [0, 2], Plane((0, 6, 0), (0, 1, 0)): [1, 2]},
+    )
+    assert aside.origin.tolist() == [5.0, 6.0, 0.0]
+    assert not flat_pieces(aside)
+    assert patch_volumes(aside)[0] == pytest.approx(patch_volumes(corner)[0], rel=1e-12)
+
+
+def test_supports_of_several_planes():
+    roof = corner_roof()
+    corners = np.isin(roof.vertices[:, :2], (0, 1)).all(axis=1)
+    assert len(roof.auto_lines) == 4
+    np.testing.assert_array_equal(roof.fixed, corners)
+    assert not roof.pinned.any()
+    assert roof.held.sum() == 16
+    space = motion_space(roof, vertex_classes(roof), roof.vertices)
+    assert (space.dimension[corners] == 1).all()
+    assert (space.basis[corners, 0] == [0.0, 0.0, 1.0]).all() or (space.basis[corners, 0, 2] == -1).any()
+
+
+def test_tube_between_plates_is_a_cylinder():
+    """At rest under the pressure p the radius is α / p, with an error of order 2; its volume is enclosed."""
+    errors = []
+    for n in (8, 16, 32):
+        result = pcmc.solve(tube(n, 2 * n, radius=1.1), target="stationary")
+        assert result.converged
+        X = result.surface.vertices
+        radius = np.linalg.norm(X[:, :2] - X[:, :2].mean(axis=0), axis=1)
+        errors.append([np.abs(radius - 1.0).max(), abs(patch_volumes(result.surface)[0] - 2 * np.pi)])
+    orders = np.log2(np.array(errors)[:-1] / np.array(errors)[1:])
+    assert (np.abs(orders - 2.0) < 0.1).all()
+
+
+@pytest.mark.parametrize("method", ["nesterov", "lbfgs"])
+def test_other_solvers_keep_to_the_planes(method):
+    half = pcmc.cut(spherical_cap(edge_length=0.4), Plane((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+    expected = pcmc.solve(half)
+    result = pcmc.solve(
+        half, method=method, tolerance=1e-16, **{"lbfgs": {}}.get(method, {"iterations": 5000})
+    )
+    assert result.converged
+    middle = half.on_planes[0][1]
+    assert np.abs(result.surface.vertices[middle, 1]).max() < 1e-12
+    top, same = (shape.surface.vertices[:, 2].max() for shape in (result, expected))
+    assert top == pytest.approx(same, rel=1e-2)
+
+
+def test_refining_and_remeshing_keep_the_planes():
+    roof = corner_roof()
+    for finer in (refine(roof), refine_faces(roof, [0, 5]), remesh(roof, 0.15)):
+        assert [plane for plane, _ in finer.on_planes] == [plane for plane, _ in roof.on_planes]
+        for plane, mask in finer.on_planes:
+            near = np.abs(plane.height(finer.vertices)) < 1e-12
+            np.testing.assert_array_equal(mask, near)
+        assert finer.fixed.sum() == 4
+
+
+@pytest.mark.parametrize("suffix", [".pcmc", ".fe"])
+def test_files_keep_the_planes(tmp_path, suffix):
+    for surface in (corner_roof(), tube(3, 7), schwarz_p(2)):
+        pcmc.write(tmp_path / f"a{suffix}", surface)
+        again = pcmc.read(tmp_path / f"a{suffix}")
+        assert pcmc.energy(again) == pytest.approx(pcmc.energy(surface), rel=1e-13)
+        np.testing.assert_array_equal(again.fixed, surface.fixed)
+        np.testing.assert_array_equal(again.on_plane, surface.on_plane)
+        for (plane, mask), (other, same) in zip(again.on_planes, surface.on_planes, strict=True):
+            np.testing.assert_array_equal(mask, same)
+            assert (plane.name, plane.mirror) == (other.name, other.mirror)
+            assert np.abs(plane.height(surface.vertices[mask])).max() < 1e-12
+
+
+def test_files_without_planes_say_so(tmp_path):
+    with pytest.warns(LostWarning, match="mirror planes"):
+        pcmc.write(tmp_path / "a.obj", corner_roof())
+
+
+def test_copies_keep_the_planes():
+    roof = corner_roof()
+    again = pickle.loads(pickle.dumps(roof))
+    assert again.on_planes[0][0] == roof.on_planes[0][0]
+    assert not again.given.fixed.flags.writeable
+    assert pcmc.energy(again) == pcmc.energy(roof)
+
+
+def test_a_part_between_plates_cannot_shrink():
+    film = tube(3, 7, pressure=0.0)
+    assert unheld(film, stable=True) is None
+    onto_floor = tube(3, 7, pressure=0.0, on_planes={})
+    assert unheld(onto_floor, stable=True) is not None
+
+
+def test_what_it_refuses():
+    X, F, patches = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [Patch("a", 1.0)]
+    with refused(SurfaceError, what="vertices", where=1):
+        Surface(X, F, [0], patches, on_planes={Plane(normal=(1, 0, 0)): [1]})
+    three = {Plane((place, 0, 0), (1, 1, 0)): [0] for place in (0, 1)} | {Plane(normal=(0, 1, 0)): [0]}
+    with refused(SurfaceError, what="on_planes", where=0) as caught:
+        Surface(X, F, [0], patches, on_planes=three)
+    assert "planes that do not meet" in str(caught.value)
+    with refused(SurfaceError, what="plane"):
+        Surface(X, F, [0], patches, plane=Plane(mirror=True))
+    for wrong in (3, [3], {"x": [0]}):
+        with refused(SurfaceError, what="on_planes"):
+            Surface(X, F, [0], patches, on_planes=wrong)

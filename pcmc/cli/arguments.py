@@ -43,6 +43,8 @@ START = "The start shape of a project, before it is solved, instead of its desig
 Start = Annotated[bool, typer.Option("--start", help=START)]
 CACHE = "Keep a project's roof and take it from there the next time; --no-cache solves it again."
 Cache = Annotated[bool, typer.Option("--cache/--no-cache", help=CACHE)]
+WHOLE = "Unfold a surface at its mirror planes: the whole roof instead of its piece."
+Whole = Annotated[bool, typer.Option("--whole", help=WHOLE)]
 MANY_FILES = option("FILE", "File to write; may be repeated.", "-o", "--output")
 
 

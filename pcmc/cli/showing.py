@@ -14,9 +14,9 @@ from ..base.errors import OptionError, unknown
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS
 from ..io import write
-from ..surface import Surface
+from ..surface import Surface, mirrored, unfolded
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import Cache, Colour, Input, Pressures, Settings, Start, ViewName, option
+from .arguments import Cache, Colour, Input, Pressures, Settings, Start, ViewName, Whole, option
 from .progress import working
 from .reports import report
 
@@ -36,6 +36,7 @@ def convert(
             "NAME", "Scalar of the file that colours the vertices of a .glb or .usda.", "--colour", "--color"
         ),
     ] = "",
+    whole: Whole = False,
 ) -> int:
     """Write a surface or a project's roof as .pcmc .fe .obj .ply .stl .vtp .vtu .glb .gltf .3dm .ifc .usda.
 
@@ -49,12 +50,19 @@ def convert(
     projects.check_outputs([output])
     with working() as say:
         shown = arguments.given(file, say, tension, pressure, start=start, cache=cache)
-    if shown.outcome is not None:
-        if not _is_good(file, shown.outcome):
-            return NOT_CERTIFIED
+    if shown.outcome is not None and not _is_good(file, shown.outcome):
+        return NOT_CERTIFIED
+    data: dict[str, Any] = {"units": shown.units, "colour": colour}
+    if whole:
+        unfold = unfolded(shown.surface)
+        scalars = {} if shown.data is None else shown.data.scalars
+        place = {shown.surface.n: unfold.vertex, shown.surface.m: unfold.face}
+        with defer_interrupts():
+            carried = {name: values[place[len(values)]] for name, values in scalars.items()}
+            write(output, unfold.surface, scalars=carried, **data)
+    elif shown.outcome is not None:
         projects.write_all(projects.surface_files(shown.outcome, [output], colour))
     else:
-        data: dict[str, Any] = {"units": shown.units, "colour": colour}
         if shown.data is not None:
             data |= {"scalars": shown.data.scalars, "certificate": shown.data.certificate or None}
         with defer_interrupts():
@@ -78,6 +86,7 @@ def plot(
     colour: Colour = "patches",
     start: Start = False,
     cache: Cache = True,
+    whole: Whole = False,
 ) -> int:
     """Draw a surface or a project's roof, by patch, mean curvature, curvature error, or with its reactions.
 
@@ -85,6 +94,7 @@ def plot(
     Examples:
       pcmc plot roof.pcmc roof.png --colour error
       pcmc plot roof.toml start.png --start
+      pcmc plot half.pcmc roof.png --whole
     """
     projects.check_names([], picture)
     seen = arguments.view_of(view)
@@ -94,7 +104,8 @@ def plot(
         shown = arguments.given(file, say, start=start, cache=cache)
     if shown.outcome is not None and not _is_good(file, shown.outcome):
         return NOT_CERTIFIED
-    painting = partial(projects.paint, shown.surface, view=seen, colour=colour, units=shown.units)
+    surface = mirrored(shown.surface) if whole else shown.surface
+    painting = partial(projects.paint, surface, view=seen, colour=colour, units=shown.units)
     projects.write_all([(picture, painting)])
     print(f"written: {picture}")
     return OK

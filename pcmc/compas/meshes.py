@@ -19,7 +19,7 @@ from ..certificate.balance import reactions
 from ..contact.pinching import standing_part
 from ..energy.curvature import mean_curvature
 from ..io.import_warnings import import_warnings
-from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of
+from ..io.mesh_data import FIXED, SLIDING, MeshData, given_support
 from ..surface import Surface, expect_surface
 from ..surface.topology import topology
 from . import mesh_arrays
@@ -29,7 +29,7 @@ from .whole import KEY, Whole, read_whole
 MARKS: dict[str, Any] = {"is_support": False, SLIDES: False, GUIDE: None, PLANES: None}
 QUANTITIES = dict.fromkeys(("mean_curvature", "rx", "ry", "rz"))
 CARRIED = {"vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane", "on_line"}
-CARRIED |= {"on_planes", "cables", "rooms"}
+CARRIED |= {"on_planes", "cables", "rooms", "given"}
 
 
 def to_meshes(surface: Surface) -> list[Any]:
@@ -188,9 +188,9 @@ def _check_numbers(name: str, numbers: list[int], listed: int) -> None:
 
 def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
     """A row per vertex: coordinates, support, curvature and reaction."""
-    support, standing = support_of(surface), standing_part(surface).surface
+    support, standing = given_support(surface), standing_part(surface).surface
     guide = np.full(surface.n, None)
-    for number, (_, along) in enumerate(surface.on_line):
+    for number, (_, along) in enumerate(surface.given.on_line):
         guide[along] = number
     planes: list[list[int]] = [[] for _ in range(surface.n)]
     for number, (_, mask) in enumerate(surface.on_planes):

@@ -34,7 +34,8 @@ class Whole:
     @classmethod
     def of(cls, surface: Surface) -> Whole:
         """That of a surface."""
-        guides, planes = tuple(one for one, _ in surface.on_line), tuple(one for one, _ in surface.on_planes)
+        guides = tuple(guide for guide, _ in surface.given.on_line)
+        planes = tuple(plane for plane, _ in surface.on_planes)
         return cls(surface.plane, guides, planes, surface.rooms, tuple(c.name for c in surface.cables))
 
     def plain(self) -> dict[str, Any]:

@@ -33,7 +33,7 @@ class BoundaryMotion:
     Parameters
     ----------
     positions : P, a smooth function of λ; the positions (k,3) of the fixed vertices in the order of their
-        numbers, ``surface.vertices[surface.fixed]``.
+        numbers, ``surface.vertices[surface.pinned]``.
     start : λ of the surface that ``follow`` starts from.
 
     Examples
@@ -56,7 +56,7 @@ class BoundaryMotion:
 
     def line(self, surface: Surface) -> BoundaryLine:
         """The boundary along this motion, which at its start must be that of the surface."""
-        if not surface.fixed.any():
+        if not surface.pinned.any():
             message = "BoundaryMotion: the surface has no fixed vertex that could move"
             raise OptionError(message, what="parameter", found=0)
         if surface.rooms:
@@ -65,10 +65,10 @@ class BoundaryMotion:
             )
             hint = "as the boundary moves; remove the room, and give its pressure"
             raise OptionError(f"{message} {hint}", what="parameter", found=surface.rooms[0].name)
-        line = BoundaryLine(self.start, self.positions, int(surface.fixed.sum()))
-        off = np.linalg.norm(line.boundary(self.start) - surface.vertices[surface.fixed], axis=1)
+        line = BoundaryLine(self.start, self.positions, int(surface.pinned.sum()))
+        off = np.linalg.norm(line.boundary(self.start) - surface.vertices[surface.pinned], axis=1)
         if off.max() > SAME_PLACE * surface.size:
-            worst = int(np.flatnonzero(surface.fixed)[off.argmax()])
+            worst = int(np.flatnonzero(surface.pinned)[off.argmax()])
             message = f"BoundaryMotion: positions({self.start:g}) is not the surface's boundary: fixed vertex"
             raise OptionError(
                 f"{message} {worst} is {off.max():.3g} away; check start= and the order of the vertices",
@@ -134,7 +134,7 @@ class BoundaryLine:
     def energy_derivative(self, surface: Surface, X: Floats, value: float) -> float:
         """Σ ⟨∇E, dP/dλ⟩ over the fixed vertices at X (n,3), force·length per unit of λ."""
         forces = energy_and_gradient(surface, X, supports=False)[1]
-        return float((forces[surface.fixed] * self.velocity(value)).sum())
+        return float((forces[surface.pinned] * self.velocity(value)).sum())
 
     def gradient(self, surface: Surface, X: Floats) -> Floats:
         """∂∇E/∂λ where no vertex moves: zero (n,3)."""

@@ -103,11 +103,11 @@ class BranchMesh:
         """The motion w (n,3) in which the inside follows a change (k,3) of the boundary."""
         surface = self.surface
         if self._inside is None:
-            self._inside = HarmonicExtension(surface, self.classes, X, self._backend, surface.fixed)
+            self._inside = HarmonicExtension(surface, self.classes, X, self._backend, surface.pinned)
         motion = np.zeros_like(X)
-        motion[surface.fixed] = change
-        w = self._inside.harmonic(motion)
-        w[surface.on_plane] = surface.plane.along(w[surface.on_plane])
+        motion[surface.pinned] = change
+        w = apply_supports(surface, self._inside.harmonic(motion), X)
+        w[surface.pinned] = change
         return w
 
     def full_surface(self, X: Floats) -> Surface:
@@ -289,7 +289,7 @@ class State:
         X = self.moved(d)
         boundary = self.mesh.line.boundary(parameter)
         if boundary is not None:
-            fixed = self.mesh.surface.fixed
+            fixed = self.mesh.surface.pinned
             left = self.mesh.carried(boundary - X[fixed], self.X)
             X = self.moved(d + left)
             X[fixed] = boundary

@@ -27,9 +27,9 @@ def rigid_motions(surface: Surface) -> Floats:
         for line, along in surface.on_line:
             if isinstance(line, Circle):
                 outward = surface.vertices[along] - np.array(line.centre)
-                across = np.array(line.normal), outward / line.radius
+                across = [np.array(line.normal), outward / line.radius]
             else:
-                across = tuple(perpendicular(np.array([line.direction])))
+                across = list(perpendicular(np.array([line.direction])))
             rows += [_row(arm[along], axis) for axis in across]
         rows += [_row(arm[mask], np.array(plane.normal)) for plane, mask in surface.sliding]
         resisted = np.concatenate(rows)

@@ -50,7 +50,7 @@ class Spread:
         fixed = np.isfinite(lengths)
         X, plane = surface.vertices, surface.plane
         held = (groups >= 0) & surface.fixed
-        if len(lengths) < 2 or not fixed.any() or (surface.fixed & ~held).any():
+        if len(lengths) < 2 or not fixed.any() or (surface.fixed & ~held).any() or surface.on_planes:
             return None
         centres = np.array([X[groups == number].mean(axis=0) for number in range(len(lengths))])
         if surface.on_plane.any():

@@ -33,13 +33,13 @@ def low_start(surface: Surface) -> Surface | None:
     >>> low_start(spire).vertices[4].round(3).tolist()
     [0.0, 0.0, 0.283]
     """
-    if not _spans(surface.vertices[surface.fixed]):
+    if not _spans(surface.vertices[surface.fixed]) or not _upright(surface):
         return None
     walls = surface.walls[surface.patch_of_face]
     faces = surface.faces[~walls] if not walls.all() else surface.faces
     roof = np.zeros(surface.n, dtype=bool)
     roof[faces] = True
-    held = surface.fixed | surface.on_plane
+    held = surface.pinned | surface.on_ground
     place = surface.plane.to_local(surface.vertices)
     corners = place[faces, :2] - place[faces[:, :1], :2]
     turns = np.sign(corners[:, 1, 0] * corners[:, 2, 1] - corners[:, 1, 1] * corners[:, 2, 0])
@@ -47,6 +47,8 @@ def low_start(surface: Surface) -> Surface | None:
     extent, span = _diagonal(place[roof]), _diagonal(place[held]) or _diagonal(place[roof])
     kept = np.abs(turns.sum()) == len(turns) and plan.min() > SOUND and extent < WIDE * span
     low = place.copy()
+    if not kept and surface.on_planes:
+        return None  # spread anew, its boundary would leave the planes
     if not kept:
         low[:, :2] = _in_the_middle(faces, surface.fixed | ~roof, place[:, :2])
     low[:, 2] = _in_the_middle(faces, held | ~roof, place[:, 2])
@@ -76,6 +78,12 @@ def _spans(points: Floats) -> bool:
 def _diagonal(place: Floats) -> float:
     """Diagonal of the bounding box along Π of coordinates (k,3)."""
     return float(np.linalg.norm(np.ptp(place[:, :2], axis=0)))
+
+
+def _upright(surface: Surface) -> bool:
+    """Whether all planes besides Π are at right angles to it, so that heights are free there."""
+    normal = np.array(surface.plane.normal)
+    return all(abs(float(normal @ plane.normal)) <= 1e-9 for plane, _ in surface.on_planes)
 
 
 def _at(surface: Surface, place: Floats) -> Surface:

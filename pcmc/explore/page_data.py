@@ -52,8 +52,8 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
         "edge_wall": of_wall[inner],
         "curves": topo.edges[curves],
         "curve_wall": of_wall[curves],
-        "fixed": np.flatnonzero(surface.fixed),
-        "sliding": np.flatnonzero(surface.on_plane),
+        "fixed": np.flatnonzero(surface.pinned),
+        "sliding": np.flatnonzero(surface.held & ~surface.pinned),
     }
 
 

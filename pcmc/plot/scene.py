@@ -183,9 +183,9 @@ def _dots(surface: Surface, view: View, supports: bool, faces: Ints) -> tuple[Fl
     """Where the supported vertices to draw are, and their colours."""
     there = np.zeros(surface.n, dtype=bool)
     there[faces] = supports
-    held = np.flatnonzero(there & (surface.fixed | surface.on_plane))
+    held = np.flatnonzero(there & surface.held)
     points = surface.vertices[held] + 3 * LIFT * surface.size * view.axes[2]
-    colors = np.where(surface.fixed[held][:, None], rgb(FIXED_DOT), rgb(SLIDING_DOT))
+    colors = np.where(surface.pinned[held][:, None], rgb(FIXED_DOT), rgb(SLIDING_DOT))
     return points, colors
 
 

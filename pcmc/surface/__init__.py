@@ -6,8 +6,9 @@ Gives ``Patch``, ``Plane``, ``Line``, ``Circle``, ``Cable``, ``Room``, ``Surface
 
 from .cable import Cable
 from .circle import Circle, Guide
+from .cutting import cut
 from .line import Line
-from .mirroring import cut, mirrored, unfolded
+from .mirroring import mirrored, unfolded
 from .patch import Patch
 from .plane import Plane
 from .room import Room

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -23,6 +23,7 @@ from .supports import NEAR
 from .surface import Surface, expect_surface
 from .topology import topology
 
+Held = TypeVar("Held", Plane, Guide)  # what holds vertices
 MOST_IMAGES = 120  # of the planes through one point no more are possible, but of a prism
 ALIKE = 1e-9  # two matrices or unit vectors this near are the same
 
@@ -112,18 +113,12 @@ def unfolded(surface: Surface, planes: Sequence[Plane | str] | None = None) -> W
     place = place.reshape(k, n)
     patch_label, patch_names = _patches(surface, mirrors, next_to, F)
     patch = patch_label[:, surface.patch_of_face].ravel()
-    patches = [replace(surface.patches[p], name=name) for p, name in patch_names]
-    supports = _supports(surface, mirrors, images, place, len(X))
-    whole = Surface(
-        X,
-        F,
-        patch,
-        patches,
-        plane=surface.plane,
-        cables=_cables(surface, place),
-        rooms=_rooms(surface, mirrors, next_to, patch_label, [name for _, name in patch_names]),
-        **supports,
-    )
+    patches = tuple(replace(surface.patches[p], name=name) for p, name in patch_names)
+    fixed, lines, flat = _supports(surface, mirrors, images, place, len(X))
+    cables = _cables(surface, place)
+    rooms = _rooms(surface, mirrors, next_to, patch_label, [name for _, name in patch_names])
+    on_plane, others = flat[0][1], flat[1:]
+    whole = Surface(X, F, patch, patches, fixed, on_plane, surface.plane, lines, others, cables, rooms)
     return Whole(whole, first % n, np.tile(np.arange(m), k), k)
 
 
@@ -155,7 +150,8 @@ def _reflection(plane: Plane) -> Image:
 
 def _group(generators: Sequence[Image], size: float) -> tuple[list[Image], list[Ints]]:
     """All images of the piece, itself first, and for each generator g the number (k,) of image · g."""
-    images, next_to = [Image(np.eye(3), np.zeros(3))], [[] for _ in generators]
+    images = [Image(np.eye(3), np.zeros(3))]
+    next_to: list[list[int]] = [[] for _ in generators]
     for number in count():
         if number == len(images):
             break
@@ -239,10 +235,11 @@ def _patches(
     topo = topology(F, source, int(F.max()) + 1)
     key = topo.edge_of_face.astype(np.int64) * q + source[:, None]
     crowded = np.bincount(key.ravel(), minlength=q * len(topo.edges)).reshape(-1, q) > 2
-    apart = crowded.any(axis=0)
+    apart = np.asarray(crowded.any(axis=0))
     for room in surface.rooms:
         apart[[surface.patch_index(name) for name, _ in room.patches]] = True
-    out, names = np.empty((k, q), dtype=np.int64), []
+    out = np.empty((k, q), dtype=np.int64)
+    names: list[tuple[int, str]] = []
     taken = {patch.name for patch in surface.patches}
     for p, patch in enumerate(surface.patches):
         parts = np.unique(label[:, p]) if apart[p] else label[:1, p]
@@ -264,8 +261,11 @@ def _supports(
     images: Sequence[Image],
     place: Ints,
     n: int,
-) -> dict[str, object]:
-    """The supports of the whole: those of the piece in all images, but for the planes unfolded at."""
+) -> tuple[Bools, tuple[tuple[Guide, Bools], ...], tuple[tuple[Plane, Bools], ...]]:
+    """What is fixed, on lines, and on Π and other planes in the whole: all images of the piece's supports.
+
+    Those in the planes unfolded at are none any more.
+    """
     given, size = surface.given, surface.size
     fixed = np.zeros(n, dtype=bool)
     fixed[place[:, given.fixed]] = True
@@ -276,28 +276,24 @@ def _supports(
     for image, row in zip(images, place, strict=True):
         for plane, mask in kept:
             new = _moved_plane(plane, image)
-            _merge(planes, new, row[mask], lambda old, new: _same_plane(old, new, size), n)
+            _merge(planes, new, row[mask], [_same_plane(old, new, size) for old, _ in planes], n)
         for guide, mask in given.on_line:
-            _merge(
-                lines, _moved_guide(guide, image), row[mask], lambda old, new: _same_guide(old, new, size), n
-            )
+            moved = _moved_guide(guide, image)
+            _merge(lines, moved, row[mask], [_same_guide(old, moved, size) for old, _ in lines], n)
     if lines:
         double = np.sum([mask for _, mask in lines], axis=0) > 1
         fixed |= double
         lines = [(guide, mask & ~double) for guide, mask in lines]
-    return {"fixed": fixed, "on_plane": planes[0][1], "on_planes": planes[1:], "on_line": lines}
+    return fixed, tuple(lines), tuple(planes)
 
 
-def _merge(parts: list, new, vertices: Ints, same, n: int) -> None:
-    """Add the vertices to the part of this plane or line, or as a new part."""
-    for old, mask in parts:
-        if same(old, new):
-            mask[vertices] = True
-            return
-    mask = np.zeros(n, dtype=bool)
-    mask[vertices] = True
-    if mask.any():
-        parts.append((new, mask))
+def _merge(parts: list[tuple[Held, Bools]], new: Held, vertices: Ints, same: list[bool], n: int) -> None:
+    """Add the vertices to the part that is the ``same`` plane or line, or as a new part."""
+    if not any(same) and len(vertices):
+        parts.append((new, np.zeros(n, dtype=bool)))
+        same = [*same, True]
+    if any(same):
+        parts[same.index(True)][1][vertices] = True
 
 
 def _same_plane(one: Plane, other: Plane, size: float) -> bool:
@@ -327,7 +323,7 @@ def _same_guide(one: Guide, other: Guide, size: float) -> bool:
     return bool(parallel and float(one.distance(np.array(other.point))) <= near)
 
 
-def _cables(surface: Surface, place: Ints) -> list[Cable]:
+def _cables(surface: Surface, place: Ints) -> tuple[Cable, ...]:
     """The cables with their images; in a mirror plane the tensions of coinciding images add up."""
     cables = []
     for cable in surface.cables:
@@ -337,7 +333,7 @@ def _cables(surface: Surface, place: Ints) -> list[Cable]:
             text = f"cable {cable.name!r} lies in a mirror plane in part; make that part a cable of its own"
             raise SurfaceError(text, what="cables", where=cable.name)
         cables.append(Cable(cable.name, int(times[0]) * cable.tension, edges))
-    return cables
+    return tuple(cables)
 
 
 def _rooms(
@@ -346,10 +342,10 @@ def _rooms(
     next_to: Sequence[Ints],
     patch_label: Ints,
     patch_names: Sequence[str],
-) -> list[Room]:
+) -> tuple[Room, ...]:
     """The rooms: images of one that meet across a plane are one room, with the volume of all."""
     if not surface.rooms:
-        return []
+        return ()
     bounds = surface.room_signs != 0.0
     meets = (_meets(surface, mirrors)[:, None, :] & bounds[None]).any(axis=2)
     label = _across(meets, next_to)
@@ -364,92 +360,5 @@ def _rooms(
                 for image in images
                 for patch, sign in room.patches
             }
-            rooms.append(Room(name, patches, len(images) * room.volume))
-    return rooms
-
-
-def cut(surface: Surface, plane: Plane) -> Surface:
-    """The part of a symmetric surface in front of a plane, which becomes a mirror plane of it.
-
-    The mesh must have edges along the plane, as a symmetric mesh can. A room that the plane cuts keeps half
-    of its volume, and a cable in the plane half of its tension, so that ``mirrored`` gives the whole back.
-
-    Parameters
-    ----------
-    plane : its normal points to the part that stays.
-
-    Raises
-    ------
-    SurfaceError
-        If a triangle crosses the plane, or nothing lies on one side of it.
-
-    >>> from pcmc import Patch
-    >>> square = Surface([[-1, 0, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3], [1, 2, 3]], [0, 0],
-    ...                  [Patch("floor", 1.0)], fixed=range(4))
-    >>> half = cut(square, Plane(normal=(1, 0, 0)))
-    >>> half.vertices.tolist(), mirrored(half).m
-    ([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 2)
-    """
-    expect_surface(surface)
-    if not isinstance(plane, Plane):
-        validate.refuse("plane", plane, "a Plane", error=SurfaceError)
-    plane = replace(plane, mirror=True)
-    height = plane.height(surface.vertices)
-    side = np.where(np.abs(height) <= NEAR * surface.size, 0, np.sign(height)).astype(int)
-    corners = side[surface.faces]
-    crossing = np.flatnonzero((corners > 0).any(axis=1) & (corners < 0).any(axis=1))
-    if len(crossing):
-        text = f"triangle {crossing[0]} crosses the {plane} ({len(crossing)} such triangles); the mesh must"
-        raise SurfaceError(f"{text} have edges along the plane", what="plane", where=int(crossing[0]))
-    stays = (corners > 0).any(axis=1)
-    if stays.all() or not stays.any():
-        where = "in front of" if stays.all() else "behind"
-        raise SurfaceError(f"all of the surface is {where} the {plane}", what="plane", where=where)
-    vertices = np.unique(surface.faces[stays])
-    number = np.full(surface.n, -1)
-    number[vertices] = np.arange(len(vertices))
-    patches, patch = np.unique(surface.patch_of_face[stays], return_inverse=True)
-    given, X = surface.given, surface.vertices[vertices]
-    X = X - (height[vertices] * (side[vertices] == 0))[:, None] * np.array(plane.normal)
-    planes = [(other, mask[vertices]) for other, mask in surface.on_planes if mask[vertices].any()]
-    return Surface(
-        X,
-        number[surface.faces[stays]],
-        patch,
-        [surface.patches[p] for p in patches],
-        given.fixed[vertices],
-        given.on_plane[vertices],
-        surface.plane,
-        [(guide, mask[vertices]) for guide, mask in given.on_line if mask[vertices].any()],
-        [*planes, (plane, side[vertices] == 0)],
-        _cut_cables(surface, side, number),
-        _cut_rooms(surface, stays),
-    )
-
-
-def _cut_cables(surface: Surface, side: Ints, number: Ints) -> list[Cable]:
-    """The cables of the part that stays; of one in the plane, half the tension."""
-    cables = []
-    for cable in surface.cables:
-        ends = side[cable.edges]
-        inside, stays = (ends == 0).all(axis=1), (ends >= 0).all(axis=1)
-        if inside.any() and not inside[stays].all():
-            text = f"cable {cable.name!r} lies in the plane in part; make that part a cable of its own"
-            raise SurfaceError(text, what="cables", where=cable.name)
-        if stays.any():
-            share = 0.5 if inside.any() else 1.0
-            cables.append(Cable(cable.name, share * cable.tension, number[cable.edges[stays]]))
-    return cables
-
-
-def _cut_rooms(surface: Surface, stays: Bools) -> list[Room]:
-    """The rooms of the part that stays; of one that the plane cuts, half the volume."""
-    left = {surface.patches[p].name for p in np.unique(surface.patch_of_face[stays])}
-    gone = {surface.patches[p].name for p in np.unique(surface.patch_of_face[~stays])}
-    rooms = []
-    for room in surface.rooms:
-        patches = {name: sign for name, sign in room.patches if name in left}
-        if patches:
-            halved = any(name in gone for name, _ in room.patches)
-            rooms.append(Room(room.name, patches, room.volume * (0.5 if halved else 1.0)))
-    return rooms
+            rooms.append(Room(name, tuple(patches.items()), len(images) * room.volume))
+    return tuple(rooms)

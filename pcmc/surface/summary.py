@@ -28,8 +28,8 @@ def summary(surface: Any) -> str:
         "planes": [str(plane) for plane, _ in surface.on_planes],
     }
     height = surface.plane.height(surface.vertices)
-    fixed = np.count_nonzero(surface.fixed)
-    sliding = np.count_nonzero(surface.held & ~surface.fixed)
+    fixed = np.count_nonzero(surface.pinned)
+    sliding = np.count_nonzero(surface.held & ~surface.pinned)
     return "\n".join(
         [
             f"Surface of {surface.m} triangles and {surface.n} vertices, {surface.size:.4g} across",

@@ -86,16 +86,21 @@ def check_mirrors(
                 where=str(plane),
                 found=sides,
             )
-        flat = np.flatnonzero(mask[F].all(axis=1))
-        if len(flat):
-            name = names[patch[flat[0]]]
-            raise SurfaceError(
-                f"patch {name!r} lies in the {plane} (triangle {flat[0]}), so it is its own mirror image;"
-                " use a mirror plane that it does not lie in, or model the whole",
-                what="on_planes",
-                where=name,
-                found=int(flat[0]),
-            )
+        refuse_in_mirror(plane, mask, F, patch, names)
+
+
+def refuse_in_mirror(plane: Plane, mask: Bools, F: Ints, patch: Ints, names: Sequence[str]) -> None:
+    """Refuse a triangle with all its vertices in a mirror plane, given by their mask (n,)."""
+    flat = np.flatnonzero(mask[F].all(axis=1))
+    if len(flat):
+        name = names[patch[flat[0]]]
+        raise SurfaceError(
+            f"patch {name!r} lies in the {plane} (triangle {flat[0]}), so it is its own mirror image;"
+            " use a mirror plane that it does not lie in, or model the whole",
+            what="on_planes",
+            where=name,
+            found=int(flat[0]),
+        )
 
 
 def common_point(point: Floats, planes: Sequence[Plane]) -> Floats:

@@ -24,20 +24,8 @@ from .room import Room, checked_rooms, room_signs
 from .summary import summary
 from .topology import Topology, topology
 
-FIELDS = (
-    "vertices",
-    "faces",
-    "patch_of_face",
-    "patches",
-    "fixed",
-    "on_plane",
-    "plane",
-    "on_line",
-    "on_planes",
-    "cables",
-    "rooms",
-    "given",
-)
+MESH = ("vertices", "faces", "patch_of_face", "patches")
+FIELDS = (*MESH, "fixed", "on_plane", "plane", "on_line", "on_planes", "cables", "rooms", "given")
 GROUND = Plane()
 FAR = 30.0  # sizes from the point of Π: farther, volumes seen from it lose over three digits
 
