@@ -207,7 +207,7 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
     left = _left_over(surface, signs)
     grounded = np.asarray(np.abs(surface.plane.height(surface.vertices)) <= ON_PLANE * surface.size)
     edges = surface.topology.edges
-    lying: Bools = grounded[edges].all(axis=1)
+    lying = np.asarray(grounded[edges].all(axis=1))
     _refuse_open(surface, room, np.flatnonzero((left != 0.0) & ~_closed_by_support(surface, edges, lying)))
     for _, mask in surface.on_planes:
         lying |= mask[edges].all(axis=1)
