@@ -65,7 +65,8 @@ def triple_bubble(
     films = [f"film {names[k]}{names[(k + 1) % 3]}" for k in range(3)]
     patches += [Patch(film, alpha, pressure=0.0) for film in films]
     rooms = [
-        Room(names[k], {f"bubble {names[k]}": 1, films[k]: 1, films[k - 1]: -1}, volume) for k in range(3)
+        Room(names[k], ((f"bubble {names[k]}", 1), (films[k], 1), (films[k - 1], -1)), volume)
+        for k in range(3)
     ]
     surface = mesh.closed_surface(patches, rooms)
     return surface if exact else surface.moved(surface.vertices * STRETCH)

@@ -83,7 +83,7 @@ def gradient(surface: pcmc.Surface) -> Floats:
     they lack those of line tensions, so cables cannot be compared where pressures differ.
     """
     convert = "convert_to_quantities\n"
-    if surface.cables:
+    if len(surface.cable_edges.ends):
         if len(np.unique(surface.pressures[surface.pressures != 0.0])) > 1:
             raise EvolverError(f"{PROGRAM}: no forces of cables where patches differ in pressure")
         convert = ""

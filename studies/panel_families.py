@@ -123,8 +123,8 @@ def figure(folder: Folder) -> None:
         }
         for name, mine in records.groupby("example", sort=False)
     }
-    labels = {"xlabel": "tolerance / mean edge", "ylabel": "families"}
-    curve_panels(curves, folder.figure("families"), columns=3, **labels)
+    path, xlabel = folder.figure("families"), "tolerance / mean edge"
+    curve_panels(curves, path, columns=3, xlabel=xlabel, ylabel="families")
     for path in folder.meshes():
         stages = folder.read_mesh(path.stem)
         surfaces = list(stages.values())

@@ -109,8 +109,7 @@ def compared(model: StructuralModel, form: StepResults, snow: StepResults) -> Ro
 
 def stress_errors(model: StructuralModel, form: StepResults) -> Floats:
     """(e,2) the principal stresses of each element over α/t, less 1."""
-    expected = model.prestress[model.surface.patch_of_face[model.faces]]
-    return np.asarray(form.principal_stresses[model.faces] / expected[:, None] - 1.0)
+    return np.asarray(form.principal_stresses[model.faces] / model.prestress[:, None] - 1.0)
 
 
 def by_patch(model: StructuralModel, form: StepResults) -> list[Row]:

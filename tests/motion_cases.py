@@ -1,6 +1,7 @@
 """Surfaces with everything a motion space distinguishes, small enough for dense algebra."""
 
 import numpy as np
+from cable_cases import net
 from shapes import octahedron, pyramid, shaken, three_patches
 from tents import tent
 
@@ -56,5 +57,6 @@ SURFACES = {
     "seam": seam,
     "faces against each other": against,
     "touching": touching,
+    "cables and weights": net,
     "bubbles": lambda: shaken(double_bubble(1.2)),
 }

@@ -28,8 +28,17 @@ def symmetric(pattern, data):
 
 
 def dense_laplacian(surface):
-    """L_α (n,n) from the angles: -½ α (cot β + cot γ) summed over the triangles at each edge."""
+    """L_α (n,n) from the angles: -½ α (cot β + cot γ) summed over the triangles at each edge.
+
+    A cable adds τ/ℓ to its edges, and a weight w z to the tension of triangles where it is positive.
+    """
     L = np.zeros((surface.n, surface.n))
+    height = surface.plane.height(surface.vertices)
+    for cable in surface.cables:
+        for a, b in cable.edges:
+            pull = cable.tension / np.linalg.norm(surface.vertices[a] - surface.vertices[b])
+            L[[a, b], [b, a]] -= pull
+            L[[a, b], [a, b]] += pull
     for face, patch in zip(surface.faces, surface.patch_of_face, strict=True):
         for corner in range(3):
             apex, a, b = np.roll(face, -corner)
@@ -37,7 +46,8 @@ def dense_laplacian(surface):
                 surface.vertices[a] - surface.vertices[apex],
                 surface.vertices[b] - surface.vertices[apex],
             )
-            weight = 0.5 * surface.tensions[patch] * (u @ w) / np.linalg.norm(np.cross(u, w))
+            tension = surface.tensions[patch] + max(surface.weights[patch] * height[face].mean(), 0.0)
+            weight = 0.5 * tension * (u @ w) / np.linalg.norm(np.cross(u, w))
             L[[a, b], [b, a]] -= weight
             L[[a, b], [a, b]] += weight
     return L

@@ -188,3 +188,40 @@ def test_shells_carry_the_same_load_and_bend_less():
             depths.append(-np.nanmin(snow.deflections))
     assert depths[1] < 0.9 * depths[0]
     assert depths[1] / depths[0] < depths[3] / depths[2] < 1.0
+
+
+def sail(n):
+    """A saddle over a square of side 8, held at its four corners, with a cable along each edge."""
+    flat, side = square(n), np.arange(n + 1)
+    x, y = 8.0 * flat.vertices[:, 0], 8.0 * flat.vertices[:, 1]
+    X = np.column_stack([x, y, 2.0 * (x / 4.0 - 1.0) * (y / 4.0 - 1.0)])
+    rims = {"south": side, "north": n * (n + 1) + side, "west": side * (n + 1), "east": side * (n + 1) + n}
+    cables = [pcmc.Cable.along(name, 20.0, vertices) for name, vertices in rims.items()]
+    corners = [0, n, n * (n + 1), n * (n + 2)]
+    return Surface(X, flat.faces, flat.patch_of_face, flat.patches, fixed=corners, cables=cables)
+
+
+def test_a_sail_between_edge_cables_is_at_rest_there():
+    """Tensions of cables and reactions converge to ours, about fourfold nearer for each halving."""
+    off = []
+    for n in (6, 12):
+        model = model_of(pcmc.solve(sail(n)), loads=[Snow(0.05, patches=["film"])], cable_area=1e-3)
+        form, snow = calculix.run(model)
+        compared = structure.compared(model, form, snow)
+        assert compared["displacement"] < 3e-5
+        tensions = np.concatenate(list(form.cable_tensions.values()))
+        off.append([np.abs(tensions / 20.0 - 1.0).max(), compared["stress_rms"], compared["reaction_rms"]])
+        assert snow.deflections.min() < 0.0
+    assert (np.array(off[1]) < 0.4 * np.array(off[0])).all()
+    assert max(off[1]) < 3e-3
+
+
+def test_a_heavy_roof_is_at_rest_under_its_own_weight():
+    """Weights per area belong to the form-finding load."""
+    surface = pcmc.solve(spherical_cap(0.15, alpha=0.6).retensioned(weights={"cap": 0.2})).surface
+    model = structure.structural_model(surface)
+    form, snow = calculix.run(model)
+    compared = structure.compared(model, form, snow)
+    assert compared["displacement"] < 2e-6
+    assert compared["reaction_rms"] < 0.01
+    assert compared["support_theirs"] == pytest.approx(compared["support_ours"], rel=5e-3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -102,9 +103,10 @@ def test_families_depend_neither_on_the_order_of_faces_nor_on_their_first_corner
     order = np.random.default_rng(0).permutation(len(lengths))
     turn = np.random.default_rng(1).integers(3, size=len(lengths))
     turned = np.take_along_axis(lengths, (np.arange(3) + turn[:, None]) % 3, axis=1)
-    for apart in (False, True):
-        before, after = families(lengths, 0.01, apart), families(turned[order], 0.01, apart)
+    for apart, tolerance in product((False, True), (0.01, 0.03, 0.1)):
+        before, after = families(lengths, tolerance, apart), families(turned[order], tolerance, apart)
         assert np.array_equal(before.family[order], after.family)
+        assert before.at_least == after.at_least
 
 
 def test_a_row_of_triangles_needs_as_few_families_as_intervals():

@@ -120,6 +120,7 @@ def test_sliding_vertices_are_held_across_their_plane(tmp_path):
         given.vertices @ turn.T, given.faces, given.patch_of_face, given.patches,
         fixed=given.fixed, on_plane=given.on_plane, plane=pcmc.Plane(normal=turn[:, 2]),
     )  # fmt: skip
+    surface = surface.retensioned(weights={"wall": 0.1})
     model = model_of(surface, loads=[Snow(0.5)], anyway=True)
     found = written(tmp_path, model)
     axes = np.array(found["*TRANSFORM, NSET=GUIDE_1, TYPE=R"], dtype=float).reshape(2, 3)
@@ -131,6 +132,7 @@ def test_sliding_vertices_are_held_across_their_plane(tmp_path):
     np.testing.assert_allclose(
         model.axes @ model.axes.transpose(0, 2, 1), np.tile(np.eye(3), (surface.n, 1, 1)), atol=1e-12
     )
+    assert np.abs(model.steps[1].forces[guided]).max() > 1e-3
     forces = np.zeros((surface.n, 3))
     for vertex, axis, value in found["*CLOAD, OP=NEW"]:
         forces[int(vertex) - 1, int(axis) - 1] = float(value)
@@ -376,13 +378,24 @@ def test_a_project_is_solved_and_has_the_values(tmp_path, monkeypatch, capsys):
     found = sections(tmp_path / "roof.inp")
     assert found["*ELASTIC"] == [["1000000", "0.1"]]
     assert ["PATCH_1", "P1", "1.5"] in found["*DLOAD, OP=NEW"]
-    monkeypatch.setattr("pcmc.project.running.solve", None)  # what follows is refused before solving
+    monkeypatch.setattr("pcmc.project.designed", None)  # what follows is refused before solving
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp", "--wind", "rof=1"]) == 2
     (tmp_path / "roof.toml").write_text(PROJECT.replace("young", "yung"))
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
     assert "young" in capsys.readouterr().err
     (tmp_path / "roof.toml").write_text(PROJECT.replace("1e6", "-1.0"))
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
+
+
+def test_a_roof_that_misses_its_targets_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    targets = '[targets]\nmeet = [{quantity = "apex", of = "roof", value = 30.0}]\nvary = ["roof"]\n'
+    (tmp_path / "roof.toml").write_text(PROJECT + targets)
+    assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
+    assert "targets" in capsys.readouterr().err
+    assert not (tmp_path / "roof.inp").exists()
+    assert cli.main(["structure", "roof.toml", "-o", "roof.inp", "--anyway"]) == 1
+    assert (tmp_path / "roof.inp").exists()
 
 
 def test_reactions_of_an_exact_answer_are_ours(tmp_path):

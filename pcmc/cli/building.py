@@ -11,14 +11,14 @@ import typer
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError
+from ..base.units import Units
 from ..drawings import drawing_set
 from ..drawings.drawing_set import check_name
 from ..io import FORMATS, write
 from ..panels import Panels, fewer_families, panels
 from ..panels.schedule import MIRROR_IMAGES
-from ..surface import Surface
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import MANY_FILES, TOML, Input, ViewName, number, option
+from .arguments import MANY_FILES, Input, ViewName, number, option
 from .progress import working
 
 CSV = ".csv"
@@ -26,6 +26,7 @@ CHANGE = "Move the vertices along the shape to lower the number of families; lea
 ANYWAY = "Accept a surface that is not certified."
 MARKED = "Draw a surface that is not certified; every sheet is marked."
 TOLERANCE = "Largest difference of edges within a family of panels; adds the schedule."
+UNITS = "Unit of the lengths: m, cm, mm, ft or in; by default the file's."
 TRUE_SIZE = "Draw every panel at true size; needs --tolerance."
 Anyway = Annotated[bool, typer.Option("--anyway", help=ANYWAY)]
 
@@ -64,7 +65,8 @@ def panels_(
     projects.check_outputs([path for one in files for path in _paths(one)] + ([picture] if picture else []))
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": anyway}
     with working() as say:
-        surface = settled(file, say)
+        shown = arguments.given(file, say)
+        surface = shown.surface
         say("sorting panels")
         if change is None:
             schedule = panels(surface, tolerance, **options)
@@ -75,7 +77,7 @@ def panels_(
 
             fewer = fewer_families(surface, tolerance, change, callback=callback, **options)
             schedule = fewer.after
-        works = [work for path in files for work in _works(path, schedule)]
+        works = [work for path in files for work in _works(path, schedule, shown.units)]
         if picture is not None:
             works.append((picture, partial(_paint, schedule, seen)))
         written = projects.write_all(works, say)
@@ -90,7 +92,7 @@ def panels_(
 def draw_(
     file: Input,
     output: Annotated[list[Path], MANY_FILES],
-    units: Annotated[str | None, option("NAME", "Unit of the lengths: m, cm, mm, ft or in.")] = None,
+    units: Annotated[str | None, option("NAME", UNITS)] = None,
     sheet: Annotated[str, option("NAME", "Format of the sheets: A4, A3, A2, A1 or A0.")] = "A1",
     scale: Annotated[
         int | None, option("NUMBER", "1 to this; by default it fits.", parser=arguments.integer)
@@ -115,13 +117,12 @@ def draw_(
     projects.check_outputs(output)
     heights = None if height is None else [number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]
-    arguments.check_input(file)
     with working() as say:
-        surface = settled(file, say)
+        shown = arguments.given(file, say)
         say("drawing")
         drawings = drawing_set(
-            surface,
-            units or "",
+            shown.surface,
+            units or shown.units.length,
             sheet=sheet,
             scale=scale,
             heights=heights,
@@ -145,16 +146,6 @@ def _ends(text: str) -> Any:
     return (a, b), (c, d)
 
 
-def settled(file: Path, say: projects.OnStep) -> Surface:
-    """The surface in a file, or that of a project, solved."""
-    arguments.check_input(file)
-    if file.suffix.lower() != TOML:
-        return arguments.surface_in(file)
-    project = projects.load(file)
-    say("meshing the plan")
-    return projects.solve_project(project, projects.surface_of(project), say).surface
-
-
 def _paths(path: Path) -> list[Path]:
     """The files that the name of an output stands for."""
     suffix = path.suffix.lower()
@@ -168,10 +159,10 @@ def _beside(path: Path, name: str) -> Path:
     return path.with_name(f"{path.stem}-{name}{path.suffix}")
 
 
-def _works(path: Path, schedule: Panels) -> list[Any]:
+def _works(path: Path, schedule: Panels, units: Units) -> list[Any]:
     """Each file with the function that writes it."""
     if path.suffix.lower() != CSV:
-        return [(path, partial(write, surface=schedule.surface))]
+        return [(path, partial(write, surface=schedule.surface, units=units))]
     tables = (schedule.panels, schedule.families, schedule.edges)
     return [
         (one, partial(table.to_csv, index=False)) for one, table in zip(_paths(path), tables, strict=True)

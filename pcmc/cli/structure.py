@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -10,12 +10,11 @@ import typer
 
 from .. import project as projects
 from ..base.errors import FileError
-from ..io import read_bare
 from ..solvers.result import Result
 from ..structure import write_structure
 from ..surface import Surface
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import TOML, Input, number, option
+from .arguments import TOML, Cache, Input, number, option
 from .progress import working
 
 THICKNESS = "Thickness of a patch; a bare VALUE applies to every patch that is not named."
@@ -37,6 +36,7 @@ def structure(
     snow: Annotated[float | None, option("VALUE", "Load per plan area.", parser=number)] = None,
     wind: Annotated[list[str] | None, option("NAME=VALUE", WIND, "--wind")] = None,
     cable_area: Annotated[float | None, option("VALUE", "Section of the cables.", parser=number)] = None,
+    cache: Cache = True,
     anyway: Annotated[bool, typer.Option("--anyway", help="Write it even if not certified.")] = False,
 ) -> int:
     """Write a structural model for CalculiX: prestressed membranes, supports, loads.
@@ -54,7 +54,7 @@ def structure(
     projects.check_outputs([output])
     with working() as say:
         project = projects.load(file) if file.suffix.lower() == TOML else None
-        start = projects.surface_of(project) if project is not None else read_bare(file)
+        start = arguments.given(file, say, start=True).surface
         given = {
             "thickness": _thickness(start, thickness),
             "young": young,
@@ -69,17 +69,20 @@ def structure(
         wanted = projects.Structure(**values | {k: v for k, v in given.items() if v is not None})
         wanted.check(start)
         solved: Surface | Result = start
+        missed = False
         if project is not None:
-            solved = projects.run_project(
-                replace(project, files=(), picture=None, mesh_check=False), say
-            ).result
+            outcome = projects.designed(project, say, use_cache=cache)
+            solved, missed = outcome.result, outcome.certificate.certified and not outcome.good
+        if missed and not anyway:
+            hint = f"pcmc solve {file} shows them, --anyway writes the model"
+            raise FileError(f"{file}: the roof misses its targets; {hint}", what=str(file))
         say("certifying")
         model = wanted.model(solved, anyway)
         write_structure(output, model)
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
-    return OK if model.certified else NOT_CERTIFIED
+    return OK if model.certified and not missed else NOT_CERTIFIED
 
 
 def _thickness(surface: Surface, given: list[str] | None) -> float | dict[str, float] | None:

@@ -96,6 +96,11 @@ class BoundaryLine:
     count: int
 
     @property
+    def volume_rates(self) -> Floats:
+        """(0,) no prescribed volume varies."""
+        return np.zeros(0)
+
+    @property
     def scale(self) -> float:
         """The size of λ in the metric of arclength: its value at the start, or 1."""
         return abs(self.value) or 1.0

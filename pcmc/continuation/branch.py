@@ -269,7 +269,8 @@ def _direction(parameter: object) -> Direction | BoundaryMotion:
         return Direction({parameter: 1.0})
     if isinstance(parameter, Parameter):
         weights = {parameter.patch: 1.0}
-        return Direction(**{f"{parameter.kind}s": weights})
+        by_kind: dict[str, Any] = {f"{parameter.kind}s": weights}
+        return Direction(**by_kind)
     validate.refuse(
         "parameter", parameter, "the name of a patch, a Parameter, a Direction or a BoundaryMotion"
     )

@@ -208,10 +208,8 @@ def _common_value(surface: Surface, w: Floats, u: Floats, v: Floats, loads: Load
         for kind, parts, values, rates in sources
         for i in np.flatnonzero(rates)
     ]
-    (first, value), *others = [
-        *given,
-        *((f"{load.kind} of {load.name!r}", load.start / load.rate) for load in loads.parts),
-    ]
+    given += [(f"{load.kind} of {load.name!r}", load.start / load.rate) for load in loads.parts]
+    (first, value), *others = given
     for name, other in others:
         if abs(other - value) > SAME_VALUE * max(abs(value), abs(other)):
             message = f"the {first} makes the parameter {value:g}, the {name} makes it {other:g}"

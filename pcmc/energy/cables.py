@@ -17,6 +17,7 @@ from ..base.errors import SurfaceError
 from ..surface import Surface
 from ..surface.cable import CableEdges
 from ..surface.geometry import dot, norm, point, scaled, sub, vector
+from ..surface.topology import Topology
 
 
 def add_cables(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
@@ -76,18 +77,15 @@ def squared_cable_forces(surface: Surface) -> Floats:
     return np.asarray(2.0 * surface.cable_edges.tension**2)
 
 
-def tensions_on(edges: Ints, cables: CableEdges, n: int) -> Floats:
-    """(e,) the line tension on each of the edges (e,2) of a mesh with n vertices, force.
+def tensions_on(topo: Topology, cables: CableEdges) -> Floats:
+    """(e,) the line tension on each edge of a topology, force.
 
     Raises
     ------
-    SurfaceError : a cable runs along an edge that is not among them, so that nothing else acts there.
+    SurfaceError : a cable runs along an edge that is not there, so that nothing else acts on it.
     """
-    keys = edges.astype(np.int64) @ np.array([n, 1])
-    wanted = cables.ends.astype(np.int64) @ np.array([n, 1])
-    order = np.argsort(keys)
-    place = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
-    alone = np.flatnonzero(keys[place] != wanted)
+    place = topo.edge_numbers(cables.ends)
+    alone = np.flatnonzero(place < 0)
     if len(alone):
         i, j = (int(v) for v in cables.ends[alone[0]])
         message = (
@@ -95,7 +93,7 @@ def tensions_on(edges: Ints, cables: CableEdges, n: int) -> Floats:
             " give the patches there a tension, or remove the cable"
         )
         raise SurfaceError(message, what="cables", where=(i, j))
-    return np.bincount(place, cables.tension, len(edges))
+    return np.bincount(place, cables.tension, len(topo.edges))
 
 
 @compiled

@@ -160,7 +160,7 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     on_curve = topo.curve_edge | topo.one_way_edge
     if surface.on_planes:
         on_curve = on_curve & ~mirror_edges(surface.on_planes, topo)
-    pull = tensions_on(topo.edges, surface.cable_edges, surface.n) if surface.cables else None
+    pull = tensions_on(topo, surface.cable_edges) if surface.cables else None
     if pull is not None:
         on_curve = on_curve | (pull > 0.0)
     edges = topo.edges[on_curve]

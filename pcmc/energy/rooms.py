@@ -199,15 +199,15 @@ def _left_over(surface: Surface, signs: Floats) -> Floats:
     """(e,) how often the patches of a room run along each edge one way more than the other."""
     topo = surface.topology
     ways = signs[surface.patch_of_face, None] * topo.sense
-    return np.bincount(topo.edge_of_face.ravel(), ways.ravel(), len(topo.edges))
+    return np.bincount(topo.edge_of_face.ravel(), ways.ravel(), len(topo.edges)).astype(float)
 
 
 def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
     """The volumes of the fans over the connected pieces of a room's fixed boundary off Π."""
     left = _left_over(surface, signs)
-    grounded = np.abs(surface.plane.height(surface.vertices)) <= ON_PLANE * surface.size
+    grounded: Bools = np.abs(surface.plane.height(surface.vertices)) <= ON_PLANE * surface.size
     edges = surface.topology.edges
-    lying = grounded[edges].all(axis=1)
+    lying: Bools = grounded[edges].all(axis=1)
     _refuse_open(surface, room, np.flatnonzero((left != 0.0) & ~_closed_by_support(surface, edges, lying)))
     for _, mask in surface.on_planes:
         lying |= mask[edges].all(axis=1)

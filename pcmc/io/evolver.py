@@ -172,7 +172,7 @@ def _cones(surface: Surface) -> Floats:
     """(k,) the volumes of the patches' cones seen from the point of Π, as the program sees them."""
     corners = surface.vertices[surface.faces] - np.array(surface.plane.point)
     volumes = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
-    of_patch = np.bincount(surface.patch_of_face, volumes, len(surface.patches))
+    of_patch = np.bincount(surface.patch_of_face, volumes, len(surface.patches)).astype(float)
     return add_plane_volumes(surface, surface.vertices, of_patch)
 
 
@@ -377,7 +377,8 @@ def _pressures(
 
     And the bodies of prescribed volume: by number and volume, (m,) 1 or -1 where a face bounds them.
     """
-    pressure, prescribed = np.zeros(len(face_ids)), {}
+    pressure = np.zeros(len(face_ids))
+    prescribed: dict[tuple[str, float], Ints] = {}
     if "bodies" not in file:
         return pressure, prescribed, ("the file has no bodies, so no patch is under pressure",)
     section, without = file["bodies"], []
@@ -398,7 +399,8 @@ def _pressures(
         if given is not None:
             sides = np.zeros(len(face_ids), dtype=np.int64)
             np.add.at(sides, place[of_body == row], np.sign(signed[of_body == row]))
-            prescribed[number, _numbers((given[1],), known, section, row)[0]] = sides
+            volume = float(_numbers((given[1],), known, section, row)[0])
+            prescribed[str(number), volume] = sides
     if prescribed:  # the difference of two rooms' pressures is 0 but for rounding
         pressure[np.abs(pressure) <= ROUNDING * np.abs(pressure).max(initial=0.0)] = 0.0
     note = f"body {', '.join(without)} has no pressure in the file; 1 is used"
@@ -442,7 +444,7 @@ def _rooms(
     for (number, volume), sides in prescribed.items():
         of_patch = np.zeros(len(patches), dtype=np.int64)
         of_patch[patch_of_face] = sides
-        signs = {patches[k].name: int(of_patch[k]) for k in np.flatnonzero(of_patch)}
+        signs = tuple((patches[k].name, int(of_patch[k])) for k in np.flatnonzero(of_patch))
         rooms.append(Room(names.get(number, f"body {number}"), signs, volume))
     return tuple(rooms)
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import shapely
 
 from ..base.errors import OptionError, PlanError, unknown
@@ -20,6 +21,10 @@ ACROSS = 2.5  # edges from the middle of the smallest part to its edge, at least
 ROOM = 1.6  # tension, over the least at which a roof over the plan exists
 WALL_ROOM = 0.3  # of the smaller tension: a wall's tension above the difference of its neighbours'
 SAMPLES = 16  # points of a divider at which its neighbours are looked up
+WEDGE = 1.5  # edges from a corner, where the width of the sheets there is taken
+CORNER_SHARE = 0.6  # of what those sheets carry
+NARROW = 0.82  # sine of the angle, 55 degrees, below which a sheet in a corner counts as narrow
+SMALL_HOLE = 0.05  # of the plan's area; smaller holes change its least tension little
 NEAR = 1e-4  # of the plan's size: a part this near to a point of a divider is beside it
 
 
@@ -35,7 +40,8 @@ class Part:
 def parts_of(drawing: Drawing) -> list[Part]:
     """The parts into which the dividers cut the plan, from left to right."""
     holes = [_line(curve) for curve in drawing.holes.values()]
-    lines = [_line(drawing.outline), *holes, *(_line(curve) for curve in drawing.dividers.values())]
+    lines = [_line(drawing.outline), *holes]
+    lines += [_line(curve, 2e-3 * drawing.outline.length) for curve in drawing.dividers.values()]
     noded = shapely.set_precision(shapely.union_all(lines, grid_size=1e-3 * drawing.gap), 0.0)
     roof = roof_area(drawing)
     polygons = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
@@ -44,17 +50,24 @@ def parts_of(drawing: Drawing) -> list[Part]:
     return sorted(parts, key=lambda part: (round(part.area.centroid.x, 6), round(part.area.centroid.y, 6)))
 
 
-def roof_area(drawing: Drawing) -> Any:
-    """The plan without its holes, as a polygon."""
-    holes = [curve.at(curve.dense)[:, :2] for curve in drawing.holes.values()]
-    outline = shapely.Polygon(drawing.outline.at(drawing.outline.dense)[:, :2])
-    for hole in holes:
-        outline = shapely.difference(shapely.make_valid(outline), shapely.make_valid(shapely.Polygon(hole)))
-    return outline
+def roof_area(drawing: Drawing, smallest: float = 0.0) -> Any:
+    """The plan without its holes, as a polygon; level holes below a share of its area are filled."""
+    whole = shapely.make_valid(shapely.Polygon(drawing.outline.at(drawing.outline.dense)[:, :2]))
+    area = whole
+    for curve in drawing.holes.values():
+        hole = shapely.make_valid(shapely.Polygon(curve.at(curve.dense)[:, :2]))
+        level = curve.pieces[0].points.shape[1] == 2  # a raised one carries the roof
+        if not level or hole.area > smallest * whole.area:
+            area = shapely.difference(area, hole)
+    return area
 
 
-def _line(curve: Curve) -> Any:
+def _line(curve: Curve, further: float = 0.0) -> Any:
+    """The curve as a polyline; an open one ``further`` at both ends, so that it meets the chords of arcs."""
     xy = curve.at(curve.dense)[:, :2]
+    if further and not curve.closed:
+        out = [curve.reversed().pieces[-1].direction(1), curve.pieces[-1].direction(1)]
+        xy = np.concatenate([[xy[0] + further * out[0][:2]], xy, [xy[-1] + further * out[1][:2]]])
     return shapely.LineString(xy)
 
 
@@ -107,11 +120,13 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     parts = parts_of(drawing)
     areas = _areas(parts, drawing, values.pop("patches", {}), values.pop("tension", None))
     tensions = [area["tension"] for area in areas]
+    edge_length = values.setdefault("edge_length", edge_length_for(parts, drawing))
     dividers = _changed(drawing.dividers, values.pop("dividers", []), "divider", Divider)
     for entry in dividers:
         if isinstance(entry, dict) and entry.get("name") in drawing.dividers:
             entry.setdefault("bottom", "held" if drawing.flat else "sloped")
-            entry.setdefault("wall", wall_tension(entry["curve"], parts, tensions, drawing.outline.length))
+            most = most_in_corners(entry["curve"], drawing.outline, edge_length)
+            entry.setdefault("wall", wall_tension(entry["curve"], parts, tensions, most))
     patches: dict[str, dict[str, Any]] = {}
     for area in areas:
         name = area.pop("name")
@@ -121,7 +136,7 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
             patches[name] = area
     plan: dict[str, Any] = {
         "outline": drawing.outline,
-        "edge_length": edge_length_for(parts, drawing),
+        "edge_length": edge_length,
         "holes": _changed(drawing.holes, values.pop("holes", []), "hole", Hole),
         "dividers": dividers,
         "supports": [*drawing.supports, *values.pop("supports", [])],
@@ -139,7 +154,7 @@ def _areas(
     if not parts:
         text = f"{drawing.path}: the outline encloses no area in plan; draw it around the roof"
         raise PlanError(text, what="outline")
-    least = least_tension(roof_area(drawing))
+    least = least_tension(roof_area(drawing, SMALL_HOLE))
     default = float(f"{ROOM * least:.2g}") if tension is None else tension
     names = _names(parts, drawing)
     areas = []
@@ -213,18 +228,38 @@ def _changed(drawn: Mapping[str, Curve], given: Sequence[Any], what: str, kind: 
     return [*entries.values(), *more]
 
 
-def wall_tension(curve: Curve, parts: Sequence[Part], tensions: Sequence[float], size: float) -> float:
-    """The tension of a wall: the difference of its neighbours' and 0.3 of the smaller one; two digits.
+def wall_tension(curve: Curve, parts: Sequence[Part], tensions: Sequence[float], most: float) -> float:
+    """The tension of a wall: the difference of its neighbours' and 0.3 of the smaller one, at most ``most``.
 
     A junction balances if the wall's tension is between the difference and the sum. Of several neighbours
-    along the divider the largest value counts.
+    along the divider the largest value counts. Two digits.
     """
+    size = sum(part.area.length for part in parts)
     wanted = [0.0]
     for t in (len(curve.pieces) * (k + 0.5) / SAMPLES for k in range(SAMPLES)):
         point = shapely.Point(curve.at([t])[0, :2])
-        near = [
-            a for part, a in zip(parts, tensions, strict=True) if part.area.distance(point) <= NEAR * size
-        ]
+        beside = [part.area.distance(point) <= NEAR * size for part in parts]
+        near = [tension for tension, there in zip(tensions, beside, strict=True) if there]
         if near:
-            wanted.append(max(near) - min(near) + WALL_ROOM * min(near))
+            wanted.append(max(near) - min(near) + min(WALL_ROOM * min(near), most))
     return float(f"{max(wanted):.2g}")
+
+
+def most_in_corners(curve: Curve, outline: Curve, edge_length: float, pressure: float = 1.0) -> float:
+    """The most by which a wall may exceed the difference of its neighbours, where it runs into a corner.
+
+    There the sheets on both sides get narrow, and carry the wall only as long as its tension is less than
+    p w, with w their width, which is taken an edge and a half from the corner; 0.6 of that leaves room.
+    Infinite where both sides are wide.
+    """
+    edge = _line(outline)
+    corners = outline.at(outline.corners)[:, :2] if len(outline.corners) else np.empty((0, 2))
+    most = math.inf
+    for one in () if curve.closed else (curve, curve.reversed()):
+        away = one.at(one.parameter(np.array([0.0, WEDGE * edge_length])))[:, :2]
+        if not len(corners) or np.linalg.norm(corners - away[0], axis=1).min() > 1e-3 * outline.length:
+            continue
+        width = float(edge.distance(shapely.Point(away[1])))
+        if width < NARROW * WEDGE * edge_length:
+            most = min(most, CORNER_SHARE * pressure * width)
+    return most

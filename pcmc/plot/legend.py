@@ -63,7 +63,8 @@ def _pixels_of_patches(picture: Shown) -> Floats:
     patch = surface.patch_of_face
     if names is not None:
         patch = patch[surface.patch_faces([surface.patch_index(name) for name in names])]
-    return np.bincount(patch, picture.painted.triangles, len(surface.patches))
+    pixels = np.bincount(patch, picture.painted.triangles, len(surface.patches))
+    return np.asarray(pixels, dtype=float)
 
 
 def add_legend(figure: Any, pictures: Iterable[Shown]) -> None:

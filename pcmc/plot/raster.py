@@ -6,10 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled
 from .scene import Scene
+
+Singles = npt.NDArray[np.float32]
 
 SAMPLES = 2  # pixels painted for each pixel shown, in each direction
 DOT = 5.0  # pixels across
@@ -60,7 +63,7 @@ def paint(scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> Pai
 
 
 @compiled
-def _paint_triangles(corners: Floats, colors: Floats, image: Floats, nearest: Floats, part: Ints) -> None:
+def _paint_triangles(corners: Floats, colors: Floats, image: Singles, nearest: Singles, part: Ints) -> None:
     """Triangles (t,3,3) in the colours (t,3,3) of their corners, by barycentric coordinates u, v, w."""
     height, width = nearest.shape
     for t in range(len(corners)):
@@ -85,7 +88,7 @@ def _paint_triangles(corners: Floats, colors: Floats, image: Floats, nearest: Fl
 
 @compiled
 def _paint_strokes(
-    ends: Floats, radii: Floats, shades: Floats, image: Floats, nearest: Floats, part: Ints, first: int
+    ends: Floats, radii: Floats, shades: Floats, image: Singles, nearest: Singles, part: Ints, first: int
 ) -> None:
     """Segments (s,2,3) with round ends; a segment without length is a dot."""
     height, width = nearest.shape

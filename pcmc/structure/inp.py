@@ -148,7 +148,7 @@ def _prestress(model: StructuralModel) -> Iterator[str]:
     normals = area_vectors(surface.vertices[surface.faces[elements]])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     stress = np.eye(3) - normals[:, :, None] * normals[:, None, :]
-    stress *= model.prestress[surface.patch_of_face[elements], None, None]
+    stress *= model.prestress[:, None, None]
     yield "*INITIAL CONDITIONS, TYPE=STRESS\n" + _stresses(model.faces + 1, stress, POINTS)
     if surface.cables:
         stress = cables.cable_stress(surface, model.cable_areas)

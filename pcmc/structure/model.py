@@ -78,7 +78,7 @@ class StructuralModel:
     ...                [Patch("roof", 1.0)], fixed=range(4))
     >>> model = StructuralModel(roof, Material(young=1e6), thickness=0.001)
     >>> model.prestress.tolist(), [step.name for step in model.steps]
-    ([1000.0], ['form pressure'])
+    ([1000.0, 1000.0, 1000.0, 1000.0], ['form pressure'])
     """
 
     surface: Surface
@@ -130,8 +130,16 @@ class StructuralModel:
 
     @cached_array
     def prestress(self) -> Floats:
-        """(k,) the membrane stress α/t of each patch under the form-finding load, force/area."""
-        return self.surface.tensions / self.thicknesses
+        """(e,) the membrane stress of each element under the form-finding load, force/area.
+
+        α/t; with a weight w per area (α + w z)/t, z the height of the middle above Π: so E = ∫ (α + w z) dA
+        has it, whose tension carries the part of the weight along the surface.
+        """
+        s = self.standing
+        patch = s.patch_of_face[self.active]
+        weights = np.array([p.weight for p in s.patches])[patch]
+        height = s.plane.height(s.vertices[s.faces[self.active]].mean(axis=1))
+        return (s.tensions[patch] + weights * height) / self.thicknesses[patch]
 
     @cached_property
     def cable_areas(self) -> tuple[float, ...]:

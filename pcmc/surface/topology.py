@@ -143,6 +143,8 @@ class Topology:
 
     def edge_numbers(self, ends: Ints) -> Ints:
         """(k,) the numbers of the edges that join pairs of vertices (k,2); -1 where none does."""
+        if not len(self.edges):
+            return np.full(len(ends), -1)
         weights = np.array([self.vertex_count, 1])
         keys = self.edges.astype(np.int64) @ weights
         wanted = np.sort(ends, axis=1).astype(np.int64) @ weights

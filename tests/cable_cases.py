@@ -1,0 +1,32 @@
+"""Surfaces with cables and weights, for tests of what they share with all others."""
+
+from __future__ import annotations
+
+import numpy as np
+from shapes import shaken
+
+from generators.grid import grid_faces
+from pcmc import Cable, Patch, Plane, Surface
+
+
+def net(pressures: tuple[float, float] = (0.5, 0.2), weights: tuple[float, float] = (0.7, -0.3)) -> Surface:
+    """Two patches over a square on a tilted Π, cables on a free edge, inside a patch and between."""
+    side = np.linspace(0.0, 2.0, 5)
+    X = np.array([[x, y, 1.0 + 0.2 * x * y] for x in side for y in side])
+    faces = grid_faces(4, 4)
+    patch = (X[faces].mean(axis=1)[:, 0] > 1.0).astype(int)
+    number = np.arange(25).reshape(5, 5)
+    surface = Surface(
+        X,
+        faces,
+        patch,
+        [Patch("a", 1.0, pressures[0], weight=weights[0]), Patch("b", 1.5, pressures[1], weight=weights[1])],
+        fixed=number[[0, 0, -1, -1], [0, -1, 0, -1]],
+        plane=Plane((0.1, 0.2, 0.3), (0.2, -0.1, 1.0)),
+        cables=[
+            Cable.along("edge", 2.0, number[0]),
+            Cable.along("ridge", 1.0, number[1:4, 1]),
+            Cable.along("between", 0.5, number[2]),
+        ],
+    )
+    return shaken(surface)
