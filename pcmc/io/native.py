@@ -126,11 +126,12 @@ def _version(surface: Surface) -> int:
 def _cables(arrays: dict[str, Any], rows: Any) -> tuple[Cable, ...]:
     """The cables in the description, name and tension of each, with their edges (k,2)."""
     fit = isinstance(rows, list) and all(isinstance(row, list) and len(row) == 2 for row in rows)
-    edges = [arrays.pop(f"cable {k}", None) for k in range(len(rows))] if fit else [None]
-    if not fit or any(ends is None for ends in edges):
+    names = [f"cable {k}" for k in range(len(rows))] if fit else []
+    if not fit or any(name not in arrays for name in names):
         text = "cables: expected a name, a tension and edges for each"
         raise FileError(text, where="cables", found=str(rows)[:60])
-    return tuple(Cable(*row, ends) for row, ends in zip(rows, edges, strict=True))
+    edges = [arrays.pop(name) for name in names]
+    return tuple(Cable(name, pull, ends) for (name, pull), ends in zip(rows, edges, strict=True))
 
 
 def _rooms(meta: Mapping[str, Any]) -> tuple[Room, ...]:
