@@ -15,7 +15,7 @@ import pandas as pd
 
 import pcmc
 from generators import hypar_roof
-from pcmc import Parameter, Target, solve
+from pcmc import Parameter, Target, mirrored, solve
 from pcmc.base.arrays import Floats
 
 from . import forces_limits as limits
@@ -30,6 +30,7 @@ LEVELS, DRAWN = 4, 1  # meshes of a case; which of them is drawn
 ROOF = 6, 12, 24  # squares along an edge of the roof on masts
 SAGGING = 4, 8, 16  # of the flat roof whose edges are asked to sag
 SIDES = ("south", "east", "north", "west")
+DRAWN_AS = {"sag": "height", "lowest point": "height", "rise": "height", "area of a cell": "area"}
 PRINTED = 13.128168244333  # area of three bubbles, as it is sometimes printed
 
 
@@ -76,7 +77,7 @@ def roofs(folder: Folder, meshes: tuple[int, ...]) -> pd.DataFrame:
     for squares in meshes:
         result = solve(hypar_roof(squares, weight=0.05))
         certificate = result.certificate
-        if squares == ROOF[0]:
+        if squares == meshes[len(meshes) // 2]:
             folder.write_mesh("roof", {"at rest": result.surface})
         columns = ["cable", "tension", "length", "sheet_pull", "cable_pull"]
         tables.append(
@@ -171,8 +172,10 @@ def figure(folder: Folder) -> None:
 
     records = folder.read_table("records")
     titles = {case.name: case.title for case in CASES} | {"roof": "roof on four masts"}
+    shapes = {name: folder.read_mesh(name)["at rest"] for name in titles}
+    shapes["schwarz_p"] = mirrored(shapes["schwarz_p"], ["x = 0", "y = 0", "z = 0"])
     panel(
-        [folder.read_mesh(name)["at rest"] for name in titles],
+        list(shapes.values()),
         folder.figure("surfaces"),
         titles=list(titles.values()),
         columns=3,
@@ -184,7 +187,8 @@ def figure(folder: Folder) -> None:
     for case in CASES:
         mine = records[records.example == case.name]
         curves = {
-            f"{name}": (of.edge_length, of.error.abs()) for name, of in mine.groupby("quantity", sort=False)
+            DRAWN_AS.get(str(name), str(name)): (of.edge_length, of.error.abs())
+            for name, of in mine.groupby("quantity", sort=False)
         }
         h = mine.edge_length.unique()
         panels[case.title] = curves | {"h²: second order": (h, 0.1 * h**2)}
@@ -194,7 +198,6 @@ def figure(folder: Folder) -> None:
     curves = {"exact": (volumes, limits.cap_pressure(volumes))}
     for edge_length, mine in branches.groupby("edge_length", sort=False):
         curves[f"edge length {edge_length:g}"] = (mine.volume, mine.pressure)
-    folds = folder.read_table("folds")
     lines(
         curves,
         folder.figure("fold"),
@@ -202,7 +205,6 @@ def figure(folder: Folder) -> None:
         y="pressure p",
         title="A cap over the unit disc, α = 0.6: stable all along, past the largest pressure",
         dashes=True,
-        fits={"dp/dV = 0": (folds.volume, folds.pressure)} if len(folds) > 1 else None,
     )
 
 

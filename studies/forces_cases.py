@@ -179,5 +179,7 @@ CASES = (
     ),
     Case("three_bubbles", "three bubbles of volume 1", "volumes", triple_bubble, 0.4, _area(TRIPLE_BUBBLE)),
     Case("heavy_bubble", "heavy bubble on Π", "weight, volume", heavy_bubble, 0.4, _heavy_bubble),
-    Case("schwarz_p", "Schwarz' P, an eighth", "mirror planes", lambda n: schwarz_p(int(n)), 4, _schwarz_p),
+    Case(
+        "schwarz_p", "Schwarz' P from an eighth", "mirror planes", lambda n: schwarz_p(int(n)), 4, _schwarz_p
+    ),
 )
