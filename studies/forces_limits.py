@@ -1,4 +1,4 @@
-"""Where things turn: lengths at which tubes of given volume lose stability, and the fold of a cap's pressure."""
+"""Where stability and pressure turn: lengths of tubes of given volume, and the fold of a cap."""
 
 from __future__ import annotations
 
