@@ -146,7 +146,7 @@ def test_the_export_downloads_the_surface(page, driver, explorer):
     for suffix in (".obj", ".pcmc", ".png"):
         page.find("#export summary").click()
         page.find(f"#export button[value='{suffix}']").click()
-        path = driver.downloads / f"surface{suffix}"
+        path = driver.downloads / f"the hall{suffix}"
         until(path.exists, f"the download of {path.name}")
         if suffix == ".png":
             assert path.read_bytes().startswith(b"\x89PNG")
