@@ -9,6 +9,7 @@ from browsing import BROWSER, DRIVER, SOFTWARE_GL, Explored, browser, changed, u
 import pcmc
 from generators import bezier_hall, four_fans, spherical_cap
 from pcmc import explore
+from pcmc.base.units import Units
 
 CAP = spherical_cap(edge_length=0.25)
 HALL = bezier_hall(edge_length=10.0)
@@ -188,6 +189,28 @@ def test_two_pages_are_two_sessions(driver, explorer):
     driver.refresh()
     one.idle()
     assert one.text("#findings") == changed_words  # the same tab finds its session again
+
+
+def test_units_stand_behind_the_numbers_where_they_are_given(driver):
+    running = explore.start(CAP, units=Units("ft", "kip"))
+    try:
+        page = Explored(driver, running.url)
+        rows = page.text("#findings")
+        assert " ft\n" in rows
+        assert " ft²\n" in rows
+        assert " ft³\n" in rows
+        assert " kip·ft\n" in rows
+        for name, words in (("curvature", "1/ft"), ("reactions", "kip/ft")):
+            page.find(f"#colours input[value={name}]").click()
+            page.idle()
+            assert words in page.text("#legend .name")
+        titles = [
+            label.get_attribute("title") for label in driver.find_elements("css selector", "#patches label")
+        ]
+        assert titles == ["kip/ft", "kip/ft²"]
+        assert not page.complaints()
+    finally:
+        running.close()
 
 
 def test_colours_come_with_their_scale(page):

@@ -55,7 +55,7 @@ def convert(
     if whole:
         unfold = unfolded(shown.surface)
         scalars = {} if shown.data is None else shown.data.scalars
-        place = {shown.surface.n: unfold.vertex, shown.surface.m: unfold.face}
+        place = {shown.surface.m: unfold.face, shown.surface.n: unfold.vertex}
         with defer_interrupts():
             carried = {name: values[place[len(values)]] for name, values in scalars.items()}
             write(output, unfold.surface, scalars=carried, **data)

@@ -77,8 +77,8 @@ def solve_(
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
     with working() as say:
-        changed = partial(arguments.retensioned, tension=tension, pressure=pressure)
-        changed = changed if tension or pressure else None
+        retensioned = partial(arguments.retensioned, tension=tension, pressure=pressure)
+        changed = retensioned if tension or pressure else None
         outcome = projects.run_project(project, say, anyway=anyway, changed=changed, use_cache=cache)
     report(outcome)
     if project.outputs and not outcome.files:
