@@ -295,8 +295,8 @@ def test_serve_prints_the_address_opens_the_page_and_ends_with_ctrl_c(monkeypatc
 
 def test_listening_for_everyone_is_only_when_told(monkeypatch):
     bound = []
-    real = server._listen
-    monkeypatch.setattr(server, "_listen", lambda host, port: bound.append(host) or real(host, port))
+    real = server.listen
+    monkeypatch.setattr(server, "listen", lambda host, *rest: bound.append(host) or real(host, *rest))
     for host in (None, "0.0.0.0"):
         running = explore.start(CAP) if host is None else explore.start(CAP, host=host)
         running.close()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +54,7 @@ def save(
     text, note = project_with(roof, surface, aims)
     if path.exists():
         if not replace:
-            text = f"{path.name} is there already; save again to replace it, or give another name"
+            text = f"{path.name} is there already; check that it may be replaced, or give another name"
             raise FileError(text, what="name", found=path.name)
         if roof.path is not None and path.resolve() == roof.path.resolve() and text_of(path) != roof.text:
             message = f"{path.name} was changed since the page read it; save under another name"
@@ -169,11 +169,8 @@ def _set_targets(
     """Keep the targets that the surface meets: those of the page, else those of the file; drop others."""
     if aims is not None and _meets(surface, aims[0]):
         table = tomlkit.table()
-        table["meet"] = [_inline(tomlkit, {k: getattr(t, k) for k in FIELDS}) for t in aims[0]]
-        table["vary"] = [
-            p.patch if p.kind == "tension" and (p.low, p.high) == (None, None) else _inline(tomlkit, vars(p))
-            for p in aims[1]
-        ]
+        table["meet"] = _array(tomlkit, [{k: getattr(t, k) for k in FIELDS} for t in aims[0]])
+        table["vary"] = _array(tomlkit, [p.patch if _bare(p) else vars(p) for p in aims[1]])
         document["targets"] = table
         return f"with its targets: {', '.join(t.label for t in aims[0])}"
     if not roof.targets or _meets(surface, roof.targets):
@@ -194,9 +191,21 @@ def _meets(surface: Surface, targets: tuple[Target, ...]) -> bool:
     )
 
 
-def _inline(tomlkit: Any, values: Mapping[str, Any]) -> Any:
-    table = tomlkit.inline_table()
-    for key, value in values.items():
-        if value is not None:
-            table[key] = list(value) if isinstance(value, tuple) else value
-    return table
+def _bare(parameter: Parameter) -> bool:
+    """Whether a project can name a parameter by its patch alone."""
+    return parameter.kind == "tension" and (parameter.low, parameter.high) == (None, None)
+
+
+def _array(tomlkit: Any, values: Sequence[Any]) -> Any:
+    """A list of names and tables, each table in one line and without empty values."""
+    array = tomlkit.array()
+    for value in values:
+        if isinstance(value, Mapping):
+            table = tomlkit.inline_table()
+            table.update(
+                {k: list(v) if isinstance(v, tuple) else v for k, v in value.items() if v is not None}
+            )
+            array.append(table)
+        else:
+            array.append(value)
+    return array

@@ -50,7 +50,7 @@ class Watch:
                 self._show(roof)
             self.problem = "" if roof.good else roof.note
         except (PcmcError, MissingExtra, OSError) as error:
-            self.problem = " ".join(str(error).split())
+            self.problem = " ".join(str(error).replace(f"{self.path}: ", "").split())
         except Exception as error:  # the net: the page must learn that its shape is an old one
             self.problem = " ".join(f"{type(error).__name__}: {error}".split())
         finally:

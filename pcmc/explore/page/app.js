@@ -91,11 +91,13 @@ class Page {
 
   request(final) {
     this.next = { act: final ? "settle" : "follow", values: this.panel.values() };
+    this.targets.say(""); // it was about the last surface
     find("#verdict").dataset.busy = "true";
     this.pump();
   }
 
   act(name, values = {}) {
+    if (["undo", "redo", "reset", "recall", "stabilise"].includes(name)) this.targets.say("");
     this.next = { act: name, values };
     this.pump(true);
   }

@@ -1,4 +1,4 @@
-// Following the file behind the page: asks for news each second while the page is visible.
+// Following the file behind the page: asks for news each second.
 
 import { ask } from "./server.js";
 
