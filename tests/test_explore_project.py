@@ -217,7 +217,7 @@ def test_the_difference_of_two_caps_is_that_of_their_spheres():
     rise = higher.vertices[:, 2].max() - flat.vertices[:, 2].max()
     top = higher.vertices[:, 2].argmax()
     assert difference(higher, flat)[top] == pytest.approx(rise, rel=1e-3)
-    assert difference(flat, higher)[flat.vertices[:, 2].argmax()] == pytest.approx(-rise, rel=1e-3)
+    assert difference(flat, higher)[flat.vertices[:, 2].argmax()] == pytest.approx(-rise, rel=5e-3)
     finer = pcmc.solve(spherical_cap(edge_length=0.05)).surface
     errors = [np.abs(difference(finer, s)).max() for s in (flat, higher)]
     assert errors[0] < 0.2 * errors[1]  # other triangles are hardly another shape
@@ -235,7 +235,8 @@ def test_saving_keeps_comments_and_the_shape_found_by_sliders(roof, session, fol
         assert line in text
     assert tomllib.loads(text)["plan"]["patches"]["east"]["pressure"] == 1.1
     again = read_roof(path, use_cache=False).surface
-    assert np.abs(difference(again, state.surface)).max() < 1e-6 * again.size
+    moved = np.abs(difference(state.surface, roof.surface)).max()
+    assert np.abs(difference(again, state.surface)).max() < 0.05 * moved  # other triangles, the same shape
     path.unlink()
 
 
@@ -260,7 +261,8 @@ def test_an_unchanged_surface_is_saved_with_the_targets_of_the_file(roof, folder
 
 
 def test_the_same_file_is_replaced_only_if_it_is_as_it_was_read(folder, roof):
-    refused(FileError, what="name", call=lambda: saving.save(roof, roof.surface, "hall.toml", False))
+    with refused(FileError, what="name", found="hall.toml"):
+        saving.save(roof, roof.surface, "hall.toml", False)
     path = folder / "hall.toml"
     path.write_text(TEXT + "# someone else\n")
     try:
@@ -401,8 +403,9 @@ def test_cables_weights_and_rooms_have_values_that_move_the_surface():
     assert state.surface.patches[0].weight == 0.2
     assert state.certificate.verdict is Verdict.STABLE
     depth = [s.vertices[5, 1] for s in (session.undo().surface, state.surface)]
-    assert depth[0] < depth[1] < 0.0 or 0.0 < depth[1]  # a stronger cable is straighter
-    refused(OptionError, call=lambda: session.follow({"cables": {"egde": 1.0}}), raises=Exception)
+    assert depth[0] > depth[1] > 0.0  # a stronger cable is straighter
+    with refused(OptionError, what="cable", found="egde"):
+        session.follow({"cables": {"egde": 1.0}})
 
 
 def test_names_of_downloads_are_those_of_files():
