@@ -319,3 +319,23 @@ def test_the_whole_on_the_command_line(tmp_path, monkeypatch, capsys):
     assert (tmp_path / "whole.png").read_bytes().startswith(b"\x89PNG")
     assert cli.main(["convert", "whole.pcmc", "again.pcmc", "--whole"]) == 2
     assert "no mirror plane" in capsys.readouterr().err
+
+
+def test_a_prescribed_volume_in_an_eighth():
+    """An eighth of a bubble with an eighth of its volume: stable; the whole keeps volume and energy."""
+    volume, start = np.pi / 6.0, octant(3)
+    room = Room("inside", {"bubble": 1}, volume)
+    piece = Surface(
+        *(start.vertices, start.faces, start.patch_of_face, start.patches),
+        on_planes=start.on_planes,
+        rooms=[room],
+    )
+    result = pcmc.solve(piece)
+    assert result.converged
+    assert result.certify().index == 0
+    assert result.surface.patches[0].pressure == pytest.approx(2.0, rel=0.01)
+    whole = mirrored(result.surface)
+    assert whole.rooms[0].volume == 8 * volume
+    certificate = pcmc.certify(whole)
+    assert (certificate.verdict.name, certificate.index) == ("NEUTRAL", 0)
+    assert certificate.energy == pytest.approx(8 * result.energy, rel=1e-12)
