@@ -70,8 +70,8 @@ def double_bubble(
         Patch("right", alpha_right, 1.0 / scale),
         Patch("wall", alpha_aux, pressure=0.0),
     ]
-    around = ((("left", 1), ("wall", 1)), (("right", 1), ("wall", -1)))
-    rooms = [Room(signs[0][0], signs, v) for signs, v in zip(around, volumes or (), strict=False)]
+    sides = ((("left", 1), ("wall", 1)), (("right", 1), ("wall", -1)))
+    rooms = [Room(signs[0][0], signs, v) for signs, v in zip(sides, volumes or (), strict=False)]
     surface = mesh.closed_surface(patches, rooms)
     stretch = scale * (1.0 if exact else np.array(STRETCH))
     return surface.moved(surface.vertices * stretch)

@@ -56,13 +56,15 @@ def hypar_roof(
     X[:, 2] = height * (s * t + (1.0 - s) * (1.0 - t))
     number = np.arange(len(X)).reshape(squares + 1, squares + 1)
     edges = {"south": number[:, 0], "east": number[-1], "north": number[:, -1], "west": number[0]}
+    masts = np.zeros(len(X), dtype=bool)
+    masts[number[[0, 0, -1, -1], [0, -1, 0, -1]]] = True
     return Surface(
         X,
         grid_faces(squares, squares),
         np.zeros(2 * squares**2, dtype=int),
-        [Patch("roof", tension, 0.0, weight=weight)],
-        fixed=number[[0, 0, -1, -1], [0, -1, 0, -1]],
-        cables=[Cable.along(name, cable, vertices) for name, vertices in edges.items()],
+        (Patch("roof", tension, 0.0, weight=weight),),
+        fixed=masts,
+        cables=tuple(Cable.along(name, cable, vertices) for name, vertices in edges.items()),
     )
 
 

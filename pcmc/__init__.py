@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .design import Design, Parameter, Target, meet, sensitivities
     from .energy.curvature import curvature_error, mean_curvature, target_curvature
     from .energy.functional import energy, gradient, hessian
+    from .energy.rooms import room_volume_gradients, room_volumes
     from .existence import solve
     from .io import read, write
     from .io.repairing import Repaired, repair
@@ -65,6 +66,8 @@ __all__ = [
     "read",
     "repair",
     "read_results",
+    "room_volume_gradients",
+    "room_volumes",
     "sensitivities",
     "solve",
     "solve_to_accuracy",
@@ -82,6 +85,7 @@ _NAMES = {
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
     "energy.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
     "energy.functional": ("energy", "gradient", "hessian"),
+    "energy.rooms": ("room_volume_gradients", "room_volumes"),
     "existence": ("solve",),
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),

@@ -11,6 +11,9 @@ import pytest
 
 import pcmc
 from pcmc import cli
+from pcmc.base.units import Units
+from pcmc.cli.reports import UNIT_OF
+from pcmc.design.quantities import QUANTITIES
 from pcmc.project import build, cached_files, clear_cache, designed, load, run, running
 from tests.test_project import SMALL
 
@@ -174,6 +177,21 @@ def test_commands_show_the_designed_roof(folder, capsys, command):
         assert pcmc.certify(roof).certified
     assert cli.main(command) == 0
     assert "solved before" in capsys.readouterr().out
+
+
+def test_targets_are_shown_in_their_units(folder, capsys):
+    text = 'units = "ft"\nforce = "kip"\n' + (folder / "roof.toml").read_text(encoding="utf-8")
+    (folder / "feet.toml").write_text(text, encoding="utf-8")
+    assert cli.main(["certify", "feet.toml"]) == 0
+    out = capsys.readouterr().out
+    assert "apex of roof 0.6 ft, with tension of roof " in out
+    assert " kip/ft\n" in out
+    assert "lengths in ft" in out
+
+
+def test_every_quantity_of_a_target_has_a_unit():
+    for quantity in (*QUANTITIES, "tension", "pressure"):
+        assert getattr(Units("m", "kN"), UNIT_OF.get(quantity, quantity))
 
 
 def test_the_start_shape_has_a_flag_of_its_own(folder, capsys):

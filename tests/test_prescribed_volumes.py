@@ -26,6 +26,7 @@ from pcmc.energy.rooms import (
 from pcmc.meshing.local_refinement import refine_faces
 from pcmc.meshing.refinement import refine
 from pcmc.stability.modes import lowest, morse_index, second_variation
+from pcmc.surface.mirroring import mirrored
 from studies import evolver
 
 DOUBLE, TRIPLE = 9.139421678069, 13.128168244433  # least areas around volumes of 1
@@ -136,6 +137,42 @@ def test_rooms_that_do_not_close_are_refused():
     arched = arch()  # its arch ends free in the air
     with refused(SurfaceError, what="rooms", where="r"):
         room_volumes(replace(arched, fixed=[0, 2, 3, 4, 5]))
+
+
+def test_a_fixed_boundary_must_not_end_on_a_plane_above_the_ground():
+    X, F = [[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], [[0, 1, 2], [0, 2, 3]]
+    front = {Plane(normal=(0, 1, 0), mirror=True): [0, 1]}
+    rooms = [Room("r", {"roof": 1}, 1.0)]
+    square = Surface(X, F, [0, 0], [Patch("roof", 1.0)], range(4), on_planes=front, rooms=rooms)
+    with refused(SurfaceError, what="rooms", where="r", found=[0.0, 0.0, 1.0]) as caught:
+        room_volumes(square)
+    assert "plane=" in str(caught.value)
+    assert room_volumes(replace(square, plane=Plane((0, 0, 1)))) == pytest.approx(0.0)
+
+
+def test_a_piece_between_mirror_planes_has_its_share_of_the_volume():
+    n = 6
+    t = np.linspace(0.0, 1.0, n + 1)
+    x, y = np.meshgrid(t, t, indexing="ij")
+    X = np.stack([x, y, 0.3 * (1.0 - x**2) * (1.0 - y**2)], axis=-1).reshape(-1, 3)
+    number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    F = np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
+    mirrors = {
+        Plane(normal=(1, 0, 0), name="x", mirror=True): number[0],
+        Plane(normal=(0, 1, 0), name="y", mirror=True): number[:, 0],
+    }
+    fixed = np.unique(np.append(number[-1], number[:, -1]))
+    quarter = Surface(X, F, np.zeros(len(F), dtype=int), [Patch("roof", 1.0)], fixed, on_planes=mirrors,
+                      rooms=[Room("r", {"roof": 1}, 0.4)])  # fmt: skip
+    result = pcmc.solve(quarter)
+    assert result.certificate.index == 0
+    whole = mirrored(result.surface)
+    assert [room.volume for room in whole.rooms] == [1.6]
+    assert room_volumes(whole)[0] == pytest.approx(1.6, rel=1e-10)
+    certificate = pcmc.certify(whole)
+    assert certificate.residual < 1e-10
+    assert certificate.index == 0
 
 
 def test_impossible_volumes_are_refused():

@@ -22,7 +22,7 @@ from ..panels.schedule import MIRROR_IMAGES
 from ..report import roof_report
 from ..report.document import check_name as check_report
 from . import NOT_CERTIFIED, OK, arguments, checking
-from .arguments import MANY_FILES, Cache, Input, ViewName, number, option
+from .arguments import MANY_FILES, Cache, Input, ViewName, Whole, number, option
 from .checking import CHECKED
 from .progress import working
 
@@ -55,6 +55,7 @@ def panels_(
         str, option("NAME", "alike: of one family; or apart.", "--mirror-images")
     ] = MIRROR_IMAGES[0],
     walls: Annotated[bool, typer.Option("--walls", help="Triangles of walls are panels, too.")] = False,
+    whole: Whole = False,
     cache: Cache = True,
     anyway: Anyway = False,
 ) -> int:
@@ -77,7 +78,7 @@ def panels_(
     projects.check_outputs([path for one in files for path in _paths(one)] + ([picture] if picture else []))
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": anyway}
     with working() as say:
-        shown = arguments.to_build(file, say, anyway, cache)
+        shown = arguments.to_build(file, say, anyway=anyway, cache=cache, whole=whole)
         surface = shown.surface
         say("sorting panels")
         if change is None:
@@ -115,6 +116,7 @@ def draw_(
     line: Annotated[list[str] | None, option("X,Y,X,Y", "Section along this line; may be repeated.")] = None,
     tolerance: Annotated[float | None, option("LENGTH", TOLERANCE, parser=number)] = None,
     panel_sheets: Annotated[bool, typer.Option("--panel-sheets", help=TRUE_SIZE)] = False,
+    whole: Whole = False,
     cache: Cache = True,
     anyway: Annotated[bool, typer.Option("--anyway", help=MARKED)] = False,
 ) -> int:
@@ -131,7 +133,7 @@ def draw_(
     heights = None if height is None else [number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]
     with working() as say:
-        shown = arguments.to_build(file, say, anyway, cache)
+        shown = arguments.to_build(file, say, anyway=anyway, cache=cache, whole=whole)
         say("drawing")
         drawings = drawing_set(
             shown.surface,
@@ -159,6 +161,7 @@ def report_(
     tolerance: Annotated[float | None, option("LENGTH", TOLERANCE, parser=number)] = None,
     date: Annotated[str | None, option("TEXT", DATE)] = None,
     mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
+    whole: Whole = False,
     cache: Cache = True,
     anyway: Annotated[bool, typer.Option("--anyway", help=REPORTED)] = False,
 ) -> int:
@@ -172,7 +175,7 @@ def report_(
     check_report(output)
     projects.check_outputs([output])
     with working() as say:
-        shown = arguments.to_build(file, say, anyway, cache)
+        shown = arguments.to_build(file, say, anyway=anyway, cache=cache, whole=whole)
         say("certifying")
         outcome, project, documents = shown.outcome, shown.project, shown.documents
         report = roof_report(
@@ -185,7 +188,7 @@ def report_(
             date=documents.date if date is None else date,
             anyway=anyway,
         )
-    if project is None or outcome is None:
+    if project is None or outcome is None or report.surface is not outcome.surface:
         check = checking.mesh_check(
             report.surface, report.certificate, mesh_check, lambda say: check_mesh(report.surface)
         )

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import pandas as pd
+
+from ..base.units import Units
 from ..project import Outcome
+
+UNIT_OF = {"apex": "length", "height": "length", "sag": "length", "reaction": "tension", "weight": "pressure"}
+"""The unit of quantities and parameters; others are named as their units."""
 
 
 def report(outcome: Outcome, *, verdict: bool = True) -> None:
@@ -14,13 +20,26 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
     if outcome.design is not None:
         print(f"targets {outcome.design.message}")
         if outcome.design.met:  # otherwise the message has the values
-            tables = (outcome.design.targets, outcome.design.parameters)
-            print(", with ".join(", ".join(f"{k} {v:.6g}" for k, v in t["value"].items()) for t in tables))
+            tables = (outcome.design.targets["value"], outcome.design.parameters["value"])
+            print(", with ".join(_values(table, outcome.units) for table in tables))
     if verdict and outcome.units:
         print(outcome.units.sentence)
     if verdict:
         print(outcome.certificate.verdict.value)
         if outcome.certificate.detail:
             print(outcome.certificate.detail)
+        if outcome.whole is not None:
+            whole = outcome.whole
+            print(f"the whole roof, {whole.surface.m} triangles: {whole.certificate.verdict.value}")
     if outcome.files:
         print(f"written: {', '.join(map(str, outcome.files))}")
+
+
+def _values(values: pd.Series, units: Units) -> str:
+    """Targets or parameters, such as "apex of roof 1.2 m"; the first word of a label is the quantity."""
+    shown = []
+    for label, value in values.items():
+        quantity = "force" if str(label).startswith("tension of cable ") else str(label).split()[0]
+        unit = f" {getattr(units, UNIT_OF.get(quantity, quantity))}" if units else ""
+        shown.append(f"{label} {value:.6g}{unit}")
+    return ", ".join(shown)

@@ -18,7 +18,21 @@ from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
 from . import NOT_CERTIFIED, OK, arguments, checking
-from .arguments import MANY_FILES, Cache, Input, Pressures, Settings, Start, number, option
+from .arguments import (
+    MANY_FILES,
+    Cables,
+    Cache,
+    Input,
+    Loads,
+    Pressures,
+    Settings,
+    Start,
+    Volumes,
+    Weights,
+    Whole,
+    number,
+    option,
+)
 from .checking import CHECKED
 from .progress import working
 from .reports import report
@@ -29,6 +43,7 @@ ACCURACY = (
 )
 ACCURACY_OF = "mesh: the value on the mesh is to be so accurate; limit: the extrapolated one."
 MOST_TRIANGLES = f"The most that the mesh for an accuracy may have, {TRIANGLES} by default."
+WHOLE_INDEX = "Of a surface with mirror planes certify the whole: motions that are not symmetric count, too."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
 
@@ -42,6 +57,9 @@ def solve_(
     ] = None,
     tension: Settings = None,
     pressure: Pressures = None,
+    weight: Weights = None,
+    cable: Cables = None,
+    volume: Volumes = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
     anyway: Annotated[bool, typer.Option("--anyway", help="Write the output even if not certified.")] = False,
     accuracy: Annotated[list[str] | None, option("QUANTITY=NUMBER", ACCURACY, "--accuracy")] = None,
@@ -49,6 +67,7 @@ def solve_(
     most_triangles: Annotated[int | None, option("NUMBER", MOST_TRIANGLES, parser=arguments.integer)] = None,
     mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
     cache: Cache = True,
+    whole: Whole = False,
 ) -> int:
     """Solve a surface or a project, certify it, write all files, or none; then check its mesh.
 
@@ -59,6 +78,7 @@ def solve_(
     Examples:
       pcmc solve roof.toml
       pcmc solve roof.toml --accuracy height=1e-3
+      pcmc solve sail.toml --cable "cable 1=12"
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
     project = _project(file, folder, output, picture)
@@ -71,12 +91,13 @@ def solve_(
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
     # a report has the mesh check's numbers; else it comes after the files, so that Ctrl-C leaves them
-    project = replace(project, mesh_check=False if project.documents.report is None else wanted)
+    wanted_before = False if project.documents.report is None else wanted
+    project = replace(project, mesh_check=wanted_before, whole=whole or project.whole)
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
     with working() as say:
-        change = partial(arguments.retensioned, tension=tension, pressure=pressure)
-        changed = change if tension or pressure else None
+        loads = Loads(tension, pressure, weight, cable, volume)
+        changed = loads.of if loads else None
         outcome = projects.run_project(project, say, anyway=anyway, changed=changed, use_cache=cache)
     report(outcome)
     if project.outputs and not outcome.files:
@@ -105,9 +126,13 @@ def certify_(
     file: Input,
     tension: Settings = None,
     pressure: Pressures = None,
+    weight: Weights = None,
+    cable: Cables = None,
+    volume: Volumes = None,
     meshes: Annotated[int | None, option("NUMBER", MESHES, parser=arguments.integer)] = None,
     start: Start = False,
     cache: Cache = True,
+    whole: Annotated[bool, typer.Option("--whole", help=WHOLE_INDEX)] = False,
 ) -> int:
     """Check a surface, or a project's roof: residual forces, curvature errors, stability, reactions.
 
@@ -120,10 +145,14 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as say:
-        shown = arguments.given(file, say, tension, pressure, start=start, cache=cache)
+        loads = Loads(tension, pressure, weight, cable, volume)
+        shown = arguments.given(file, say, loads, start=start, cache=cache)
         surface, outcome = shown.surface, shown.outcome
         say("certifying")
-        certificate = certify(surface) if outcome is None else outcome.certificate
+        if whole or outcome is None:
+            certificate = certify(surface, whole=whole)
+        else:
+            certificate = outcome.certificate
     if outcome is not None:
         report(outcome, verdict=False)
     print(certificate.text(shown.units))

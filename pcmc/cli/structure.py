@@ -12,9 +12,9 @@ import typer
 from .. import project as projects
 from ..solvers.result import Result
 from ..structure import write_structure
-from ..surface import Surface
+from ..surface import Surface, mirrored
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import Cache, Input, number, option
+from .arguments import Cache, Input, Whole, number, option
 from .progress import working
 
 THICKNESS = "Thickness of a patch; a bare VALUE applies to every patch that is not named."
@@ -36,6 +36,7 @@ def structure(
     snow: Annotated[float | None, option("VALUE", "Load per plan area.", parser=number)] = None,
     wind: Annotated[list[str] | None, option("NAME=VALUE", WIND, "--wind")] = None,
     cable_area: Annotated[float | None, option("VALUE", "Section of the cables.", parser=number)] = None,
+    whole: Whole = False,
     cache: Cache = True,
     anyway: Annotated[bool, typer.Option("--anyway", help="Write it even if not certified.")] = False,
 ) -> int:
@@ -72,6 +73,8 @@ def structure(
             shown = replace(shown, surface=outcome.surface, outcome=outcome)
             solved = outcome.result
         arguments.refuse_missed(file, shown, anyway)
+        if whole or (project is not None and project.whole):
+            solved = mirrored(shown.surface)
         say("certifying")
         model = wanted.model(solved, anyway)
         projects.write_all([(output, partial(write_structure, model=model))], say)

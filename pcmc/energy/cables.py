@@ -93,7 +93,7 @@ def tensions_on(topo: Topology, cables: CableEdges) -> Floats:
             " give the patches there a tension, or remove the cable"
         )
         raise SurfaceError(message, what="cables", where=(i, j))
-    return np.bincount(place, cables.tension, len(topo.edges))
+    return np.bincount(place, cables.tension, len(topo.edges)).astype(float)
 
 
 @compiled

@@ -205,9 +205,9 @@ def _left_over(surface: Surface, signs: Floats) -> Floats:
 def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
     """The volumes of the fans over the connected pieces of a room's fixed boundary off Π."""
     left = _left_over(surface, signs)
-    grounded: Bools = np.abs(surface.plane.height(surface.vertices)) <= ON_PLANE * surface.size
+    grounded = np.asarray(np.abs(surface.plane.height(surface.vertices)) <= ON_PLANE * surface.size)
     edges = surface.topology.edges
-    lying: Bools = grounded[edges].all(axis=1)
+    lying = np.asarray(grounded[edges].all(axis=1))
     _refuse_open(surface, room, np.flatnonzero((left != 0.0) & ~_closed_by_support(surface, edges, lying)))
     for _, mask in surface.on_planes:
         lying |= mask[edges].all(axis=1)
@@ -226,8 +226,14 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
         np.add.at(net, a, -n)
         tips = np.flatnonzero(net)  # where it comes down to Π: closed straight from tip to tip
         if not grounded[tips].all():
-            bad = off[np.isin(edges[off], tips[~grounded[tips]]).any(axis=1)]
-            _refuse_open(surface, room, bad)
+            place = surface.vertices[tips[~grounded[tips]][0]].round(4).tolist()
+            raise SurfaceError(
+                f"room {room.name!r} does not close: its fixed boundary ends at {place}, off Π; fix it down"
+                " to Π, or choose Π (plane=) through it",
+                what="rooms",
+                where=room.name,
+                found=place,
+            )
         if len(tips):
             yield float((net[tips] * _cones(middle, X[tips].mean(axis=0), X[tips])).sum())
 

@@ -117,8 +117,9 @@ def assemble_weights(
 
     L_(wz) is the cotangent Laplacian with the weights max(w z̄, 0), which the tension w z adds to.
     """
-    arguments = basis, dimension, start, indptr, offset, hessian, stiffness, data
-    _assemble(faces, patch, X, surface.weights, *_plane(surface), *arguments)
+    at, normal = _plane(surface)
+    law = (faces, patch, X, surface.weights, at, normal)
+    _assemble(*law, basis, dimension, start, indptr, offset, hessian, stiffness, data)
 
 
 def _plane(surface: Surface) -> tuple[Floats, Floats]:

@@ -225,8 +225,7 @@ def to_surface(
         X = X - np.where(rounded, height, 0.0)[:, None] * np.array(plane.normal)
     lines, planes = (data.lines, data.planes) if fixed is None else ((), ())
     supports = held, sliding, plane, lines, planes
-    parts = {"cables": data.cables, "rooms": data.rooms}
-    return Surface(X, data.faces, data.patch_of_face, patches, *supports, **parts)
+    return Surface(X, data.faces, data.patch_of_face, patches, *supports, data.cables, data.rooms)
 
 
 def _changed(

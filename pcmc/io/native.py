@@ -126,11 +126,12 @@ def _version(surface: Surface) -> int:
 def _cables(arrays: dict[str, Any], rows: Any) -> tuple[Cable, ...]:
     """The cables in the description, name and tension of each, with their edges (k,2)."""
     fit = isinstance(rows, list) and all(isinstance(row, list) and len(row) == 2 for row in rows)
-    edges = [arrays.pop(f"cable {k}", None) for k in range(len(rows))] if fit else [None]
-    if not fit or any(ends is None for ends in edges):
+    names = [f"cable {k}" for k in range(len(rows))] if fit else []
+    if not fit or any(name not in arrays for name in names):
         text = "cables: expected a name, a tension and edges for each"
         raise FileError(text, where="cables", found=str(rows)[:60])
-    return tuple(Cable(*row, ends) for row, ends in zip(rows, edges, strict=True))
+    edges = [arrays.pop(name) for name in names]
+    return tuple(Cable(name, pull, ends) for (name, pull), ends in zip(rows, edges, strict=True))
 
 
 def _rooms(meta: Mapping[str, Any]) -> tuple[Room, ...]:
@@ -169,8 +170,8 @@ def _planes(arrays: dict[str, Any], described: Any) -> tuple[tuple[Plane, Bools]
         text = f"planes: expected a point and a normal for each of {len(masks)} masks"
         raise FileError(text, where="planes", found=np.shape(rows), expected=(len(masks), 2, 3))
     planes = (
-        Plane(*map(tuple, row.tolist()), name=str(one["name"]), mirror=bool(one["mirror"]))
-        for row, one in zip(rows, described, strict=True)
+        Plane(tuple(point), tuple(normal), str(one["name"]), bool(one["mirror"]))
+        for (point, normal), one in zip(np.asarray(rows).tolist(), described, strict=True)
     )
     return tuple(zip(planes, masks, strict=True))
 

@@ -14,7 +14,6 @@ import numpy as np
 from ..base.errors import OptionError
 from ..base.units import MICROMETRES, NO_UNITS, Units, conversion_note, length_factor
 from ..surface import Circle, Line, Patch, Plane, Room, Surface
-from ..surface.surface import FIELDS
 from .mesh_data import MeshData
 
 
@@ -45,8 +44,8 @@ def scaled(value: Any, factor: float) -> Any:
             return tuple(scaled(part, factor) for part in value)
         case Patch():
             area = factor * factor
-            changes = {"pressure": value.pressure / area, "weight": value.weight / area}
-            return replace(value, tension=value.tension / factor, **changes)
+            pressure, weight = value.pressure / area, value.weight / area
+            return replace(value, tension=value.tension / factor, pressure=pressure, weight=weight)
         case Plane() | Line():
             return replace(value, point=_point(value.point, factor))
         case Circle():
@@ -60,8 +59,9 @@ def scaled_surface(surface: Surface, factor: float) -> Surface:
     """The surface in a unit of which ``factor`` make one of the old unit."""
     if factor == 1.0:
         return surface
-    parts = {name: scaled(getattr(surface, name), factor) for name in FIELDS}
-    return Surface(**parts | {"vertices": factor * surface.vertices})
+    parts = {f.name: scaled(getattr(surface, f.name), factor) for f in fields(surface) if f.init}
+    given = {name: scaled(part, factor) for name, part in surface.given._asdict().items()}
+    return Surface(**parts | given | {"vertices": factor * surface.vertices})
 
 
 def converted(data: MeshData, length: str) -> MeshData:

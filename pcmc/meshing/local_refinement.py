@@ -120,7 +120,7 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
     X = np.concatenate([surface.vertices, middle])
     fixed, sliding = (np.concatenate(p) for p in zip(given_supports(surface), (held, slides), strict=True))
     lines, planes = carry_lines(surface, X, fixed, surface.n), carry_planes(surface, cut)
-    cables = [cable.cut(ends, number) for cable in surface.cables]
+    cables = tuple(cable.cut(ends, number) for cable in surface.cables)
     supports = fixed, sliding, surface.plane, lines, planes
     return Surface(X, F, patch, surface.patches, *supports, cables=cables, rooms=surface.rooms)
 

@@ -167,7 +167,7 @@ def _refine_once(surface: Surface, project: Projection | None) -> Surface:
     fixed, sliding = (np.concatenate(p) for p in zip(given_supports(surface), (held, slides), strict=True))
     lines, planes = carry_lines(surface, X, fixed, surface.n), carry_planes(surface, every)
     edges = surface.topology.edges
-    cables = [cable.cut(edges, surface.n + np.arange(len(edges))) for cable in surface.cables]
+    cables = tuple(cable.cut(edges, surface.n + np.arange(len(edges))) for cable in surface.cables)
     supports = fixed, sliding, surface.plane, lines, planes
     return Surface(X, F, patch, surface.patches, *supports, cables=cables, rooms=surface.rooms)
 

@@ -407,9 +407,9 @@ def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Sur
     X = np.concatenate([mesh.X for mesh in meshes])[used]
     fixed, sliding, *on_planes = np.concatenate([mesh.support for mesh in meshes])[used].T
     lines = carry_lines(surface, X, fixed)
-    planes = [(plane, mask) for (plane, _), mask in zip(surface.on_planes, on_planes, strict=True)]
+    planes = tuple((plane, mask) for (plane, _), mask in zip(surface.on_planes, on_planes, strict=True))
     ends = np.searchsorted(used, old.curves)
-    cables = [replace(c, edges=ends[old.cable == index]) for index, c in enumerate(surface.cables)]
+    cables = tuple(replace(c, edges=ends[old.cable == index]) for index, c in enumerate(surface.cables))
     supports = fixed, sliding, surface.plane, lines, planes
     return Surface(X, F, patch_of_face, surface.patches, *supports, cables=cables, rooms=surface.rooms)
 

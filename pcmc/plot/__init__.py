@@ -1,4 +1,4 @@
-"""Pictures of surfaces and of curves; needs the extra ``plot`` (matplotlib), no display.
+"""Pictures of surfaces (pyvista or matplotlib) and of curves; needs the extra ``plot``, no display.
 
 With a path every function writes a PNG; each returns the picture as an (h,w,3) array of bytes. May import
 ``panels`` and the rooms below it.

@@ -33,6 +33,7 @@ def vectors(
     supports: bool = True,
     edges: bool | None = None,
     width: int = 900,
+    renderer: str = "auto",
 ) -> Image:
     """Vectors at the vertices (a mode, the reactions, the forces) as arrows on the surface.
 
@@ -42,7 +43,7 @@ def vectors(
     length : of the longest arrow, as a part of the surface's size.
     most : number of arrows; if there were more, the longest of each neighbourhood is drawn.
     label : the unit, beside an arrow of round length that shows the scale.
-    view, title, supports, edges, width : as in ``draw``.
+    view, title, supports, edges, width, renderer : as in ``draw``.
     """
     arrows = np.asarray(field, dtype=float)
     if arrows.shape != (surface.n, 3) or not np.isfinite(arrows).all():
@@ -62,7 +63,7 @@ def vectors(
     if label:
         figure.supxlabel(" ", fontsize=2.0 * SMALL)  # the place of the arrow that tells the scale
     fit_frames(figure, [axes], [frame], 1)
-    frame.show(axes, paint(painted, frame.low, frame.scale, frame.size).image)
+    frame.show(axes, paint(painted, frame.low, frame.scale, frame.size, renderer))
     if longest > 0.0:
         chosen = _thinned(at, size, most)
         in_plane = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
@@ -80,7 +81,7 @@ def vectors(
 def reactions(surface: Surface, path: Path | None = None, **options: Any) -> Image:
     """Arrows of the reactions along the held boundary, force per length; see ``reactions_per_length``.
 
-    ``options`` are those of ``vectors``: view, length, most, label, title, supports, edges, width.
+    ``options`` are those of ``vectors``: view, length, most, label, title, supports, edges, width, renderer.
 
     Raises
     ------

@@ -47,6 +47,7 @@ def draw(
     patches: Sequence[str] | None = None,
     title: str = "",
     width: int = 900,
+    renderer: str = "auto",
 ) -> Image:
     """A picture of a surface, in parallel projection.
 
@@ -65,6 +66,7 @@ def draw(
     legend : explain the colours of patches, supports, and places without a value.
     patches : names of those to draw, such as the walls; by default all.
     width : of the picture in pixels.
+    renderer : "pyvista", "matplotlib", or "auto": pyvista for many triangles where the system has OpenGL.
 
     Returns
     -------
@@ -72,8 +74,8 @@ def draw(
 
     Raises
     ------
-    OptionError : for an unknown view or colour map, or arrays of a wrong shape.
-    MissingExtra : when matplotlib is not installed.
+    OptionError : for an unknown view, renderer or colour map, or arrays of a wrong shape.
+    MissingExtra : when pyvista or matplotlib is not installed.
     """
     return panel(
         [surface],
@@ -91,6 +93,7 @@ def draw(
         legend=legend,
         titles=[title] if title else (),
         width=width,
+        renderer=renderer,
     )
 
 
@@ -113,6 +116,7 @@ def panel(
     patches: Sequence[str] | Sequence[Sequence[str] | None] | None = None,
     one_scale: bool = True,
     width: int = 1200,
+    renderer: str = "auto",
 ) -> Image:
     """Several surfaces in one picture, with one scale of colour.
 
@@ -131,19 +135,19 @@ def panel(
         place.set_title(drawing.title, fontsize=TEXT, color=INK, pad=5.0)
     if colors is not None:
         colors.bar(figure, axes, label)
-    shown = []
+    images = []
     for k, drawing in enumerate(drawings):
         fill = None if colors is None or drawing.values is None else colors.rgb(drawing.values)
         meshed = edge[k] >= EDGES_FROM if edges is None else edges
         view, chosen = drawing.view, drawing.patches
-        parts = scene(drawing.surface, view, fill, supports=dotted[k], edges=meshed, patches=chosen)
-        painted = paint(parts, frames[k].low, frames[k].scale, frames[k].size)
-        shown.append(Shown(drawing.surface, chosen, drawing.values, parts, painted))
+        painted = scene(drawing.surface, view, fill, supports=dotted[k], edges=meshed, patches=chosen)
+        images.append(paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer))
     if legend:
-        add_legend(figure, shown)
+        seen = zip(drawings, dotted, images, strict=True)
+        add_legend(figure, [Shown(d.surface, d.patches, d.values, dots, image) for d, dots, image in seen])
     fit_frames(figure, axes, frames, columns)
-    for drawing, frame, picture, place in zip(drawings, frames, shown, axes, strict=True):
-        frame.show(place, picture.painted.image)
+    for drawing, frame, image, place in zip(drawings, frames, images, axes, strict=True):
+        frame.show(place, image)
         if drawing.numbers is not None:
             _print_numbers(place, drawing.surface, drawing.view, drawing.numbers, form)
     return finish(figure, path)
@@ -203,7 +207,7 @@ class Frame:
     low: Floats
     scale: float
 
-    def show(self, axes: Any, image: Floats) -> None:
+    def show(self, axes: Any, image: Image) -> None:
         """Place a painted scene on the axes, pixel on pixel."""
         right, top = self.low + np.array(self.size) / self.scale
         figure, box = axes.figure.bbox, axes.get_window_extent()

@@ -1,106 +1,125 @@
-"""The painter of a Scene: a depth for each pixel, the same on every machine, without OpenGL."""
+"""Two painters of a Scene: matplotlib, from back to front; pyvista for many triangles, with OpenGL."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+import subprocess
+import sys
+from functools import cache
+from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
-from ..base.compiled import compiled
+from ..base import validate
+from ..base.arrays import Floats
+from ..base.errors import MissingExtra
+from .figure import Image
 from .scene import Scene
 
+RENDERERS = ("auto", "pyvista", "matplotlib")
 SAMPLES = 2  # pixels painted for each pixel shown, in each direction
 DOT = 5.0  # pixels across
-ROUNDING = 1e-9  # of a triangle: a pixel this far outside is painted, so that no cracks show
+MANY = 40_000  # triangles from which pyvista is faster than matplotlib, its import and first answer included
 
 
-@dataclass(frozen=True, eq=False)
-class Painted:
-    """A picture, and how much of each part of its scene can be seen.
-
-    Attributes
-    ----------
-    image : (h,w,3) bytes.
-    triangles, dots : (t,) and (d,) pixels on which each of them is the nearest.
-    """
-
-    image: Floats
-    triangles: Floats
-    dots: Floats
-
-
-def paint(scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> Painted:
-    """The scene with picture coordinates ``low`` at the lower left corner.
+def paint(scene: Scene, low: Floats, scale: float, size: tuple[int, int], renderer: str = "auto") -> Image:
+    """(h,w,3) bytes: the scene with picture coordinates ``low`` at the lower left corner.
 
     ``scale`` is pixels per unit of length, ``size`` (w, h) in pixels.
     """
-    width, height = size[0] * SAMPLES, size[1] * SAMPLES
-    image = np.ones((height, width, 3), dtype=np.float32)
-    nearest = np.full((height, width), -np.inf, dtype=np.float32)
-    part = np.full((height, width), -1, dtype=np.int32)  # triangles first, then strokes
+    validate.choice("renderer", renderer, RENDERERS)
+    many = len(scene.corners) > MANY
+    painter = _with_matplotlib
+    if renderer == "pyvista" or (renderer == "auto" and many and opengl()):
+        painter = _with_pyvista
+    blocks = painter(scene, low, scale, size).reshape(size[1], SAMPLES, size[0], SAMPLES, 3).astype(float)
+    return np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
 
-    def placed(points: Floats) -> Floats:
-        """(…,3) pixels to the right, pixels down, and pixels towards the viewer."""
-        right, up = np.moveaxis((scene.view.project(points) - low) * scale * SAMPLES, -1, 0)
-        return np.stack([right, height - up, scene.view.depth(points) * scale * SAMPLES], axis=-1)
 
-    _paint_triangles(placed(scene.corners), scene.colors.astype(float), image, nearest, part)
-    ends = np.concatenate([scene.segments, np.stack([scene.dots, scene.dots], axis=1)])
-    widths = SAMPLES * np.concatenate([scene.widths, np.full(len(scene.dots), DOT)])
-    shades = np.concatenate([scene.shades, scene.dot_colors])
-    first = len(scene.corners)
-    _paint_strokes(placed(ends), 0.5 * widths, shades, image, nearest, part, first)
-    mean = sum(image[a::SAMPLES, b::SAMPLES] for a in range(SAMPLES) for b in range(SAMPLES)) / SAMPLES**2
-    pixels = np.bincount(part[part >= 0], minlength=first + len(ends)) / SAMPLES**2
-    return Painted(
-        np.round(255.0 * mean).astype(np.uint8), pixels[:first], pixels[first + len(scene.segments) :]
+@cache
+def opengl() -> bool:
+    """Whether VTK can draw here. A child process tries it: without a driver VTK aborts the process."""
+    _pyvista()
+    probe = (
+        "import vtkmodules.vtkRenderingOpenGL2\n"
+        "from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow\n"
+        "w = vtkRenderWindow(); w.SetOffScreenRendering(1); w.SetSize(8, 8)\n"
+        "w.AddRenderer(vtkRenderer()); w.Render()\n"
     )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, check=False)
+    return done.returncode == 0
 
 
-@compiled
-def _paint_triangles(corners: Floats, colors: Floats, image: Floats, nearest: Floats, part: Ints) -> None:
-    """Triangles (t,3,3) in the colours (t,3,3) of their corners, by barycentric coordinates u, v, w."""
-    height, width = nearest.shape
-    for t in range(len(corners)):
-        ax, ay, az = corners[t, 0]
-        bx, by, bz = corners[t, 1]
-        cx, cy, cz = corners[t, 2]
-        twice_area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if twice_area == 0.0:  # seen from the side
-            continue
-        for i in range(max(0, int(min(ay, by, cy))), min(height, int(max(ay, by, cy)) + 1)):
-            for j in range(max(0, int(min(ax, bx, cx))), min(width, int(max(ax, bx, cx)) + 1)):
-                x, y = j + 0.5, i + 0.5
-                u = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / twice_area
-                v = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / twice_area
-                w = 1.0 - u - v
-                depth = u * az + v * bz + w * cz
-                if min(u, v, w) >= -ROUNDING and depth > nearest[i, j]:
-                    nearest[i, j], part[i, j] = depth, t
-                    for k in range(3):
-                        image[i, j, k] = u * colors[t, 0, k] + v * colors[t, 1, k] + w * colors[t, 2, k]
+def _pyvista() -> Any:
+    try:
+        import pyvista
+    except ImportError:
+        raise MissingExtra("pyvista", "plot") from None
+    return pyvista
 
 
-@compiled
-def _paint_strokes(
-    ends: Floats, radii: Floats, shades: Floats, image: Floats, nearest: Floats, part: Ints, first: int
-) -> None:
-    """Segments (s,2,3) with round ends; a segment without length is a dot."""
-    height, width = nearest.shape
-    for s in range(len(ends)):
-        ax, ay, az = ends[s, 0]
-        bx, by, bz = ends[s, 1]
-        r, dx, dy = radii[s], bx - ax, by - ay
-        length2 = dx * dx + dy * dy
-        for i in range(max(0, int(min(ay, by) - r)), min(height, int(max(ay, by) + r) + 1)):
-            for j in range(max(0, int(min(ax, bx) - r)), min(width, int(max(ax, bx) + r) + 1)):
-                x, y = j + 0.5 - ax, i + 0.5 - ay
-                along = (x * dx + y * dy) / length2 if length2 > 0.0 else 0.0
-                along = min(1.0, max(0.0, along))
-                depth = az + along * (bz - az)
-                if math.hypot(x - along * dx, y - along * dy) <= r and depth > nearest[i, j]:
-                    nearest[i, j], part[i, j] = depth, first + s
-                    for k in range(3):
-                        image[i, j, k] = shades[s, k]
+def _with_pyvista(scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> Floats:
+    pyvista = _pyvista()
+    width, height = size[0] * SAMPLES, size[1] * SAMPLES
+    with pyvista.vtk_verbosity("off"):
+        plotter = pyvista.Plotter(off_screen=True, window_size=(width, height), lighting="none")
+        plotter.set_background("white")
+        plain: dict[str, Any] = {"scalars": "rgb", "rgb": True, "lighting": False}
+        cells = np.arange(3 * len(scene.corners)).reshape(-1, 3)
+        mesh = pyvista.PolyData.from_regular_faces(scene.corners.reshape(-1, 3), cells)
+        mesh["rgb"] = np.round(scene.colors.reshape(-1, 3) * 255.0).astype(np.uint8)
+        plotter.add_mesh(mesh, **plain)
+        for line_width in np.unique(scene.widths):
+            chosen = scene.widths == line_width
+            lines = pyvista.line_segments_from_points(scene.segments[chosen].reshape(-1, 3))
+            lines.cell_data["rgb"] = np.round(scene.shades[chosen] * 255.0).astype(np.uint8)
+            plotter.add_mesh(lines, line_width=SAMPLES * line_width, **plain)
+        if len(scene.dots):
+            dots = pyvista.PolyData(scene.dots)
+            dots["rgb"] = np.round(scene.dot_colors * 255.0).astype(np.uint8)
+            round_dots = {"style": "points", "render_points_as_spheres": True, "point_size": SAMPLES * DOT}
+            plotter.add_mesh(dots, **plain, **round_dots)
+        _aim(plotter, scene, low, scale, size)
+        image = plotter.screenshot(return_img=True)
+        plotter.close()
+    return image[..., :3]
+
+
+def _aim(plotter: Any, scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> None:
+    axes, depth = scene.view.axes, scene.view.depth(scene.corners.reshape(-1, 3))
+    centre = low + np.array(size) / (2.0 * scale)
+    near, far = depth.max(), depth.min()
+    reach = max(near - far, np.array(size).max() / scale)
+    focus = centre @ axes[:2] + near * axes[2]
+    camera = plotter.camera
+    camera.position = focus + reach * axes[2]
+    camera.focal_point = focus
+    camera.up = axes[1]
+    camera.parallel_projection = True
+    camera.parallel_scale = size[1] / (2.0 * scale)
+    camera.clipping_range = (0.5 * reach, reach + (near - far) + 0.5 * reach)
+
+
+def _with_matplotlib(scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> Floats:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import PolyCollection
+    from matplotlib.figure import Figure
+
+    project = scene.view.project
+    circle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    disc = np.stack([np.cos(circle), np.sin(circle)], axis=1) * DOT / (2.0 * scale)
+    shapes = [*project(scene.corners), *project(scene.segments), *(project(scene.dots)[:, None] + disc)]
+    fills = np.concatenate([scene.colors.mean(axis=1), scene.shades, scene.dot_colors])
+    thin = np.full(len(scene.corners), 0.4)
+    widths = np.concatenate([thin, scene.widths, np.zeros(len(scene.dots))])
+    order = scene.order
+    figure = Figure(figsize=(size[0] / 72.0, size[1] / 72.0), dpi=72.0 * SAMPLES)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set_xlim(low[0], low[0] + size[0] / scale)
+    axes.set_ylim(low[1], low[1] + size[1] / scale)
+    painted, fills = [shapes[k] for k in order], fills[order]
+    look: dict[str, Any] = {"linewidths": widths[order], "joinstyle": "round"}
+    axes.add_collection(PolyCollection(painted, facecolors=fills, edgecolors=fills, **look))
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[: size[1] * SAMPLES, : size[0] * SAMPLES, :3]

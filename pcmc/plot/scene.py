@@ -1,7 +1,7 @@
 """A surface as coloured triangles, lines and dots, in a view: everything except the painting.
 
 Projection is parallel throughout, so lengths can be compared between pictures and text can be
-placed on the vertices. Light and colour are computed here, so a painter has no choices left.
+placed on the vertices. Light and colour are computed here, so both painters show the same.
 """
 
 from __future__ import annotations
@@ -71,6 +71,8 @@ class Scene:
     corners : (t,3,3) triangles; colors : (t,3,3) RGB of their corners, 0..1.
     segments : (s,2,3); widths (s,), in pixels; shades (s,3) RGB.
     dots : (d,3); dot_colors (d,3) RGB.
+    order : (t + s + d,) indices into triangles, then segments, then dots, farthest first: a
+        triangle is as near as its middle, what lies on triangles as near as the nearest of them.
     """
 
     view: View
@@ -81,6 +83,7 @@ class Scene:
     shades: Floats
     dots: Floats
     dot_colors: Floats
+    order: Ints
 
 
 def scene(
@@ -101,6 +104,7 @@ def scene(
         shown = surface.patch_faces([surface.patch_index(name) for name in patches])
     F = surface.faces[shown]
     P = surface.vertices[F]
+    near = view.depth(P).mean(axis=1)
     light = _light(_normals(surface, smooth=not edges)[shown], view, 0.45 if values is None else 0.08)
     if values is None:
         base = patch_colors(surface)[surface.patch_of_face[shown]]
@@ -108,13 +112,25 @@ def scene(
         base = np.where(np.isnan(values), rgb(NO_VALUE), values)[shown]
     else:
         base = _mean_known(values, F)
-    colors = base[:, None] * light[..., None]
+    colors, triangles_near = base[:, None] * light[..., None], near
     if values is not None and len(values) == surface.n and len(F) <= CELLS_UP_TO:
         known = np.where(np.isnan(values), rgb(NO_VALUE), values)
         P, colors = _cells(P, known[F], light)
-    ends, widths, shades = _segments(surface, view, edges, shown)
-    points, kinds = _dots(surface, view, supports, F)
-    return Scene(view, P, np.clip(colors, 0.0, 1.0), ends, widths, shades, points, kinds)
+        triangles_near = np.tile(near, 6)
+    chosen, ends, widths, shades = _segments(surface, view, edges, shown)
+    held, points, kinds = _dots(surface, view, supports, F)
+    topo = surface.topology
+    edges_near = _nearest(len(topo.edges), topo.edge_of_face[shown], near)[chosen]
+    depth = np.concatenate([triangles_near, edges_near, _nearest(surface.n, F, near)[held]])
+    order = np.argsort(depth, kind="stable")
+    return Scene(view, P, np.clip(colors, 0.0, 1.0), ends, widths, shades, points, kinds, order)
+
+
+def _nearest(count: int, parts: Ints, near: Floats) -> Floats:
+    """(count,) depth of the nearest face at each edge or vertex; ``parts`` (m,3) are those of the faces."""
+    result = np.full(count, -np.inf)
+    np.maximum.at(result, parts.ravel(), np.repeat(near, 3))
+    return result
 
 
 def _light(normals: Floats, view: View, strength: float) -> Floats:
@@ -166,8 +182,8 @@ def _mean_known(values: Floats, faces: Ints) -> Floats:
     return np.where(count > 0, total / np.maximum(count, 1), rgb(NO_VALUE))
 
 
-def _segments(surface: Surface, view: View, edges: bool, shown: Bools) -> tuple[Floats, Floats, Floats]:
-    """Ends, widths and colours of the edges to draw."""
+def _segments(surface: Surface, view: View, edges: bool, shown: Bools) -> tuple[Ints, Floats, Floats, Floats]:
+    """Indices of the edges to draw, their ends, widths and colours."""
     topo = surface.topology
     curve = topo.curve_edge
     there = np.zeros(len(curve), dtype=bool)
@@ -176,17 +192,17 @@ def _segments(surface: Surface, view: View, edges: bool, shown: Bools) -> tuple[
     ends = surface.vertices[topo.edges[chosen]] + LIFT * surface.size * view.axes[2]
     heavy = curve[chosen]
     shades = np.where(heavy[:, None], rgb(LINE), rgb("#585858"))
-    return ends, np.where(heavy, 1.6, 0.6), shades
+    return chosen, ends, np.where(heavy, 1.6, 0.6), shades
 
 
-def _dots(surface: Surface, view: View, supports: bool, faces: Ints) -> tuple[Floats, Floats]:
-    """Where the supported vertices to draw are, and their colours."""
+def _dots(surface: Surface, view: View, supports: bool, faces: Ints) -> tuple[Ints, Floats, Floats]:
+    """Indices of the supported vertices to draw, where, and their colours."""
     there = np.zeros(surface.n, dtype=bool)
     there[faces] = supports
     held = np.flatnonzero(there & surface.held)
     points = surface.vertices[held] + 3 * LIFT * surface.size * view.axes[2]
     colors = np.where(surface.pinned[held][:, None], rgb(FIXED_DOT), rgb(SLIDING_DOT))
-    return points, colors
+    return held, points, colors
 
 
 def mean_edge(surface: Surface) -> float:

@@ -124,7 +124,7 @@ def document_works(
     ------
     OptionError, SurfaceError : as ``drawing_set``, ``panels``, ``StructuralModel`` and ``roof_report``.
     """
-    surface, units, works = outcome.surface, outcome.units, Works()
+    surface, units, works = outcome.shown.surface, outcome.units, Works()
     if documents.drawings:
         drawings = drawing_set(
             surface,
@@ -140,7 +140,8 @@ def document_works(
         schedule = panels(surface, documents.tolerance, anyway=anyway)
         works += schedule_works(Path(documents.panels), schedule)
     if documents.structure is not None and structure is not None:
-        model = structure.model(outcome.result, anyway)
+        solved = outcome.result if outcome.whole is None else outcome.whole.surface
+        model = structure.model(solved, anyway)
         works.append((Path(documents.structure), partial(write_structure, model=model)))
     if documents.report is not None:
         report = roof_report(

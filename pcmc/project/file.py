@@ -59,6 +59,7 @@ class Project:
     documents : drawings, schedule of panels, structural model and report to write.
     folder : made for the output if it is missing; None if the names include their folders.
     views, colour : of the picture, side by side; ``colour`` is one of ``COLOURS``.
+    whole : whether the output is the whole roof that a surface with mirror planes is a part of.
     drawing : that the plan refers to, or that ``path`` is; None if there is none.
     """
 
@@ -80,6 +81,7 @@ class Project:
     folder: Path | None = None
     views: Sequence[Any] = ("diagonal",)
     colour: str = "patches"
+    whole: bool = False
     drawing: Drawing | None = None
 
     @property
@@ -251,6 +253,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             documents=documents,
             views=[tuple(view) if isinstance(view, list) else view for view in views],
             colour=colour,
+            whole=output.get("whole", False),
             drawing=drawing,
         )
 

@@ -18,15 +18,16 @@ from ..base.arrays import Ints
 from ..base.errors import BalanceWarning, FileError, OptionError, PcmcError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
+from ..certificate.certificate import certify
 from ..contact.pinching import standing_part
 from ..existence import solve
 from ..meshing.remeshing import remesh
 from ..solvers.result import Progress, Result, Status
-from ..surface import Surface
+from ..surface import Surface, mirrored
 from . import cache
 from .documents import document_works
 from .file import Project, in_file, load, start_of
-from .outcome import Outcome
+from .outcome import Outcome, Whole
 from .output import OnStep, PathLike, Works, check_names, check_outputs, fields, ignore, paint, write_all
 
 if TYPE_CHECKING:
@@ -129,6 +130,10 @@ def _solve_and_write(
     _keep_drawing(project, outputs)
     check_outputs(outputs, project.folder)
     outcome = solve_from_start(project, report, changed)
+    if project.whole:
+        report("certifying the whole")
+        whole = mirrored(outcome.surface)
+        outcome = replace(outcome, whole=Whole(whole, certify(whole)))
     if not outputs or not (outcome.good or anyway):
         return outcome
     if project.documents.report is not None:
@@ -136,7 +141,7 @@ def _solve_and_write(
     works = surface_files(outcome, project.files)
     if project.picture is not None:
         painting = partial(paint, views=project.views, colour=project.colour, units=outcome.units)
-        works.append((Path(project.picture), partial(painting, outcome.surface)))
+        works.append((Path(project.picture), partial(painting, outcome.shown.surface)))
     works += _documents(project, outcome, anyway, report)
     with made(project.folder or Path()):
         return replace(outcome, files=write_all(works, report))
@@ -144,11 +149,17 @@ def _solve_and_write(
 
 def _reported_check(project: Project, outcome: Outcome, report: OnStep) -> MeshCheck | None:
     """The mesh check for a report: where it is asked for, or left open and the mesh is small enough."""
-    wanted = outcome.surface.m <= MOST_CHECKED if project.mesh_check is None else project.mesh_check
+    small = outcome.shown.surface.m <= MOST_CHECKED
+    wanted = small if project.mesh_check is None else project.mesh_check
     if not wanted or outcome.certificate.index is None:
         return None
+    from ..accuracy import check_mesh
+
     try:
-        return check_of(project, outcome, report)
+        if outcome.whole is None:
+            return check_of(project, outcome, report)
+        report("mesh check")
+        return check_mesh(outcome.whole.surface)
     except PcmcError:
         if project.mesh_check:
             raise
@@ -184,13 +195,14 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
 
     ``colour`` names the scalar that colours vertices.
     """
+    surface, certificate = outcome.shown
     data: dict[str, Any] = {
-        "scalars": fields(outcome.surface, outcome.certificate),
-        "certificate": outcome.certificate,
+        "scalars": fields(surface, certificate),
+        "certificate": certificate,
         "units": outcome.units,
         "colour": colour,
     }
-    return [(Path(file), partial(io.write, surface=outcome.surface, **data)) for file in files]
+    return [(Path(file), partial(io.write, surface=surface, **data)) for file in files]
 
 
 def solve_from_start(
@@ -203,6 +215,9 @@ def solve_from_start(
     if project.documents.structure is not None and project.structure is not None:
         with in_file(project.path):
             project.structure.check(start)
+    if project.whole and not any(plane.mirror for plane, _ in start.on_planes):
+        text = f"{project.path}: the roof has no mirror planes, so it is the whole already; leave out whole"
+        raise OptionError(f"{text}, or give the plan mirrors", what="whole")
     _check_balance(start)
     return replace(solve_project(project, start, report), units=units)
 
