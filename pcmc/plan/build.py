@@ -104,8 +104,20 @@ def build_surface(plan: PlanData) -> Surface:
         cables=cables,
         rooms=_rooms(plan, wall_patches, sides),
     )
-    check_rooms(surface)
+    _check_rooms(surface)
     return surface
+
+
+def _check_rooms(surface: Surface) -> None:
+    """Refuse a room that does not close, as the missing wall of a plan."""
+    try:
+        check_rooms(surface)
+    except SurfaceError as error:
+        problem, open_edges, _ = str(error).partition("; name the patches that are missing")
+        if not open_edges:
+            raise
+        problem += "; give the dividers around it walls, or make its patches one room with those beside them"
+        raise PlanError(problem, what="rooms", where=error.where, found=error.found) from None
 
 
 def _rise(draft: _Draft, patches: Sequence[Patch], held: Bools) -> Floats:

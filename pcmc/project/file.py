@@ -13,6 +13,7 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 from .. import io
+from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError
 from ..base.files import check_name, check_regular
 from ..base.units import NO_UNITS, Units
@@ -53,6 +54,7 @@ class Project:
     search : whether further starts are tried where the first leads to no equilibrium.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
+    misfit : ``tolerance`` of ``pcmc.meet``; None for the default.
     structure : of the structural model; None without [structure].
     files, picture : the output.
     folder : made for the output if it is missing; None if the names include their folders.
@@ -72,6 +74,7 @@ class Project:
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
     vary: Sequence[Parameter] = ()
+    misfit: float | None = None
     structure: Structure | None = None
     files: Sequence[PathLike] = ()
     picture: PathLike | None = None
@@ -261,10 +264,13 @@ def _search(table: Mapping[str, Any]) -> dict[str, Any]:
     """The targets of a project, and the parameters that may vary."""
     from ..design import Parameter, Target
 
+    if "tolerance" in table:
+        validate.positive("targets.tolerance", table["tolerance"])
     for key in ("meet", "vary"):
         if not table[key]:
             raise OptionError(f"targets.{key} is empty; give at least one", what=f"targets.{key}")
     return {
         "targets": [Target(**entry) for entry in table["meet"]],
         "vary": [Parameter(v) if isinstance(v, str) else Parameter(**v) for v in table["vary"]],
+        "misfit": table.get("tolerance"),
     }
