@@ -12,7 +12,6 @@ import typer
 from .. import project as projects
 from ..base.errors import OptionError, unknown
 from ..base.interrupts import defer_interrupts
-from ..base.units import NO_UNITS
 from ..io import write
 from ..surface import Surface, mirrored, unfolded
 from . import NOT_CERTIFIED, OK, arguments
@@ -135,6 +134,9 @@ def plot(
     return OK
 
 
+WATCH = "Follow the file: when it, or a drawing that it refers to, is saved, the page shows the new roof."
+
+
 def explore(
     file: Annotated[Path | None, typer.Argument(metavar="[FILE]")] = None,
     example: Annotated[
@@ -146,6 +148,7 @@ def explore(
     host: Annotated[str, option("ADDRESS", "Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, option("NUMBER", "Port; 0 for any free one.", parser=arguments.integer)] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
+    watch: Annotated[bool, typer.Option("--watch", help=WATCH)] = False,
     start_shape: Start = False,
     cache: Cache = True,
 ) -> int:
@@ -154,24 +157,28 @@ def explore(
     \b
     Examples:
       pcmc explore roof.pcmc
+      pcmc explore roof.toml --watch
       pcmc explore --example two_caps --set edge_length=1.2
     """
-    from ..explore import open_and_wait, start
+    from ..explore import open_and_wait, start_roof
+    from ..explore.roof import Roof, read_roof
 
     if (file is None) == (example is None):
         raise OptionError("explore: give a file or --example, one of them", what="--example")
+    if watch and file is None:
+        raise OptionError("explore: --watch needs a file", what="--watch")
+    again = None
     with working() as say:
         say("building")
         if file is not None:
-            shown = arguments.given(file, say, start=start_shape, cache=cache)
-            surface, title, units = shown.surface, file.name, shown.units
-            if shown.outcome is not None:
-                report(shown.outcome)
+            arguments.check_input(file)
+            read = partial(read_roof, file, start_shape=start_shape, use_cache=cache)
+            roof, again = read(progress=say, report=report), read if watch else None
         else:
             values = {name: listed[0] for name, listed in map(arguments.values_of, parameter or ())}
-            surface, title, units = _example(str(example), values), str(example), NO_UNITS
+            roof = Roof(_example(str(example), values), str(example))
         say("solving")
-        explorer = start(surface, host, port, title, units)
+        explorer = start_roof(roof, host, port, again)
     open_and_wait(explorer, browser)
     return OK
 
