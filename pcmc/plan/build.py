@@ -100,9 +100,9 @@ def build_surface(plan: PlanData) -> Surface:
         np.concatenate([fixed, walls.fixed]),
         np.concatenate([sliding, walls.sliding]),
         plan.plane,
-        on_planes=mirror_planes(plan, vertices),
-        cables=cables,
-        rooms=_rooms(plan, wall_patches, sides),
+        on_planes=tuple(mirror_planes(plan, vertices)),
+        cables=tuple(cables),
+        rooms=tuple(_rooms(plan, wall_patches, sides)),
     )
     _check_rooms(surface)
     return surface
@@ -383,5 +383,5 @@ def _rooms(plan: PlanData, walls: Sequence[Patch], sides: Sequence[_Sides]) -> l
             sign = (side.left == number) - (side.right == number)
             if sign:
                 around[wall.name] = sign
-        rooms.append(Room(name, around, room.volume))
+        rooms.append(Room(name, tuple(around.items()), room.volume))
     return rooms
