@@ -7,9 +7,10 @@ and a flat piece between the boundary and a point c of plane k is added, as seen
     V_i += -(1/6) Σ ⟨c, a × b⟩
 
 over the sides a → b of triangles on the boundary in plane k, all positions seen from o. Other curves between
-two vertices of plane k may rise from it like an arch; only in mirror planes they count, too. Where the boundary
-leaves plane k for a plane j, the piece ends along the line that both have in common. c is chosen on as many of these
-lines as possible, and then as near to o as possible. On others, with c' the point of the line nearest to o,
+two vertices of plane k may rise from it like an arch; only in mirror planes they count, too. Where the
+boundary leaves plane k for a plane j, the piece ends along the line that both have in common. c is chosen on
+as many of these lines as possible, and then as near to o as possible. On others, with c' the point of the
+line nearest to o,
 V_i += ∓(1/6) ⟨c, v × c'⟩ for the vertex v there (- at the head of the last side, + at the tail of the first).
 """
 
