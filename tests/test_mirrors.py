@@ -212,7 +212,7 @@ def test_refining_keeps_the_mirror():
 
 
 def test_a_pinched_wall_ends_at_a_mirror_plane(tmp_path):
-    """There its triangles have no area, in the half as in the whole; cables run along its top and its foot."""
+    """There its triangles have no area, in the half as in the whole; cables run along its top and foot."""
     whole = two_squares(6, alpha_aux=3.0)
     edges, low = whole.topology.edges, whole.vertices[:, 2] == 0.0
     on_wall = np.isin(np.arange(whole.n), whole.faces[whole.patch_of_face == 2])
