@@ -228,7 +228,7 @@ def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(
         page.idle()
         assert changed(before, page.picture()) > 0.1
         assert "Distance from Variant 1, m" in page.text("#legend .name")
-        assert "Apex of west 1.2 1.5 +0.3 (+25 %)" in page.text("#variants table")
+        assert "Apex of west 1.2 1.5 +0.3 +25 %" in page.text("#variants table")
         page.find("#variants button[aria-pressed]").click()
         page.idle()
         assert changed(before, page.picture()) == 0.0

@@ -227,8 +227,9 @@ class Session:
 
         def act(stop: Callable[[], bool]) -> None:
             self._start, self.aims = start.surface, None
-            self._go_on_with(start.surface)
-            self._failure = start.failure
+            self.surface, self._certificate = start.surface, start.certificate
+            self._wanted, self._failure = start.wanted, start.failure
+            self._add_step()
 
         return self._run(act)
 
