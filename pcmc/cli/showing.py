@@ -15,7 +15,21 @@ from ..base.interrupts import defer_interrupts
 from ..io import write
 from ..surface import Surface, mirrored, unfolded
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import Cache, Colour, Input, Pressures, Settings, Start, ViewName, Whole, option
+from .arguments import (
+    Cables,
+    Cache,
+    Colour,
+    Input,
+    Loads,
+    Pressures,
+    Settings,
+    Start,
+    ViewName,
+    Volumes,
+    Weights,
+    Whole,
+    option,
+)
 from .progress import working
 from .reports import report
 
@@ -27,6 +41,9 @@ def convert(
     ],
     tension: Settings = None,
     pressure: Pressures = None,
+    weight: Weights = None,
+    cable: Cables = None,
+    volume: Volumes = None,
     start: Start = False,
     cache: Cache = True,
     colour: Annotated[
@@ -48,7 +65,8 @@ def convert(
     projects.check_names([output])
     projects.check_outputs([output])
     with working() as say:
-        shown = arguments.given(file, say, tension, pressure, start=start, cache=cache)
+        loads = Loads(tension, pressure, weight, cable, volume)
+        shown = arguments.given(file, say, loads, start=start, cache=cache)
     if shown.outcome is not None and not _is_good(file, shown.outcome):
         return NOT_CERTIFIED
     data: dict[str, Any] = {"units": shown.units, "colour": colour}
@@ -83,6 +101,11 @@ def plot(
     picture: Annotated[Path, typer.Argument(metavar="PNG")],
     view: ViewName = "diagonal",
     colour: Colour = "patches",
+    tension: Settings = None,
+    pressure: Pressures = None,
+    weight: Weights = None,
+    cable: Cables = None,
+    volume: Volumes = None,
     start: Start = False,
     cache: Cache = True,
     whole: Whole = False,
@@ -100,7 +123,8 @@ def plot(
     projects.check_picture(seen, colour)
     projects.check_outputs([picture])
     with working() as say:
-        shown = arguments.given(file, say, start=start, cache=cache)
+        loads = Loads(tension, pressure, weight, cable, volume)
+        shown = arguments.given(file, say, loads, start=start, cache=cache)
     if shown.outcome is not None and not _is_good(file, shown.outcome):
         return NOT_CERTIFIED
     surface = mirrored(shown.surface) if whole else shown.surface
