@@ -94,7 +94,8 @@ def read_roof(
     more = {"path": path, "text": text, "signature": before}
     more |= {"targets": tuple(project.targets), "vary": tuple(project.vary)}
     if start_shape:
-        return Roof(projects.surface_of(project), path.name, project.units, note="The start shape", **more)
+        note = "the targets are not met yet: the page opened its start shape" if project.targets else ""
+        return Roof(projects.surface_of(project), path.name, project.units, note=note, **more)
     outcome = projects.designed(project, progress, use_cache=use_cache)
     if report is not None:
         report(outcome)
