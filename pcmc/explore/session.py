@@ -94,7 +94,8 @@ class Session:
         self._wanted, self._failure = start.wanted, start.failure
         self._start = self.surface
         self._steps, self._place = [self.surface], 0
-        self._message, self._compared = "", None
+        self._message = ""
+        self._compared: int | None = None
         self.variants: list[Variant] = []
         self.aims: Aims | None = None
 
