@@ -210,8 +210,8 @@ def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surf
 def resting_supports(surface: Surface, resting: Bools) -> dict[str, object]:
     """The supports with vertices that come to rest on Π, some of which slide on other planes, too."""
     planes = ((surface.plane, surface.on_ground | resting), *surface.on_planes)
-    lines, points = guides_and_points(planes, surface.given.fixed, surface.given.on_line)
-    fixed = surface.given.fixed | points
+    lines, points = guides_and_points(planes, surface.given_supports.fixed, surface.given_supports.on_line)
+    fixed = surface.given_supports.fixed | points
     for _, along in lines:
         fixed |= along
     sliding = (surface.on_plane | resting) & ~fixed

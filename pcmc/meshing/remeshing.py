@@ -22,7 +22,6 @@ from .refinement import (
     Projection,
     carry_lines,
     edges_on_planes,
-    given_supports,
     held_midpoints,
     onto_round_edges,
     projected,
@@ -196,7 +195,9 @@ def _cut_curves(
     topo, stay = surface.topology, _curve_edges(surface)
     fixed_edge, sliding_edge = held_midpoints(surface)
     X, F, patch, number = surface.vertices, surface.faces, surface.patch_of_face, np.arange(surface.n)
-    at_vertices = np.stack([*given_supports(surface), *(mask for _, mask in surface.on_planes)], axis=1)
+    at_vertices = np.stack(
+        [*surface.given_supports.fixed_and_sliding(), *(mask for _, mask in surface.on_planes)], axis=1
+    )
     mesh = _Mesh(X, F, patch, topo.edges[stay], at_vertices, number, _cable_of_edge(surface)[stay])
     support = np.stack([fixed_edge, sliding_edge, *edges_on_planes(surface)], axis=1)[stay]
     while (counts > 1).any():
@@ -410,8 +411,16 @@ def _assembled(surface: Surface, old: _Mesh, candidates: Sequence[_Mesh]) -> Sur
     planes = tuple((plane, mask) for (plane, _), mask in zip(surface.on_planes, on_planes, strict=True))
     ends = np.searchsorted(used, old.curves)
     cables = tuple(replace(c, edges=ends[old.cable == index]) for index, c in enumerate(surface.cables))
-    supports = fixed, sliding, surface.plane, lines, planes
-    return Surface(X, F, patch_of_face, surface.patches, *supports, cables=cables, rooms=surface.rooms)
+    return surface.rebuilt(
+        vertices=X,
+        faces=F,
+        patch_of_face=patch_of_face,
+        fixed=fixed,
+        on_plane=sliding,
+        on_line=lines,
+        on_planes=planes,
+        cables=cables,
+    )
 
 
 def _patch_angles(mesh: _Mesh, count: int) -> Floats:
