@@ -12,9 +12,10 @@ from ..base.errors import OptionError
 from ..contact.pinching import Walls, lift, standing_part
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
+from .curve_cutting import cut_triangles
 from .quality import edge_lengths
 from .refinement import Projection, new_vertices, with_vertices_on
-from .remeshing import RAISED, cut_triangles
+from .remeshing import RAISED
 
 TALL = 4.0  # heights of a wall over the length of its top edge: a higher column does not come to rest
 

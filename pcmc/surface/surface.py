@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, cast
 
@@ -21,6 +21,7 @@ from .geometry import bounding_size
 from .origin import uncancelled_pressures, volume_origin
 from .patch import Patch
 from .plane import Plane
+from .renewed import renewed
 from .room import Room, checked_rooms, room_signs
 from .summary import summary
 from .topology import Topology, topology
@@ -318,22 +319,17 @@ class Surface:
         ``walls`` names patches that are walls whatever their pressure; ``cables`` gives tensions by the name
         of the cable, ``volumes`` volumes by the name of the room.
         """
-        by_patch = {"tension": tensions, "pressure": pressures, "weight": weights}
+        by_patch: dict[str, Any] = {"tension": tensions, "pressure": pressures, "weight": weights}
         for key, given in (by_patch | {"cable": cables, "volume": volumes}).items():
             if not isinstance(given or {}, Mapping):
                 validate.refuse(f"{key}s", given, "a mapping from names to numbers", error=SurfaceError)
         if isinstance(walls, str) or not isinstance(walls, Iterable):
             validate.refuse("walls", walls, "a sequence of patch names", error=SurfaceError)
-        patches = list(self.patches)
-        changes: dict[int, dict[str, Any]] = {self.patch_index(name): {"wall": True} for name in walls}
-        for key, given in by_patch.items():
-            for name, value in (given or {}).items():
-                changes.setdefault(self.patch_index(name), {})[key] = value
-        for index, both in changes.items():
-            patches[index] = replace(patches[index], **both)
-        pulling = _renewed("cable", self.cables, "tension", cables)
+        walled = dict.fromkeys(walls, True)
         return self._with(
-            patches=tuple(patches), cables=pulling, rooms=_renewed("room", self.rooms, "volume", volumes)
+            patches=renewed("patch", self.patches, **by_patch, wall=walled),
+            cables=renewed("cable", self.cables, tension=cables),
+            rooms=renewed("room", self.rooms, volume=volumes),
         )
 
     def __repr__(self) -> str:
@@ -374,14 +370,7 @@ class Surface:
         loaded = self.retensioned(pressures=given, walls=set(kept) - set(names))
         edges = np.flatnonzero(loaded.uncancelled)
         if snow != 0.0 and len(edges):
-            i, j = (int(v) for v in self.topology.edges[edges[0]])
-            message = (
-                f"snow: {len(edges)} edges are free, the first from vertex {i} to {j}, and there a change of"
-            )
-            message += " pressure is not the same as snow; give a weight instead, as in"
-            raise SurfaceError(
-                f"{message} retensioned(weights={{{names[0]!r}: {snow:g}}})", what="snow", where=(i, j)
-            )
+            checks.refuse_snow(snow, names[0], len(edges), self.topology.edges[edges[0]])
         return loaded
 
     def __copy__(self) -> Surface:
@@ -423,14 +412,3 @@ class Surface:
             if "flat_pieces" in vars(self) and "faces" not in changes:
                 vars(other)["flat_pieces"] = vars(self)["flat_pieces"]
         return other
-
-
-def _renewed(
-    kind: str, parts: tuple[Any, ...], key: str, values: Mapping[str, float] | None
-) -> tuple[Any, ...]:
-    """Cables or rooms with other values of a field, given by name."""
-    names, new = [part.name for part in parts], list(parts)
-    for name, value in (values or {}).items():
-        index = names.index(validate.choice(kind, name, names))
-        new[index] = replace(new[index], **{key: value})
-    return tuple(new)
