@@ -196,6 +196,9 @@ def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, f
             amount = math.nan
         if (sign and not name) or math.isnan(amount):
             validate.refuse(flag, text, "NAME=NUMBER or NUMBER")
+        if not (name or names):
+            message = f"{flag} {text}: the surface has no {flag.removeprefix('--')} that this could replace"
+            raise OptionError(message, what=flag, found=text)
         values |= {name: amount} if name else dict.fromkeys(names, amount)
     return values
 

@@ -18,8 +18,8 @@ from ..base.errors import FileError, OptionError, unknown
 from ..base.files import atomic_writes
 from ..base.units import expect_length, length_factor
 from ..certificate import Certificate
+from ..certificate.required import certified
 from ..panels import Panels, panels
-from ..panels.schedule import certified
 from ..surface import Surface, expect_surface
 from . import dxf, pdf, views
 from .panel_sheets import panel_sheets as panels_at_true_size

@@ -13,6 +13,7 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 from .. import io
+from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError
 from ..base.files import check_name, check_regular
 from ..base.units import NO_UNITS, Units
@@ -54,6 +55,7 @@ class Project:
     search : whether further starts are tried where the first leads to no equilibrium.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
+    misfit : ``tolerance`` of ``pcmc.meet``; None for the default.
     structure : of the structural model; None without [structure].
     files, picture : the output.
     documents : drawings, schedule of panels, structural model and report to write.
@@ -74,6 +76,7 @@ class Project:
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
     vary: Sequence[Parameter] = ()
+    misfit: float | None = None
     structure: Structure | None = None
     files: Sequence[PathLike] = ()
     picture: PathLike | None = None
@@ -279,10 +282,13 @@ def _search(table: Mapping[str, Any]) -> dict[str, Any]:
     """The targets of a project, and the parameters that may vary."""
     from ..design import Parameter, Target
 
+    if "tolerance" in table:
+        validate.positive("targets.tolerance", table["tolerance"])
     for key in ("meet", "vary"):
         if not table[key]:
             raise OptionError(f"targets.{key} is empty; give at least one", what=f"targets.{key}")
     return {
         "targets": [Target(**entry) for entry in table["meet"]],
         "vary": [Parameter(v) if isinstance(v, str) else Parameter(**v) for v in table["vary"]],
+        "misfit": table.get("tolerance"),
     }

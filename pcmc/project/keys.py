@@ -249,6 +249,7 @@ def target_sections() -> tuple[Section, ...]:
             (
                 Key("meet", "a list of tables", REQUIRED, "the quantities and their values"),
                 Key("vary", "a list of names or tables", REQUIRED, varied),
+                Key("tolerance", "a number", 1e-7, "largest relative misfit of a target that counts as met"),
             ),
         ),
         Section("targets.meet", "A quantity and what it is to be.", wanted),

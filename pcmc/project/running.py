@@ -329,7 +329,8 @@ def _meet(project: Project, surface: Surface, report: OnStep) -> Design:
     def callback(row: object) -> None:
         report(f"meeting the targets: solve {next(solves)}")
 
-    design = meet(surface, project.targets, project.vary, callback=callback, **project.options)
+    options = dict(project.options) | ({} if project.misfit is None else {"tolerance": project.misfit})
+    design = meet(surface, project.targets, project.vary, callback=callback, **options)
     if design.status is DesignStatus.STOPPED:  # by Ctrl-C
         raise KeyboardInterrupt
     return design
