@@ -178,7 +178,7 @@ def octant(levels):
 
 def test_a_sphere_from_its_eighth():
     """Three planes at right angles: no vertex is held, corners slide along axes; the radius is 2 α / p."""
-    assert len(octant(1).auto_lines) == 3
+    assert len(octant(1).meeting_lines) == 3
     errors = []
     for levels in (2, 3, 4):
         result = pcmc.solve(octant(levels), target="stationary")
@@ -278,7 +278,7 @@ def test_lines_circles_and_other_planes_are_carried():
         on_planes={half_tent().on_planes[0][0]: [0, 2, 3], slope: [0]},
     )
     whole = mirrored(piece)
-    assert sorted(mask.sum() for _, mask in whole.given.on_line) == [1, 1, 2]
+    assert sorted(mask.sum() for _, mask in whole.given_supports.on_line) == [1, 1, 2]
     assert len(whole.on_planes) == 2
     assert all(mask.tolist()[0] for _, mask in whole.on_planes)
 

@@ -222,7 +222,7 @@ def test_datafiles_have_planes_at_any_height(tmp_path, height):
 def test_supports_of_several_planes():
     roof = corner_roof()
     corners = np.isin(roof.vertices[:, :2], (0, 1)).all(axis=1)
-    assert len(roof.auto_lines) == 4
+    assert len(roof.meeting_lines) == 4
     np.testing.assert_array_equal(roof.fixed, corners)
     assert not roof.pinned.any()
     assert roof.held.sum() == 16
@@ -291,7 +291,7 @@ def test_copies_keep_the_planes():
     roof = corner_roof()
     again = pickle.loads(pickle.dumps(roof))
     assert again.on_planes[0][0] == roof.on_planes[0][0]
-    assert not again.given.fixed.flags.writeable
+    assert not again.given_supports.fixed.flags.writeable
     assert pcmc.energy(again) == pcmc.energy(roof)
 
 

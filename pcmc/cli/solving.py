@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,23 +14,36 @@ from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
-from ..base.errors import FileError, PcmcError
 from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
-from . import NOT_CERTIFIED, OK, arguments
-from .arguments import MANY_FILES, Cache, Input, Pressures, Settings, Start, number, option
+from . import NOT_CERTIFIED, OK, arguments, checking
+from .arguments import (
+    MANY_FILES,
+    Cables,
+    Cache,
+    Input,
+    Loads,
+    Pressures,
+    Settings,
+    Start,
+    Volumes,
+    Weights,
+    Whole,
+    number,
+    option,
+)
+from .checking import CHECKED
 from .progress import working
 from .reports import report
 
-MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
-CHECKED = f"Solve on two finer meshes, too, for error bars; by default up to {MOST_CHECKED} triangles."
 MESHES = "Check the mesh on this many meshes in all, 3 for error bars and orders."
 ACCURACY = (
     "Error bar wanted, such as height=1e-3: finer triangles where the error comes from; may be repeated."
 )
 ACCURACY_OF = "mesh: the value on the mesh is to be so accurate; limit: the extrapolated one."
 MOST_TRIANGLES = f"The most that the mesh for an accuracy may have, {TRIANGLES} by default."
+WHOLE_INDEX = "Of a surface with mirror planes certify the whole: motions that are not symmetric count, too."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
 
@@ -45,6 +57,9 @@ def solve_(
     ] = None,
     tension: Settings = None,
     pressure: Pressures = None,
+    weight: Weights = None,
+    cable: Cables = None,
+    volume: Volumes = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
     anyway: Annotated[bool, typer.Option("--anyway", help="Write the output even if not certified.")] = False,
     accuracy: Annotated[list[str] | None, option("QUANTITY=NUMBER", ACCURACY, "--accuracy")] = None,
@@ -52,6 +67,7 @@ def solve_(
     most_triangles: Annotated[int | None, option("NUMBER", MOST_TRIANGLES, parser=arguments.integer)] = None,
     mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
     cache: Cache = True,
+    whole: Whole = False,
 ) -> int:
     """Solve a surface or a project, certify it, write all files, or none; then check its mesh.
 
@@ -62,6 +78,7 @@ def solve_(
     Examples:
       pcmc solve roof.toml
       pcmc solve roof.toml --accuracy height=1e-3
+      pcmc solve sail.toml --cable "cable 1=12"
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
     project = _project(file, folder, output, picture)
@@ -73,35 +90,25 @@ def solve_(
     goal = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
-    project = replace(project, mesh_check=False)
+    # a report has the mesh check's numbers; else it comes after the files, so that Ctrl-C leaves them
+    wanted_before = False if project.documents.report is None else wanted
+    project = replace(project, mesh_check=wanted_before, whole=whole or project.whole)
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
     with working() as say:
-        retensioned = partial(arguments.retensioned, tension=tension, pressure=pressure)
-        changed = retensioned if tension or pressure else None
+        loads = Loads(tension, pressure, weight, cable, volume)
+        changed = loads.of if loads else None
         outcome = projects.run_project(project, say, anyway=anyway, changed=changed, use_cache=cache)
     report(outcome)
     if project.outputs and not outcome.files:
         print("nothing written (use --anyway to write it)")
-    _check_mesh(project, outcome, wanted)
-    return OK if outcome.good else NOT_CERTIFIED
-
-
-def _check_mesh(project: projects.Project, outcome: projects.Outcome, wanted: bool | None) -> None:
-    """Check the mesh of a surface at rest and print its table, unless it is not wanted or too large."""
-    if outcome.certificate.index is None or wanted is False:
-        return
-    if wanted is None and outcome.surface.m > MOST_CHECKED:
-        print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
-        return
-    sys.stdout.flush()
-    try:
-        with working() as say:
-            check = projects.check_of(project, outcome, say)
-    except PcmcError as error:  # the surface and its files are good without it
-        print(f"no mesh check: {error}")
-    else:
+    check = outcome.mesh_check
+    if check is None:
+        run = partial(projects.check_of, project, outcome)
+        check = checking.mesh_check(outcome.surface, outcome.certificate, wanted, run)
+    if check is not None:
         print(f"\n{check.brief()}")
+    return OK if outcome.good else NOT_CERTIFIED
 
 
 def _project(
@@ -112,27 +119,20 @@ def _project(
     if not projects.is_project(file):
         return projects.Project(file, files=output or (), picture=picture, folder=folder)
     project = projects.load(file).in_folder(file.parent if folder is None else folder)
-    _keep_drawing(project, output or ())
     return replace(project, files=output or project.files, picture=picture or project.picture)
-
-
-def _keep_drawing(project: projects.Project, outputs: Sequence[Path]) -> None:
-    """Refuse to write a roof over the drawing that it is made from."""
-    if project.drawing is None:
-        return
-    for path in outputs:
-        if path.resolve() == project.drawing.path.resolve():
-            text = f"{path}: this is the drawing; name another file for the roof"
-            raise FileError(text, what=str(path))
 
 
 def certify_(
     file: Input,
     tension: Settings = None,
     pressure: Pressures = None,
+    weight: Weights = None,
+    cable: Cables = None,
+    volume: Volumes = None,
     meshes: Annotated[int | None, option("NUMBER", MESHES, parser=arguments.integer)] = None,
     start: Start = False,
     cache: Cache = True,
+    whole: Annotated[bool, typer.Option("--whole", help=WHOLE_INDEX)] = False,
 ) -> int:
     """Check a surface, or a project's roof: residual forces, curvature errors, stability, reactions.
 
@@ -145,10 +145,14 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as say:
-        shown = arguments.given(file, say, tension, pressure, start=start, cache=cache)
+        loads = Loads(tension, pressure, weight, cable, volume)
+        shown = arguments.given(file, say, loads, start=start, cache=cache)
         surface, outcome = shown.surface, shown.outcome
         say("certifying")
-        certificate = certify(surface) if outcome is None else outcome.certificate
+        if whole or outcome is None:
+            certificate = certify(surface, whole=whole)
+        else:
+            certificate = outcome.certificate
     if outcome is not None:
         report(outcome, verdict=False)
     print(certificate.text(shown.units))
@@ -193,6 +197,7 @@ def remesh_(
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
     project = replace(_project(file, None, output, None), remeshing=(stage,), picture=None)
+    project = replace(project, documents=projects.Documents())
     with working() as say:
         outcome = projects.run_project(project, say)
     report(outcome)

@@ -58,7 +58,7 @@ NONE = FlatPieces(EMPTY, EMPTY, FLAT, EMPTY, EMPTY, FLAT)
 def ground(surface: Surface) -> Bools:
     """(n,) vertices held on Π: those that slide there, and fixed ones that lie on it."""
     low = lying(surface.plane.height(surface.vertices), surface.vertices)
-    return surface.given.on_plane | (surface.fixed & low)
+    return surface.given_supports.on_plane | (surface.fixed & low)
 
 
 def flat_pieces(surface: Surface) -> FlatPieces:

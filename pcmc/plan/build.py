@@ -6,18 +6,33 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, PlanWarning, SurfaceError
+from ..energy.rooms import check_rooms
 from ..meshing.angles import improve_angles
-from ..surface import Patch, Surface
+from ..surface import Cable, Patch, Room, Surface
 from .arrangement import Arrangement, arrange, hole_points
 from .curves import Curve
+from .edges import (
+    NONE,
+    STATES,
+    Boundary,
+    boundary,
+    check_lines,
+    check_pressures,
+    edge_cables,
+    mirror_planes,
+    raised_heights,
+    strip_mask,
+)
 from .heights import dome, harmonic_heights
 from .lines import SNAP, Kind, Line
-from .parts import EDGES, Area, PlanData
+from .parts import Area, PlanData
 from .pieces import to_local, to_space
 from .planar import PlanarMesh, locate, signed_areas, triangulate
 from .walls import UpperEdge, WallMesh, build_walls
@@ -37,16 +52,19 @@ class _Draft:
     supports_on_edge: Sequence[Curve]
     drawn: Arrangement
     mesh: PlanarMesh
+    edges: Boundary
 
 
 @dataclass(frozen=True, eq=False)
 class _Roof:
-    """Positions (n,3), heights (n,) of the surface that the boundary spans, fixed (n,), pressures (m,)."""
+    """Positions (n,3), heights (n,) of the surface that the boundary spans, fixed (n,), pressures (m,), and
+    the number (m,) of the room of prescribed volume below, -1 for none."""
 
     positions: Floats
     base: Floats
     fixed: Bools
     pressure: Floats
+    room: Ints
 
 
 def build_surface(plan: PlanData) -> Surface:
@@ -61,30 +79,62 @@ def build_surface(plan: PlanData) -> Surface:
         raise PlanError("every vertex of the mesh is held; use a smaller edge_length", what="edge_length")
     _warn_of_free_edges(draft, fixed | sliding)
     given = np.full(len(mesh.points), np.nan)
-    given[: len(draft.drawn.heights)] = draft.drawn.heights
+    given[: len(draft.drawn.heights)] = raised_heights(plan, draft.edges, draft.drawn, fixed | sliding)
     base = harmonic_heights(mesh.points, mesh.triangles, given)
     patches, patch_of_face = _patches(plan, mesh)
-    height = base + dome(mesh.points, mesh.triangles, fixed | sliding, plan.rise)
+    cables = _cables(draft, fixed | sliding)
+    _check_free_pressure(draft, cables, patches, patch_of_face)
+    height = base + _rise(draft, patches, fixed | sliding)
     inner = np.arange(len(base)) >= len(draft.drawn.points)
     raised = improve_angles(np.column_stack([mesh.points, height]), mesh.triangles, inner, GOOD_ANGLE)
     pressure = np.array([p.pressure for p in patches])[patch_of_face]
-    roof = _Roof(to_space(raised, plan.plane), base, fixed, pressure)
-    walls, wall_patches = _walls(draft, roof)
-    return Surface(
-        np.concatenate([roof.positions, walls.vertices]),
+    rooms = _room_of_face(plan, patches, patch_of_face)
+    roof = _Roof(to_space(raised, plan.plane), base, fixed, pressure, rooms)
+    walls, wall_patches, sides = _walls(draft, roof)
+    vertices = np.concatenate([roof.positions, walls.vertices])
+    surface = Surface(
+        vertices,
         np.concatenate([mesh.triangles, walls.faces]),
         np.concatenate([patch_of_face, walls.label + len(patches)]),
         (*patches, *wall_patches),
         np.concatenate([fixed, walls.fixed]),
         np.concatenate([sliding, walls.sliding]),
         plan.plane,
+        on_planes=tuple(mirror_planes(plan, vertices)),
+        cables=tuple(cables),
+        rooms=tuple(_rooms(plan, wall_patches, sides)),
     )
+    _check_rooms(surface)
+    return surface
+
+
+def _check_rooms(surface: Surface) -> None:
+    """Refuse a room that does not close, as the missing wall of a plan."""
+    try:
+        check_rooms(surface)
+    except SurfaceError as error:
+        problem, open_edges, _ = str(error).partition("; name the patches that are missing")
+        if not open_edges:
+            raise
+        problem += "; give the dividers around it walls, or make its patches one room with those beside them"
+        raise PlanError(problem, what="rooms", where=error.where, found=error.found) from None
+
+
+def _rise(draft: _Draft, patches: Sequence[Patch], held: Bools) -> Floats:
+    """(n,) what the initial surface rises above the one that the boundary spans."""
+    plan, mesh = draft.plan, draft.mesh
+    walled = any(divider.wall is not None for divider in plan.dividers)
+    if plan.rise is None and not walled and all(patch.pressure == 0.0 for patch in patches):
+        return np.zeros(len(mesh.points))  # a sail starts without a dome
+    return dome(mesh.points, mesh.triangles, held, plan.rise)
 
 
 def _drafted(plan: PlanData) -> _Draft:
     lines, on_edge = _lines(plan)
+    check_lines(plan, lines)
     spots = np.array([to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)])
-    stops = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in on_edge)])
+    cut = [*on_edge, *(c.local(plan.plane) for c in (*(part.curve for part in plan.cables), *plan.mirrors))]
+    stops = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in cut)])
     drawn = arrange(lines, plan.edge_length, spots.reshape(-1, 3), stops)
     edges = np.concatenate([chain.edges for chain in drawn.chains])
     try:
@@ -92,7 +142,7 @@ def _drafted(plan: PlanData) -> _Draft:
     except SurfaceError as error:
         problem = f"lines of the plan are too close to each other for edges of length {plan.edge_length:g}"
         raise PlanError(f"{problem}: {error}", what="edge_length", found=plan.edge_length) from None
-    return _Draft(plan, lines, on_edge, drawn, mesh)
+    return _Draft(plan, lines, on_edge, drawn, mesh, boundary(plan, lines, drawn))
 
 
 def _check_size(plan: PlanData) -> None:
@@ -151,38 +201,61 @@ def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:
 
 def _supports(draft: _Draft) -> tuple[Bools, Bools]:
     """(n,) fixed and sliding vertices."""
-    plan, drawn = draft.plan, draft.drawn
-    edges = [plan.edge, *(hole.edge for hole in plan.holes)]  # the first lines are the boundary
-    masks = {kind: np.zeros(len(draft.mesh.points), dtype=bool) for kind in EDGES}
-    boundary: set[int] = set()
+    plan, drawn, edges = draft.plan, draft.drawn, draft.edges
+    fixed, sliding = np.zeros((2, len(draft.mesh.points)), dtype=bool)
+    fixed[edges.vertices("fixed")] = True
+    sliding[edges.vertices("sliding")] = True
     for chain in drawn.chains:
         if draft.lines[chain.line].kind is Kind.SUPPORT:
-            masks["fixed"][chain.vertices] = True
-        elif chain.line < len(edges):
-            masks[edges[chain.line]][chain.vertices] = True
-            boundary.update(chain.vertices.tolist())
+            fixed[chain.vertices] = True
+    rim = np.unique(edges.ends)
     for support in draft.supports_on_edge:
         strip = Line("support", Kind.SUPPORT, support)
-        for vertex in boundary:
-            if strip.nearest(drawn.points[vertex])[1] <= SNAP * plan.edge_length:
-                masks["fixed"][vertex] = True
-    masks["fixed"][drawn.spots] = True
-    return masks["fixed"], masks["sliding"] & ~masks["fixed"]
+        fixed[strip_mask(strip, drawn.points, rim, SNAP * plan.edge_length)] = True
+    fixed[drawn.spots] = True
+    return fixed, sliding & ~fixed
 
 
 def _warn_of_free_edges(draft: _Draft, held: Bools) -> None:
     """Warn of free edges: the tension of the patch has nothing to pull against there."""
+    edges = draft.edges
     for number, line in enumerate(draft.lines):
-        chains = [c.vertices for c in draft.drawn.chains if c.line == number and line.bounds]
-        free = list(dict.fromkeys(v for chain in chains for v in chain if not held[v]))
+        chosen = edges.ends[(edges.line == number) & (edges.state == STATES.index("free"))]
+        free = [v for v in dict.fromkeys(chosen[:, 0].tolist()) if not held[v]]
         if free:
             place = draft.drawn.points[free[0]].round(4).tolist()
             text = (
                 f"nothing holds {line.name} at {place} ({len(free)} such vertices): the tension has"
-                " nothing to pull against there, and there is probably no equilibrium; fix the edge,"
-                " along a curve in space if it should be above the plane"
+                " nothing to pull against there, and there is probably no equilibrium; give the edge a cable"
+                ' (edge = "cable"), or fix it, along a curve in space if it should be above the plane'
             )
             warnings.warn(text, PlanWarning, stacklevel=4)
+
+
+def _cables(draft: _Draft, held: Bools) -> list[Cable]:
+    """The cables of the edges, and those along dividers."""
+    numbers = count(1)
+    cables = edge_cables(draft.edges, held, numbers)
+    first = 1 + len(draft.plan.holes)
+    for k, divider in enumerate(draft.plan.dividers):
+        if divider.cable is None:
+            continue
+        parts = [chain.edges for chain in draft.drawn.chains if chain.line == first + k]
+        named = divider.wall is None and not divider.name.startswith("divider ")
+        name = divider.name if named else f"cable {next(numbers)}"
+        cables.append(Cable(name, divider.cable, np.concatenate(parts)))
+    return cables
+
+
+def _check_free_pressure(
+    draft: _Draft, cables: Sequence[Cable], patches: Sequence[Patch], patch_of_face: Ints
+) -> None:
+    """Refuse pressure, and snow, on a patch with a free edge."""
+    loads = []
+    for k, patch in enumerate(patches):
+        F = draft.mesh.triangles[patch_of_face == k]
+        loads.append((patch.name, patch.pressure, F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)))
+    check_pressures(draft.edges, cables, loads)
 
 
 def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
@@ -195,7 +268,8 @@ def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
     areas = plan.patches
     if not areas:
         assert plan.tension is not None
-        areas = tuple(Area(f"patch {k + 1}", plan.tension) for k in range(count))
+        values = {"tension": plan.tension, "pressure": plan.pressure, "weight": plan.weight}
+        areas = tuple(Area(f"patch {k + 1}", **values) for k in range(count))
     located = [a for a in areas if a.at is not None]
     if not located:
         if len(areas) != count:
@@ -211,7 +285,10 @@ def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
         raise PlanError(problem, what="at", where=missing)
     else:
         owner = _located(areas, mesh, count, centroid)
-    patches = [Patch(a.name, a.tension, a.pressure) for a in areas]
+    snow = [plan.snow if a.snow is None else a.snow for a in areas]
+    patches = [
+        Patch(a.name, a.tension, a.pressure - s, weight=a.weight) for a, s in zip(areas, snow, strict=True)
+    ]
     return patches, owner[mesh.region]
 
 
@@ -240,8 +317,15 @@ def _located(areas: Sequence[Area], mesh: PlanarMesh, count: int, centroid: Floa
     return owner
 
 
-def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch]]:
-    """The walls and their patches: one for each divider and each difference of pressure along it.
+def _room_of_face(plan: PlanData, patches: Sequence[Patch], patch_of_face: Ints) -> Ints:
+    """(m,) the room of prescribed volume below each face, -1 for none."""
+    rooms = [room.patches for room in plan.rooms.values()]
+    number = [next((k for k, names in enumerate(rooms) if patch.name in names), NONE) for patch in patches]
+    return np.array(number, dtype=np.int64)[patch_of_face]
+
+
+def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], list[_Sides]]:
+    """The walls and their patches: one for each divider and each pair of pressures and rooms along it.
 
     A wall takes the pressure on the left of its divider less that on the right.
     """
@@ -256,8 +340,7 @@ def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch]]:
             floor[chain.vertices] = roof.base[chain.vertices]
         else:
             level[chain.vertices] = True
-        difference = _difference(draft.mesh.triangles, roof.pressure, *chain.vertices[:2])
-        walled.append((chain.vertices, (number, difference)))
+        walled.append((chain.vertices, (number, _sides(draft.mesh.triangles, roof, *chain.vertices[:2]))))
     mixed = np.flatnonzero(level & (floor != 0.0))
     if len(mixed):
         place = draft.drawn.points[mixed[0]].round(6).tolist()
@@ -266,16 +349,39 @@ def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch]]:
     kinds = sorted(dict.fromkeys(kind for _, kind in walled), key=lambda kind: kind[0])
     tops = [UpperEdge(v, kinds.index(k), plan.dividers[k[0]].bottom != "sliding") for v, k in walled]
     patches = []
-    for number, difference in kinds:
+    for number, sides in kinds:
         divider, alike = plan.dividers[number], [kind for kind in kinds if kind[0] == number]
-        suffix = f"-{alike.index((number, difference)) + 1}" if len(alike) > 1 else ""
-        patches.append(Patch(divider.name + suffix, divider.wall, difference, wall=True))
-    return build_walls(X, tops, plan.edge_length, plan.plane, roof.fixed, floor), patches
+        suffix = f"-{alike.index((number, sides)) + 1}" if len(alike) > 1 else ""
+        patches.append(Patch(divider.name + suffix, divider.wall, sides.difference, wall=True))
+    walls = build_walls(X, tops, plan.edge_length, plan.plane, roof.fixed, floor)
+    return walls, patches, [sides for _, sides in kinds]
 
 
-def _difference(triangles: Ints, pressure: Floats, one: int, two: int) -> float:
-    """Pressure on the left of the edge from vertex ``one`` to ``two`` less that on its right."""
+class _Sides(NamedTuple):
+    """Of a wall: the pressure on the left less that on the right, and the rooms there, -1 for none."""
+
+    difference: float
+    left: int
+    right: int
+
+
+def _sides(triangles: Ints, roof: _Roof, one: int, two: int) -> _Sides:
+    """The sides of the edge from vertex ``one`` to ``two``."""
     ahead = np.roll(triangles, -1, axis=1)
     left = ((triangles == one) & (ahead == two)).any(axis=1)
     right = ((triangles == two) & (ahead == one)).any(axis=1)
-    return float(pressure[left].sum() - pressure[right].sum())
+    rooms = (int(roof.room[side].max(initial=NONE)) for side in (left, right))
+    return _Sides(float(roof.pressure[left].sum() - roof.pressure[right].sum()), *rooms)
+
+
+def _rooms(plan: PlanData, walls: Sequence[Patch], sides: Sequence[_Sides]) -> list[Room]:
+    """The rooms of prescribed volume: below their patches, between the walls to other rooms."""
+    rooms = []
+    for number, (name, room) in enumerate(plan.rooms.items()):
+        around = dict.fromkeys(room.patches, 1)
+        for wall, side in zip(walls, sides, strict=True):
+            sign = (side.left == number) - (side.right == number)
+            if sign:
+                around[wall.name] = sign
+        rooms.append(Room(name, tuple(around.items()), room.volume))
+    return rooms

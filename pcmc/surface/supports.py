@@ -33,6 +33,11 @@ class Supports(NamedTuple):
     on_plane: Bools
     on_line: tuple[tuple[Guide, Bools], ...]
 
+    def fixed_and_sliding(self) -> tuple[Bools, Bools]:
+        """(n,) masks of vertices that are fixed or slide along a line, and of the others that slide on Π."""
+        fixed = np.any([self.fixed, *(along for _, along in self.on_line)], axis=0)
+        return fixed, self.on_plane & ~fixed
+
     def frozen(self) -> Supports:
         """The same with arrays that cannot be written to."""
         lines = tuple((line, read_only(along)) for line, along in self.on_line)
