@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 import tomllib
 
 import numpy as np
@@ -121,6 +122,29 @@ def test_a_target_out_of_reach_keeps_the_surface_and_says_why(session):
     assert "nearest reachable" in state.message
     assert state.undo == 0
     assert session.undo().message == ""
+
+
+def test_a_search_tells_its_progress_and_can_be_stopped(session, monkeypatch):
+    told = []
+    real = Session.stop
+
+    def met(surface, targets, vary, callback):
+        callback(None)
+        told.append(session.progress)
+        stopping = threading.Thread(target=real, args=(session,))
+        stopping.start()
+        until(lambda: session._requests == 2, "the stop")
+        with pytest.raises(StopIteration):
+            callback(None)
+        return pcmc.meet(surface, targets, vary, solves=1)
+
+    monkeypatch.setattr("pcmc.explore.session.meet", met)
+    before = session.surface
+    state = session.meet((Target("apex", "west", 1.3),), (Parameter("west"),))
+    assert told == ["1 solves"]
+    assert state.superseded
+    assert session.state().surface is before
+    assert session.progress == ""
 
 
 @pytest.mark.parametrize(
@@ -332,7 +356,7 @@ def test_the_page_follows_the_file_and_survives_a_broken_save(tmp_path):
         def news():
             return client.ask(f"/api/{name}/news")[0]
 
-        assert news() == {"version": 0, "working": False, "problem": ""}
+        assert news() == {"version": 0, "working": False, "problem": "", "progress": ""}
         path.write_text(TEXT.replace("edge_length", "edge_lenght"))
         until(lambda: "did you mean 'edge_length'" in news()["problem"], "the problem")
         assert str(tmp_path) not in news()["problem"]
