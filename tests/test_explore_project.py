@@ -22,6 +22,7 @@ from pcmc.certificate import Verdict
 from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
 from pcmc.explore import saving
+from pcmc.explore.page_data import outline
 from pcmc.explore.roof import Roof, read_roof
 from pcmc.explore.session import Session, solved_start
 from pcmc.explore.variants import difference, measures
@@ -418,8 +419,16 @@ def test_cables_weights_and_rooms_have_values_that_move_the_surface():
         [0] * 5,
         [pcmc.Patch("roof", 1.0, 0.5, weight=0.1)],
         fixed=[0, 1, 2, 3],
-        cables=[pcmc.Cable("edge", 3.0, [[0, 5], [5, 1]])],
+        cables=[pcmc.Cable("edge", 3.0, [[0, 5], [5, 1]]), pcmc.Cable("inner", 0.0, [[0, 4]])],
     )
+    about, arrays = outline(square)
+    assert [group["kinds"] for group in about["controls"]] == [
+        ["tensions", "pressures", "weights"],
+        ["cables"],
+        ["cables"],
+    ]
+    drawn = {tuple(sorted(pair)) for pair in arrays["curves"].tolist()}
+    assert {(0, 5), (1, 5), (0, 4)} < drawn
     session = Session(solved_start(square))
     state = session.settle({"cables": {"edge": 6.0}, "weights": {"roof": 0.2}})
     assert state.failure is None
