@@ -129,8 +129,9 @@ class Parameter:
     @property
     def label(self) -> str:
         """The parameter in words."""
-        kind = "tension of cable" if self.kind == "cable" else f"{self.kind} of"
-        return f"{kind} {self.patch}"
+        if self.kind == "cable":  # which may have the name "cable 1"
+            return f"tension of cable {self.patch.removeprefix('cable ')}"
+        return f"{self.kind} of {self.patch}"
 
     def value(self, surface: Surface) -> float:
         """Its value on a surface."""
