@@ -12,12 +12,14 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, PlanWarning, SurfaceError
 from ..meshing.angles import improve_angles
-from ..surface import Patch, Surface
+from ..surface import Patch, Plane, Surface
+from ..surface.wall_tensions import balanced_wall
 from .arrangement import Arrangement, arrange, hole_points
+from .corners import most_in_corners
 from .curves import Curve
 from .heights import dome, harmonic_heights
 from .lines import SNAP, Kind, Line
-from .parts import EDGES, Area, PlanData
+from .parts import BALANCED, EDGES, Area, PlanData
 from .pieces import to_local, to_space
 from .planar import PlanarMesh, locate, signed_areas, triangulate
 from .walls import UpperEdge, WallMesh, build_walls
@@ -41,12 +43,14 @@ class _Draft:
 
 @dataclass(frozen=True, eq=False)
 class _Roof:
-    """Positions (n,3), heights (n,) of the surface that the boundary spans, fixed (n,), pressures (m,)."""
+    """Positions (n,3), heights (n,) of the surface that the boundary spans, fixed (n,); of each triangle (m,)
+    the pressure and tension."""
 
     positions: Floats
     base: Floats
     fixed: Bools
     pressure: Floats
+    tension: Floats
 
 
 def build_surface(plan: PlanData) -> Surface:
@@ -67,9 +71,9 @@ def build_surface(plan: PlanData) -> Surface:
     height = base + dome(mesh.points, mesh.triangles, fixed | sliding, plan.rise)
     inner = np.arange(len(base)) >= len(draft.drawn.points)
     raised = improve_angles(np.column_stack([mesh.points, height]), mesh.triangles, inner, GOOD_ANGLE)
-    pressure = np.array([p.pressure for p in patches])[patch_of_face]
-    roof = _Roof(to_space(raised, plan.plane), base, fixed, pressure)
-    walls, wall_patches = _walls(draft, roof)
+    pressure, tension = np.array([[p.pressure, p.tension] for p in patches])[patch_of_face].T
+    roof = _Roof(to_space(raised, plan.plane), base, fixed, pressure, tension)
+    walls, wall_patches, divider_of_label = _walls(draft, roof)
     return Surface(
         np.concatenate([roof.positions, walls.vertices]),
         np.concatenate([mesh.triangles, walls.faces]),
@@ -78,6 +82,7 @@ def build_surface(plan: PlanData) -> Surface:
         np.concatenate([fixed, walls.fixed]),
         np.concatenate([sliding, walls.sliding]),
         plan.plane,
+        on_planes=_upright_planes(draft, walls, divider_of_label),
     )
 
 
@@ -240,8 +245,29 @@ def _located(areas: Sequence[Area], mesh: PlanarMesh, count: int, centroid: Floa
     return owner
 
 
-def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch]]:
-    """The walls and their patches: one for each divider and each difference of pressure along it.
+def _upright_planes(draft: _Draft, walls: WallMesh, divider_of_label: Ints) -> tuple[tuple[Plane, Ints], ...]:
+    """The vertical plane of each upright divider, and the vertices of its wall and junction."""
+    planes = []
+    for number, divider in enumerate(draft.plan.dividers):
+        if not divider.upright:
+            continue
+        line = draft.lines[1 + len(draft.plan.holes) + number]
+        along = line.curve.at(line.curve.dense)[:, :2]
+        start, way = along[0], along[-1] - along[0]
+        across = np.array([-way[1], way[0]]) / (np.linalg.norm(way) or 1.0)
+        if line.curve.closed or np.abs((along - start) @ across).max() > SNAP * draft.plan.edge_length:
+            raise line.error("is not straight, so no plane can hold its wall upright; remove upright = true")
+        foot, tip = to_space(np.array([[*start, 0.0], [*(start + across), 0.0]]), draft.plan.plane)
+        chains = [c.vertices for c in draft.drawn.chains if c.line == 1 + len(draft.plan.holes) + number]
+        own = walls.faces[divider_of_label[walls.label] == number]
+        planes.append(
+            (Plane(tuple(foot), tuple(tip - foot)), np.unique(np.concatenate([*chains, own.ravel()])))
+        )
+    return tuple(planes)
+
+
+def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], Ints]:
+    """The walls, their patches, and the divider of each: one patch for each difference of pressure along it.
 
     A wall takes the pressure on the left of its divider less that on the right.
     """
@@ -269,8 +295,25 @@ def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch]]:
     for number, difference in kinds:
         divider, alike = plan.dividers[number], [kind for kind in kinds if kind[0] == number]
         suffix = f"-{alike.index((number, difference)) + 1}" if len(alike) > 1 else ""
-        patches.append(Patch(divider.name + suffix, divider.wall, difference, wall=True))
-    return build_walls(X, tops, plan.edge_length, plan.plane, roof.fixed, floor), patches
+        tension = _balanced(draft, roof, number) if divider.wall == BALANCED else divider.wall
+        patches.append(Patch(divider.name + suffix, tension, difference, wall=True))
+    numbers = np.array([number for number, _ in kinds], dtype=np.int64)
+    return build_walls(X, tops, plan.edge_length, plan.plane, roof.fixed, floor), patches, numbers
+
+
+def _balanced(draft: _Draft, roof: _Roof, number: int) -> float:
+    """A tension for the wall of a divider with which all of its junctions balance, if there is one."""
+    line = 1 + len(draft.plan.holes) + number
+    beside = [_beside(draft.mesh.triangles, *c.vertices[:2]) for c in draft.drawn.chains if c.line == line]
+    pressure = min(float(np.abs(roof.pressure[faces]).min(initial=np.inf)) for faces in beside)
+    curve, outline = draft.lines[line].curve, draft.lines[0].curve
+    most = most_in_corners(curve, outline, draft.plan.edge_length, pressure)
+    return balanced_wall([roof.tension[faces].tolist() for faces in beside], most or np.inf)
+
+
+def _beside(triangles: Ints, one: int, two: int) -> Ints:
+    """The triangles at the edge between two vertices."""
+    return np.flatnonzero((triangles == one).any(axis=1) & (triangles == two).any(axis=1))
 
 
 def _difference(triangles: Ints, pressure: Floats, one: int, two: int) -> float:

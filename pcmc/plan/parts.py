@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from .curves import Curve, curve
 
 EDGES = ("fixed", "sliding", "free")
 BOTTOMS = ("sliding", "held", "sloped")
+BALANCED = "balanced"  # in place of a wall's tension: chosen from those of its neighbours
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,19 +28,24 @@ class Divider:
     ----------
     curve : the line. Each end is on the outline, a hole or another divider; parts outside the outline
         or inside a hole are left out.
-    wall : tension of the wall, force/length, ≥ 0; None for no wall. Between patches of different
-        pressures the wall takes the difference.
+    wall : tension of the wall, force/length, ≥ 0; "balanced", chosen so that the junction balances with room
+        to spare: the difference of the neighbours' tensions and 0.3 of the smaller one, less where the wall
+        runs into a corner; None for no wall. Between patches of different pressures the wall takes the
+        difference.
     name : of the wall's patch; by default "wall 1", "wall 2", … in order. Where the difference of
         pressure changes along the divider, each part is a patch of its own: "wall 1-1", "wall 1-2".
     bottom : "held" on Π in all directions; "sliding" on Π; or "sloped": held in all directions on the
         surface that the boundary curves span (for boundaries that leave Π). A junction over a sliding
         bottom is held at its ends by the mesh alone: on finer meshes it slips, or the shape is a saddle.
+    upright : whether a vertical plane holds the wall and the junction on it, in which they slide; the line
+        must be straight. The plane takes the pull across it.
     """
 
     curve: Any
-    wall: float | None = 1.0
+    wall: float | str | None = BALANCED
     name: str = ""
     bottom: str = "held"
+    upright: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +108,11 @@ def divider_of(spec: Any, number: int) -> Divider:
     what = f"divider {number}"
     part = _part_of(Divider, spec, what)
     validate.choice(f"bottom of {what}", part.bottom, BOTTOMS)
-    return Divider(curve_of(part.curve, what), part.wall, part.name or f"wall {number}", part.bottom)
+    if isinstance(part.wall, str):
+        validate.choice(f"wall of {what}", part.wall, (BALANCED,))
+    if not isinstance(part.upright, bool):
+        validate.refuse("upright", part.upright, "True or False", what)
+    return replace(part, curve=curve_of(part.curve, what), name=part.name or f"wall {number}")
 
 
 def hole_of(spec: Any, number: int) -> Hole:

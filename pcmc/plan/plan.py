@@ -26,7 +26,7 @@ class Plan(PlanData):
     Attributes
     ----------
     outline : a closed curve; it may leave Π, but its course in plan must not cross itself.
-    dividers : lines between patches: Dividers, or curves (with walls of tension 1).
+    dividers : lines between patches: Dividers, or curves (with walls whose tension is chosen).
     holes : openings: Holes, or curves (with fixed edges).
     patches : an Area for each part into which the dividers cut the plan, or a mapping from names to
         their attributes; without patches ``tension`` holds for every part.

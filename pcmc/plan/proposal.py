@@ -11,6 +11,8 @@ import numpy as np
 import shapely
 
 from ..base.errors import OptionError, PlanError, unknown
+from ..surface.wall_tensions import balanced_wall
+from .corners import most_in_corners
 from .curves import Curve
 from .drawing import Drawing, Label
 from .parts import Area, Divider, Hole, check_keys
@@ -19,11 +21,7 @@ TRIANGLES = 1500  # of a first roof, about
 FINEST = 6000  # triangles at most, where a part is small
 ACROSS = 2.5  # edges from the middle of the smallest part to its edge, at least
 ROOM = 1.6  # tension, over the least at which a roof over the plan exists
-WALL_ROOM = 0.3  # of the smaller tension: a wall's tension above the difference of its neighbours'
 SAMPLES = 16  # points of a divider at which its neighbours are looked up
-WEDGE = 1.5  # edges from a corner, where the width of the sheets there is taken
-CORNER_SHARE = 0.6  # of what those sheets carry
-NARROW = 0.82  # sine of the angle, 55 degrees, below which a sheet in a corner counts as narrow
 SMALL_HOLE = 0.05  # of the plan's area; smaller holes change its least tension little
 NEAR = 1e-4  # of the plan's size: a part this near to a point of a divider is beside it
 
@@ -229,37 +227,11 @@ def _changed(drawn: Mapping[str, Curve], given: Sequence[Any], what: str, kind: 
 
 
 def wall_tension(curve: Curve, parts: Sequence[Part], tensions: Sequence[float], most: float) -> float:
-    """The tension of a wall: the difference of its neighbours' and 0.3 of the smaller one, at most ``most``.
-
-    A junction balances if the wall's tension is between the difference and the sum. Of several neighbours
-    along the divider the largest value counts. Two digits.
-    """
+    """The tension of a wall along a curve; see ``balanced_wall``."""
     size = sum(part.area.length for part in parts)
-    wanted = [0.0]
+    neighbours = []
     for t in (len(curve.pieces) * (k + 0.5) / SAMPLES for k in range(SAMPLES)):
         point = shapely.Point(curve.at([t])[0, :2])
         beside = [part.area.distance(point) <= NEAR * size for part in parts]
-        near = [tension for tension, there in zip(tensions, beside, strict=True) if there]
-        if near:
-            wanted.append(max(near) - min(near) + min(WALL_ROOM * min(near), most))
-    return float(f"{max(wanted):.2g}")
-
-
-def most_in_corners(curve: Curve, outline: Curve, edge_length: float, pressure: float = 1.0) -> float:
-    """The most by which a wall may exceed the difference of its neighbours, where it runs into a corner.
-
-    There the sheets on both sides get narrow, and carry the wall only as long as its tension is less than
-    p w, with w their width, which is taken an edge and a half from the corner; 0.6 of that leaves room.
-    Infinite where both sides are wide.
-    """
-    edge = _line(outline)
-    corners = outline.at(outline.corners)[:, :2] if len(outline.corners) else np.empty((0, 2))
-    most = math.inf
-    for one in () if curve.closed else (curve, curve.reversed()):
-        away = one.at(one.parameter(np.array([0.0, WEDGE * edge_length])))[:, :2]
-        if not len(corners) or np.linalg.norm(corners - away[0], axis=1).min() > 1e-3 * outline.length:
-            continue
-        width = float(edge.distance(shapely.Point(away[1])))
-        if width < NARROW * WEDGE * edge_length:
-            most = min(most, CORNER_SHARE * pressure * width)
-    return most
+        neighbours.append([tension for tension, there in zip(tensions, beside, strict=True) if there])
+    return balanced_wall(neighbours, most)

@@ -12,7 +12,7 @@ from typing import Any
 from ..accuracy.adaptive import ACCURACY_OF
 from ..base.units import FORCES, LENGTHS
 from ..plan import Area, Divider, Hole, Plan
-from ..plan.parts import BOTTOMS, EDGES
+from ..plan.parts import BALANCED, BOTTOMS, EDGES
 from ..solvers import METHODS, find_method
 from ..surface import Plane
 from .accuracy import AccuracyWanted
@@ -22,6 +22,7 @@ from .structure import Structure
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
 FIRST = "First lines"  # the keys before any table
+WALL = 'a number or "balanced"'
 REQUIRED = MISSING  # the default of a key that must be given
 
 
@@ -76,6 +77,7 @@ def _list_of(*kinds: type) -> Callable[[Any], bool]:
 KINDS: dict[str, Callable[[Any], bool]] = {
     "a value": lambda value: True,
     "a number": _number,
+    WALL: lambda value: _number(value) or value == BALANCED,
     "a whole number": lambda value: _number(value) and isinstance(value, int),
     "true or false": lambda value: isinstance(value, bool),
     "a text": lambda value: isinstance(value, str),
@@ -159,7 +161,7 @@ def main_sections() -> tuple[Section, ...]:
         Section(
             "plan.dividers",
             "A line between patches, with a wall below it. A curve alone is a divider, too.",
-            _of_class(Divider, curve, {"bottom": BOTTOMS}),
+            _of_class(Divider, curve | {"wall": WALL}, {"bottom": BOTTOMS}),
         ),
         Section(
             "plan.holes", "An opening. A curve alone is a hole, too.", _of_class(Hole, curve, {"edge": EDGES})
