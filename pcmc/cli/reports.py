@@ -21,12 +21,16 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         if outcome.design.met:  # otherwise the message has the values
             tables = (outcome.design.targets["value"], outcome.design.parameters["value"])
             print(", with ".join(_values(table, outcome.units) for table in tables))
+    for note in outcome.notes:
+        print(note)
     if verdict and outcome.units:
         print(outcome.units.sentence)
     if verdict:
         print(outcome.certificate.verdict.value)
         if outcome.certificate.detail:
             print(outcome.certificate.detail)
+    if outcome.advice:
+        print("\n  ".join(outcome.advice))
     if outcome.files:
         print(f"written: {', '.join(map(str, outcome.files))}")
 

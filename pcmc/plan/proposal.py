@@ -15,7 +15,7 @@ from ..surface.wall_tensions import balanced_wall
 from .corners import most_in_corners
 from .curves import Curve
 from .drawing import Drawing, Label
-from .parts import Area, Divider, Hole, check_keys
+from .parts import Area, Divider, Hole, PlanData, check_keys
 
 TRIANGLES = 1500  # of a first roof, about
 FINEST = 6000  # triangles at most, where a part is small
@@ -48,11 +48,21 @@ def parts_of(drawing: Drawing) -> list[Part]:
     return sorted(parts, key=lambda part: (round(part.area.centroid.x, 6), round(part.area.centroid.y, 6)))
 
 
+def plan_area(plan: PlanData) -> Any:
+    """The plan on Π without its holes, as ``roof_area``."""
+    holes = [hole.curve.local(plan.plane) for hole in plan.holes]
+    return _area(plan.outline.local(plan.plane), holes, SMALL_HOLE)
+
+
 def roof_area(drawing: Drawing, smallest: float = 0.0) -> Any:
     """The plan without its holes, as a polygon; level holes below a share of its area are filled."""
-    whole = shapely.make_valid(shapely.Polygon(drawing.outline.at(drawing.outline.dense)[:, :2]))
+    return _area(drawing.outline, list(drawing.holes.values()), smallest)
+
+
+def _area(outline: Curve, holes: Sequence[Curve], smallest: float) -> Any:
+    whole = shapely.make_valid(shapely.Polygon(outline.at(outline.dense)[:, :2]))
     area = whole
-    for curve in drawing.holes.values():
+    for curve in holes:
         hole = shapely.make_valid(shapely.Polygon(curve.at(curve.dense)[:, :2]))
         level = curve.pieces[0].points.shape[1] == 2  # a raised one carries the roof
         if not level or hole.area > smallest * whole.area:

@@ -31,6 +31,8 @@ class Outcome:
     units : those of the project, in which all numbers are.
     cached : whether the roof was solved before and comes from the cache. Then ``accurate`` is None, and the
         histories of ``result`` and ``design`` are empty.
+    notes : what was chosen where the project does not say it, and what happened on the way.
+    advice : where the roof is not good, what to type, a line each; empty if no remedy is known.
     """
 
     result: Result
@@ -40,6 +42,8 @@ class Outcome:
     accurate: AccurateResult | None = None
     units: Units = NO_UNITS
     cached: bool = False
+    notes: Sequence[str] = ()
+    advice: Sequence[str] = ()
 
     @property
     def surface(self) -> Surface:
