@@ -45,10 +45,10 @@ def barrel(
     one = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 6)
     other = np.stack([a, b, d, b, c, d], axis=-1).reshape(-1, 6)
     faces = np.where(rising[:, None], one, other).reshape(-1, 3)
-    ends = {
-        Plane((0.0, place, 0.0), (0.0, 1.0, 0.0), name, mirror=True): number[:, column]
-        for place, name, column in ((0.0, "front", 0), (length, "back", -1))
-    }
+    ends = tuple(
+        (Plane((0.0, place, 0.0), (0.0, 1.0, 0.0), name, mirror=True), X[:, 1] == place)
+        for place, name in ((0.0, "front"), (length, "back"))
+    )
     vault = Patch("vault", alpha, pressure, weight=weight)
-    held = np.concatenate([number[0], number[-1]])
-    return Surface(X, faces, np.zeros(len(faces), dtype=int), [vault], fixed=held, on_planes=ends)
+    held = np.abs(X[:, 0]) == 0.5 * span
+    return Surface(X, faces, np.zeros(len(faces), dtype=int), (vault,), fixed=held, on_planes=ends)

@@ -50,7 +50,9 @@ def schwarz_p(rings: int = 6, *, size: float = 1.0, alpha: float = 1.0) -> Surfa
             point, normal = size * place * np.eye(3)[axis], np.eye(3)[axis]
             planes[Plane(tuple(point), tuple(normal), f"{name} = {text}", mirror=True)] = there
     patch = np.zeros(len(net.faces), dtype=int)
-    return Surface(size * X, net.faces, patch, [Patch("film", alpha, pressure=0.0)], on_planes=planes)
+    return Surface(
+        size * X, net.faces, patch, (Patch("film", alpha, pressure=0.0),), on_planes=tuple(planes.items())
+    )
 
 
 def _on_level_set(X: Floats) -> Floats:

@@ -77,7 +77,7 @@ def triple_bubble_exact(*, volume: float = 1.0, alpha: float = 1.0) -> ExactSolu
 
     A bubble's volume is ∫∫ ½ s² dz dθ along the arcs of its sphere in the half-planes at θ, |θ| ≤ 60°, with s
     the distance from the common edge. At rest α A = 3/2 · Σ p V, p = 2α/R: homotheties change neither. At
-    volumes 1, A = 13.128168244333. At prescribed volumes the index is 0.
+    volumes 1, A = 13.128168244433. At prescribed volumes the index is 0.
 
     >>> round(triple_bubble_exact().area, 9)
     13.128168244

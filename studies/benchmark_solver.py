@@ -22,6 +22,7 @@ from pcmc.energy.projected_hessian import Pattern, assemble, hessian_pattern
 from pcmc.stability.factorisation import Factoriser, available, factoriser
 
 from . import evolver
+from .benchmark_pieces import pieces
 from .timing import Row, median, median_seconds, peak_bytes
 
 QUARTER_MILLION, MILLION = 245, 492  # squares a side, for 260 000 and 1 050 000 triangles
@@ -150,4 +151,4 @@ def redesign(quick: bool) -> list[Row]:
     return [Row("solving a changed design again", 1e3 * seconds, "ms", remark, most=50.0)]
 
 
-SOLVER: list[Callable[[bool], list[Row]]] = [redesign, newton_steps, from_start_to_rest, peak_memory]
+SOLVER: list[Callable[[bool], list[Row]]] = [redesign, newton_steps, from_start_to_rest, pieces, peak_memory]

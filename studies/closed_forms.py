@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -119,7 +120,7 @@ def _bubbles() -> Iterator[Case]:
             start = partial(hemisphere, 2.0 * alpha * edge, alpha=alpha)
             yield Case("hemisphere", f"α {alpha:g}, edge {2 * alpha * edge:g}", start, values)
     for left, right, wall in ((1.0, 1.0, 1.0), (1.0, 1.3, 1.2), (1.0, 0.8, 1.5)):
-        tensions = {"alpha_left": left, "alpha_right": right, "alpha_aux": wall}
+        tensions: dict[str, Any] = {"alpha_left": left, "alpha_right": right, "alpha_aux": wall}
         for edge in (0.8, 0.6, 0.4):
             start = partial(double_bubble, edge, exact=False, **tensions)
             values = _whole(double_bubble_exact(**tensions))

@@ -18,6 +18,7 @@ from . import (
     example3,
     example4,
     existence,
+    forces,
     gallery,
     mesh_check,
     mesh_search,
@@ -48,6 +49,7 @@ MODULES = (
     accuracy,
     panel_families,
     gallery,
+    forces,
     structure,
 )
 STUDIES: dict[str, Study] = {module.STUDY.name: module.STUDY for module in MODULES}

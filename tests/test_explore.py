@@ -147,7 +147,7 @@ def test_exports_are_the_surface_shown(client, suffix, tmp_path):
     client.ask(f"/api/{name}/settle", {"tensions": {"right wall": 18.0}})
     answer, body = client.raw("GET", f"/api/{name}/export?suffix={suffix}")
     assert answer.status == 200
-    assert answer.getheader("Content-Disposition") == f'attachment; filename="surface{suffix}"'
+    assert answer.getheader("Content-Disposition") == f"attachment; filename*=UTF-8''the%20hall{suffix}"
     path = tmp_path / f"surface{suffix}"
     path.write_bytes(body)
     read = pcmc.read(path)
@@ -198,7 +198,7 @@ def test_a_surface_that_is_not_at_rest_has_no_mesh_check():
         ("/api/NAME/follow", '{"tensions": {"left": -3}}', 400, "expected a finite number"),
         ("/api/NAME/follow", '{"tensions": {"left": "a"}}', 400, "'left': expected a number, found 'a'"),
         ("/api/NAME/follow", '{"tensions": {"left": true}}', 400, "expected a number, found True"),
-        ("/api/NAME/settle", '{"pressures": [1]}', 400, "pressures: expected numbers by patch"),
+        ("/api/NAME/settle", '{"pressures": [1]}', 400, "pressures: expected numbers by name"),
         ("/api/NAME/settle", '{"tensions": {"left": 1e999}}', 400, "finite"),
         ("/api/NAME/settle", "{", 400, "not JSON"),
         ("/api/NAME/settle", "\xff", 400, "not JSON"),
@@ -295,8 +295,8 @@ def test_serve_prints_the_address_opens_the_page_and_ends_with_ctrl_c(monkeypatc
 
 def test_listening_for_everyone_is_only_when_told(monkeypatch):
     bound = []
-    real = server._listen
-    monkeypatch.setattr(server, "_listen", lambda host, port: bound.append(host) or real(host, port))
+    real = server.listen
+    monkeypatch.setattr(server, "listen", lambda host, *rest: bound.append(host) or real(host, *rest))
     for host in (None, "0.0.0.0"):
         running = explore.start(CAP) if host is None else explore.start(CAP, host=host)
         running.close()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from browsing import BROWSER, DRIVER, SOFTWARE_GL, Explored, browser, changed, until
@@ -10,6 +12,8 @@ import pcmc
 from generators import bezier_hall, four_fans, spherical_cap
 from pcmc import explore
 from pcmc.base.units import Units
+from pcmc.explore.roof import read_roof
+from pcmc.explore.session import Session
 
 CAP = spherical_cap(edge_length=0.25)
 HALL = bezier_hall(edge_length=10.0)
@@ -147,7 +151,7 @@ def test_the_export_downloads_the_surface(page, driver, explorer):
     for suffix in (".obj", ".pcmc", ".png"):
         page.find("#export summary").click()
         page.find(f"#export button[value='{suffix}']").click()
-        path = driver.downloads / f"surface{suffix}"
+        path = driver.downloads / f"the hall{suffix}"
         until(path.exists, f"the download of {path.name}")
         if suffix == ".png":
             assert path.read_bytes().startswith(b"\x89PNG")
@@ -172,6 +176,170 @@ def test_the_mesh_check_is_shown_until_the_surface_changes(page):
     page.enter("Tension α of left wall", 12)
     assert not page.find("#check-result").is_displayed()
     assert page.complaints() == []
+
+
+PROJECT = """# the hall
+units = "m"
+force = "kN"
+[plan]
+edge_length = 1.0
+outline = [[0, 0], [12, 0], [12, 6], [0, 6]]
+[[plan.dividers]]
+curve = [[6, 0], [6, 6]]  # the valley
+wall = 2.0
+[plan.patches]
+west = {tension = 5.0}  # left
+east = {tension = 5.0}
+[targets]
+meet = [{quantity = "apex", of = "west", value = 1.2}]
+vary = ["west", "east"]
+"""
+
+
+def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(driver, tmp_path):
+    path = tmp_path / "hall.toml"
+    path.write_text(PROJECT)
+
+    def read():
+        return read_roof(path, use_cache=False)
+
+    running = explore.start_roof(read(), watch=read)
+    try:
+        page = Explored(driver, running.url)
+        assert page.text("#targets .message").startswith("met")
+        assert "kN/m" in page.text("#by-patch")
+        assert "west 1.2 " in page.text("#by-patch")
+        # a target is met from the page; one that cannot be met keeps the surface
+        page.find("#variants button[type=submit]").click()
+        page.idle()
+        for value, state in (("1.5", "met"), ("90", "missed")):
+            wanted = page.find("#targets input[aria-label='Value wanted']")
+            wanted.clear()
+            wanted.send_keys(value)
+            page.find("#targets .meet").click()
+            told = page.find("#targets .message")
+            until(lambda told=told, state=state: told.get_attribute("data-state") == state, state)
+            page.idle()
+            assert "west 1.5 " in page.text("#by-patch")
+        assert "nearest reachable" in page.text("#targets .message")
+        # compared with what was kept
+        before = page.picture()
+        page.find("#variants button[aria-pressed]").click()
+        page.idle()
+        assert changed(before, page.picture()) > 0.1
+        assert "Distance from Variant 1, m" in page.text("#legend .name")
+        assert "Apex of west 1.2 1.5 +0.3 (+25 %)" in page.text("#variants table")
+        page.find("#variants button[aria-pressed]").click()
+        page.idle()
+        assert changed(before, page.picture()) == 0.0
+        # saved: a name is asked for, and a file is replaced only when that is allowed
+        page.find("#save-project").click()
+        page.find("#saving .same").click()
+        page.find("#saving input[type=checkbox]").click()
+        page.find("#saving button[type=submit]").click()
+        until(lambda: "is there already" in page.text("#saving .message"), "the refusal")
+        assert path.read_text() == PROJECT
+        name = page.find("#saving input[type=text]")
+        name.clear()
+        name.send_keys("higher")
+        page.find("#saving button[type=submit]").click()
+        until(lambda: "Saved as higher.toml" in page.text("#note"), "the saved file")
+        text = (tmp_path / "higher.toml").read_text()
+        assert "# the valley" in text
+        assert "value = 1.5" in text
+        page.complaints()  # the refused save
+        # followed: another plan, then a broken one
+        path.write_text(PROJECT.replace("[6, 0], [6, 6]", "[7, 0], [7, 6]"))
+        until(lambda: "west 1.2 " in page.text("#by-patch"), "the new roof")
+        page.idle()
+        assert changed(before, page.picture()) > 0.01
+        assert page.text("#variants li").startswith("Variant 1")
+        path.write_text("[plan]\n")
+        until(lambda: page.find("#watch").get_attribute("data-state") == "problem", "the problem")
+        assert "edge_length" in page.text("#watch") or "outline" in page.text("#watch")
+        assert "west 1.2 " in page.text("#by-patch")
+        assert page.complaints() == []
+    finally:
+        running.close()
+
+
+def test_wrong_targets_are_named_on_the_page(page):
+    message = page.find("#targets .message")
+    page.find("#targets .meet").click()
+    assert "number" in message.text
+    page.find("#targets input[aria-label='Value wanted']").send_keys("3")
+    page.driver.execute_script("document.querySelector('#targets details').open = true")
+    for box in page.driver.find_elements("css selector", "#targets .vary input"):
+        if box.is_selected():
+            box.click()
+    page.find("#targets .meet").click()
+    assert "at least one tension" in message.text
+    page.find("#targets .target-row button").click()
+    page.find("#targets .meet").click()
+    assert "number" in message.text
+    assert page.complaints() == []
+
+
+def test_sliders_agree_with_their_numbers(page, explorer):
+    """Also for values beyond the slider's ends, zero, and another sign."""
+    for value in (40, 3, 0):
+        page.enter("Tension α of left wall", value)
+        number, slider = page.number("Tension α of left wall"), page.slider("Tension α of left wall")
+        assert float(number.get_attribute("value")) == value
+        assert float(slider.get_attribute("aria-valuetext")) == value
+        place, low = float(slider.get_attribute("value")), float(slider.get_attribute("min"))
+        assert (place == low) == (value == 0)
+    page.enter("Tension α of left wall", 3)
+    page.enter("Pressure p of left", -0.5)
+    place = float(page.slider("Pressure p of left").get_attribute("value"))
+    assert place == 0.0
+    page.slider("Pressure p of left").send_keys("\ue014" * 20)  # to the right
+    page.idle()
+    shown = float(page.number("Pressure p of left").get_attribute("value"))
+    asked = explorer.sessions[next(reversed(explorer.sessions))].state().asked[0].pressure
+    assert shown == asked  # to the last digit
+    page.complaints()
+
+
+def test_terms_are_explained_where_they_stand_by_keys_too(page):
+    from selenium.webdriver.common.keys import Keys
+
+    for name, words in (
+        ("Morse index", "saddle"),
+        ("Load over capacity", "no equilibrium exists"),
+        ("Error by Meyer's measure", "Voronoi"),
+    ):
+        (summary,) = [
+            s for s in page.driver.find_elements("css selector", "#findings summary") if s.text == name
+        ]
+        assert words not in page.text("#findings")
+        summary.send_keys(Keys.ENTER)
+        assert words in page.text("#findings")
+        page.driver.find_element("css selector", "#findings details[open] summary").click()
+
+
+def test_the_walls_are_a_layer(page):
+    page.find("#canvas").send_keys("\ue015" * 12)  # down: the roof from below
+    page.idle()
+    before = page.picture()
+    page.find("#shows input[value=walls]").click()
+    page.idle()
+    assert changed(before, page.picture()) > 0.01
+
+
+def test_slow_work_is_said(page, monkeypatch):
+    real = Session.settle
+
+    def slow(self, values):
+        time.sleep(2.0)
+        return real(self, values)
+
+    monkeypatch.setattr(Session, "settle", slow)
+    number = page.number("Tension α of left wall")
+    number.send_keys("\ue009a\ue000", "11", "\ue004")
+    until(lambda: "Working" in page.text("#verdict .work"), "the words", seconds=1.9)
+    page.idle()
+    assert not page.text("#verdict .work")
 
 
 def test_two_pages_are_two_sessions(driver, explorer):

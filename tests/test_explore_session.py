@@ -14,7 +14,8 @@ from generators import bezier_hall, four_fans, spherical_cap
 from pcmc.accuracy import check_mesh
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate import Verdict
-from pcmc.explore.session import Session, between, reach, solved_start
+from pcmc.explore.following import between, reach
+from pcmc.explore.session import Session, solved_start
 from pcmc.surface.wall_pressures import with_pressures
 
 CAP = spherical_cap(edge_length=0.25)

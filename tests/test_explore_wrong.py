@@ -7,12 +7,13 @@ import json
 import socket
 import time
 from contextlib import ExitStack
+from http.server import BaseHTTPRequestHandler
 
 import pytest
 
 from generators import spherical_cap
 from pcmc import explore
-from pcmc.explore import server
+from pcmc.explore import listening, server
 from pcmc.explore.messages import unpack
 
 CAP = spherical_cap(edge_length=0.5)
@@ -59,7 +60,7 @@ def sent(explorer, data):
         ("NAME/follow", '{"tensions": {"cap": NaN}}', "finite"),
         ("NAME/follow", '{"tensions": {"cap": [1]}}', "expected a number"),
         ("NAME/follow", '{"tensions": {"%s": 1}}' % ("a" * 500_000), "a name of 500000 characters"),
-        ("NAME/settle", '{"tensions": null}', "expected numbers by patch"),
+        ("NAME/settle", '{"tensions": null}', "expected numbers by name"),
         ("NAME/settle", DEEP, "nested too deep"),
         ("NAME/settle", '{"tensions": ' + DEEP, "nested too deep"),
     ],
@@ -123,7 +124,7 @@ def test_forty_browsers_at_once_are_all_served(explorer):
 
 def test_connections_wait_for_a_busy_server():
     """A server that accepts none for a while: the system keeps their connections."""
-    waiting = server._listen("127.0.0.1", 0)
+    waiting = listening.listen("127.0.0.1", 0, BaseHTTPRequestHandler)
     with ExitStack() as stack:
         stack.callback(waiting.server_close)
         for _ in range(40):
@@ -140,13 +141,13 @@ def test_connections_wait_for_a_busy_server():
     ],
 )
 def test_a_half_sent_request_is_closed(explorer, monkeypatch, data):
-    monkeypatch.setattr(server, "REQUEST_SECONDS", 0.2)
+    monkeypatch.setattr(listening, "REQUEST_SECONDS", 0.2)
     answer = sent(explorer, data)
     assert not answer or answer.startswith(b"HTTP/1.1 400 ")
 
 
 def test_a_request_that_trickles_is_closed(explorer, monkeypatch):
-    monkeypatch.setattr(server, "REQUEST_SECONDS", 0.5)
+    monkeypatch.setattr(listening, "REQUEST_SECONDS", 0.5)
     end = time.monotonic() + 60.0
     with socket.create_connection(("127.0.0.1", explorer.port), timeout=60) as line:
         while time.monotonic() < end:
@@ -159,7 +160,7 @@ def test_a_request_that_trickles_is_closed(explorer, monkeypatch):
 
 
 def test_a_long_computation_is_not_cut_off(explorer, monkeypatch):
-    monkeypatch.setattr(server, "REQUEST_SECONDS", 0.5)
+    monkeypatch.setattr(listening, "REQUEST_SECONDS", 0.5)
     real = server.Explorer.open
 
     def slow(self):

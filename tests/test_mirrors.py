@@ -9,12 +9,13 @@ from refusals import refused
 import pcmc
 from generators import barrel, four_fans, schwarz_p, spherical_cap, two_squares
 from generators.schwarz_p import AREA
-from pcmc import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
+from pcmc import Cable, Circle, Line, Patch, Plane, Room, Surface, cli, cut, mirrored
 from pcmc.base.errors import FreeSurfaceWarning, OptionError, SurfaceError
 from pcmc.energy.curvature import mean_curvature
 from pcmc.energy.functional import energy_and_gradient, patch_volumes
 from pcmc.energy.jacobian import linearise
 from pcmc.energy.motion_space import motion_space, vertex_classes
+from pcmc.io import load
 from pcmc.meshing.refinement import refine
 from pcmc.surface import unfolded
 from pcmc.surface.geometry import area_vectors
@@ -302,3 +303,39 @@ def test_what_mirror_planes_refuse():
             cut(whole, Plane((0, place, 0), (0, 1, 0)))
     with refused(SurfaceError, what="plane"):
         cut(whole, 3)
+
+
+def test_the_whole_on_the_command_line(tmp_path, monkeypatch, capsys):
+    """convert and plot unfold a piece, with its scalars; without a mirror plane they say what is missing."""
+    monkeypatch.chdir(tmp_path)
+    piece = cut(spherical_cap(edge_length=0.4), MIDDLE)
+    values = {"height": piece.vertices[:, 2], "patch": np.zeros(piece.m)}
+    pcmc.write("half.pcmc", piece, scalars=values)
+    assert cli.main(["convert", "half.pcmc", "whole.pcmc", "--whole"]) == 0
+    whole = load("whole.pcmc")
+    assert len(whole.faces) == 2 * piece.m
+    np.testing.assert_allclose(whole.scalars["height"], whole.vertices[:, 2], atol=1e-14)
+    assert cli.main(["plot", "half.pcmc", "whole.png", "--whole"]) == 0
+    assert (tmp_path / "whole.png").read_bytes().startswith(b"\x89PNG")
+    assert cli.main(["convert", "whole.pcmc", "again.pcmc", "--whole"]) == 2
+    assert "no mirror plane" in capsys.readouterr().err
+
+
+def test_a_prescribed_volume_in_an_eighth():
+    """An eighth of a bubble with an eighth of its volume: stable; the whole keeps volume and energy."""
+    volume, start = np.pi / 6.0, octant(3)
+    room = Room("inside", {"bubble": 1}, volume)
+    piece = Surface(
+        *(start.vertices, start.faces, start.patch_of_face, start.patches),
+        on_planes=start.on_planes,
+        rooms=[room],
+    )
+    result = pcmc.solve(piece)
+    assert result.converged
+    assert result.certify().index == 0
+    assert result.surface.patches[0].pressure == pytest.approx(2.0, rel=0.01)
+    whole = mirrored(result.surface)
+    assert whole.rooms[0].volume == 8 * volume
+    certificate = pcmc.certify(whole)
+    assert (certificate.verdict.name, certificate.index) == ("NEUTRAL", 0)
+    assert certificate.energy == pytest.approx(8 * result.energy, rel=1e-12)

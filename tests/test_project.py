@@ -158,7 +158,11 @@ def test_a_bad_value_is_one_line_with_the_file(small, old, new, fields):
         ("patches = {roof = 3}", "patches.roof", "a table"),
         ('patches = {roof = {tension = "b"}}', "patches.roof.tension", "a number"),
         ("patches = {roof = {tension = true}}", "patches.roof.tension", "a number"),
-        ('dividers = [{curve = [[2, 0], [2, 3]], wall = "a"}]', "dividers.wall", 'a number or "balanced"'),
+        (
+            'dividers = [{curve = [[2, 0], [2, 3]], wall = "a"}]',
+            "dividers.wall",
+            'a number, "balanced" or false',
+        ),
         ("outline = 3", "outline", "a curve"),
         ('rise = "x"', "rise", "a number"),
         ("plane = {normal = 3}", "plane.normal", "a point [x, y, z]"),

@@ -348,7 +348,8 @@ def boundary_table(surface: Surface, forces: Floats) -> pd.DataFrame:
 
 def _curves_by_patch(surface: Surface, edges: Bools) -> list[Curve]:
     """The curves of boundary edges (e,), each in one patch."""
-    topo, curves = surface.topology, []
+    topo = surface.topology
+    curves: list[Curve] = []
     patch = np.empty(len(topo.edges), dtype=np.int64)
     patch[topo.edge_of_face] = surface.patch_of_face[:, None]
     for p in np.unique(patch[edges]):

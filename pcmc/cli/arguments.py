@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import math
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +14,7 @@ from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import Units
+from ..energy.rooms import refuse_varied_pressure
 from ..io import FORMATS, READ_ONLY, read_bare
 from ..io.mesh_data import MeshData
 from ..project.output import OnStep
@@ -36,6 +36,16 @@ Settings = Annotated[list[str] | None, option("NAME=VALUE", f"Tension of a patch
 Pressures = Annotated[
     list[str] | None,
     option("NAME=VALUE", f"Pressure on a patch. {_EVERY}; wall pressures are updated.", "--pressure"),
+]
+Weights = Annotated[
+    list[str] | None,
+    option("NAME=VALUE", "Weight of a patch per area. A bare VALUE applies to every patch.", "--weight"),
+]
+Cables = Annotated[
+    list[str] | None, option("NAME=VALUE", "Tension of a cable. A bare VALUE applies to all.", "--cable")
+]
+Volumes = Annotated[
+    list[str] | None, option("NAME=VALUE", "Volume of a room that has one already.", "--volume")
 ]
 ViewName = Annotated[str, option("NAME", "diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees.")]
 Colour = Annotated[str, option("NAME", "patches, curvature, error or reactions.", "--colour", "--color")]
@@ -64,6 +74,36 @@ def integer(text: str | int) -> int:
         raise typer.BadParameter(f"expected a whole number, found {text!r}") from None
 
 
+@dataclass(frozen=True)
+class Loads:
+    """Values of the command line that replace those of a surface: each a list of NAME=VALUE, or VALUE."""
+
+    tension: list[str] | None = None
+    pressure: list[str] | None = None
+    weight: list[str] | None = None
+    cable: list[str] | None = None
+    volume: list[str] | None = None
+
+    def __bool__(self) -> bool:
+        """Whether there are any."""
+        return any(vars(self).values())
+
+    def of(self, surface: Surface) -> Surface:
+        """The surface with these values; wall pressures follow those of their rooms."""
+        sheets = [patch.name for patch in surface.patches if not patch.wall]
+        loaded = [patch.name for patch in surface.patches if not patch.auxiliary] or sheets
+        pressures = by_name(loaded, self.pressure, "--pressure")
+        refuse_varied_pressure(surface, map(surface.patch_index, pressures))
+        return with_pressures(
+            surface,
+            by_name(loaded, self.tension, "--tension"),
+            pressures,
+            weights=by_name(sheets, self.weight, "--weight"),
+            cables=by_name([cable.name for cable in surface.cables], self.cable, "--cable"),
+            volumes=by_name([room.name for room in surface.rooms], self.volume, "--volume"),
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Given:
     """The surface that a command is given.
@@ -73,7 +113,7 @@ class Given:
     surface : the surface in a file, the designed roof of a project, or its start shape.
     units : of its numbers.
     outcome : how the roof of a project was reached; None for a file and for a start shape.
-    data : everything in a file; None for a project, and where its tensions or pressures are changed.
+    data : everything in a file; None for a project, and where its tensions or other loads are changed.
     """
 
     surface: Surface
@@ -85,15 +125,14 @@ class Given:
 def given(
     file: Path,
     say: OnStep,
-    tension: list[str] | None = None,
-    pressure: list[str] | None = None,
+    loads: Loads | None = None,
     *,
     start: bool = False,
     cache: bool = True,
 ) -> Given:
     """The surface in a file, or the designed roof of a project; with ``start`` its start shape."""
     check_input(file)
-    changed = partial(retensioned, tension=tension, pressure=pressure) if tension or pressure else None
+    changed = loads.of if loads else None
     if not projects.is_project(file):
         surface, data = read_bare(file)
         if changed is None:
@@ -114,15 +153,8 @@ def check_input(file: Path) -> None:
         raise FileError(f"{file}: {unknown('suffix', suffix, known)}", what=str(file))
 
 
-def retensioned(surface: Surface, tension: list[str] | None, pressure: list[str] | None) -> Surface:
-    """The surface with the tensions and pressures of the command line."""
-    loaded = [patch.name for patch in surface.patches if not patch.auxiliary]
-    tensions, pressures = by_name(loaded, tension, "--tension"), by_name(loaded, pressure, "--pressure")
-    return with_pressures(surface, tensions, pressures)
-
-
 def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:
-    """Value by patch, from NAME=VALUE, or VALUE for all ``names``. A later one replaces an earlier one."""
+    """Value by name, from NAME=VALUE, or VALUE for all ``names``. A later one replaces an earlier one."""
     values: dict[str, float] = {}
     for text in given or ():
         name, sign, value = text.rpartition("=")

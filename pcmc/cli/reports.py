@@ -7,7 +7,8 @@ import pandas as pd
 from ..base.units import Units
 from ..project import Outcome
 
-UNIT_OF = {"apex": "length", "height": "length", "reaction": "tension"}  # others are named as their units
+UNIT_OF = {"apex": "length", "height": "length", "sag": "length", "reaction": "tension", "weight": "pressure"}
+"""The unit of quantities and parameters; others are named as their units."""
 
 
 def report(outcome: Outcome, *, verdict: bool = True) -> None:
@@ -29,6 +30,9 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         print(outcome.certificate.verdict.value)
         if outcome.certificate.detail:
             print(outcome.certificate.detail)
+        if outcome.whole is not None:
+            whole = outcome.whole
+            print(f"the whole roof, {whole.surface.m} triangles: {whole.certificate.verdict.value}")
     if outcome.advice:
         print("\n  ".join(outcome.advice))
     if outcome.files:
@@ -39,7 +43,7 @@ def _values(values: pd.Series, units: Units) -> str:
     """Targets or parameters, such as "apex of roof 1.2 m"; the first word of a label is the quantity."""
     shown = []
     for label, value in values.items():
-        quantity = str(label).split()[0]
+        quantity = "force" if str(label).startswith("tension of cable ") else str(label).split()[0]
         unit = f" {getattr(units, UNIT_OF.get(quantity, quantity))}" if units else ""
         shown.append(f"{label} {value:.6g}{unit}")
     return ", ".join(shown)

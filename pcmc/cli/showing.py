@@ -12,11 +12,24 @@ import typer
 from .. import project as projects
 from ..base.errors import OptionError, unknown
 from ..base.interrupts import defer_interrupts
-from ..base.units import NO_UNITS
 from ..io import write
 from ..surface import Surface, mirrored, unfolded
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import Cache, Colour, Input, Pressures, Settings, Start, ViewName, Whole, option
+from .arguments import (
+    Cables,
+    Cache,
+    Colour,
+    Input,
+    Loads,
+    Pressures,
+    Settings,
+    Start,
+    ViewName,
+    Volumes,
+    Weights,
+    Whole,
+    option,
+)
 from .progress import working
 from .reports import report
 
@@ -28,6 +41,9 @@ def convert(
     ],
     tension: Settings = None,
     pressure: Pressures = None,
+    weight: Weights = None,
+    cable: Cables = None,
+    volume: Volumes = None,
     start: Start = False,
     cache: Cache = True,
     colour: Annotated[
@@ -49,14 +65,15 @@ def convert(
     projects.check_names([output])
     projects.check_outputs([output])
     with working() as say:
-        shown = arguments.given(file, say, tension, pressure, start=start, cache=cache)
+        loads = Loads(tension, pressure, weight, cable, volume)
+        shown = arguments.given(file, say, loads, start=start, cache=cache)
     if shown.outcome is not None and not _is_good(file, shown.outcome):
         return NOT_CERTIFIED
     data: dict[str, Any] = {"units": shown.units, "colour": colour}
     if whole:
         unfold = unfolded(shown.surface)
         scalars = {} if shown.data is None else shown.data.scalars
-        place = {shown.surface.n: unfold.vertex, shown.surface.m: unfold.face}
+        place = {shown.surface.m: unfold.face, shown.surface.n: unfold.vertex}
         with defer_interrupts():
             carried = {name: values[place[len(values)]] for name, values in scalars.items()}
             write(output, unfold.surface, scalars=carried, **data)
@@ -84,6 +101,11 @@ def plot(
     picture: Annotated[Path, typer.Argument(metavar="PNG")],
     view: ViewName = "diagonal",
     colour: Colour = "patches",
+    tension: Settings = None,
+    pressure: Pressures = None,
+    weight: Weights = None,
+    cable: Cables = None,
+    volume: Volumes = None,
     start: Start = False,
     cache: Cache = True,
     whole: Whole = False,
@@ -101,7 +123,8 @@ def plot(
     projects.check_picture(seen, colour)
     projects.check_outputs([picture])
     with working() as say:
-        shown = arguments.given(file, say, start=start, cache=cache)
+        loads = Loads(tension, pressure, weight, cable, volume)
+        shown = arguments.given(file, say, loads, start=start, cache=cache)
     if shown.outcome is not None and not _is_good(file, shown.outcome):
         return NOT_CERTIFIED
     surface = mirrored(shown.surface) if whole else shown.surface
@@ -109,6 +132,9 @@ def plot(
     projects.write_all([(picture, painting)])
     print(f"written: {picture}")
     return OK
+
+
+WATCH = "Follow the file: when it, or a drawing that it refers to, is saved, the page shows the new roof."
 
 
 def explore(
@@ -122,6 +148,7 @@ def explore(
     host: Annotated[str, option("ADDRESS", "Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, option("NUMBER", "Port; 0 for any free one.", parser=arguments.integer)] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
+    watch: Annotated[bool, typer.Option("--watch", help=WATCH)] = False,
     start_shape: Start = False,
     cache: Cache = True,
 ) -> int:
@@ -130,24 +157,28 @@ def explore(
     \b
     Examples:
       pcmc explore roof.pcmc
+      pcmc explore roof.toml --watch
       pcmc explore --example two_caps --set edge_length=1.2
     """
-    from ..explore import open_and_wait, start
+    from ..explore import open_and_wait, start_roof
+    from ..explore.roof import Roof, read_roof
 
     if (file is None) == (example is None):
         raise OptionError("explore: give a file or --example, one of them", what="--example")
+    if watch and file is None:
+        raise OptionError("explore: --watch needs a file", what="--watch")
+    again = None
     with working() as say:
         say("building")
         if file is not None:
-            shown = arguments.given(file, say, start=start_shape, cache=cache)
-            surface, title, units = shown.surface, file.name, shown.units
-            if shown.outcome is not None:
-                report(shown.outcome)
+            arguments.check_input(file)
+            read = partial(read_roof, file, start_shape=start_shape, use_cache=cache)
+            roof, again = read(progress=say, report=report), read if watch else None
         else:
             values = {name: listed[0] for name, listed in map(arguments.values_of, parameter or ())}
-            surface, title, units = _example(str(example), values), str(example), NO_UNITS
+            roof = Roof(_example(str(example), values), str(example))
         say("solving")
-        explorer = start(surface, host, port, title, units)
+        explorer = start_roof(roof, host, port, again)
     open_and_wait(explorer, browser)
     return OK
 

@@ -20,7 +20,21 @@ from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import MANY_FILES, Cache, Input, Pressures, Settings, Start, number, option
+from .arguments import (
+    MANY_FILES,
+    Cables,
+    Cache,
+    Input,
+    Loads,
+    Pressures,
+    Settings,
+    Start,
+    Volumes,
+    Weights,
+    Whole,
+    number,
+    option,
+)
 from .progress import working
 from .reports import report
 
@@ -32,6 +46,7 @@ ACCURACY = (
 )
 ACCURACY_OF = "mesh: the value on the mesh is to be so accurate; limit: the extrapolated one."
 MOST_TRIANGLES = f"The most that the mesh for an accuracy may have, {TRIANGLES} by default."
+WHOLE_INDEX = "Of a surface with mirror planes certify the whole: motions that are not symmetric count, too."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
 
@@ -45,6 +60,9 @@ def solve_(
     ] = None,
     tension: Settings = None,
     pressure: Pressures = None,
+    weight: Weights = None,
+    cable: Cables = None,
+    volume: Volumes = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
     anyway: Annotated[bool, typer.Option("--anyway", help="Write the output even if not certified.")] = False,
     accuracy: Annotated[list[str] | None, option("QUANTITY=NUMBER", ACCURACY, "--accuracy")] = None,
@@ -52,6 +70,7 @@ def solve_(
     most_triangles: Annotated[int | None, option("NUMBER", MOST_TRIANGLES, parser=arguments.integer)] = None,
     mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
     cache: Cache = True,
+    whole: Whole = False,
 ) -> int:
     """Solve a surface or a project, certify it, write all files, or none; then check its mesh.
 
@@ -62,6 +81,7 @@ def solve_(
     Examples:
       pcmc solve roof.toml
       pcmc solve roof.toml --accuracy height=1e-3
+      pcmc solve sail.toml --cable "cable 1=12"
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
     project = _project(file, folder, output, picture)
@@ -73,12 +93,12 @@ def solve_(
     goal = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
-    project = replace(project, mesh_check=False)
+    project = replace(project, mesh_check=False, whole=whole or project.whole)
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
     with working() as say:
-        retensioned = partial(arguments.retensioned, tension=tension, pressure=pressure)
-        changed = retensioned if tension or pressure else None
+        loads = Loads(tension, pressure, weight, cable, volume)
+        changed = loads.of if loads else None
         outcome = projects.run_project(project, say, anyway=anyway, changed=changed, use_cache=cache)
     report(outcome)
     if project.outputs and not outcome.files:
@@ -130,9 +150,13 @@ def certify_(
     file: Input,
     tension: Settings = None,
     pressure: Pressures = None,
+    weight: Weights = None,
+    cable: Cables = None,
+    volume: Volumes = None,
     meshes: Annotated[int | None, option("NUMBER", MESHES, parser=arguments.integer)] = None,
     start: Start = False,
     cache: Cache = True,
+    whole: Annotated[bool, typer.Option("--whole", help=WHOLE_INDEX)] = False,
 ) -> int:
     """Check a surface, or a project's roof: residual forces, curvature errors, stability, reactions.
 
@@ -145,10 +169,14 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as say:
-        shown = arguments.given(file, say, tension, pressure, start=start, cache=cache)
+        loads = Loads(tension, pressure, weight, cable, volume)
+        shown = arguments.given(file, say, loads, start=start, cache=cache)
         surface, outcome = shown.surface, shown.outcome
         say("certifying")
-        certificate = certify(surface) if outcome is None else outcome.certificate
+        if whole or outcome is None:
+            certificate = certify(surface, whole=whole)
+        else:
+            certificate = outcome.certificate
     if outcome is not None:
         report(outcome, verdict=False)
     print(certificate.text(shown.units))

@@ -119,6 +119,8 @@ def _sheet_factor(
     _across_normals(area_vector, single, basis, gradient, out)
     for plane, mask in surface.sliding:
         sliding = np.flatnonzero(single & mask)
+        if not len(sliding):
+            continue
         length = np.linalg.norm(area_vector[sliding], axis=1)
         normal = area_vector[sliding] / length[:, None]
         shadow = np.linalg.norm(plane.along(normal), axis=1)

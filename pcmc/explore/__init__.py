@@ -7,15 +7,17 @@ May import ``project`` and the rooms below it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..base.units import NO_UNITS, Units
 from ..surface import Surface
 
 if TYPE_CHECKING:
+    from .roof import Roof
     from .server import Explorer, View
 
-__all__ = ["open_and_wait", "serve", "show", "start"]
+__all__ = ["open_and_wait", "serve", "show", "start", "start_roof"]
 
 
 def serve(
@@ -61,9 +63,25 @@ def start(
     surface: Surface, host: str = "127.0.0.1", port: int = 0, title: str = "", units: Units = NO_UNITS
 ) -> Explorer:
     """Start the server in the background; the Explorer returned has ``.url`` and ``.close()``."""
+    from .roof import Roof
+
+    return start_roof(Roof(surface, title, units), host, port)
+
+
+def start_roof(
+    roof: Roof, host: str = "127.0.0.1", port: int = 0, watch: Callable[[], Roof] | None = None
+) -> Explorer:
+    """As ``start``, for the roof in a file; with ``watch``, which reads it again, the page follows the file.
+
+    >>> from pcmc.explore.roof import read_roof
+    >>> explorer = start_roof(read_roof("notebooks/roof.toml"))
+    >>> explorer.start.certificate.verdict.name
+    'STABLE'
+    >>> explorer.close()
+    """
     from .server import Explorer
 
-    return Explorer(surface, host, port, title, units)
+    return Explorer(roof, host, port, watch)
 
 
 def show(surface: Surface, height: int = 680, title: str = "") -> View:

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 import numpy.typing as npt
 
 from ..accuracy.mesh_check import MeshCheck, with_bar
 from ..base.arrays import Floats
+from ..base.errors import SurfaceError
 from ..base.units import Units
-from ..certificate.balance import reactions_per_length
+from ..certificate.balance import reactions, reactions_per_length
 from ..certificate.certificate import Certificate
+from ..contact.pinching import standing_part
+from ..design import Parameter, Target
 from ..energy.curvature import curvature_error, mean_curvature
 from ..energy.functional import patch_areas
 from ..surface import Surface
 from ..surface.colours import patch_colors
+from ..surface.mirroring import Whole, unfolded
+from .following import values_of
+from .session import State
+from .variants import Variant, difference
 
 Arrays = dict[str, npt.NDArray[Any]]
 
@@ -25,8 +33,11 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
 
     A vertex where sheets meet is drawn once for each sheet, so that colours and shading break there:
     ``sheet_faces`` (m,3) index these corners; ``sheet_vertex`` and ``sheet_patch`` are their vertex
-    and patch.
+    and patch. A surface that ends at mirror planes is drawn whole.
     """
+    values, whole = values_of(surface), whole_of(surface)
+    groups, piece = control_groups(surface, values), surface
+    surface = surface if whole is None else whole.surface
     corner = surface.patch_of_face[:, None].astype(np.int64) * surface.n + surface.faces
     corners, faces = np.unique(corner, return_inverse=True)
     topo = surface.topology
@@ -35,6 +46,9 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
             {"name": p.name, "wall": p.auxiliary, "color": color}
             for p, color in zip(surface.patches, patch_colors(surface).tolist(), strict=True)
         ],
+        "controls": groups,
+        "whole": whole is not None,
+        "mesh": mesh_key(piece, centre(piece)),
         "vertices": surface.n,
         "triangles": surface.m,
         "size": surface.size,
@@ -57,11 +71,39 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
     }
 
 
+def control_groups(surface: Surface, values: dict[str, dict[str, float]]) -> list[dict[str, Any]]:
+    """What has sliders: a group for each patch, cable and room, with the kinds of its values."""
+    groups = []
+    for number, patch in enumerate(surface.patches):
+        kinds = [kind for kind in ("tensions", "pressures", "weights") if patch.name in values[kind]]
+        groups.append({"name": patch.name, "patch": number, "wall": patch.auxiliary, "kinds": kinds})
+    for kind in ("cables", "volumes"):
+        groups += [{"name": name, "patch": None, "wall": False, "kinds": [kind]} for name in values[kind]]
+    return groups
+
+
+def mesh_key(surface: Surface, origin: Floats) -> int:
+    """A number that changes with all that ``outline`` holds."""
+    names = repr([(p.name, p.auxiliary) for p in surface.patches])
+    return crc32(surface.faces.tobytes() + origin.tobytes() + names.encode())
+
+
+def whole_of(surface: Surface) -> Whole | None:
+    """The whole of a surface that ends at mirror planes; None without these, and where images never end."""
+    if not any(plane.mirror for plane, _ in surface.on_planes):
+        return None
+    try:
+        return unfolded(surface)
+    except SurfaceError:
+        return None
+
+
 def unit_texts(units: Units) -> dict[str, Any]:
     """The units that the page shows; ``given`` is whether they are more than "force" and "length"."""
     names = ("area", "volume", "curvature", "tension", "pressure", "energy")
     texts = {name: getattr(units, name) for name in names}
-    return {"given": bool(units), "length": units.length or "length", **texts}
+    bare = {"length": units.length or "length", "force": units.force or "force"}
+    return {"given": bool(units), **bare, **texts}
 
 
 def centre(surface: Surface) -> Floats:
@@ -70,17 +112,38 @@ def centre(surface: Surface) -> Floats:
     return 0.5 * (X.min(axis=0) + X.max(axis=0))
 
 
-def fields(surface: Surface, certificate: Certificate, origin: Floats) -> Arrays:
+def fields(state: State, origin: Floats) -> Arrays:
     """Vertices relative to the origin, and the values that colours may show."""
+    surface, certificate, whole = state.surface, state.certificate, whole_of(state.surface)
+    drawn = surface if whole is None else whole.surface
+    forces = certificate.reactions if whole is None else reactions(standing_part(drawn).surface)
     arrays: Arrays = {
-        "vertices": surface.vertices - origin,
-        "curvature": mean_curvature(surface, "variational"),
-        "error": curvature_error(surface, "cotangent"),
-        "reactions": reactions_per_length(surface, certificate.reactions),
+        "vertices": drawn.vertices - origin,
+        "curvature": mean_curvature(drawn, "variational"),
+        "error": curvature_error(drawn, "cotangent"),
+        "reactions": reactions_per_length(drawn, forces),
     }
-    if len(certificate.modes):
+    if len(certificate.modes) and whole is None:
         arrays["mode"] = certificate.modes[0] / (np.abs(certificate.modes[0]).max() or 1.0)
+    if state.compared is not None:
+        away = difference(surface, state.variants[state.compared].surface)
+        arrays["difference"] = away if whole is None else away[whole.vertex]
     return arrays
+
+
+def variant_data(variant: Variant) -> dict[str, Any]:
+    """A variant for the page's table."""
+    verdict = variant.certificate.verdict
+    word = verdict.value.partition(": ")[0]
+    return {"name": variant.name, "verdict": verdict.name.lower(), "word": word, "measures": variant.measures}
+
+
+def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[str, Any]:
+    """Targets and parameters as plain data, for the page's form."""
+    return {
+        "targets": [{**vars(target), "label": target.label} for target in targets],
+        "vary": [vars(parameter) for parameter in vary],
+    }
 
 
 def findings(surface: Surface, certificate: Certificate) -> dict[str, Any]:
@@ -91,10 +154,8 @@ def findings(surface: Surface, certificate: Certificate) -> dict[str, Any]:
         **certificate.numbers(),
         "height": float(height.max()),
         "area": float(patch_areas(surface)[roof].sum()),
-        "patches": [
-            {"name": row["patch"], "mean_H": row["mean_H"], "area": row["area"]}
-            for row in certificate.patches.to_dict(orient="records")
-        ],
+        "mirrored": list(certificate.symmetric_in),
+        "rooms": certificate.rooms.to_dict(orient="records"),
     }
 
 

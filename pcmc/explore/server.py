@@ -5,56 +5,59 @@ It is the standard library's, so that exploring needs the core install alone.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import re
 import secrets
-import socket
 import tempfile
 import threading
-import time
 import warnings
 from collections import OrderedDict
-from contextlib import suppress
+from collections.abc import Callable
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import BaseHTTPRequestHandler
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, quote, urlsplit
 
-from ..base.errors import MissingExtra, OptionError, PcmcError, SurfaceError, unknown
-from ..base.units import NO_UNITS, Units
+from ..base.errors import MissingExtra, PcmcError, SurfaceError, unknown
 from ..certificate.certificate import Certificate
 from ..io import FORMATS, write
 from ..project.output import fields as written_fields
 from ..surface import Patch, Surface
+from . import requests, saving
+from .following import values_of
+from .listening import LOOPBACK, Listener, listen
 from .messages import pack, plain
-from .page_data import centre, fields, findings, mesh_findings, outline, unit_texts
+from .page_data import (
+    aims_data,
+    centre,
+    fields,
+    findings,
+    mesh_findings,
+    mesh_key,
+    outline,
+    unit_texts,
+    variant_data,
+)
+from .requests import RequestError
+from .roof import Roof, signature
 from .session import Session, State, solved_start
+from .variants import measures
+from .watching import Watch
 
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
 SOLVES_AT_ONCE = 2
 LONGEST_REQUEST = 1_000_000  # bytes
-LONGEST_NAME = 1000  # characters
-REQUEST_SECONDS = 30.0  # to send a request, from its first byte or the last answer; and to take an answer
-WAITING = 128  # connections that the system keeps until they are accepted
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
 TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 HEADERS = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
     "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:",
 }
-ACTS = ("follow", "settle", "stabilise", "undo", "redo", "reset", "state")
-
-
-class RequestError(Exception):
-    """A request that the server answers with one line of error."""
-
-    def __init__(self, line: str, status: HTTPStatus = HTTPStatus.BAD_REQUEST) -> None:
-        super().__init__(line)
-        self.status = status
+OTHERS = ("check", "news", "save")  # acts that answer with no surface
 
 
 class Explorer:
@@ -63,24 +66,53 @@ class Explorer:
     Each page has its own session in ``sessions``, the most recently used last.
     """
 
-    def __init__(self, surface: Surface, host: str, port: int, title: str, units: Units = NO_UNITS) -> None:
-        if not isinstance(surface, Surface):
-            found = type(surface).__name__
+    def __init__(self, roof: Roof, host: str, port: int, watch: Callable[[], Roof] | None = None) -> None:
+        if not isinstance(roof.surface, Surface):
+            found = type(roof.surface).__name__
             raise SurfaceError(f"explore: expected a Surface, found {found}", what="surface", found=found)
-        self._server = _listen(host, port)
+        self._server = listen(host, port, _Handler)
         self._server.explorer = self
-        self.title, self.units = title, units
         self.local = host in LOOPBACK
-        self.origin = centre(surface)
-        self.start = solved_start(surface)
+        self.roof, self.origin = roof, centre(roof.surface)
+        self.start = solved_start(roof.surface)
+        self.version = 0
         self.sessions: OrderedDict[str, Session] = OrderedDict()
         self._turn = threading.Semaphore(SOLVES_AT_ONCE)
-        self._lock = threading.Lock()
+        self._lock, self._saving = threading.Lock(), threading.Lock()
         self.port = int(self._server.server_address[1])
         named = f"[{host}]" if ":" in host else host
         self.url = f"http://{'127.0.0.1' if host in ('', '0.0.0.0') else named}:{self.port}/"
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self._thread.start()
+        self.watch: Watch | None = None
+        if watch is not None and roof.path is not None:
+            self.watch = Watch(roof.path, roof.signature, watch, self.show)
+
+    def show(self, roof: Roof) -> None:
+        """Show another roof on every page."""
+        start = solved_start(roof.surface)
+        if start.failure is not None:
+            raise SurfaceError(f"{start.failure.verdict.value}; {start.failure.detail}", what="surface")
+        with self._lock:
+            self.roof, self.origin, self.start = roof, centre(roof.surface), start
+            sessions = list(self.sessions.values())
+        for session in sessions:
+            session.renew(start)
+        self.version += 1
+
+    def save(self, session: Session, name: str, replace: bool) -> dict[str, Any]:
+        """Save the surface of a session as a project beside the file that was opened."""
+        if not self.local:
+            text = f"only a page of this machine saves files; here the server listens on {self.url}"
+            raise RequestError(text, HTTPStatus.FORBIDDEN)
+        with self._saving:
+            path, note = saving.save(self.roof, session.surface, name, replace, session.aims)
+            if self.roof.path is not None and path == self.roof.path:
+                text = path.read_bytes().decode("utf-8-sig")
+                self.roof = dataclasses.replace(self.roof, text=text)
+                if self.watch is not None:  # the page shows this already
+                    self.watch.seen = signature(path)
+        return {"saved": path.name, "note": note}
 
     def open(self) -> tuple[str, Session]:
         """A new session and its name in addresses."""
@@ -106,6 +138,8 @@ class Explorer:
 
     def close(self) -> None:
         """Stop listening."""
+        if self.watch is not None:
+            self.watch.close()
         self._server.shutdown()
         self._server.server_close()
         self._server.close_connections()
@@ -116,7 +150,7 @@ class View:
     """The page in a notebook; ``surface`` is the one it shows now."""
 
     def __init__(self, surface: Surface, height: int, title: str) -> None:
-        self.explorer = Explorer(surface, "127.0.0.1", 0, title)
+        self.explorer = Explorer(Roof(surface, title), "127.0.0.1", 0)
         self._name, self._session = self.explorer.open()
         self.height = int(height)
 
@@ -141,58 +175,11 @@ class View:
         )
 
 
-class _Server(ThreadingHTTPServer):
-    daemon_threads = True
-    request_queue_size = WAITING
-    explorer: Explorer
-
-    def __init__(self, address: tuple[str, int]) -> None:
-        self._deadlines: dict[socket.socket, float] = {}
-        super().__init__(address, _Handler)
-
-    def get_request(self) -> tuple[socket.socket, Any]:
-        connection, address = super().get_request()
-        self.limit(connection, REQUEST_SECONDS)
-        return connection, address
-
-    def limit(self, connection: Any, seconds: float) -> None:
-        """Close the connection after so many seconds, unless another limit is set before."""
-        self._deadlines[connection] = time.monotonic() + seconds
-
-    def shutdown_request(self, request: Any) -> None:
-        self._deadlines.pop(request, None)
-        super().shutdown_request(request)
-
-    def service_actions(self) -> None:
-        """Close the connections whose request or answer takes too long; ``serve_forever`` calls this."""
-        self.close_connections(time.monotonic())
-
-    def close_connections(self, now: float = math.inf) -> None:
-        """Close the connections whose time is over; by default all, for browsers leave them open."""
-        for connection, deadline in list(self._deadlines.items()):
-            if deadline <= now:
-                with suppress(OSError):
-                    connection.shutdown(socket.SHUT_RDWR)
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing: a browser may leave in the middle of an answer."""
-
-
-def _listen(host: str, port: int) -> _Server:
-    try:
-        return _Server((host, port))
-    except (OSError, OverflowError) as error:
-        reason = getattr(error, "strerror", None) or error
-        text = f"cannot listen on {host!r}, port {port}: {reason}; with port 0 pcmc takes a free one"
-        what = "port" if host in LOOPBACK else "host"
-        raise OptionError(text, what=what, found=(host, port)) from None
-
-
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True  # else the body waits up to 40 ms for the header
     wbufsize = -1  # header and body leave together
-    server: _Server
+    server: Listener
 
     def do_GET(self) -> None:
         self._answer(self._get)
@@ -201,7 +188,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer(self._post)
 
     def handle_one_request(self) -> None:
-        self.server.limit(self.connection, REQUEST_SECONDS)
+        self.server.limit(self.connection)
         super().handle_one_request()
 
     def log_message(self, format: str, *args: Any) -> None:
@@ -260,24 +247,42 @@ class _Handler(BaseHTTPRequestHandler):
         steps = urlsplit(self.path).path.strip("/").split("/")
         explorer = self.server.explorer
         if steps == ["api", "open"]:
-            name = asked.get("session")
-            if not isinstance(name, str | None):
-                raise RequestError(f"session: expected a name, found {name!r:.60}")
+            name = requests.session_name(asked)
             name, session = (name, explorer.session(name)) if name else explorer.open()
-            header, arrays = outline(session.surface)
-            about = {"title": explorer.title, "units": unit_texts(explorer.units)}
-            first = {"session": name, "formats": list(FORMATS), **about, **header}
-            self._send_state(session.state(), first, arrays)
-        elif len(steps) == 3 and steps[0] == "api" and steps[2] == "check":
-            check = explorer.session(steps[1]).check_mesh()
-            header = {"superseded": True} if check is None else {"check": mesh_findings(check)}
-            self._send(pack(header, {}), "application/octet-stream")
-        elif len(steps) == 3 and steps[0] == "api" and steps[2] in ACTS:
-            session = explorer.session(steps[1])
-            given = (_values(asked),) if steps[2] in ("follow", "settle") else ()
-            self._send_state(getattr(session, steps[2])(*given))
-        else:
+            self._send_state(session, session.state(), self._opening(name, session))
+            return
+        if len(steps) != 3 or steps[0] != "api" or steps[2] not in (*requests.ACTS, *OTHERS):
             raise RequestError(f"there is nothing at {self.path:.60}", HTTPStatus.NOT_FOUND)
+        session, act = explorer.session(steps[1]), steps[2]
+        if act == "check":
+            check = session.check_mesh()
+            self._send_header({"superseded": True} if check is None else {"check": mesh_findings(check)})
+        elif act == "news":
+            watch = explorer.watch
+            news = {"working": bool(watch and watch.working), "problem": watch.problem if watch else ""}
+            self._send_header({"version": explorer.version, **news})
+        elif act == "save":
+            self._send_header(explorer.save(session, *requests.file_to_save(asked)))
+        else:
+            self._send_state(session, getattr(session, act)(*requests.ACTS[act](asked)))
+
+    def _opening(self, name: str, session: Session) -> dict[str, Any]:
+        """What the page learns once."""
+        explorer = self.server.explorer
+        roof = explorer.roof
+        return {
+            "session": name,
+            "formats": list(FORMATS),
+            "title": roof.title,
+            "name": roof.name,
+            "units": unit_texts(roof.units),
+            "note": roof.note,
+            "project": roof.is_project and explorer.local,
+            "file": roof.path.name if roof.path is not None else "",
+            "aims": aims_data(*(session.aims or (roof.targets, roof.vary))),
+            "watching": explorer.watch is not None,
+            "version": explorer.version,
+        }
 
     def _read_content(self) -> bytes:
         """What follows the headers: all of it, or what is left would be read as another request."""
@@ -304,26 +309,38 @@ class _Handler(BaseHTTPRequestHandler):
 
     # -- answers -----------------------------------------------------------------------------------
 
-    def _send_state(
-        self, state: State, first: dict[str, Any] | None = None, arrays: dict[str, Any] | None = None
-    ) -> None:
-        header: dict[str, Any] = {"superseded": state.superseded, **(first or {})}
-        drawn: dict[str, Any] = dict(arrays or {})
-        if not state.superseded:
+    def _send_header(self, header: dict[str, Any]) -> None:
+        self._send(pack(header, {}), "application/octet-stream")
+
+    def _send_state(self, session: Session, state: State, first: dict[str, Any] | None = None) -> None:
+        """A state; with ``first``, what the page learns once, and the mesh."""
+        header: dict[str, Any] = {"superseded": state.superseded and first is None}
+        drawn: dict[str, Any] = {}
+        origin = self.server.explorer.origin
+        if first is not None:
+            about, drawn = outline(state.surface)
+            header |= {**about, **first}
+        if not header["superseded"]:
             header |= {
+                "mesh": mesh_key(state.surface, origin),
                 "asked": _patches(state.asked),
                 "shown": _patches(state.surface.patches),
+                "values": {"asked": values_of(state.wanted), "shown": values_of(state.surface)},
                 "verdict": _verdict(state.failure or state.certificate),
                 "at_rest": state.failure is None,
                 "findings": findings(state.surface, state.certificate),
+                "measures": measures(state.surface, state.certificate),
                 "undo": state.undo,
                 "redo": state.redo,
+                "message": state.message,
+                "variants": [variant_data(variant) for variant in state.variants],
+                "compared": state.compared,
             }
-            drawn |= fields(state.surface, state.certificate, self.server.explorer.origin)
+            drawn |= fields(state, origin)
         self._send(pack(header, drawn), "application/octet-stream")
 
     def _export(self, session: Session, suffix: str) -> None:
-        state = session.state()
+        state, roof = session.state(), self.server.explorer.roof
         if suffix not in FORMATS:
             raise RequestError(unknown("format", suffix[:60], FORMATS))
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
@@ -331,9 +348,10 @@ class _Handler(BaseHTTPRequestHandler):
             path = Path(folder) / f"surface{suffix}"
             scalars = written_fields(state.surface, state.certificate)
             numbers = plain(state.certificate.numbers())
-            write(path, state.surface, scalars=scalars, certificate=numbers, units=self.server.explorer.units)
+            write(path, state.surface, scalars=scalars, certificate=numbers, units=roof.units)
             body = path.read_bytes()
-        self._send(body, "application/octet-stream", f'attachment; filename="surface{suffix}"')
+        name = quote(f"{roof.name}{suffix}", safe="")
+        self._send(body, "application/octet-stream", f"attachment; filename*=UTF-8''{name}")
 
     def _send_file(self, name: str) -> None:
         kind = TYPES.get(Path(name).suffix)
@@ -350,32 +368,12 @@ class _Handler(BaseHTTPRequestHandler):
             headers["Content-Disposition"] = disposition
         if self.close_connection:
             headers["Connection"] = "close"
-        self.server.limit(self.connection, REQUEST_SECONDS)
+        self.server.limit(self.connection)
         self.send_response(status)
         for name, value in headers.items():
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(body)
-
-
-def _values(asked: dict[str, Any]) -> dict[str, dict[str, float]]:
-    """Tensions and pressures by patch; RequestError unless they are numbers."""
-    values: dict[str, dict[str, float]] = {}
-    for key in ("tensions", "pressures"):
-        given = asked.get(key, {})
-        if not isinstance(given, dict):
-            raise RequestError(f"{key}: expected numbers by patch")
-        values[key] = {}
-        for name, value in given.items():
-            if len(name) > LONGEST_NAME:
-                raise RequestError(f"{key}: a name of {len(name)} characters: {name[:40]!r}...")
-            if not isinstance(value, int | float) or isinstance(value, bool):
-                raise RequestError(f"{key}: {name!r}: expected a number, found {value!r:.60}")
-            try:
-                values[key][name] = float(value)
-            except OverflowError:
-                raise RequestError(f"{key}: {name!r}: expected a number up to 1.8e308") from None
-    return values
 
 
 def _patches(patches: tuple[Patch, ...]) -> list[dict[str, Any]]:

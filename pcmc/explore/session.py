@@ -8,29 +8,30 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
 from .. import existence
 from ..accuracy import MeshCheck, check_mesh
-from ..certificate import Certificate, Verdict, certify
+from ..base.errors import OptionError
+from ..certificate import Certificate, certify
+from ..design import Parameter, Target, meet
 from ..solvers import solve
-from ..solvers.result import Progress, Result
+from ..solvers.result import Progress
 from ..surface import Patch, Surface
-from ..surface.wall_pressures import with_pressures
+from .following import AT_REST, Values, attempt, reach, until, values_of, wanted
+from .variants import MOST_VARIANTS, Variant
 
-AT_REST = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.SADDLE)
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
 SETTLE: dict[str, Any] = {"iterations": 40, "tolerance": 1e-11}  # when it is let go
 FOLLOW_SECONDS = 1.0  # time limit of following, and as much again for each 50 000 triangles
 SETTLE_SECONDS = 6.0  # time limit of settling
-SMALLEST_STEP = 1.0 / 64.0  # part of the way; settling takes no smaller step
 MOST_STEPS = 200  # to undo
 MOST_BYTES = 64_000_000  # of vertices in these steps
 
-Values = Mapping[str, Mapping[str, float]]
+Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,19 +41,29 @@ class State:
     Attributes
     ----------
     surface, certificate : the surface to show and its certificate.
-    asked : the patches with the values asked for.
+    wanted : a surface with the values asked for.
     failure : certificate of the attempt at the values asked for, if it did not come to rest.
     undo, redo : how many steps there are either way.
     superseded : whether newer values have arrived meanwhile, so that the page ignores this state.
+    message : how the search for targets ended; empty after other acts.
+    variants : those kept; ``compared`` is the number of the one compared with, or None.
     """
 
     surface: Surface
     certificate: Certificate
-    asked: tuple[Patch, ...]
+    wanted: Surface
     failure: Certificate | None = None
     undo: int = 0
     redo: int = 0
     superseded: bool = False
+    message: str = ""
+    variants: tuple[Variant, ...] = ()
+    compared: int | None = None
+
+    @property
+    def asked(self) -> tuple[Patch, ...]:
+        """The patches with the values asked for."""
+        return self.wanted.patches
 
 
 def solved_start(surface: Surface) -> State:
@@ -65,9 +76,9 @@ def solved_start(surface: Surface) -> State:
         result = solver(surface, target=target)
         ended = result.certify()
         if ended.verdict in AT_REST:
-            return State(result.surface, ended, result.surface.patches)
+            return State(result.surface, ended, result.surface)
         failure = ended
-    return State(surface, certificate, surface.patches, failure)
+    return State(surface, certificate, surface, failure)
 
 
 class Session:
@@ -80,8 +91,12 @@ class Session:
         self._lock, self._turn = threading.Lock(), turn or nullcontext()
         self._requests = 0
         self.surface, self._certificate = start.surface, start.certificate
-        self._asked, self._failure = start.asked, start.failure
+        self._wanted, self._failure = start.wanted, start.failure
+        self._start = self.surface
         self._steps, self._place = [self.surface], 0
+        self._message, self._compared = "", None
+        self.variants: list[Variant] = []
+        self.aims: Aims | None = None
 
     def state(self) -> State:
         """The present state."""
@@ -139,6 +154,88 @@ class Session:
 
         return self._run(act)
 
+    def meet(self, targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> State:
+        """Move to tensions that meet the targets; if there are none, ``message`` says why."""
+
+        def act(stop: Callable[[], bool]) -> None:
+            def check(_: object) -> None:
+                if stop():
+                    raise StopIteration
+
+            design = meet(self.surface, targets, vary, callback=check)
+            if stop():
+                return
+            certificate = design.certificate
+            self._message = design.message
+            if design.met and certificate.verdict in AT_REST:
+                self._show(design.surface)
+                self._wanted, self._failure = design.surface, None
+                self.aims = targets, vary
+                self._add_step()
+            elif design.met:
+                self._message += f"; but {certificate.verdict.value}; {certificate.detail}"
+
+        return self._run(act)
+
+    def keep(self, name: str) -> State:
+        """Keep the surface shown as a variant; one of the same name is replaced."""
+
+        def act(stop: Callable[[], bool]) -> None:
+            names = [variant.name for variant in self.variants]
+            variant = Variant(name, self.surface, certify(self.surface))
+            if name in names:
+                self.variants[names.index(name)] = variant
+            elif len(names) >= MOST_VARIANTS:
+                text = f"there are {MOST_VARIANTS} variants; remove one first"
+                raise OptionError(text, what="variants", found=len(names))
+            else:
+                self.variants.append(variant)
+
+        return self._run(act)
+
+    def forget(self, number: int) -> State:
+        """Remove a variant."""
+
+        def act(stop: Callable[[], bool]) -> None:
+            self._variant(number)
+            del self.variants[number]
+            if self._compared is not None and self._compared >= number:
+                self._compared = None if self._compared == number else self._compared - 1
+
+        return self._run(act)
+
+    def recall(self, number: int) -> State:
+        """Show a variant again, as a new step."""
+
+        def act(stop: Callable[[], bool]) -> None:
+            self._go_on_with(self._variant(number).surface)
+
+        return self._run(act)
+
+    def compare(self, number: int | None) -> State:
+        """Compare the surface shown with a variant, or with none."""
+
+        def act(stop: Callable[[], bool]) -> None:
+            if number is not None:
+                self._variant(number)
+            self._compared = number
+
+        return self._run(act)
+
+    def renew(self, start: State) -> State:
+        """Show another start, as a new step: the file behind the page was saved."""
+
+        def act(stop: Callable[[], bool]) -> None:
+            self._start, self.aims = start.surface, None
+            self._go_on_with(start.surface)
+            self._failure = start.failure
+
+        return self._run(act)
+
+    def stop(self) -> State:
+        """End the work under way."""
+        return self._run(lambda stop: None)
+
     def check_mesh(self) -> MeshCheck | None:
         """The mesh check of the surface shown; None if the page shows another one before it ends."""
         checked = self.surface
@@ -166,12 +263,7 @@ class Session:
     def reset(self) -> State:
         """Return to the start, as a new step."""
 
-        def act(stop: Callable[[], bool]) -> None:
-            self._show(self._steps[0])
-            self._asked, self._failure = self.surface.patches, None
-            self._add_step()
-
-        return self._run(act)
+        return self._run(lambda stop: self._go_on_with(self._start))
 
     # -- below here the lock is held ---------------------------------------------------------------
 
@@ -183,22 +275,32 @@ class Session:
             return mine < self._requests
 
         with self._lock, self._turn:
-            before = self._asked
+            before = self._wanted
+            self._message = ""
             if not late():
                 act(late)
             if late():
-                self._asked = before
+                self._wanted = before
             return self._state(superseded=late())
 
     def _with_values(self, values: Values) -> Surface:
         """The surface shown, with the values asked for."""
-        given = {key: dict(values.get(key) or {}) for key in ("tensions", "pressures")}
-        wanted = with_pressures(self.surface, given["tensions"], given["pressures"])
-        self._asked = wanted.patches
-        return wanted
+        self._wanted = wanted(self.surface, values)
+        return self._wanted
 
     def _show(self, surface: Surface) -> None:
         self.surface, self._certificate = surface, certify(surface)
+
+    def _go_on_with(self, surface: Surface) -> None:
+        """Show a surface as the newest step."""
+        self._show(surface)
+        self._wanted, self._failure = surface, None
+        self._add_step()
+
+    def _variant(self, number: int) -> Variant:
+        if not 0 <= number < len(self.variants):
+            raise OptionError(f"there is no variant {number + 1}", what="number", found=number)
+        return self.variants[number]
 
     def _add_step(self) -> None:
         """The surface shown becomes the newest step."""
@@ -213,80 +315,26 @@ class Session:
     def _go(self, place: int) -> None:
         self._place = place
         self._show(self._steps[place])
-        self._asked, self._failure = self.surface.patches, None
+        self._wanted, self._failure = self.surface, None
 
     @property
     def _has_unsaved_changes(self) -> bool:
         """Whether values or surface differ from the newest step."""
         here = self._steps[self._place]
-        return self.surface is not here or self._asked != here.patches
+        return self.surface is not here or values_of(self._wanted) != values_of(here)
 
     def _state(self, superseded: bool = False) -> State:
         after = len(self._steps) - 1 - self._place
         before = self._place + self._has_unsaved_changes
-        return State(self.surface, self._certificate, self._asked, self._failure, before, after, superseded)
-
-
-def until(stop: Callable[[], bool], end: float) -> Callable[[], bool]:
-    """True when ``stop`` is, or when the monotonic clock has passed ``end``."""
-    return lambda: stop() or time.monotonic() > end
-
-
-def attempt(surface: Surface, stop: Callable[[], bool], **options: Any) -> Result:
-    """Solve, and end early when ``stop`` becomes true."""
-
-    def check(_: Progress) -> None:
-        if stop():
-            raise StopIteration
-
-    return solve(surface, callback=check, **options)
-
-
-@dataclass(frozen=True, eq=False)
-class Reached:
-    """The last surface at rest on the way to other values, and the failed attempt after it, if any.
-
-    ``certificate`` is the surface's, without modes; None if there was no step at all.
-    """
-
-    surface: Surface
-    certificate: Certificate | None
-    failed: Certificate | None
-
-
-def reach(
-    start: Surface, asked: Surface, stop: Callable[[], bool], attempts: int = 100, **options: Any
-) -> Reached:
-    """Follow the equilibrium from ``start`` to the values of ``asked``; a step that fails is halved."""
-    here, certificate, done, step = start, None, 0.0, 1.0
-    failed = None
-    for _ in range(attempts):
-        ahead = min(1.0, done + step)
-        aim = between(start, asked, ahead).moved(here.vertices)
-        result = attempt(aim, stop, target="stationary", **options)
-        ended = result.certify(modes=0)
-        if ended.verdict in AT_REST:
-            here, certificate, done, step = result.surface, ended, ahead, 2.0 * step
-            if done == 1.0:
-                return Reached(here, certificate, None)
-        else:
-            failed = ended if ahead == 1.0 or failed is None else failed
-            step = 0.5 * (ahead - done)
-        if step < SMALLEST_STEP or stop():
-            break
-    return Reached(here, certificate, failed)
-
-
-def between(start: Surface, end: Surface, part: float) -> Surface:
-    """``start`` with its tensions and pressures moved a part of the way to those of ``end``."""
-    if part >= 1.0:
-        tensions, pressures = end.tensions, end.pressures  # to the last digit
-    else:
-        tensions = (1.0 - part) * start.tensions + part * end.tensions
-        pressures = (1.0 - part) * start.pressures + part * end.pressures
-    names = [p.name for p in start.patches]
-    return start.retensioned(
-        dict(zip(names, tensions.tolist(), strict=True)),
-        dict(zip(names, pressures.tolist(), strict=True)),
-        [p.name for p in end.patches if p.wall],
-    )
+        return State(
+            self.surface,
+            self._certificate,
+            self._wanted,
+            self._failure,
+            before,
+            after,
+            superseded,
+            self._message,
+            tuple(self.variants),
+            self._compared,
+        )

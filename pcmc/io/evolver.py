@@ -9,24 +9,17 @@ coordinates are relative to the point of Π, or with other planes to ``Surface.o
 where that is. A plane that does not pass there has the ``content`` of its flat pieces, as an integral along
 its edges: ∫ ⟨-c × x / 6, dx⟩ = -⟨c, a × b⟩ / 6; the ends of these pieces are a quantity ``corner_k`` of their
 vertex, with its pressure. Then the program's ``total_energy`` is E of Eq. (20).
-
-The reader takes datafiles of this kind, those that the program's ``dump`` writes, and others whose
-sections list elements by number. A room of prescribed volume is a body with that ``volume``; its Lagrange
-multiplier is the pressure, and ``volconst`` the part of the volume that the program's cones do not see.
+A room of prescribed volume is a body with that ``volume``; its Lagrange multiplier is the pressure, and
+``volconst`` the part of the volume that the program's cones do not see. ``evolver_reading`` has the reader.
 """
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError
@@ -34,14 +27,14 @@ from ..energy.flat_pieces import flat_pieces
 from ..energy.plane_pieces import add_plane_volumes
 from ..energy.rooms import room_pressures, room_volumes
 from ..meshing.refinement import edges_on_planes
-from ..surface import Cable, Patch, Plane, Room, Surface
+from ..surface import Surface
 from . import evolver_forces
-from .expressions import constant, linear
-from .mesh_data import FIXED, FREE, SLIDING, MeshData, given_support
-from .polygons import triangulate
+from .evolver_reading import ROUNDING, read
+from .mesh_data import FREE, SLIDING, given_support
 from .text import format_rows
 
-ROUNDING = 1e-12  # of the largest pressure: what is left of differences
+__all__ = ["read", "write"]
+
 HEADER = """\
 // Piecewise constant-mean-curvature surface, written by pcmc.
 // total_energy is E = sum tension * area - sum pressure * volume, volumes seen from the origin.
@@ -101,8 +94,8 @@ def _constraints(surface: Surface, origin: Floats) -> str:
             )
         offset = -float(plane.height(origin)) + 0.0
         text += f"CONSTRAINT {number}\nFORMULA: {formula} = {offset!r}\n".replace("= 0.0", "= 0")
-        own = np.flatnonzero(mask[tail] & mask[head]) if number > 1 else ()
-        if len(own):
+        own = np.flatnonzero(mask[tail] & mask[head])
+        if number > 1 and len(own):
             x, y, z = (pieces.apex[own[0]] / -6.0).tolist()
             text += (
                 f"CONTENT\nC1: ({y!r})*z - ({z!r})*y\nC2: ({z!r})*x - ({x!r})*z\nC3: ({x!r})*y - ({y!r})*x\n"
@@ -192,339 +185,3 @@ def _room_pressures(surface: Surface) -> tuple[Floats, Floats]:
 
 
 # Reading
-
-
-def read(path: Path) -> MeshData:
-    """The mesh, tensions, pressures and supports of a datafile; errors name the line."""
-    header, file = _open(path)
-    if "written by pcmc" in header:
-        file["read"]  # its last line: without it the file is cut off
-    known = _parameters(file["top"])
-    ids, X, support, constraints = _vertices(file["vertices"], known)
-    face_ids, corners, counts, rest = _faces(file["edges"], file["faces"], ids)
-    F, source, notes = triangulate(X, corners, counts)
-    pressure, prescribed, more = _pressures(file, face_ids, known)
-    patch_of_face, patches = _patches(header, file["faces"], rest, (pressure, *prescribed.values()), known)
-    given = re.search(r"^// origin (\S+) (\S+) (\S+)$", header, re.M)
-    place = _Section(header, 1)
-    origin = np.array([_numbers((c,), known, place, 0)[0] for c in given.groups()] if given else np.zeros(3))
-    plane, planes = _planes(header, file["top"], constraints, support, origin, known)
-    rooms = _rooms(header, prescribed, patch_of_face, patches)
-    X, notes = X + origin, (*notes, *more)
-    return MeshData(
-        X,
-        F,
-        patch_of_face[source],
-        patches,
-        support,
-        plane,
-        notes=notes,
-        planes=planes,
-        rooms=rooms,
-        cables=_cables(header, file["edges"], ids, known),
-    )
-
-
-@dataclass(frozen=True)
-class _Section:
-    """A part of the file. A form feed stands for a line end that does not end an element."""
-
-    text: str
-    first_line: int
-
-    def error(self, text: str, row: int | None = None, offset: int = 0) -> FileError:
-        """An error at the given element (counting from 0), or at an offset into the text."""
-        if row is not None:
-            starts = [m.start() for m in re.finditer(r"^[^\S\n]*\S", self.text, re.M)]
-            offset = starts[min(row, len(starts) - 1)]
-        before = self.text[:offset]
-        line = self.first_line + before.count("\n") + before.count("\f")
-        return FileError(f"line {line}: {text}", where=line)
-
-    def elements(self, pattern: str, what: str) -> list[tuple[str, ...]]:
-        """Groups of the pattern for each line that is not blank."""
-        matches = re.findall(rf"^[^\S\n]*{pattern}$", self.text, re.M)
-        lines = re.findall(r"^[^\S\n]*\S[^\n]*$", self.text, re.M)
-        if len(matches) != len(lines):
-            one = re.compile(rf"[^\S\n]*{pattern}")
-            row = next(k for k, line in enumerate(lines) if not one.fullmatch(line))
-            raise self.error(f"expected {what}, found {' '.join(lines[row].split())[:60]!r}", row)
-        return matches
-
-
-class _Sections(dict[str, _Section]):
-    """The sections by name."""
-
-    def __missing__(self, name: str) -> _Section:
-        known = ", ".join(k for k in self if k != "top") or "none"
-        text = f"no {name} section (found: {known}); the file is cut off or no Surface Evolver datafile"
-        raise FileError(text, where=name)
-
-
-def _open(path: Path) -> tuple[str, _Sections]:
-    """The text before the vertices with its comments, and the sections without theirs."""
-    text = path.read_text(encoding="utf-8-sig")
-    bare = re.sub(r"/\*.*?(?:\*/|\Z)", lambda m: "\f" * m[0].count("\n") + " ", text, flags=re.S)
-    bare = re.sub(r"//[^\n]*", "", bare)
-    bare = re.sub(r"\\[^\S\n]*\n", "\f", bare)
-    heads = list(re.finditer(r"^[^\S\n]*(vertices|edges|faces|facets|bodies|read)\b", bare, re.I | re.M))
-    starts = [0, *(h.end() for h in heads)]
-    ends = [*(h.start() for h in heads), len(bare)]
-    names = ["top", *("faces" if h[1].lower() == "facets" else h[1].lower() for h in heads)]
-    sections = _Sections()
-    for name, start, end in zip(names, starts, ends, strict=True):
-        line = 1 + bare[:start].count("\n") + bare[:start].count("\f")
-        sections.setdefault(name, _Section(bare[start:end], line))
-        if name == "read":
-            break  # what follows are commands
-    header = re.split(r"^[^\S\n]*vertices\b", text, maxsplit=1, flags=re.I | re.M)[0]
-    return header, sections
-
-
-UNREADABLE = (
-    "string|quadratic|lagrange|simplex_representation|torus|torus_filled|symmetry_group|#include|#define"
-)
-
-
-def _parameters(top: _Section) -> dict[str, float]:
-    """Named constants of the top section, which coordinates and tensions may use."""
-    foreign = re.search(rf"^[^\S\n]*({UNREADABLE})\b", top.text, re.I | re.M)
-    if foreign:
-        text = f"{foreign[1].lower()} is not supported; load the file in Surface Evolver and `dump` it"
-        raise top.error(f"{text}; read the dump", offset=foreign.start())
-    known = {"pi": math.pi}
-    for hit in re.finditer(r"^[^\S\n]*parameter\s+(\w+)\s*=\s*([^\n]+)", top.text, re.I | re.M):
-        known[hit[1].lower()] = constant(hit[2], known, partial(top.error, offset=hit.start()))
-    return known
-
-
-def _vertices(section: _Section, known: Mapping[str, float]) -> tuple[Ints, Floats, Ints, dict[int, Bools]]:
-    """Ids, positions, support, and by the number of each constraint the vertices that lie on it."""
-    what = "a vertex number and three coordinates"
-    listed = section.elements(r"(\d+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)([^\n]*)", what)
-    columns = list(zip(*listed, strict=True)) or [()] * 5
-    X = np.stack([_numbers(column, known, section) for column in columns[1:4]], axis=1)
-    code, kinds = pd.factorize(np.array(columns[4], dtype=object))
-    first = np.unique(code, return_index=True)[1]
-    support = np.zeros(len(kinds), dtype=np.int8)
-    constraints: dict[int, Bools] = {}
-    for k, rest in enumerate(kinds):
-        row, words = int(first[k]), rest.lower()
-        if re.search(r"\bboundary\b", words):
-            raise section.error("a vertex on a parametric boundary is not supported", row)
-        named = re.search(r"\bconstraints?((?:\s+\d+)+)", words)
-        numbers = _whole(named[1].split(), section, row).tolist() if named else []
-        support[k] = FIXED if re.search(r"\bfixed\b", words) else SLIDING if numbers else FREE
-        for number in numbers:
-            constraints.setdefault(number, np.zeros(len(kinds), dtype=bool))[k] = True
-    of_vertex = {number: mask[code] for number, mask in sorted(constraints.items())}
-    return _whole(columns[0], section), X, support[code], of_vertex
-
-
-def _faces(edges: _Section, faces: _Section, vertex_ids: Ints) -> tuple[Ints, Ints, Ints, list[str]]:
-    """Ids, vertices of face after face, corners of each face, and what follows the edges on its line."""
-    what = "an edge number and two vertices"
-    edge_rows = edges.elements(r"(\d+)[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)[^\n]*", what)
-    columns = list(zip(*edge_rows, strict=True)) or [()] * 3
-    numbers = np.stack([_whole(column, edges) for column in columns], axis=1)
-    ends = np.stack([_places(vertex_ids, numbers[:, k], edges, "vertex") for k in (1, 2)], axis=1)
-    listed = faces.elements(r"(\d+)((?:[^\S\n]+-?\d+)+)([^\n]*)", "a face number and its edges")
-    counts = np.array([len(f[1].split()) for f in listed], dtype=np.int64)
-    row = np.repeat(np.arange(len(listed)), counts)
-    signed = _whole(" ".join(f[1] for f in listed).split(), faces, row)
-    place = _places(numbers[:, 0], np.abs(signed), faces, "edge", row)
-    tail = np.where(signed > 0, ends[place, 0], ends[place, 1])
-    head = np.where(signed > 0, ends[place, 1], ends[place, 0])
-    last = np.cumsum(counts) - 1
-    following = np.arange(1, len(signed) + 1)
-    following[last] = last - counts + 1
-    open_at = np.flatnonzero(head != tail[following])
-    if len(open_at):
-        raise faces.error("the edges of the face do not follow each other head to tail", row[open_at[0]])
-    ids = _whole([f[0] for f in listed], faces)
-    return ids, tail, counts, [f[2] for f in listed]
-
-
-def _cables(header: str, edges: _Section, vertex_ids: Ints, known: Mapping[str, float]) -> tuple[Cable, ...]:
-    """The edges with a tension, as cables."""
-    if not re.search(r"\b(?:tension|density)\b", edges.text, re.I):
-        return ()
-    rows = edges.elements(r"\d+[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)([^\n]*)", "an edge number and two vertices")
-    numbers = np.stack([_whole([row[k] for row in rows], edges) for k in (0, 1)], axis=1)
-    ends = np.stack([_places(vertex_ids, column, edges, "vertex") for column in numbers.T], axis=1)
-
-    def number(word: str, row: int) -> float:
-        return float(_numbers((word,), known, edges, row)[0])
-
-    return evolver_forces.cables(header, [row[2] for row in rows], ends, number)
-
-
-def _places(ids: Ints, wanted: Ints, section: _Section, what: str, row: Ints | None = None) -> Ints:
-    """Where each wanted id stands among the ids."""
-    order = np.argsort(ids, kind="stable")
-    place = order[np.minimum(np.searchsorted(ids, wanted, sorter=order), len(ids) - 1)]
-    bad = np.flatnonzero(ids[place] != wanted)
-    if len(bad):
-        at = int(bad[0] if row is None else row[bad[0]])
-        raise section.error(f"there is no {what} {wanted[bad[0]]}", at)
-    return place
-
-
-def _pressures(
-    file: _Sections, face_ids: Ints, known: Mapping[str, float]
-) -> tuple[Floats, dict[tuple[str, float], Ints], tuple[str, ...]]:
-    """(m,) pressure along each face's normal: the sum over the bodies on its two sides.
-
-    And the bodies of prescribed volume: by number and volume, (m,) 1 or -1 where a face bounds them.
-    """
-    pressure = np.zeros(len(face_ids))
-    prescribed: dict[tuple[str, float], Ints] = {}
-    if "bodies" not in file:
-        return pressure, prescribed, ("the file has no bodies, so no patch is under pressure",)
-    section, without = file["bodies"], []
-    listed = section.elements(r"(\d+)((?:[^\S\n]+-?\d+)*)([^\n]*)", "a body number and its faces")
-    inside = np.ones(len(listed))
-    for row, (number, _, rest) in enumerate(listed):
-        given = re.search(r"\b(?:pressure|lagrange_multiplier)\s+(\S+)", rest, re.I)
-        if given is None:
-            without.append(number)
-        else:
-            inside[row] = _numbers((given[1],), known, section, row)[0]
-    of_body = np.repeat(np.arange(len(listed)), [len(members.split()) for _, members, _ in listed])
-    signed = _whole(" ".join(members for _, members, _ in listed).split(), section, of_body)
-    place = _places(face_ids, np.abs(signed), section, "face", of_body)
-    np.add.at(pressure, place, np.sign(signed) * inside[of_body])
-    for row, (number, _, rest) in enumerate(listed):
-        given = re.search(r"\bvolume\s+(\S+)", rest, re.I)
-        if given is not None:
-            sides = np.zeros(len(face_ids), dtype=np.int64)
-            np.add.at(sides, place[of_body == row], np.sign(signed[of_body == row]))
-            volume = float(_numbers((given[1],), known, section, row)[0])
-            prescribed[str(number), volume] = sides
-    if prescribed:  # the difference of two rooms' pressures is 0 but for rounding
-        pressure[np.abs(pressure) <= ROUNDING * np.abs(pressure).max(initial=0.0)] = 0.0
-    note = f"body {', '.join(without)} has no pressure in the file; 1 is used"
-    return pressure, prescribed, (note,) if without else ()
-
-
-def _patches(
-    header: str,
-    section: _Section,
-    rest: list[str],
-    of_face: Sequence[Floats | Ints],
-    known: Mapping[str, float],
-) -> tuple[Ints, tuple[Patch, ...]]:
-    """Faces of one patch number, tension, weight, pressure and rooms (each (m,) ``of_face``) are a patch."""
-    code, kinds = pd.factorize(np.array(rest, dtype=object))
-    first = np.unique(code, return_index=True)[1]
-    number, tension, weight = np.zeros(len(kinds)), np.ones(len(kinds)), np.zeros(len(kinds))
-    for k, words in enumerate(kinds):
-        row = int(first[k])
-        for target, key in ((number, "patch"), (tension, "tension|density"), (weight, "weight")):
-            given = re.search(rf"\b(?:{key})\s+(\S+)", words, re.I)
-            if given:
-                target[k] = _numbers((given[1],), known, section, row)[0]
-    laws = np.stack([number[code], tension[code], weight[code], *of_face], axis=1)
-    rows_, patch_of_face = np.unique(laws, axis=0, return_inverse=True)
-    names = dict(re.findall(r"^// patch (\d+) ([^\n]+)$", header, re.M))
-    once = len(np.unique(rows_[:, 0])) == len(rows_)
-    patches = [
-        Patch(names.get(str(int(a)), f"patch {k}") if once else f"patch {k}", t, p, weight=w)
-        for k, (a, t, w, p, *_) in enumerate(rows_, 1)
-    ]
-    return patch_of_face.ravel(), tuple(patches)
-
-
-def _rooms(
-    header: str, prescribed: Mapping[tuple[str, float], Ints], patch_of_face: Ints, patches: tuple[Patch, ...]
-) -> tuple[Room, ...]:
-    """The bodies of prescribed volume as rooms, with the names that pcmc has given them."""
-    names = dict(re.findall(r"^// room (\d+) ([^\n]+)$", header, re.M))
-    rooms = []
-    for (number, volume), sides in prescribed.items():
-        of_patch = np.zeros(len(patches), dtype=np.int64)
-        of_patch[patch_of_face] = sides
-        signs = tuple((patches[k].name, int(of_patch[k])) for k in np.flatnonzero(of_patch))
-        rooms.append(Room(names.get(number, f"body {number}"), signs, volume))
-    return tuple(rooms)
-
-
-def _planes(
-    header: str,
-    top: _Section,
-    constraints: Mapping[int, Bools],
-    support: Ints,
-    origin: Floats,
-    known: Mapping[str, float],
-) -> tuple[Plane | None, tuple[tuple[Plane, Bools], ...]]:
-    """Π and the other planes with their vertices, seen from the file's origin; ``support`` is changed to fit.
-
-    Π is constraint 1, or the first that sliding vertices lie on; sliding vertices on others alone are free of
-    it.
-    """
-    used = [number for number, mask in constraints.items() if (mask & (support == SLIDING)).any()]
-    described = {int(k): (kind, name) for k, kind, name in re.findall(DESCRIBED, header, re.M)}
-    first = 1 if described or 1 in used or not used else used[0]
-    ground = _plane(top, first, origin, known, needed=first in used)
-    if first in constraints:
-        support[(support == SLIDING) & ~constraints[first]] = FREE
-    elif used:
-        support[support == SLIDING] = FREE
-    others = []
-    for number in sorted({*used, *described} & set(constraints) - {first}):
-        kind, name = described.get(number, ("support", ""))
-        plane = _plane(top, number, origin, known, needed=True)
-        assert plane is not None
-        others.append((replace(plane, name=name.strip(), mirror=kind == "mirror"), constraints[number]))
-    return ground, tuple(others)
-
-
-DESCRIBED = r"^// plane (\d+) (mirror|support)\b([^\n]*)$"
-
-
-def _plane(
-    top: _Section, number: int, origin: Floats, known: Mapping[str, float], needed: bool
-) -> Plane | None:
-    """The plane of this constraint; None if it is not needed and not there."""
-    pattern = rf"^[^\S\n]*constraint\s+{number}\b[^\n]*\s+(?:formula|function)\s*:?\s*([^\n]+)"
-    hit = re.search(pattern, top.text, re.I | re.M)
-    if hit is None and not needed:
-        return None
-    if hit is None:
-        raise top.error(f"constraint {number} has no formula here")
-    left, _, right = hit[1].partition("=")
-
-    def fail(text: str) -> FileError:
-        return top.error(f"constraint {number} is not a plane: {text}", offset=hit.start(1))
-
-    formula = linear(left, known, fail) - linear(right or "0", known, fail)
-    normal = formula[1:]
-    if not normal.any():
-        raise fail(f"{hit[1].strip()!r} names no coordinate")
-    point = origin - formula[0] * normal / (normal @ normal)
-    return Plane(tuple(point), tuple(normal))
-
-
-def _whole(words: Sequence[str], section: _Section, row: int | Ints | None = None) -> Ints:
-    """Whole numbers from words of the given rows, by default one of each row."""
-    try:
-        return np.array(words, dtype=np.int64)
-    except (OverflowError, ValueError):
-        bad = next((k for k, word in enumerate(words) if len(word.lstrip("-0")) > 18), 0)
-        at = bad if row is None else int(np.broadcast_to(row, len(words))[bad])
-        text = f"expected whole numbers below 2^63, found {words[bad][:40]!r}"
-        raise section.error(text, at) from None
-
-
-def _numbers(
-    words: tuple[str, ...], known: Mapping[str, float], section: _Section, row: int | None = None
-) -> Floats:
-    """Floats from words: numbers, or expressions of numbers and parameters."""
-    try:
-        return np.array(words, dtype=np.float64)
-    except ValueError:
-        rows = range(len(words)) if row is None else [row]
-        values = [
-            constant(word, known, partial(section.error, row=k)) for k, word in zip(rows, words, strict=True)
-        ]
-        return np.array(values)

@@ -170,8 +170,8 @@ def _planes(arrays: dict[str, Any], described: Any) -> tuple[tuple[Plane, Bools]
         text = f"planes: expected a point and a normal for each of {len(masks)} masks"
         raise FileError(text, where="planes", found=np.shape(rows), expected=(len(masks), 2, 3))
     planes = (
-        Plane(*map(tuple, row.tolist()), name=str(one["name"]), mirror=bool(one["mirror"]))
-        for row, one in zip(rows, described, strict=True)
+        Plane(tuple(point), tuple(normal), str(one["name"]), bool(one["mirror"]))
+        for (point, normal), one in zip(np.asarray(rows).tolist(), described, strict=True)
     )
     return tuple(zip(planes, masks, strict=True))
 

@@ -1,19 +1,20 @@
 """A Surface with walls, from the lines of a plan or from a mesh with labelled faces.
 
-``plan`` holds Plan, ``curves`` its curves, ``parts`` dividers, holes and patches; ``build`` makes the
-Surface from ``lines`` and their ``arrangement``, ``planar`` meshes, ``heights`` and ``walls``. ``drawing``
-reads CAD files (``strokes``, joined to ``paths``), ``proposal`` chooses what they do not say.
+``plan`` holds Plan, ``curves`` its curves, ``parts`` dividers, holes, patches and cables; ``build`` makes the
+Surface from ``lines`` and their ``arrangement``, ``edges``, ``planar`` meshes, ``heights`` and ``walls``.
+``drawing`` reads CAD files (``strokes``, joined to ``paths``), ``proposal`` chooses what they do not say.
 May import ``io`` and the rooms below it.
 """
 
 from .curves import Curve, arc, bezier, circle, curve, ellipse, join, polyline
 from .labelled import surface_from_labels
-from .parts import Area, Divider, Hole
+from .parts import Area, CableLine, Divider, Hole
 from .plan import Plan, plan_from
 from .walls import add_walls
 
 __all__ = [
     "Area",
+    "CableLine",
     "Curve",
     "Divider",
     "Hole",

@@ -6,20 +6,35 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, PlanWarning, SurfaceError
+from ..energy.rooms import check_rooms
 from ..meshing.angles import improve_angles
-from ..surface import Patch, Plane, Surface
+from ..surface import Cable, Patch, Plane, Room, Surface
 from ..surface.wall_tensions import balanced_wall
 from .arrangement import Arrangement, arrange, hole_points
 from .corners import most_in_corners
 from .curves import Curve
+from .edges import (
+    NONE,
+    STATES,
+    Boundary,
+    boundary,
+    check_lines,
+    check_pressures,
+    edge_cables,
+    mirror_planes,
+    raised_heights,
+    strip_mask,
+)
 from .heights import dome, harmonic_heights
 from .lines import SNAP, Kind, Line
-from .parts import BALANCED, EDGES, Area, PlanData
+from .parts import BALANCED, Area, PlanData
 from .pieces import to_local, to_space
 from .planar import PlanarMesh, locate, signed_areas, triangulate
 from .walls import UpperEdge, WallMesh, build_walls
@@ -39,17 +54,19 @@ class _Draft:
     supports_on_edge: Sequence[Curve]
     drawn: Arrangement
     mesh: PlanarMesh
+    edges: Boundary
 
 
 @dataclass(frozen=True, eq=False)
 class _Roof:
     """Positions (n,3), heights (n,) of the surface that the boundary spans, fixed (n,); of each triangle (m,)
-    the pressure and tension."""
+    the pressure, the number of the room of prescribed volume below, -1 for none, and the tension."""
 
     positions: Floats
     base: Floats
     fixed: Bools
     pressure: Floats
+    room: Ints
     tension: Floats
 
 
@@ -65,31 +82,50 @@ def build_surface(plan: PlanData) -> Surface:
         raise PlanError("every vertex of the mesh is held; use a smaller edge_length", what="edge_length")
     _warn_of_free_edges(draft, fixed | sliding)
     given = np.full(len(mesh.points), np.nan)
-    given[: len(draft.drawn.heights)] = draft.drawn.heights
+    given[: len(draft.drawn.heights)] = raised_heights(plan, draft.edges, draft.drawn, fixed | sliding)
     base = harmonic_heights(mesh.points, mesh.triangles, given)
     patches, patch_of_face = _patches(plan, mesh)
-    height = base + dome(mesh.points, mesh.triangles, fixed | sliding, plan.rise)
+    cables = _cables(draft, fixed | sliding)
+    _check_free_pressure(draft, cables, patches, patch_of_face)
+    height = base + _rise(draft, patches, fixed | sliding)
     inner = np.arange(len(base)) >= len(draft.drawn.points)
     raised = improve_angles(np.column_stack([mesh.points, height]), mesh.triangles, inner, GOOD_ANGLE)
     pressure, tension = np.array([[p.pressure, p.tension] for p in patches])[patch_of_face].T
-    roof = _Roof(to_space(raised, plan.plane), base, fixed, pressure, tension)
-    walls, wall_patches, divider_of_label = _walls(draft, roof)
-    return Surface(
-        np.concatenate([roof.positions, walls.vertices]),
+    rooms = _room_of_face(plan, patches, patch_of_face)
+    roof = _Roof(to_space(raised, plan.plane), base, fixed, pressure, rooms, tension)
+    walls, wall_patches, sides = _walls(draft, roof)
+    vertices = np.concatenate([roof.positions, walls.vertices])
+    surface = Surface(
+        vertices,
         np.concatenate([mesh.triangles, walls.faces]),
         np.concatenate([patch_of_face, walls.label + len(patches)]),
         (*patches, *wall_patches),
         np.concatenate([fixed, walls.fixed]),
         np.concatenate([sliding, walls.sliding]),
         plan.plane,
-        on_planes=_upright_planes(draft, walls, divider_of_label),
+        on_planes=(*mirror_planes(plan, vertices), *_upright_planes(draft, walls, sides)),
+        cables=cables,
+        rooms=_rooms(plan, wall_patches, sides),
     )
+    check_rooms(surface)
+    return surface
+
+
+def _rise(draft: _Draft, patches: Sequence[Patch], held: Bools) -> Floats:
+    """(n,) what the initial surface rises above the one that the boundary spans."""
+    plan, mesh = draft.plan, draft.mesh
+    walled = any(divider.wall is not None for divider in plan.dividers)
+    if plan.rise is None and not walled and all(patch.pressure == 0.0 for patch in patches):
+        return np.zeros(len(mesh.points))  # a sail starts without a dome
+    return dome(mesh.points, mesh.triangles, held, plan.rise)
 
 
 def _drafted(plan: PlanData) -> _Draft:
     lines, on_edge = _lines(plan)
+    check_lines(plan, lines)
     spots = np.array([to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)])
-    stops = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in on_edge)])
+    cut = [*on_edge, *(c.local(plan.plane) for c in (*(part.curve for part in plan.cables), *plan.mirrors))]
+    stops = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in cut)])
     drawn = arrange(lines, plan.edge_length, spots.reshape(-1, 3), stops)
     edges = np.concatenate([chain.edges for chain in drawn.chains])
     try:
@@ -97,7 +133,7 @@ def _drafted(plan: PlanData) -> _Draft:
     except SurfaceError as error:
         problem = f"lines of the plan are too close to each other for edges of length {plan.edge_length:g}"
         raise PlanError(f"{problem}: {error}", what="edge_length", found=plan.edge_length) from None
-    return _Draft(plan, lines, on_edge, drawn, mesh)
+    return _Draft(plan, lines, on_edge, drawn, mesh, boundary(plan, lines, drawn))
 
 
 def _check_size(plan: PlanData) -> None:
@@ -156,38 +192,61 @@ def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:
 
 def _supports(draft: _Draft) -> tuple[Bools, Bools]:
     """(n,) fixed and sliding vertices."""
-    plan, drawn = draft.plan, draft.drawn
-    edges = [plan.edge, *(hole.edge for hole in plan.holes)]  # the first lines are the boundary
-    masks = {kind: np.zeros(len(draft.mesh.points), dtype=bool) for kind in EDGES}
-    boundary: set[int] = set()
+    plan, drawn, edges = draft.plan, draft.drawn, draft.edges
+    fixed, sliding = np.zeros((2, len(draft.mesh.points)), dtype=bool)
+    fixed[edges.vertices("fixed")] = True
+    sliding[edges.vertices("sliding")] = True
     for chain in drawn.chains:
         if draft.lines[chain.line].kind is Kind.SUPPORT:
-            masks["fixed"][chain.vertices] = True
-        elif chain.line < len(edges):
-            masks[edges[chain.line]][chain.vertices] = True
-            boundary.update(chain.vertices.tolist())
+            fixed[chain.vertices] = True
+    rim = np.unique(edges.ends)
     for support in draft.supports_on_edge:
         strip = Line("support", Kind.SUPPORT, support)
-        for vertex in boundary:
-            if strip.nearest(drawn.points[vertex])[1] <= SNAP * plan.edge_length:
-                masks["fixed"][vertex] = True
-    masks["fixed"][drawn.spots] = True
-    return masks["fixed"], masks["sliding"] & ~masks["fixed"]
+        fixed[strip_mask(strip, drawn.points, rim, SNAP * plan.edge_length)] = True
+    fixed[drawn.spots] = True
+    return fixed, sliding & ~fixed
 
 
 def _warn_of_free_edges(draft: _Draft, held: Bools) -> None:
     """Warn of free edges: the tension of the patch has nothing to pull against there."""
+    edges = draft.edges
     for number, line in enumerate(draft.lines):
-        chains = [c.vertices for c in draft.drawn.chains if c.line == number and line.bounds]
-        free = list(dict.fromkeys(v for chain in chains for v in chain if not held[v]))
+        chosen = edges.ends[(edges.line == number) & (edges.state == STATES.index("free"))]
+        free = [v for v in dict.fromkeys(chosen[:, 0].tolist()) if not held[v]]
         if free:
             place = draft.drawn.points[free[0]].round(4).tolist()
             text = (
                 f"nothing holds {line.name} at {place} ({len(free)} such vertices): the tension has"
-                " nothing to pull against there, and there is probably no equilibrium; fix the edge,"
-                " along a curve in space if it should be above the plane"
+                " nothing to pull against there, and there is probably no equilibrium; give the edge a cable"
+                ' (edge = "cable"), or fix it, along a curve in space if it should be above the plane'
             )
             warnings.warn(text, PlanWarning, stacklevel=4)
+
+
+def _cables(draft: _Draft, held: Bools) -> list[Cable]:
+    """The cables of the edges, and those along dividers."""
+    numbers = count(1)
+    cables = edge_cables(draft.edges, held, numbers)
+    first = 1 + len(draft.plan.holes)
+    for k, divider in enumerate(draft.plan.dividers):
+        if divider.cable is None:
+            continue
+        parts = [chain.edges for chain in draft.drawn.chains if chain.line == first + k]
+        named = divider.wall is None and not divider.name.startswith("divider ")
+        name = divider.name if named else f"cable {next(numbers)}"
+        cables.append(Cable(name, divider.cable, np.concatenate(parts)))
+    return cables
+
+
+def _check_free_pressure(
+    draft: _Draft, cables: Sequence[Cable], patches: Sequence[Patch], patch_of_face: Ints
+) -> None:
+    """Refuse pressure, and snow, on a patch with a free edge."""
+    loads = []
+    for k, patch in enumerate(patches):
+        F = draft.mesh.triangles[patch_of_face == k]
+        loads.append((patch.name, patch.pressure, F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)))
+    check_pressures(draft.edges, cables, loads)
 
 
 def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
@@ -200,7 +259,8 @@ def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
     areas = plan.patches
     if not areas:
         assert plan.tension is not None
-        areas = tuple(Area(f"patch {k + 1}", plan.tension) for k in range(count))
+        values = {"tension": plan.tension, "pressure": plan.pressure, "weight": plan.weight}
+        areas = tuple(Area(f"patch {k + 1}", **values) for k in range(count))
     located = [a for a in areas if a.at is not None]
     if not located:
         if len(areas) != count:
@@ -216,7 +276,10 @@ def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
         raise PlanError(problem, what="at", where=missing)
     else:
         owner = _located(areas, mesh, count, centroid)
-    patches = [Patch(a.name, a.tension, a.pressure) for a in areas]
+    snow = [plan.snow if a.snow is None else a.snow for a in areas]
+    patches = [
+        Patch(a.name, a.tension, a.pressure - s, weight=a.weight) for a, s in zip(areas, snow, strict=True)
+    ]
     return patches, owner[mesh.region]
 
 
@@ -245,9 +308,12 @@ def _located(areas: Sequence[Area], mesh: PlanarMesh, count: int, centroid: Floa
     return owner
 
 
-def _upright_planes(draft: _Draft, walls: WallMesh, divider_of_label: Ints) -> tuple[tuple[Plane, Ints], ...]:
+def _upright_planes(
+    draft: _Draft, walls: WallMesh, sides: Sequence[_Sides]
+) -> tuple[tuple[Plane, Ints], ...]:
     """The vertical plane of each upright divider, and the vertices of its wall and junction."""
     planes = []
+    divider_of_wall = np.array([side.divider for side in sides], dtype=np.int64)
     for number, divider in enumerate(draft.plan.dividers):
         if not divider.upright:
             continue
@@ -259,15 +325,22 @@ def _upright_planes(draft: _Draft, walls: WallMesh, divider_of_label: Ints) -> t
             raise line.error("is not straight, so no plane can hold its wall upright; remove upright = true")
         foot, tip = to_space(np.array([[*start, 0.0], [*(start + across), 0.0]]), draft.plan.plane)
         chains = [c.vertices for c in draft.drawn.chains if c.line == 1 + len(draft.plan.holes) + number]
-        own = walls.faces[divider_of_label[walls.label] == number]
+        own = walls.faces[divider_of_wall[walls.label] == number]
         planes.append(
             (Plane(tuple(foot), tuple(tip - foot)), np.unique(np.concatenate([*chains, own.ravel()])))
         )
     return tuple(planes)
 
 
-def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], Ints]:
-    """The walls, their patches, and the divider of each: one patch for each difference of pressure along it.
+def _room_of_face(plan: PlanData, patches: Sequence[Patch], patch_of_face: Ints) -> Ints:
+    """(m,) the room of prescribed volume below each face, -1 for none."""
+    rooms = [room.patches for room in plan.rooms.values()]
+    number = [next((k for k, names in enumerate(rooms) if patch.name in names), NONE) for patch in patches]
+    return np.array(number, dtype=np.int64)[patch_of_face]
+
+
+def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], list[_Sides]]:
+    """The walls and their patches: one for each divider and each pair of pressures and rooms along it.
 
     A wall takes the pressure on the left of its divider less that on the right.
     """
@@ -282,8 +355,7 @@ def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], Ints]:
             floor[chain.vertices] = roof.base[chain.vertices]
         else:
             level[chain.vertices] = True
-        difference = _difference(draft.mesh.triangles, roof.pressure, *chain.vertices[:2])
-        walled.append((chain.vertices, (number, difference)))
+        walled.append((chain.vertices, (number, _sides(draft.mesh.triangles, roof, *chain.vertices[:2]))))
     mixed = np.flatnonzero(level & (floor != 0.0))
     if len(mixed):
         place = draft.drawn.points[mixed[0]].round(6).tolist()
@@ -292,13 +364,13 @@ def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], Ints]:
     kinds = sorted(dict.fromkeys(kind for _, kind in walled), key=lambda kind: kind[0])
     tops = [UpperEdge(v, kinds.index(k), plan.dividers[k[0]].bottom != "sliding") for v, k in walled]
     patches = []
-    for number, difference in kinds:
+    for number, sides in kinds:
         divider, alike = plan.dividers[number], [kind for kind in kinds if kind[0] == number]
-        suffix = f"-{alike.index((number, difference)) + 1}" if len(alike) > 1 else ""
+        suffix = f"-{alike.index((number, sides)) + 1}" if len(alike) > 1 else ""
         tension = _balanced(draft, roof, number) if divider.wall == BALANCED else divider.wall
-        patches.append(Patch(divider.name + suffix, tension, difference, wall=True))
-    numbers = np.array([number for number, _ in kinds], dtype=np.int64)
-    return build_walls(X, tops, plan.edge_length, plan.plane, roof.fixed, floor), patches, numbers
+        patches.append(Patch(divider.name + suffix, tension, sides.difference, wall=True))
+    walls = build_walls(X, tops, plan.edge_length, plan.plane, roof.fixed, floor)
+    return walls, patches, [sides._replace(divider=number) for number, sides in kinds]
 
 
 def _balanced(draft: _Draft, roof: _Roof, number: int) -> float:
@@ -316,9 +388,33 @@ def _beside(triangles: Ints, one: int, two: int) -> Ints:
     return np.flatnonzero((triangles == one).any(axis=1) & (triangles == two).any(axis=1))
 
 
-def _difference(triangles: Ints, pressure: Floats, one: int, two: int) -> float:
-    """Pressure on the left of the edge from vertex ``one`` to ``two`` less that on its right."""
+class _Sides(NamedTuple):
+    """Of a wall: the pressure on the left less that on the right, the rooms there, -1 for none, and its
+    divider."""
+
+    difference: float
+    left: int
+    right: int
+    divider: int = NONE
+
+
+def _sides(triangles: Ints, roof: _Roof, one: int, two: int) -> _Sides:
+    """The sides of the edge from vertex ``one`` to ``two``."""
     ahead = np.roll(triangles, -1, axis=1)
     left = ((triangles == one) & (ahead == two)).any(axis=1)
     right = ((triangles == two) & (ahead == one)).any(axis=1)
-    return float(pressure[left].sum() - pressure[right].sum())
+    rooms = (int(roof.room[side].max(initial=NONE)) for side in (left, right))
+    return _Sides(float(roof.pressure[left].sum() - roof.pressure[right].sum()), *rooms)
+
+
+def _rooms(plan: PlanData, walls: Sequence[Patch], sides: Sequence[_Sides]) -> list[Room]:
+    """The rooms of prescribed volume: below their patches, between the walls to other rooms."""
+    rooms = []
+    for number, (name, room) in enumerate(plan.rooms.items()):
+        around = dict.fromkeys(room.patches, 1)
+        for wall, side in zip(walls, sides, strict=True):
+            sign = (side.left == number) - (side.right == number)
+            if sign:
+                around[wall.name] = sign
+        rooms.append(Room(name, around, room.volume))
+    return rooms

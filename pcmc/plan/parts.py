@@ -13,7 +13,7 @@ from ..base.errors import OptionError, unknown
 from ..surface import Plane
 from .curves import Curve, curve
 
-EDGES = ("fixed", "sliding", "free")
+EDGES = ("fixed", "sliding", "free", "cable")
 BOTTOMS = ("sliding", "held", "sloped")
 BALANCED = "balanced"  # in place of a wall's tension: chosen from those of its neighbours
 
@@ -30,8 +30,8 @@ class Divider:
         or inside a hole are left out.
     wall : tension of the wall, force/length, ≥ 0; "balanced", chosen so that the junction balances with room
         to spare: the difference of the neighbours' tensions and 0.3 of the smaller one, less where the wall
-        runs into a corner; None for no wall. Between patches of different pressures the wall takes the
-        difference.
+        runs into a corner; None or false for no wall. Between patches of different pressures the wall takes
+        the difference.
     name : of the wall's patch; by default "wall 1", "wall 2", … in order. Where the difference of
         pressure changes along the divider, each part is a patch of its own: "wall 1-1", "wall 1-2".
     bottom : "held" on Π in all directions; "sliding" on Π; or "sloped": held in all directions on the
@@ -39,12 +39,16 @@ class Divider:
         bottom is held at its ends by the mesh alone: on finer meshes it slips, or the shape is a saddle.
     upright : whether a vertical plane holds the wall and the junction on it, in which they slide; the line
         must be straight. The plane takes the pull across it.
+    cable : tension of a cable along the line, force; None for no cable. Without a wall the cable has the
+        name of the divider, otherwise "cable 1", "cable 2", … in order. For a cable across one patch, give
+        the parts on both sides to that patch with ``at``.
     """
 
     curve: Any
     wall: float | str | None = BALANCED
     name: str = ""
     bottom: str = "held"
+    cable: float | None = None
     upright: bool = False
 
 
@@ -55,13 +59,48 @@ class Hole:
     Attributes
     ----------
     curve : its closed edge.
-    edge : the support of the edge: "fixed" at the height of the curve, "sliding" on Π, or "free".
+    edge : the support of the edge: "fixed" at the height of the curve, "sliding" on Π, "free", or "cable":
+        free, with a cable along it.
     name : for messages.
+    cable : tension of that cable, force.
     """
 
     curve: Any
     edge: str = "fixed"
     name: str = ""
+    cable: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CableLine:
+    """A part of the outline or of a hole that is free and carries a cable, whatever ``edge`` is elsewhere.
+
+    Attributes
+    ----------
+    curve : along the outline or the hole.
+    tension : of the cable, force, ≥ 0. A flat edge of a membrane of tension α is at rest on an arc of
+        radius tension / α.
+    name : of the cable; by default "cable 1", "cable 2", … in order. A cable ends where the edge is held;
+        several of one name are numbered: "east-1", "east-2".
+    """
+
+    curve: Any
+    tension: float
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class RoomData:
+    """A room under several patches whose volume is given; its pressure is a result.
+
+    Attributes
+    ----------
+    patches : names of the patches over it.
+    volume : between them, their walls and Π, length³.
+    """
+
+    patches: tuple[str, ...]
+    volume: float
 
 
 @dataclass(frozen=True)
@@ -73,6 +112,11 @@ class Area:
     name : of the patch.
     tension : α, force/length.
     pressure : p, force/area.
+    weight : of the patch, force per area of the patch, against Π's normal; negative for a lift.
+    snow : force per area of the plan; None for that of the plan. It is a change of pressure: a load s on the
+        plan area has the potential s V, so the patch takes the pressure p - s.
+    volume : of the room under the patch, between its walls, length³, instead of a pressure, which is then a
+        result.
     at : a point [x, y] inside the patch, or a point in each of its parts. If no patch has one, the
         patches are given to the parts from left to right (by centroid).
     """
@@ -81,8 +125,14 @@ class Area:
     tension: float
     pressure: float = 1.0
     at: Any = None
+    weight: float = 0.0
+    snow: float | None = None
+    volume: float | None = None
 
     def __post_init__(self) -> None:
+        for key in ("weight", "snow", "volume"):
+            if getattr(self, key) is not None:
+                validate.number(key, getattr(self, key), where=self.name)
         if self.at is None:
             return
         try:
@@ -112,7 +162,9 @@ def divider_of(spec: Any, number: int) -> Divider:
         validate.choice(f"wall of {what}", part.wall, (BALANCED,))
     if not isinstance(part.upright, bool):
         validate.refuse("upright", part.upright, "True or False", what)
-    return replace(part, curve=curve_of(part.curve, what), name=part.name or f"wall {number}")
+    wall, kind = (None, "divider") if part.wall is None or part.wall is False else (part.wall, "wall")
+    given = {"curve": curve_of(part.curve, what), "cable": cable_tension(part.cable, what)}
+    return replace(part, **given, wall=wall, name=part.name or f"{kind} {number}")
 
 
 def hole_of(spec: Any, number: int) -> Hole:
@@ -121,7 +173,77 @@ def hole_of(spec: Any, number: int) -> Hole:
     part = _part_of(Hole, spec, what)
     validate.choice(f"edge of {what}", part.edge, EDGES)
     name = f"hole {part.name!r}" if part.name else what
-    return Hole(curve_of(part.curve, what, closed=True), part.edge, name)
+    cable = edge_cable(part.edge, part.cable, name)
+    return Hole(curve_of(part.curve, what, closed=True), part.edge, name, cable)
+
+
+def edge_cable(edge: str, cable: Any, what: str) -> float | None:
+    """The tension of the cable along an edge; refused without ``edge = "cable"``, and missing with it."""
+    if edge == "cable" and cable is None:
+        message = f'{what}: edge = "cable" needs the tension of the cable, such as cable = 10.0'
+        raise OptionError(message, what="cable", where=what)
+    if edge != "cable" and cable is not None:
+        message = f'{what}: cable = {cable!r} needs edge = "cable", found "{edge}"'
+        raise OptionError(message, what="edge", where=what, found=edge, expected="cable")
+    return cable_tension(cable, what)
+
+
+def cable_tension(cable: Any, what: str) -> float | None:
+    """A tension ≥ 0, or None."""
+    return None if cable is None else validate.number("cable", cable, least=0.0, where=what)
+
+
+def cable_of(spec: Any, number: int) -> CableLine:
+    """A CableLine from a mapping of its attributes; ``number`` counts from 1."""
+    what = f"cable {number}"
+    if isinstance(spec, Mapping):
+        check_keys(spec, CableLine, what)
+        for key in ("curve", "tension"):
+            if key not in spec:
+                raise OptionError(f"{what} needs a {key}", what=key, where=what)
+        spec = CableLine(**spec)
+    if not isinstance(spec, CableLine):
+        raise OptionError(f"{what}: expected a curve with a tension, found {spec!r}", what=what, found=spec)
+    what = f"cable {spec.name!r}" if spec.name else what
+    tension = validate.number("tension", spec.tension, least=0.0, where=what)
+    return CableLine(curve_of(spec.curve, what), tension, spec.name)
+
+
+def mirror_of(spec: Any, number: int) -> Curve:
+    """The straight line of a mirror; ``number`` counts from 1."""
+    what = f"mirror {number}"
+    line = curve_of(spec, what)
+    if len(line.pieces) != 1 or line.pieces[0].sweep or len(line.pieces[0].points) != 2:
+        message = f"{what} must be a straight line, two points [[x, y], [x, y]], found {spec!r}"
+        raise OptionError(message, what=what, found=spec)
+    return line
+
+
+def rooms_of(spec: Any, areas: Sequence[Area]) -> dict[str, RoomData]:
+    """The rooms with a volume: those of single patches, and those given by name."""
+    rooms = {a.name: RoomData((a.name,), a.volume) for a in areas if a.volume is not None}
+    for name, values in (spec or {}).items():
+        if isinstance(values, RoomData):
+            values = vars(values)
+        check_keys(values, RoomData, f"room {name!r}")
+        for key in ("patches", "volume"):
+            if key not in values:
+                raise OptionError(f"room {name!r} needs {key}", what=key, where=name)
+        volume = validate.number("volume", values["volume"], where=name)
+        known = [area.name for area in areas]
+        patches = tuple(validate.choice(f"room {name!r}: patch", p, known) for p in values["patches"])
+        if rooms.get(name, RoomData(patches, volume)) != RoomData(patches, volume):
+            raise OptionError(f"room {name!r} has two volumes; give one", what="volume", where=name)
+        rooms[name] = RoomData(patches, volume)
+    owner: dict[str, str] = {}
+    for name, room in rooms.items():
+        for patch in room.patches:
+            if owner.setdefault(patch, name) != name:
+                message = (
+                    f"patch {patch!r} is in the rooms {owner[patch]!r} and {name!r}; leave it out of one"
+                )
+                raise OptionError(message, what="rooms", where=patch)
+    return rooms
 
 
 def _part_of(kind: Any, spec: Any, what: str) -> Any:
@@ -140,6 +262,11 @@ def areas_of(spec: Any) -> tuple[Area, ...]:
         check_keys(values, Area, f"patch {name!r}")
         if "tension" not in values:
             raise OptionError(f"patch {name!r} needs a tension", what="tension", where=name)
+        if "volume" in values and "pressure" in values:
+            message = (
+                f"patch {name!r} has a volume and a pressure; give one: the pressure follows from the volume"
+            )
+            raise OptionError(message, what="volume", where=name)
         areas.append(Area(name, **values))
     return tuple(areas)
 
@@ -178,3 +305,10 @@ class PlanData:
     plane: Plane = field(default_factory=Plane)
     rise: float | None = None
     tension: float | None = None
+    pressure: float = 1.0
+    weight: float = 0.0
+    snow: float = 0.0
+    cable: float | None = None
+    cables: Sequence[Any] = ()
+    mirrors: Sequence[Any] = ()
+    rooms: Any = ()

@@ -13,7 +13,20 @@ from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError
 from ..surface import Plane, Surface
 from .curves import Curve
-from .parts import EDGES, PlanData, areas_of, check_keys, curve_of, divider_of, hole_of, support_of
+from .parts import (
+    EDGES,
+    PlanData,
+    areas_of,
+    cable_of,
+    check_keys,
+    curve_of,
+    divider_of,
+    edge_cable,
+    hole_of,
+    mirror_of,
+    rooms_of,
+    support_of,
+)
 from .pieces import to_local, to_space
 
 
@@ -32,15 +45,27 @@ class Plan(PlanData):
         their attributes; without patches ``tension`` holds for every part.
     edge_length : of the triangles, length.
     edge : the support of the outline: "fixed"; "sliding" on Π, where the roof is at rest if it meets Π
-        at a right angle; or "free" except at ``supports``. A free edge has nothing to pull against:
-        for a roof on a few points, draw the edges between them as curves in space (arches) and hold
-        those.
-    supports : points [x, y] or [x, y, z], and curves along which vertices are fixed. A curve on the
-        outline or a hole fixes that part of it; one inside a patch is fixed where it is drawn.
+        at a right angle; "cable": free between ``supports``, with a cable along it; or "free", where the
+        tension has nothing to pull against.
+    supports : points [x, y] or [x, y, z], such as masts, and curves along which vertices are fixed. A curve
+        on the outline or a hole fixes that part of it; one inside a patch is fixed where it is drawn. The
+        height z of a point on a free edge or a cable is that of the edge there; between such points the
+        edge starts straight.
     plane : Π.
     rise : height of the initial surface above the one that the boundary spans, length; by default
         0.3 of the radius of the largest circle without supports.
     tension : α of all patches, instead of ``patches``, force/length.
+    pressure, weight : of all patches, with ``tension``: force per area along the normal, and per area against
+        Π's normal.
+    snow : force per area of the plan, on all patches that have none of their own. It is the same as a change
+        of pressure: a load s on the plan area has the potential s V, so a patch takes the pressure p - s.
+    cable : tension of the cables along the outline, with ``edge = "cable"``, force. Each stretch between
+        supports is a cable: "cable 1", "cable 2", … in order.
+    cables : parts of the outline and of holes that are free and carry a cable of their own: CableLines.
+    mirrors : straight lines, each two points, along edges of the outline: the plan is one half of a
+        symmetric roof, or a quarter, and goes on behind these edges as its mirror image.
+    rooms : a mapping from names to ``patches`` and ``volume``: rooms under several patches whose volume is
+        given, instead of their pressure. For a room under one patch give that patch a ``volume``.
 
     Raises
     ------
@@ -54,7 +79,7 @@ class Plan(PlanData):
     Warns
     -----
     PlanWarning
-        From ``surface``, if an edge is free.
+        From ``surface``, if an edge is free and has no cable.
 
     Examples
     --------
@@ -71,10 +96,16 @@ class Plan(PlanData):
             "holes": tuple(hole_of(h, k) for k, h in enumerate(self.holes, 1)),
             "patches": areas_of(self.patches),
             "supports": tuple(support_of(s, k) for k, s in enumerate(self.supports, 1)),
+            "cables": tuple(cable_of(c, k) for k, c in enumerate(self.cables, 1)),
+            "mirrors": tuple(mirror_of(m, k) for k, m in enumerate(self.mirrors, 1)),
         }
+        parsed["rooms"] = rooms_of(self.rooms, parsed["patches"])
         for key, value in parsed.items():
             object.__setattr__(self, key, value)
         validate.choice("edge of the outline", self.edge, EDGES)
+        object.__setattr__(self, "cable", edge_cable(self.edge, self.cable, "the outline"))
+        for key in ("pressure", "weight", "snow"):
+            validate.number(key, getattr(self, key))
         validate.positive("edge_length", self.edge_length)
         if self.rise is not None:
             validate.positive("rise", self.rise)
@@ -82,10 +113,17 @@ class Plan(PlanData):
             raise OptionError(
                 "a plan needs either patches, each with its tension, or one tension= for all", what="tension"
             )
+        if self.patches:
+            for key, usual in (("pressure", 1.0), ("weight", 0.0)):
+                if getattr(self, key) != usual:
+                    problem = f"{key} = {getattr(self, key):g} of all patches needs tension = of all patches;"
+                    raise OptionError(f"{problem} give it to each of the patches", what=key)
         names = [d.name for d in self.dividers if d.wall is not None] + [a.name for a in self.patches]
+        names += [d.name for d in self.dividers if d.wall is None and d.cable is not None]
+        names += dict.fromkeys(c.name for c in self.cables if c.name)
         for place, name in enumerate(names):
             if name in names[:place]:
-                problem = f"the name {name!r} is used twice; each patch and wall needs its own"
+                problem = f"the name {name!r} is used twice; each patch, wall and cable needs its own"
                 raise OptionError(problem, what="name", found=name)
 
     @property

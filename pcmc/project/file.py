@@ -57,6 +57,7 @@ class Project:
     files, picture : the output.
     folder : made for the output if it is missing; None if the names include their folders.
     view, colour : of the picture; ``colour`` is one of ``COLOURS``.
+    whole : whether the output is the whole roof that a surface with mirror planes is a part of.
     drawing : that the plan refers to, or that ``path`` is; None if there is none.
     """
 
@@ -77,6 +78,7 @@ class Project:
     folder: Path | None = None
     view: Any = "diagonal"
     colour: str = "patches"
+    whole: bool = False
     drawing: Drawing | None = None
 
     @property
@@ -240,6 +242,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             picture=picture,
             view=tuple(view) if isinstance(view, list) else view,
             colour=colour,
+            whole=output.get("whole", False),
             drawing=drawing,
         )
 

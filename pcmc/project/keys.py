@@ -11,8 +11,8 @@ from typing import Any
 
 from ..accuracy.adaptive import ACCURACY_OF
 from ..base.units import FORCES, LENGTHS
-from ..plan import Area, Divider, Hole, Plan
-from ..plan.parts import BALANCED, BOTTOMS, EDGES
+from ..plan import Area, CableLine, Divider, Hole, Plan
+from ..plan.parts import BALANCED, BOTTOMS, EDGES, RoomData
 from ..solvers import METHODS, find_method
 from ..surface import Plane
 from .accuracy import AccuracyWanted
@@ -21,8 +21,9 @@ from .remeshing import WHEN, Remeshing
 from .structure import Structure
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
+WHOLE = "whether to write and draw the whole roof that a plan with mirrors is a part of, and to certify it"
 FIRST = "First lines"  # the keys before any table
-WALL = 'a number or "balanced"'
+WALL = 'a number, "balanced" or false'
 REQUIRED = MISSING  # the default of a key that must be given
 
 
@@ -77,7 +78,7 @@ def _list_of(*kinds: type) -> Callable[[Any], bool]:
 KINDS: dict[str, Callable[[Any], bool]] = {
     "a value": lambda value: True,
     "a number": _number,
-    WALL: lambda value: _number(value) or value == BALANCED,
+    WALL: lambda value: value is False or _number(value) or value == BALANCED,
     "a whole number": lambda value: _number(value) and isinstance(value, int),
     "true or false": lambda value: isinstance(value, bool),
     "a text": lambda value: isinstance(value, str),
@@ -136,7 +137,8 @@ def main_sections() -> tuple[Section, ...]:
     """The file itself, and all sections but [solve] and [targets]."""
     curve, curves = {"curve": "a curve"}, "a list of curves or tables"
     plan = {"outline": "a curve", "dividers": curves, "holes": curves, "patches": "a table"}
-    plan |= {"supports": "a list of points and curves", "plane": "a table"}
+    plan |= {"supports": "a list of points and curves", "plane": "a table", "cables": "a list of tables"}
+    plan |= {"mirrors": "a list of curves or tables", "rooms": "a table"}
     area = _of_class(Area, {"at": "a point [x, y] or a list of points"})
     directions = "of the picture: diagonal, elevation, plan, or [azimuth, elevation] in degrees"
     return (
@@ -149,7 +151,7 @@ def main_sections() -> tuple[Section, ...]:
                 Key("plan", "a table", REQUIRED, "the roof, by the lines of its plan"),
                 Key("solve", "a table", None, "the solver and its options"),
                 Key("remesh", "a table or a list of tables", None, "other triangles, once or more"),
-                Key("targets", "a table", None, "heights, areas or volumes to be met"),
+                Key("targets", "a table", None, "heights, areas, sags or other quantities to be met"),
                 Key("structure", "a table", None, "material, thickness and loads of the structural model"),
                 Key("output", "a table", None, "the files and the picture to write"),
             ),
@@ -165,6 +167,16 @@ def main_sections() -> tuple[Section, ...]:
         ),
         Section(
             "plan.holes", "An opening. A curve alone is a hole, too.", _of_class(Hole, curve, {"edge": EDGES})
+        ),
+        Section(
+            "plan.cables",
+            "A part of the outline or of a hole that is free and carries a cable.",
+            _of_class(CableLine, curve | {"tension": "a number"}),
+        ),
+        Section(
+            "plan.rooms.NAME",
+            "A room under several patches; NAME is its name.",
+            _of_class(RoomData, {"patches": "a list of names"}),
         ),
         Section(
             "plan.plane",
@@ -192,6 +204,7 @@ def main_sections() -> tuple[Section, ...]:
                 Key("picture", "a text", None, "name of a picture, .png, .svg or .pdf"),
                 Key("view", "a name or two angles", "diagonal", directions),
                 Key("colour", "a text", "patches", "of the picture", COLOURS),
+                Key("whole", "true or false", False, WHOLE),
             ),
         ),
     )
@@ -219,14 +232,15 @@ def target_sections() -> tuple[Section, ...]:
     """[targets] and its tables."""
     from ..design import Parameter, Target  # needed by projects with targets only
     from ..design.quantities import QUANTITIES
+    from ..design.targets import KINDS as KINDS_OF_PARAMETER
 
-    changing = _of_class(Parameter, choices={"kind": ("tension", "pressure")})
+    changing = _of_class(Parameter, choices={"kind": KINDS_OF_PARAMETER})
     varied = "what may change; a name alone is a patch whose tension may"
     wanted = _of_class(Target, {"of": "a name or a point [x, y]"}, {"quantity": tuple(QUANTITIES)})
     return (
         Section(
             "targets",
-            "Quantities to be met by changing tensions or pressures.",
+            "Quantities to be met by changing tensions, pressures, cables, weights or volumes.",
             (
                 Key("meet", "a list of tables", REQUIRED, "the quantities and their values"),
                 Key("vary", "a list of names or tables", REQUIRED, varied),

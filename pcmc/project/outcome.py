@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
@@ -15,6 +15,13 @@ from ..surface import Surface
 if TYPE_CHECKING:
     from ..accuracy import AccurateResult, MeshCheck
     from ..design import Design
+
+
+class Whole(NamedTuple):
+    """The whole roof with its certificate, which counts motions that are not symmetric, too."""
+
+    surface: Surface
+    certificate: Certificate
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +36,7 @@ class Outcome:
     mesh_check : the surface on finer meshes; None where the project asks for none.
     accurate : the search for an accuracy; None where the project asks for none.
     units : those of the project, in which all numbers are.
+    whole : the whole roof, if the project asks for it: ``surface`` is the part between its mirror planes.
     cached : whether the roof was solved before and comes from the cache. Then ``accurate`` is None, and the
         histories of ``result`` and ``design`` are empty.
     notes : what was chosen where the project does not say it, and what happened on the way.
@@ -42,6 +50,7 @@ class Outcome:
     accurate: AccurateResult | None = None
     units: Units = NO_UNITS
     cached: bool = False
+    whole: Whole | None = None
     notes: Sequence[str] = ()
     advice: Sequence[str] = ()
 
@@ -56,9 +65,15 @@ class Outcome:
         return self.result.certificate
 
     @property
+    def shown(self) -> Whole:
+        """What is written and drawn: the whole roof if the project asks for it, with its certificate."""
+        return Whole(self.surface, self.certificate) if self.whole is None else self.whole
+
+    @property
     def good(self) -> bool:
         """Whether the surface is certified, every target is met, and every accuracy reached."""
         if self.cached:
             return True  # no other roof is kept
         met = self.design is None or self.design.met
-        return self.certificate.certified and met and (self.accurate is None or self.accurate.reached)
+        certified = self.certificate.certified and (self.whole is None or self.whole.certificate.certified)
+        return certified and met and (self.accurate is None or self.accurate.reached)

@@ -18,15 +18,16 @@ from ..base.arrays import Ints
 from ..base.errors import BalanceWarning, OptionError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
+from ..certificate.certificate import certify
 from ..contact.pinching import standing_part
 from ..existence import solve
 from ..meshing.remeshing import remesh
 from ..solvers.result import Progress, Result, Status
-from ..surface import Surface
+from ..surface import Surface, mirrored
 from . import cache
 from .advice import advice, chosen_walls
 from .file import Project, in_file, load, start_of
-from .outcome import Outcome
+from .outcome import Outcome, Whole
 from .output import OnStep, PathLike, check_names, check_outputs, fields, ignore, paint, write_all
 
 if TYPE_CHECKING:
@@ -126,12 +127,16 @@ def _solve_and_write(
     check_names(project.files, project.picture)
     check_outputs(outputs, project.folder)
     outcome = solve_from_start(project, report, changed)
+    if project.whole:
+        report("certifying the whole")
+        whole = mirrored(outcome.surface)
+        outcome = replace(outcome, whole=Whole(whole, certify(whole)))
     if not outputs or not (outcome.good or anyway):
         return outcome
     works = surface_files(outcome, project.files)
     if project.picture is not None:
         look = {"view": project.view, "colour": project.colour, "units": outcome.units}
-        works.append((Path(project.picture), partial(paint, outcome.surface, **look)))
+        works.append((Path(project.picture), partial(paint, outcome.shown.surface, **look)))
     with made(project.folder or Path()):
         return replace(outcome, files=write_all(works, report))
 
@@ -143,13 +148,14 @@ def surface_files(
 
     ``colour`` names the scalar that colours vertices.
     """
+    surface, certificate = outcome.shown
     data: dict[str, Any] = {
-        "scalars": fields(outcome.surface, outcome.certificate),
-        "certificate": outcome.certificate,
+        "scalars": fields(surface, certificate),
+        "certificate": certificate,
         "units": outcome.units,
         "colour": colour,
     }
-    return [(Path(file), partial(io.write, surface=outcome.surface, **data)) for file in files]
+    return [(Path(file), partial(io.write, surface=surface, **data)) for file in files]
 
 
 def solve_from_start(
@@ -159,6 +165,9 @@ def solve_from_start(
     report("reading" if project.plan is None else "meshing the plan")
     start, units = start_of(project)
     given, start = start, start if changed is None else changed(start)
+    if project.whole and not any(plane.mirror for plane, _ in start.on_planes):
+        text = f"{project.path}: the roof has no mirror planes, so it is the whole already; leave out whole"
+        raise OptionError(f"{text}, or give the plan mirrors", what="whole")
     _check_balance(start)
     outcome = replace(solve_project(project, start, report), units=units)
     notes = (*chosen_walls(project, start), *outcome.notes)

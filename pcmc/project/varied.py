@@ -1,4 +1,4 @@
-"""A project with other numbers: tensions and pressures by patch, all others by their key."""
+"""A project with other numbers: those of patches, cables and rooms by name, all others by their key."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from typing import Any
 
 from .. import io
 from ..base.errors import OptionError, unknown
+from ..energy.rooms import refuse_varied_pressure
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 from .drawn import files_of, is_drawing
 from .file import PathLike, Project, in_file, project_of, read_data, surface_of
 
-QUANTITIES = ("tension", "pressure")
+QUANTITIES = ("tension", "pressure", "weight")  # of a patch
+LOADS = ("tensions", "pressures", "weights", "cables", "volumes")
+CABLE = "cable "  # before the name of a cable, where a patch has the same
 KeyPath = tuple[str | int, ...]
 
 
@@ -50,9 +53,11 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
     Parameters
     ----------
     path : of a project (``.toml``), or of a surface, which has no keys.
-    values : by ``NAME.tension`` and ``NAME.pressure`` of a patch or wall, or by the dotted name of a
-        number in the file, such as ``plan.edge_length``. Numbers of the file are replaced before the
-        plan is meshed, tensions and pressures afterwards.
+    values : by ``NAME.tension``, ``NAME.pressure`` and ``NAME.weight`` of a patch or wall, by
+        ``NAME.tension`` of a cable, ``NAME.volume`` of a room, or by the dotted name of a number in the file,
+        such as ``plan.edge_length``. Numbers of the file are replaced before the plan is meshed, those of
+        patches, cables and rooms afterwards. For a cable with the name of a patch write
+        ``cable NAME.tension``.
 
     Raises
     ------
@@ -75,7 +80,7 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
     path = Path(path)
     surface = surface_of(_project(path, {}))
     keys = numbers(_data(path))
-    known = [f"{patch.name}.{what}" for what in QUANTITIES for patch in surface.patches]
+    known = list(_names(surface))
     for name, given in values.items():
         if name not in keys and name not in known:
             # no coordinates, and patches have shorter names
@@ -104,6 +109,12 @@ def digest(path: PathLike) -> str:
     sha = hashlib.sha256(repr((surface.patches, surface.plane)).encode())
     for name in ("vertices", "faces", "patch_of_face", "fixed", "on_plane"):
         sha.update(getattr(surface, name).tobytes())
+    for cable in surface.cables:
+        sha.update(repr((cable.name, cable.tension)).encode() + cable.edges.tobytes())
+    for plane, on in surface.on_planes:
+        sha.update(repr((plane, plane.name, plane.mirror)).encode() + on.tobytes())
+    if surface.rooms or surface.weights.any():
+        sha.update(repr((surface.rooms, surface.weights.tolist())).encode())
     return sha.hexdigest()
 
 
@@ -137,12 +148,24 @@ def _project(path: Path, values: Mapping[str, float]) -> Project:
 
 def _retensioned(path: Path, surface: Surface, values: Mapping[str, float]) -> Surface:
     """The surface with other tensions and pressures; names that are in the file are ignored."""
-    keys = numbers(_data(path))
-    given: dict[str, dict[str, float]] = {what: {} for what in QUANTITIES}
+    keys, known = numbers(_data(path)), _names(surface)
+    given: dict[str, dict[str, float]] = {kind: {} for kind in LOADS}
     for name in values.keys() - keys.keys():
-        patch, _, what = name.rpartition(".")
-        if what not in given:
-            raise _unknown_number(path, name, keys)
-        given[what][patch] = values[name]
+        if name not in known:
+            raise _unknown_number(path, name, known)
+        kind, part = known[name]
+        given[kind][part] = values[name]
     with in_file(path, OptionError):
-        return with_pressures(surface, given["tension"], given["pressure"])
+        refuse_varied_pressure(surface, map(surface.patch_index, given["pressures"]))
+        return with_pressures(surface, **given)
+
+
+def _names(surface: Surface) -> dict[str, tuple[str, str]]:
+    """The names of what may vary besides numbers of the file: the kind of each, and its patch, cable or
+    room."""
+    patches = [patch.name for patch in surface.patches]
+    names = {f"{name}.{what}": (f"{what}s", name) for what in QUANTITIES for name in patches}
+    names |= {f"{room.name}.volume": ("volumes", room.name) for room in surface.rooms}
+    cables = [cable.name for cable in surface.cables]
+    short = {f"{name}.tension": ("cables", name) for name in cables}
+    return {f"{CABLE}{name}.tension": ("cables", name) for name in cables} | short | names

@@ -73,6 +73,8 @@ class Evaluator:
         self._supports = surface.fixed, surface.on_plane, np.array(surface.plane.normal)
         self._others = tuple((plane, mask) for plane, mask in surface.sliding if mask is not surface.on_plane)
         self._surface = surface
+        self._pieces = bool(flat_pieces(surface))
+        self._pulled = bool(surface.cables) or bool(surface.weights.any())
         self._single = len(blocks(surface.m, threads())) == 1
 
     def __call__(self, X: Floats) -> Point:
@@ -85,10 +87,10 @@ class Evaluator:
             kernels.measure_block(self._mesh, X, 0, m, area, volume, G)
         else:
             area, volume, G = kernels.measure(self._mesh, X)
-        if flat_pieces(self._surface):
+        if self._pieces:
             add_plane_volumes(self._surface, X, volume)
             add_plane_forces(self._surface, pressure, X, G)
-        further = add_cables_and_weights(self._surface, X, G)
+        further = add_cables_and_weights(self._surface, X, G) if self._pulled else 0.0
         for plane, mask in self._others:
             G[mask] = plane.along(G[mask])
         squared = _apply_supports(G, *self._supports)

@@ -12,8 +12,8 @@ from . import Surface
 # Paul Tol's "light" scheme.
 SHEETS = ("#77AADD", "#EE8866", "#44BB99", "#EEDD88", "#AAAA00")
 # Paul Tol's "iridescent" scheme, from pale to dark.
-SCALE = ("#FEFBE9", "#F5F3C1", "#DDECBF", "#C2E3D2", "#A8D8DC", "#8DCBE4", "#7BBCE7", "#88A5DD", "#9B8AC4")
-SCALE = (*SCALE, "#9A709E", "#805770", "#46353A")
+PALE = ("#FEFBE9", "#F5F3C1", "#DDECBF", "#C2E3D2", "#A8D8DC", "#8DCBE4", "#7BBCE7", "#88A5DD", "#9B8AC4")
+SCALE = (*PALE, "#9A709E", "#805770", "#46353A")
 NO_VALUE = "#999999"
 WALLS = ("#DDDDDD", "#99DDFF", "#BBCC33", "#FFAABB")
 

@@ -119,6 +119,8 @@ def row(result: Result, names: Container[str]) -> dict[str, Any]:
         **certificate.numbers(),
         **_cells(certificate.patches, certificate.patches["patch"]),
         **_heights(result.surface, certificate),
+        **_cells(certificate.rooms, certificate.rooms.get("room", ())),
+        **_cells(certificate.cables, _cable_names(certificate.cables)),
         **_cells(certificate.junctions, [f"junction {i}" for i in certificate.junctions.index]),
         **_cells(certificate.boundaries, [f"boundary {i}" for i in certificate.boundaries.index]),
     }
@@ -154,6 +156,13 @@ def _heights(surface: Surface, certificate: Certificate) -> dict[str, float]:
         "roof_area": float(certificate.patches["area"][roof].sum()),
         "largest_reaction": 0.0 if per_length is None else float(per_length.max()),
     }
+
+
+def _cable_names(cables: pd.DataFrame) -> list[str]:
+    """The name of each row: that of its cable, numbered where supports cut the cable into several rows."""
+    names = list(cables.get("cable", ()))
+    order = [names[:k].count(name) + 1 for k, name in enumerate(names)]
+    return [f"{n} {k}" if names.count(n) > 1 else n for n, k in zip(names, order, strict=True)]
 
 
 def _cells(frame: pd.DataFrame, names: Iterable[str]) -> dict[str, Any]:

@@ -1,9 +1,15 @@
 // The page: it sends one request at a time to the server and shows the answers.
 
-import { arrowsOf, COLOURS, fieldOf, showCheck, showFindings, showLegend, showVerdict } from "./findings.js";
+import {
+  arrowsOf, COLOURS, fieldOf, showCheck, showFindings, showLegend, showPatches, showVerdict,
+} from "./findings.js";
 import { digits, Panel } from "./panel.js";
-import { Viewer } from "./viewer.js";
+import { addSaving } from "./saving.js";
 import { ask, fetchFile } from "./server.js";
+import { Targets } from "./targets.js";
+import { Variants } from "./variants.js";
+import { Viewer } from "./viewer.js";
+import { follow } from "./watching.js";
 
 const REPLACE_AFTER = 400; // milliseconds, at least, before a newer request replaces one under way
 const find = (selector) => document.querySelector(selector);
@@ -18,30 +24,56 @@ class Page {
     // a copy of this tab starts a session of its own
     sessionStorage.removeItem("session");
     addEventListener("pagehide", () => sessionStorage.setItem("session", this.name));
-    const { header, arrays } = await ask("api/open", known ? { session: known } : {})
+    const answer = await ask("api/open", known ? { session: known } : {})
       .catch((error) => (known && !location.search ? ask("api/open") : Promise.reject(error)));
-    this.name = header.session;
-    this.size = header.size;
-    this.units = header.units;
+    this.name = answer.header.session;
     this.choice = "patches";
+    this.startViewer();
+    this.variants = new Variants(find("#variants"), (name, body) => this.act(name, body), () => this.canvas());
+    this.begin(answer);
+    this.addExports(answer.header.formats);
+    this.addActs();
+    follow(find("#watch"), answer.header, () => this.name, () => this.reopen());
+    this.showWork();
+  }
+
+  /** Everything that depends on the mesh: at the start, and when the file behind the page was saved. */
+  begin({ header, arrays }) {
+    Object.assign(this, { size: header.size, units: header.units, mesh: header.mesh, download: header.name });
     find("#title").textContent = header.title || "pcmc explore";
     document.title = header.title ? `${header.title} – pcmc explore` : "pcmc explore";
+    find("#units").textContent = this.units.given
+      ? `Tension in ${this.units.tension}, pressure in ${this.units.pressure}.`
+      : "Any consistent units. With metres and kilonewtons: tension kN/m, pressure kN/m², curvature 1/m.";
+    if (header.whole) {
+      find("#units").textContent += " The surface is a piece between mirror planes: the picture shows the whole, the numbers are those of the piece.";
+    }
     this.underPressure = new Uint8Array(header.vertices);
     arrays.sheet_patch.forEach((p, i) => {
       if (!header.patches[p].wall) this.underPressure[arrays.sheet_vertex[i]] = 1;
     });
-    this.startViewer(header, arrays);
-    this.panel = new Panel(find("#patches"), header.patches, header.asked, find("#together"),
-      (final) => this.request(final), header.units);
+    this.sway(false);
+    this.viewer?.setMesh(header, arrays);
+    this.panel = new Panel(find("#patches"), header, find("#together"), (final) => this.request(final));
+    this.targets = new Targets(find("#targets"), header, (aims) => this.send("meet", aims, true), () => this.act("stop"));
+    if (header.note) this.targets.say(header.note, header.note.startsWith("met") ? "met" : "missed");
     find("#together-row").hidden = header.patches.length < 2;
-    this.addChoices();
-    this.addExports(header.formats);
-    this.addActs();
+    addSaving(find("#save-project"), find("#saving"), header, () => this.name, (text) => this.notify(text));
+    this.next = null;
     this.show({ header, arrays }, true);
-    this.showWork();
   }
 
-  startViewer(header, arrays) {
+  async reopen() {
+    this.begin(await ask("api/open", { session: this.name }));
+  }
+
+  canvas() {
+    if (!this.viewer) return null;
+    this.viewer.draw();
+    return find("#canvas");
+  }
+
+  startViewer() {
     try {
       this.viewer = new Viewer(find("#canvas"), (spacing) => {
         find("#scale").textContent = spacing ? `grid ${digits(spacing)}` : "";
@@ -52,21 +84,21 @@ class Page {
       find("#no-graphics").textContent = error.message === "no WebGL 2"
         ? "This browser cannot show the surface: WebGL 2 is missing or switched off. Everything else works."
         : `The 3D picture cannot be drawn: ${error.message}`;
-      return;
     }
-    this.viewer.setMesh(header, arrays);
   }
 
   // -- requests: one under way, and the newest of those that wait -----------------------------------
 
   request(final) {
     this.next = { act: final ? "settle" : "follow", values: this.panel.values() };
+    this.targets.say(""); // it was about the last surface
     find("#verdict").dataset.busy = "true";
     this.pump();
   }
 
-  act(name) {
-    this.next = { act: name, values: {} };
+  act(name, values = {}) {
+    if (["undo", "redo", "reset", "recall", "stabilise"].includes(name)) this.targets.say("");
+    this.next = { act: name, values };
     this.pump(true);
   }
 
@@ -85,53 +117,74 @@ class Page {
     this.send(act, values);
   }
 
-  async send(act, values) {
+  /** Send a request and show its answer; returns the header. Errors are shown, or thrown if `raise`. */
+  async send(act, values, raise = false) {
     const ticket = {};
+    let [result, failure] = [null, null];
     this.busy = ticket;
     this.since = performance.now();
     this.showWork();
     try {
       const answer = await ask(`api/${this.name}/${act}`, values);
+      result = answer.header;
       if (!answer.header.superseded && this.busy === ticket) {
         if (act === "follow") this.lasted = performance.now() - this.since;
-        this.show(answer, !["follow", "settle"].includes(act));
+        await this.show(answer, !["follow", "settle"].includes(act));
       }
     } catch (error) {
-      this.notify(error.message);
-      if (!this.next) this.panel.show(this.header.asked, this.header.shown, true);
+      failure = error;
+      if (!raise) this.notify(error.message);
+      if (!this.next) this.panel.show(this.header.values, true);
     }
-    if (this.busy !== ticket) return;
-    this.busy = null;
-    this.showWork();
-    this.pump();
+    if (this.busy === ticket) {
+      this.busy = null;
+      this.showWork();
+      this.pump();
+    }
+    if (failure && raise) throw failure;
+    return result;
   }
 
   showWork() {
     clearTimeout(this.slow);
     const card = find("#verdict");
     card.dataset.busy = String(Boolean(this.busy || this.next));
+    const work = card.querySelector(".work");
+    work.hidden = true;
     if (!this.busy) {
       card.classList.remove("working");
       card.removeAttribute("aria-busy");
       return;
     }
+    const tell = () => {
+      work.hidden = false;
+      work.textContent = `Working… ${Math.round((performance.now() - this.since) / 1000)} s`;
+      this.slow = setTimeout(tell, 1000);
+    };
     this.slow = setTimeout(() => {
       card.classList.add("working");
       card.setAttribute("aria-busy", "true");
+      this.slow = setTimeout(tell, 550);
     }, 250);
   }
 
   // -- answers -------------------------------------------------------------------------------------
 
   /** Show an answer; with `values` set the sliders too, which must not happen while one moves. */
-  show({ header, arrays }, values) {
+  async show({ header, arrays }, values) {
+    if (header.mesh !== this.mesh) {
+      await this.reopen();
+      return;
+    }
     this.header = header;
     this.arrays = { ...arrays, underPressure: this.underPressure };
     showVerdict(find("#verdict"), header);
     showFindings(find("#findings tbody"), header.findings, this.units);
+    showPatches(find("#by-patch"), header.measures, this.units);
+    this.variants.show(header, this.units);
     find("#check-result").hidden = true; // it was about the last surface
     find("#check").disabled = !header.at_rest;
-    if (!this.next) this.panel.show(header.asked, header.shown, values);
+    if (!this.next) this.panel.show(header.values, values);
     find("#undo").disabled = !header.undo;
     find("#redo").disabled = !header.redo;
     find("#stabilise").hidden = !(header.at_rest && header.verdict.name === "saddle");
@@ -141,12 +194,18 @@ class Page {
       this.sway(false);
       this.viewer?.setVertices(arrays.vertices);
     }
+    if (header.compared !== this.compared) {
+      this.compared = header.compared;
+      this.choice = header.compared === null ? "patches" : "difference";
+    }
+    this.addChoices();
     this.colour();
   }
 
   colour() {
     const field = fieldOf(this.choice, this.arrays);
-    showLegend(find("#legend"), this.choice, field, this.units);
+    const than = this.header.variants[this.header.compared]?.name;
+    showLegend(find("#legend"), this.choice, field, this.units, than);
     if (!this.viewer) return;
     this.viewer.setField(field);
     this.viewer.setArrows(this.choice === "reactions" ? arrowsOf(this.arrays, field, this.size) : null);
@@ -197,8 +256,14 @@ class Page {
   // -- controls ------------------------------------------------------------------------------------
 
   addChoices() {
-    find("#colours").replaceChildren(...Object.entries(COLOURS).map(([name, { label }]) => choice(
-      "radio", label, name === this.choice, () => { this.choice = name; this.colour(); }, name)));
+    const possible = Object.keys(COLOURS).filter((name) => name !== "difference" || this.arrays.difference);
+    const known = [...document.querySelectorAll("#colours input")];
+    if (known.map((radio) => radio.value).join() === possible.join()) {
+      for (const radio of known) radio.checked = radio.value === this.choice;
+      return; // the one in use keeps the focus
+    }
+    find("#colours").replaceChildren(...possible.map((name) => choice(
+      "radio", COLOURS[name].label, name === this.choice, () => { this.choice = name; this.colour(); }, name)));
     const shows = { mesh: "Mesh", supports: "Supports", walls: "Walls", smooth: "Smooth", grid: "Grid" };
     find("#shows").replaceChildren(...Object.entries(shows).map(([name, label]) => choice(
       "checkbox", label, this.viewer?.options[name],
@@ -234,7 +299,7 @@ class Page {
     try {
       const body = suffix === ".png"
         ? await this.viewer.picture() : await fetchFile(`api/${this.name}/export?suffix=${suffix}`);
-      download(body, `surface${suffix}`);
+      download(body, `${this.download}${suffix}`);
       if (!this.header.at_rest) this.notify("Saved: the surface shown, with its own values, not those you asked for.");
     } catch (error) {
       this.notify(error.message);

@@ -1,6 +1,7 @@
 // The verdict, the numbers of the surface, and the fields that colours show.
 
 import { colourOf, diverging, sequential } from "./colours.js";
+import { element, tableRow, term } from "./elements.js";
 import { digits } from "./panel.js";
 
 const SIGNS = {
@@ -13,6 +14,7 @@ export const COLOURS = {
   curvature: { label: "Mean curvature", name: (u) => `Mean curvature H, ${u.curvature} (walls grey)` },
   error: { label: "Curvature error", name: () => "Error (H − H̄) / H̄ of Meyer's mean curvature, %" },
   reactions: { label: "Reactions", name: (u) => `Reaction of the supports, ${u.tension}` },
+  difference: { label: "Difference", name: (u, than) => `Distance from ${than}, ${u.length}; positive outside it` },
 };
 
 /** The card that is always in view. */
@@ -46,31 +48,52 @@ export function showFindings(body, findings, units) {
   const measured = (x, kind, count) => digits(x, count) + (units.given && x !== null ? ` ${units[kind]}` : "");
   const percent = (x) => (x === null ? "–" : x < 1e-6 ? "below 0.0001 %" : `${digits(100 * x, 3)} %`);
   const rows = [
-    ["Rise above the plane", measured(findings.height, "length"), `Largest height above the plane Π, ${units.length}`],
-    ["Area under pressure", measured(findings.area, "area"), `Of all patches except walls, ${units.area}`],
-    ["Volume", measured(findings.volume, "volume"), `Under the patches with pressure, ${units.volume}`],
-    ["Energy", measured(findings.energy, "energy", 6), `Σ α A − Σ p V, ${units.energy}`],
-    ["Morse index", findings.index ?? "–", "Independent changes of shape that lower the energy; 0 is stable"],
-    ["Load over capacity", percentOf(findings.load_ratio), "The pressure, as a part of the most that the tension of the boundary can carry; above 100 % no equilibrium exists"],
-    ["Largest error of H", percent(findings.curvature_error), "Variational mean curvature against p / 2α; exact at rest"],
-    ["… by Meyer's measure", percent(findings.curvature_error_cotangent), "As in the paper's figures; smaller on finer meshes"],
-    ["Worst triangle", digits(findings.quality, 3), "4√3 area / Σ edge²: 1 is equilateral, 0 degenerate"],
-    ["Residual", digits(findings.residual, 3), "Unbalanced forces, relative to the forces of single triangles"],
+    ["Rise above the plane", measured(findings.height, "length"), `The largest height above the plane Π, ${units.length}.`],
+    ["Area under pressure", measured(findings.area, "area"), `Of all patches except walls, ${units.area}.`],
+    ["Volume", measured(findings.volume, "volume"), `Under the patches with pressure, ${units.volume}.`],
+    ["Energy", measured(findings.energy, "energy", 6), `Σ α A − Σ p V, ${units.energy}. A surface at rest has no nearby shape of other first-order energy; a stable one has the least.`],
+    ["Morse index", findings.index ?? "–", "How many independent changes of shape lower the energy. 0: stable, every small push is resisted. 1 or more: a saddle, which a small push moves away from."],
+    ["Load over capacity", percentOf(findings.load_ratio), "The pressure's total push, as a part of the most that the tensions along the supports can carry, when all of them pull straight down. Above 100 % no equilibrium exists: raise tensions or lower pressures."],
+    ["Largest error of H", percent(findings.curvature_error), "The mean curvature that balances the forces at each vertex, against H̄ = p / 2α. Exact at rest."],
+    ["Error by Meyer's measure", percent(findings.curvature_error_cotangent), "Meyer's measure reads the mean curvature from the angles of the triangles, with Voronoi areas, as in the paper's figures. It differs from H̄ by an error of the mesh, which finer triangles reduce."],
+    ["Worst triangle", digits(findings.quality, 3), "4√3 area / Σ edge²: 1 is equilateral, 0 degenerate."],
+    ["Residual", digits(findings.residual, 3), "The unbalanced forces, relative to the forces of single triangles. Below 1e-8 the surface counts as at rest."],
   ];
   if (findings.pinched) {
-    rows.push(["Wall resting on the plane", `${findings.pinched} vertices`, "Here the valley touches the plane and the wall has no height"]);
+    rows.push(["Pinched wall", `${findings.pinched} vertices`, "Here the valley between two patches has come down to the plane: it rests there, and the wall below it has no height."]);
   }
-  body.replaceChildren(...rows.map(([name, text, title]) => {
-    const row = document.createElement("tr");
-    row.title = title;
-    const head = document.createElement("th");
-    head.scope = "row";
-    head.textContent = name;
-    const cell = document.createElement("td");
-    cell.textContent = text;
-    row.append(head, cell);
-    return row;
+  for (const room of findings.rooms) {
+    rows.push([`Pressure of ${room.room}`, measured(room.pressure, "pressure"), "The volume of this room is prescribed; its pressure is the result."]);
+  }
+  const open = new Set([...body.querySelectorAll("details[open] summary")].map((s) => s.textContent));
+  body.replaceChildren(...rows.map(([name, text, meaning]) => {
+    const explained = term(name, meaning);
+    explained.open = open.has(name);
+    return tableRow(explained, [text]);
   }));
+}
+
+/** Apex, area, volume and largest reaction of each patch. */
+export function showPatches(table, measures, units) {
+  const columns = [["apex", "Apex", "length"], ["area", "Area", "area"], ["volume", "Volume", "volume"],
+    ["reaction", "Reaction", "tension"]];
+  const head = element("tr");
+  head.append(element("td"), ...columns.map(([, name, kind]) => {
+    const th = element("th", "", name);
+    th.scope = "col";
+    if (units.given) th.append(element("span", "unit", units[kind]));
+    return th;
+  }));
+  table.tHead.replaceChildren(head);
+  const rows = new Map();
+  for (const { quantity, of, value } of measures) {
+    if (!columns.some(([name]) => name === quantity)) continue;
+    if (quantity === "apex") rows.set(of, {});
+    if (rows.has(of)) rows.get(of)[quantity] = value;
+  }
+  if (rows.size === 2) rows.delete(""); // the only patch is all
+  table.tBodies[0].replaceChildren(...[...rows].map(([of, row]) => tableRow(of || "all",
+    columns.map(([name]) => digits(row[name])))));
 }
 
 /** The answer of the mesh check. */
@@ -99,9 +122,9 @@ const percentOf = (x) => (x === null ? "–" : `${digits(100 * x, 3)} %`);
 /** Values, limits and colour map of the chosen field; null for the patches' own colours. */
 export function fieldOf(choice, arrays) {
   if (choice === "patches" || !arrays[choice]) return null;
-  if (choice === "error") {
-    const values = arrays.error.map((x) => 100 * x);
-    const most = Math.max(1e-4, ...ends(values).map(Math.abs));
+  if (choice === "error" || choice === "difference") {
+    const values = choice === "error" ? arrays.error.map((x) => 100 * x) : arrays.difference;
+    const most = Math.max(choice === "error" ? 1e-4 : 1e-12, ...ends(values).map(Math.abs));
     return { values, limits: [-most, most], map: diverging };
   }
   if (choice === "reactions") {
@@ -142,11 +165,11 @@ export function arrowsOf(arrays, field, size) {
 }
 
 /** The scale beside the surface. */
-export function showLegend(root, choice, field, units) {
+export function showLegend(root, choice, field, units, than) {
   root.hidden = !field;
   if (!field) return;
   const [low, high] = field.limits;
-  root.querySelector(".name").textContent = COLOURS[choice].name(units);
+  root.querySelector(".name").textContent = COLOURS[choice].name(units, than);
   root.querySelector(".bar").style.background = field.map.css;
   root.querySelector(".low").textContent = digits(low, 3);
   root.querySelector(".middle").textContent = digits((low + high) / 2, 3);

@@ -1,7 +1,15 @@
-// A card for each patch, with a slider and a number for its tension and its pressure.
+// A card for each patch, cable and room, with a slider and a number for each of its values.
+
+import { element, input } from "./elements.js";
 
 const STEPS = 1000;
-const QUANTITIES = { tension: "Tension α", pressure: "Pressure p" };
+const QUANTITIES = {
+  tensions: { label: "Tension α", unit: "tension" },
+  pressures: { label: "Pressure p", unit: "pressure" },
+  weights: { label: "Weight w", unit: "pressure" },
+  cables: { label: "Tension τ", unit: "force" },
+  volumes: { label: "Volume V", unit: "volume" },
+};
 
 /** Four digits, without trailing zeros. */
 export function digits(x, count = 4) {
@@ -10,27 +18,34 @@ export function digits(x, count = 4) {
   return String(Number(x.toPrecision(count)));
 }
 
-/** Slider positions 0..STEPS for values: by ratio for values that cannot be zero, evenly for walls. */
+/** Slider positions 0..STEPS for values: by ratio for values that cannot be zero, else evenly. */
 class Range {
   constructor(value, evenly, usual) {
-    this.evenly = evenly || value === 0;
-    if (this.evenly) [this.low, this.high] = [0, 3 * (value || usual)];
-    else [this.low, this.high] = [value / 4, value * 4];
+    if (evenly || value === 0) this.spread(0, 3 * (value || usual));
+    else Object.assign(this, { evenly: false, low: value / 4, high: value * 4 });
   }
 
+  spread(one, other) {
+    Object.assign(this, { evenly: true, low: Math.min(one, other), high: Math.max(one, other) });
+  }
+
+  /** Make room for a value; zero and a change of sign need an even scale. */
   widen(value) {
-    if (this.evenly) this.high = Math.max(this.high, value);
-    else if (value / this.low > 0) {
-      const by = value / this.low < 1 || value / this.high > 1;
-      if (by && Math.abs(value) < Math.abs(this.low)) this.low = value;
-      if (by && Math.abs(value) > Math.abs(this.high)) this.high = value;
+    if (!this.evenly && !(value / this.low > 0)) this.spread(Math.min(this.low, this.high), Math.max(this.low, this.high));
+    if (this.evenly) {
+      this.spread(Math.min(this.low, value), Math.max(this.high, value));
+    } else {
+      if (Math.abs(value) < Math.abs(this.low)) this.low = value;
+      if (Math.abs(value) > Math.abs(this.high)) this.high = value;
     }
   }
 
+  /** The value at a position, as the number beside the slider shows it. */
   value(place) {
     const part = place / STEPS;
-    return this.evenly
+    const value = this.evenly
       ? this.low + part * (this.high - this.low) : this.low * (this.high / this.low) ** part;
+    return Number(value.toPrecision(4));
   }
 
   place(value) {
@@ -43,40 +58,38 @@ class Range {
 
 export class Panel {
   /** `changed(final)` is called while a value changes, and with true when the change is done. */
-  constructor(root, patches, asked, together, changed, units) {
-    this.units = units;
-    this.patches = patches;
-    this.together = together;
-    this.changed = changed;
-    this.rows = [];
-    const usual = Math.max(...asked.map((p) => p.tension));
-    root.replaceChildren(...patches.map((patch, i) => this.card(patch, i, asked[i], usual)));
+  constructor(root, { controls, patches, values, units }, together, changed) {
+    Object.assign(this, { units, together, changed, rows: [] });
+    const tensions = Object.values({ ...values.asked.tensions, ...values.asked.cables });
+    this.usual = Math.max(...tensions) || 1;
+    root.replaceChildren(...controls.map((group, i) => this.card(group, i, patches, values.asked)));
   }
 
-  card(patch, index, asked, usual) {
-    const card = document.createElement("fieldset");
-    const legend = element("legend", "");
+  card(group, index, patches, asked) {
+    const card = element("fieldset");
+    const legend = element("legend");
     const head = element("span", "head");
-    const swatch = element("span", "swatch");
-    swatch.style.background = `rgb(${patch.color.map((c) => Math.round(255 * c)).join(" ")})`;
     const target = element("span", "target");
-    head.append(swatch, element("span", "name", patch.name), target);
-    legend.append(head);
-    card.append(legend);
-    const kinds = patch.wall ? ["tension"] : ["tension", "pressure"];
-    for (const kind of kinds) {
-      card.append(this.row(patch, index, kind, asked[kind], target, usual));
+    if (group.patch !== null) {
+      const swatch = element("span", "swatch");
+      const { color } = patches[group.patch];
+      swatch.style.background = `rgb(${color.map((c) => Math.round(255 * c)).join(" ")})`;
+      head.append(swatch);
     }
+    head.append(element("span", "name", group.name), target);
+    legend.append(head);
+    card.append(legend, ...group.kinds.map((kind) => this.row(group, index, kind, asked[kind][group.name], target)));
     return card;
   }
 
-  row(patch, index, kind, value, target, usual) {
+  row(group, index, kind, value, target) {
     const row = element("div", "slider");
-    const name = `${QUANTITIES[kind]} of ${patch.name}`;
+    const { label: text, unit } = QUANTITIES[kind];
+    const name = `${text} of ${group.name}`;
     const id = `${kind}-${index}`;
-    const label = element("label", "", QUANTITIES[kind]);
+    const label = element("label", "", text);
     label.htmlFor = id;
-    label.title = this.units[kind];
+    label.title = this.units[unit];
     const track = element("span", "track");
     const shown = element("span", "shown");
     shown.hidden = true;
@@ -84,9 +97,9 @@ export class Panel {
     const number = input("number", `${name}, as a number`, { step: "any" });
     track.append(slider, shown);
     row.append(label, track, number);
+    const evenly = group.wall || kind === "cables";
     const entry = {
-      patch, index, kind, slider, number, shown, target, value,
-      range: new Range(value, patch.wall, usual),
+      group, index, kind, slider, number, shown, target, value, range: new Range(value, evenly, this.usual),
     };
     this.rows.push(entry);
     slider.addEventListener("input", () => this.change(entry, entry.range.value(slider.value), false));
@@ -106,7 +119,7 @@ export class Panel {
     const ratio = entry.value ? value / entry.value : 1;
     if (this.together.checked) {
       for (const other of this.rows) {
-        const similar = other.kind === entry.kind && other.patch.wall === entry.patch.wall;
+        const similar = other.kind === entry.kind && other.group.wall === entry.group.wall;
         if (similar && other !== entry) {
           this.put(other, entry.value ? other.value * ratio : value);
         }
@@ -122,19 +135,21 @@ export class Panel {
       entry.range.widen(value);
       entry.slider.value = entry.range.place(value);
     }
-    entry.number.value = digits(value);
-    entry.slider.setAttribute("aria-valuetext", digits(value));
+    entry.number.value = digits(value, 6);
+    entry.slider.setAttribute("aria-valuetext", digits(value, 6));
     const mine = this.rows.filter((r) => r.index === entry.index);
-    const [alpha, p] = ["tension", "pressure"].map((k) => mine.find((r) => r.kind === k)?.value);
-    entry.target.textContent = p === undefined ? "wall" : `H̄ = p / 2α = ${digits(p / (2 * alpha), 3)}`;
+    const [alpha, p, w] = ["tensions", "pressures", "weights"].map((k) => mine.find((r) => r.kind === k)?.value);
+    const curved = alpha !== undefined && p !== undefined && w === undefined;
+    entry.target.textContent = entry.group.wall ? "wall" : curved ? `H̄ = p / 2α = ${digits(p / (2 * alpha), 3)}` : "";
   }
 
-  /** Show these values; where the surface shown has others, mark them. */
-  show(asked, shown, all) {
+  /** Show the values asked for; where the surface shown has others, mark them. */
+  show({ asked, shown }, all) {
     for (const entry of this.rows) {
-      const wanted = asked[entry.index][entry.kind];
+      const wanted = asked[entry.kind][entry.group.name];
+      const has = shown[entry.kind][entry.group.name];
+      if (wanted === undefined || has === undefined) continue; // a patch without pressure has become a wall
       if (all) this.put(entry, wanted);
-      const has = shown[entry.index][entry.kind];
       const part = entry.range.place(has) / STEPS;
       entry.shown.hidden = Math.abs(has - wanted) <= 1e-9 * Math.abs(wanted);
       entry.shown.style.left = `calc(8px + ${part} * (100% - 16px) - 1px)`;
@@ -144,23 +159,8 @@ export class Panel {
 
   /** The values for the server. */
   values() {
-    const values = { tensions: {}, pressures: {} };
-    for (const { patch, kind, value } of this.rows) values[`${kind}s`][patch.name] = value;
+    const values = {};
+    for (const { group, kind, value } of this.rows) (values[kind] ??= {})[group.name] = value;
     return values;
   }
-}
-
-function element(tag, kind, text = "") {
-  const made = document.createElement(tag);
-  if (kind) made.className = kind;
-  if (text) made.textContent = text;
-  return made;
-}
-
-function input(type, name, attributes) {
-  const made = document.createElement("input");
-  made.type = type;
-  made.setAttribute("aria-label", name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return made;
 }

@@ -77,9 +77,10 @@ export class Viewer {
 
   /** Everything that stays the same while the surface moves. */
   setMesh(header, arrays) {
+    const again = Boolean(this.mesh);
     this.mesh = { header, ...arrays };
     this.camera.stand(header.up);
-    this.camera.look("diagonal");
+    if (!again) this.camera.look("diagonal");
     this.X = null;
     this.field = null;
     this.arrows = null;

@@ -1,0 +1,119 @@
+"""Following values: from a surface at rest to the one with other tensions, in as many steps as needed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..certificate import Certificate, Verdict
+from ..solvers import solve
+from ..solvers.result import Progress, Result
+from ..surface import Surface
+from ..surface.wall_pressures import with_pressures
+
+AT_REST = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.SADDLE)
+SMALLEST_STEP = 1.0 / 64.0  # part of the way; settling takes no smaller step
+KINDS = ("tensions", "pressures", "weights", "cables", "volumes")  # of values that can be changed
+Values = Mapping[str, Mapping[str, float]]
+
+
+def until(stop: Callable[[], bool], end: float) -> Callable[[], bool]:
+    """True when ``stop`` is, or when the monotonic clock has passed ``end``."""
+    return lambda: stop() or time.monotonic() > end
+
+
+def attempt(surface: Surface, stop: Callable[[], bool], **options: Any) -> Result:
+    """Solve, and end early when ``stop`` becomes true."""
+
+    def check(_: Progress) -> None:
+        if stop():
+            raise StopIteration
+
+    return solve(surface, callback=check, **options)
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """The last surface at rest on the way to other values, and the failed attempt after it, if any.
+
+    ``certificate`` is the surface's, without modes; None if there was no step at all.
+    """
+
+    surface: Surface
+    certificate: Certificate | None
+    failed: Certificate | None
+
+
+def reach(
+    start: Surface, asked: Surface, stop: Callable[[], bool], attempts: int = 100, **options: Any
+) -> Reached:
+    """Follow the equilibrium from ``start`` to the values of ``asked``; a step that fails is halved."""
+    here, certificate, done, step = start, None, 0.0, 1.0
+    failed = None
+    for _ in range(attempts):
+        ahead = min(1.0, done + step)
+        aim = between(start, asked, ahead).moved(here.vertices)
+        result = attempt(aim, stop, target="stationary", **options)
+        ended = result.certify(modes=0)
+        if ended.verdict in AT_REST:
+            here, certificate, done, step = result.surface, ended, ahead, 2.0 * step
+            if done == 1.0:
+                return Reached(here, certificate, None)
+        else:
+            failed = ended if ahead == 1.0 or failed is None else failed
+            step = 0.5 * (ahead - done)
+        if step < SMALLEST_STEP or stop():
+            break
+    return Reached(here, certificate, failed)
+
+
+def between(start: Surface, end: Surface, part: float) -> Surface:
+    """``start`` with its values moved a part of the way to those of ``end``."""
+
+    def mixed(here: Sequence[float], there: Sequence[float]) -> list[float]:
+        if part >= 1.0:
+            return list(there)  # to the last digit
+        return [(1.0 - part) * a + part * b for a, b in zip(here, there, strict=True)]
+
+    names = [p.name for p in start.patches]
+    by_patch = [
+        dict(zip(names, mixed(getattr(start, kind).tolist(), getattr(end, kind).tolist()), strict=True))
+        for kind in ("tensions", "pressures", "weights")
+    ]
+    cables = mixed([c.tension for c in start.cables], [c.tension for c in end.cables])
+    volumes = mixed([r.volume for r in start.rooms], [r.volume for r in end.rooms])
+    return start.retensioned(
+        by_patch[0],
+        by_patch[1],
+        [p.name for p in end.patches if p.wall],
+        weights=by_patch[2],
+        cables=dict(zip([c.name for c in start.cables], cables, strict=True)),
+        volumes=dict(zip([r.name for r in start.rooms], volumes, strict=True)),
+    )
+
+
+def values_of(surface: Surface) -> dict[str, dict[str, float]]:
+    """The values that can be changed, by kind and name.
+
+    The pressures around a room of prescribed volume are results, and a wall's follows from its rooms'.
+    """
+    result = surface.room_signs.any(axis=0) if surface.rooms else surface.walls
+    return {
+        "tensions": {p.name: p.tension for p in surface.patches},
+        "pressures": {
+            p.name: p.pressure for p, r in zip(surface.patches, result, strict=True) if not (r or p.auxiliary)
+        },
+        "weights": {p.name: p.weight for p in surface.patches if p.weight},
+        "cables": {c.name: c.tension for c in surface.cables},
+        "volumes": {r.name: r.volume for r in surface.rooms},
+    }
+
+
+def wanted(surface: Surface, values: Values) -> Surface:
+    """The surface with other values, kinds as in ``values_of``; walls follow the pressures of their rooms."""
+    given = {kind: dict(values.get(kind) or {}) for kind in KINDS}
+    changed = with_pressures(surface, given["tensions"], given["pressures"])
+    others = {kind: given[kind] for kind in KINDS[2:] if given[kind]}
+    return changed.retensioned(**others) if others else changed

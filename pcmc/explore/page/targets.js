@@ -1,0 +1,108 @@
+// Targets: quantities and the values wanted for them, and the tensions that may change for these.
+
+import { button, element, input, select } from "./elements.js";
+import { digits } from "./panel.js";
+
+const UNITS = { apex: "length", area: "area", volume: "volume", reaction: "tension", height: "length" };
+const LIMITS = [["value", "="], ["at_most", "at most"], ["at_least", "at least"]];
+
+export class Targets {
+  /** `meet(aims)` is called to meet them, `stop()` to give up. */
+  constructor(root, { controls, aims, units }, meet, stop) {
+    Object.assign(this, { root, units, aims, meet });
+    this.patches = controls.filter((g) => g.patch !== null && !g.wall).map((g) => g.name);
+    this.list = root.querySelector(".list");
+    this.message = root.querySelector(".message");
+    this.list.replaceChildren();
+    this.rows = [];
+    const given = aims.targets.length ? aims.targets : [{ quantity: "apex", of: this.patches[0] ?? null }];
+    given.forEach((target) => this.add(target));
+    this.vary = controls.filter((g) => g.kinds.includes("tensions") || g.kinds.includes("cables"))
+      .map((group) => this.parameter(group));
+    root.querySelector(".vary").replaceChildren(...this.vary.map(({ label }) => label));
+    root.querySelector(".add").onclick = () => this.add({ quantity: "apex", of: null }).focus();
+    root.querySelector(".meet").onclick = () => this.send();
+    root.querySelector(".stop").onclick = stop;
+    this.say(aims.targets.length ? "Targets of the project." : "");
+  }
+
+  /** A tension that may change, checked if the project or the user lets it. */
+  parameter(group) {
+    const kind = group.patch === null ? "cable" : "tension";
+    const known = this.aims.vary.find((p) => p.patch === group.name && p.kind === kind);
+    const label = element("label");
+    const box = input("checkbox", `Tension of ${group.name} may change`);
+    box.checked = this.aims.vary.length ? Boolean(known) : !group.wall && kind === "tension";
+    label.append(box, group.name);
+    return { label, box, parameter: known ?? { patch: group.name, kind } };
+  }
+
+  add(target) {
+    const row = element("div", "target-row");
+    const known = { apex: "Apex", area: "Area", volume: "Volume", reaction: "Largest reaction" };
+    const fixed = !(target.quantity in known); // such as the height at a point: kept as it is
+    const quantity = fixed ? element("span", "fixed", target.label) : select("Quantity", Object.entries(known));
+    const of = select("Of", [["", "all"], ...this.patches.map((name) => [`=${name}`, name])]);
+    const limit = select("Relation", LIMITS);
+    const number = input("number", "Value wanted", { step: "any", required: "" });
+    const unit = element("span", "unit");
+    const entry = { row, target, fixed, quantity, of, limit, number };
+    const remove = button("×", () => {
+      this.rows.splice(this.rows.indexOf(entry), 1);
+      row.remove();
+    }, "Remove this target");
+    const label = () => { unit.textContent = this.units.given ? this.units[UNITS[quantity.value ?? target.quantity]] ?? "" : ""; };
+    if (!fixed) {
+      quantity.value = target.quantity;
+      of.value = target.of === null || target.of === undefined ? "" : `=${target.of}`;
+      quantity.addEventListener("change", label);
+    }
+    const [key] = LIMITS.find(([name]) => typeof target[name] === "number") ?? ["value"];
+    limit.value = key;
+    if (typeof target[key] === "number") number.value = digits(target[key], 10);
+    label();
+    row.append(quantity, ...(fixed ? [] : [of]), limit, number, unit, remove);
+    this.list.append(row);
+    this.rows.push(entry);
+    return fixed ? number : quantity;
+  }
+
+  say(text, state = "") {
+    this.message.textContent = text;
+    this.message.dataset.state = state;
+  }
+
+  working(on) {
+    this.root.querySelector(".meet").disabled = on;
+    this.root.querySelector(".stop").hidden = !on;
+  }
+
+  async send() {
+    const empty = this.rows.find(({ number }) => !Number.isFinite(number.valueAsNumber));
+    const vary = this.vary.filter(({ box }) => box.checked).map(({ parameter }) => parameter);
+    if (!this.rows.length || empty) {
+      this.say("Give each target a number.", "missed");
+      empty?.number.focus();
+      return;
+    }
+    if (!vary.length) {
+      this.say("Choose at least one tension that may change.", "missed");
+      return;
+    }
+    const targets = this.rows.map(({ target, fixed, quantity, of, limit, number }) => ({
+      quantity: fixed ? target.quantity : quantity.value,
+      of: fixed ? target.of : of.value.slice(1) || null,
+      [limit.value]: number.valueAsNumber,
+    }));
+    this.say("Searching for the tensions…");
+    this.working(true);
+    try {
+      const header = await this.meet({ targets, vary });
+      if (!header || header.superseded) this.say("Stopped.");
+      else this.say(header.message, header.message.startsWith("met") && header.at_rest ? "met" : "missed");
+    } catch (error) {
+      this.say(error.message, "missed");
+    }
+    this.working(false);
+  }
+}

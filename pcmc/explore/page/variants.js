@@ -1,0 +1,90 @@
+// Variants: surfaces kept side by side, their numbers, and the differences from one of them.
+
+import { button, element, tableRow } from "./elements.js";
+import { digits } from "./panel.js";
+
+const NAMES = {
+  apex: "Apex", area: "Area", volume: "Volume", reaction: "Largest reaction",
+  tension: "Tension", pressure: "Pressure", weight: "Weight",
+};
+
+const rowName = ({ quantity, of }) => (of ? `${NAMES[quantity]} of ${of}` : `${NAMES[quantity]}, all`);
+
+export class Variants {
+  /** `act(name, body)` asks the server; `picture()` is the canvas to copy small, or null. */
+  constructor(root, act, picture) {
+    Object.assign(this, { root, act, picture, pictures: new Map() });
+    const form = root.querySelector("form");
+    const name = form.querySelector("input");
+    form.onsubmit = (event) => {
+      event.preventDefault();
+      const chosen = name.value.trim() || this.nextName();
+      this.pictures.set(chosen, this.thumbnail());
+      name.value = "";
+      act("keep", { name: chosen });
+    };
+  }
+
+  nextName() {
+    const taken = new Set(this.header.variants.map((v) => v.name));
+    let number = 1;
+    while (taken.has(`Variant ${number}`)) number += 1;
+    return `Variant ${number}`;
+  }
+
+  thumbnail() {
+    const canvas = this.picture();
+    if (!canvas) return "";
+    const small = element("canvas");
+    small.width = 160;
+    small.height = Math.round((160 * canvas.height) / canvas.width);
+    small.getContext("2d").drawImage(canvas, 0, 0, small.width, small.height);
+    return small.toDataURL();
+  }
+
+  show(header, units) {
+    this.header = header;
+    const { variants, compared, measures } = header;
+    this.root.querySelector("ul").replaceChildren(...variants.map((variant, k) => this.item(variant, k, compared)));
+    const table = this.root.querySelector("table");
+    table.hidden = compared === null;
+    if (compared === null) return;
+    const other = variants[compared];
+    table.querySelector("caption").textContent = `Differences from ${other.name}`;
+    const key = (row) => `${row.quantity} ${row.of}`;
+    const before = new Map(other.measures.map((row) => [key(row), row.value]));
+    const rows = measures.filter((row) => before.has(key(row)) && row.value !== null && before.get(key(row)) !== null);
+    const changed = rows.filter((row) => Math.abs(row.value - before.get(key(row))) > 1e-9 * Math.abs(row.value));
+    table.querySelector("tbody").replaceChildren(...changed.map((row) => {
+      const then = before.get(key(row));
+      const change = row.value - then;
+      const part = then ? ` (${change > 0 ? "+" : ""}${digits((100 * change) / Math.abs(then), 3)} %)` : "";
+      const title = units.given ? units[row.kind] : "";
+      return tableRow(rowName(row), [digits(then), digits(row.value), `${change > 0 ? "+" : ""}${digits(change, 3)}${part}`], title);
+    }));
+    if (!changed.length) table.querySelector("tbody").replaceChildren(tableRow("No number differs", ["", "", ""]));
+  }
+
+  item(variant, number, compared) {
+    const item = element("li");
+    const picture = this.pictures.get(variant.name);
+    if (picture) item.append(Object.assign(element("img"), { src: picture, alt: "", width: 80 }));
+    const words = element("div", "words");
+    const all = new Map(variant.measures.filter((row) => !row.of).map((row) => [row.quantity, row.value]));
+    words.append(
+      element("b", "", variant.name),
+      element("p", "", `${variant.word}; apex ${digits(all.get("apex"))}, area ${digits(all.get("area"))}, volume ${digits(all.get("volume"))}`),
+    );
+    const on = compared === number;
+    const compare = button(on ? "Comparing" : "Compare", () => this.act("compare", { number: on ? null : number }),
+      `Compare the surface shown with ${variant.name}`);
+    compare.setAttribute("aria-pressed", String(on));
+    const acts = element("div", "row");
+    acts.append(compare,
+      button("Show", () => this.act("recall", { number }), `Show ${variant.name} again`),
+      button("×", () => this.act("forget", { number }), `Remove ${variant.name}`));
+    words.append(acts);
+    item.append(words);
+    return item;
+  }
+}

@@ -1,0 +1,126 @@
+"""The roof that a page opens: a surface, and the project that it comes from."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import project as projects
+from ..base.errors import FileError
+from ..base.units import NO_UNITS, Units
+from ..design import Parameter, Target
+from ..io import read_bare
+from ..surface import Surface
+
+Signature = tuple[tuple[str, int, int], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Roof:
+    """What a page opens.
+
+    Attributes
+    ----------
+    surface : the designed roof of a project, its start shape, or any other surface.
+    title : at the top of the page; downloads are named after it.
+    units : of its numbers.
+    path : of the file that it was read from; None for a surface from a program.
+    text : of the project file when it was read; empty for other files.
+    targets, vary : those of the project.
+    note : how the project ended, in one sentence; empty where that needs no words.
+    good : False where the project has no roof to show: ``note`` says why.
+    signature : of the file and those it refers to, before they were read.
+    """
+
+    surface: Surface
+    title: str = ""
+    units: Units = NO_UNITS
+    path: Path | None = None
+    text: str = ""
+    targets: tuple[Target, ...] = ()
+    vary: tuple[Parameter, ...] = ()
+    note: str = ""
+    good: bool = True
+    signature: Signature = ()
+
+    @property
+    def name(self) -> str:
+        """The name of downloads, without suffix.
+
+        >>> Roof(None, "halls/nave & apse").name, Roof(None, path=Path("a/roof.toml")).name, Roof(None).name
+        ('halls-nave & apse', 'roof', 'surface')
+        """
+        name = self.path.stem if self.path is not None else self.title
+        kept = "".join("-" if c in '\\/:*?"<>|' or not c.isprintable() else c for c in name)
+        return kept.strip(" .")[:80] or "surface"
+
+    @property
+    def is_project(self) -> bool:
+        """Whether the roof has a project that changes can be saved to."""
+        return self.path is not None and projects.is_project(self.path)
+
+
+def read_roof(
+    path: str | os.PathLike[str],
+    *,
+    start_shape: bool = False,
+    use_cache: bool = True,
+    progress: Callable[[str], None] | None = None,
+    report: Callable[[projects.Outcome], None] | None = None,
+) -> Roof:
+    """The roof in a file: of a project the designed one, its targets met.
+
+    Parameters
+    ----------
+    path : of a project, a drawing or a surface.
+    start_shape : of a project, show the shape before it is solved.
+    use_cache : take the designed roof from the cache, and keep it there.
+    progress : called with a few words at each step.
+    report : called with the outcome of a project.
+
+    Raises
+    ------
+    FileError, PlanError, OptionError : as ``pcmc.project.designed`` and ``pcmc.read``.
+    """
+    path = Path(path)
+    before = signature(path)
+    if not projects.is_project(path):
+        surface, data = read_bare(path)
+        return Roof(surface, path.name, data.units, path, signature=before)
+    project = projects.load(path)
+    text = text_of(path) if path.suffix.lower() == ".toml" else ""
+    more = {"path": path, "text": text, "signature": before}
+    more |= {"targets": tuple(project.targets), "vary": tuple(project.vary)}
+    if start_shape:
+        return Roof(projects.surface_of(project), path.name, project.units, note="The start shape", **more)
+    outcome = projects.designed(project, progress, use_cache=use_cache)
+    if report is not None:
+        report(outcome)
+    certificate, design = outcome.certificate, outcome.design
+    note = "" if design is None else design.message
+    if not certificate.certified:
+        note = "; ".join(filter(None, (note, certificate.verdict.value, certificate.detail)))
+    at_rest = certificate.index is not None
+    return Roof(outcome.surface, path.name, outcome.units, note=note, good=at_rest, **more)
+
+
+def signature(path: Path) -> Signature:
+    """Name, time and size of a file and of those that it refers to; a missing file has time 0."""
+    states = []
+    for file in projects.files_of(path):
+        try:
+            state = file.stat()
+            states.append((str(file), state.st_mtime_ns, state.st_size))
+        except OSError:
+            states.append((str(file), 0, -1))
+    return tuple(states)
+
+
+def text_of(path: Path) -> str:
+    """The text of a project file, its ends of lines as they are; FileError if it cannot be read."""
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None

@@ -1,0 +1,98 @@
+"""Variants of a roof: what is measured of each, and how far one shape is from another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.arrays import Floats
+from ..certificate import Certificate
+from ..certificate.balance import reactions_per_length
+from ..design import Target
+from ..design.targets import measure
+from ..panels.distance import distances
+from ..surface import Surface
+from ..surface.geometry import area_vectors, vertex_sums
+
+MOST_VARIANTS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """A surface that is kept, with its name and certificate."""
+
+    name: str
+    surface: Surface
+    certificate: Certificate
+
+    @cached_property
+    def measures(self) -> list[dict[str, Any]]:
+        """``measures`` of it."""
+        return measures(self.surface, self.certificate)
+
+
+def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]:
+    """What a designer reads from a surface: of each patch under pressure, cable and room, and of all.
+
+    A row has ``quantity``, ``of`` ("" for all patches under pressure), ``kind`` of its unit, and ``value``.
+    The apex is the greatest height over Π, the reaction the largest force per length on the held boundary.
+    """
+    height, areas = surface.plane.height(surface.vertices), certificate.patches["area"].to_numpy()
+    sizes = np.linalg.norm(reactions_per_length(surface, certificate.reactions), axis=1)
+    topo, rows = surface.topology, []
+
+    def add(quantity: str, of: str, kind: str, value: float | None) -> None:
+        rows.append({"quantity": quantity, "of": of, "kind": kind, "value": value})
+
+    def largest(reactions: Floats) -> float | None:
+        known = reactions[np.isfinite(reactions)]
+        return float(known.max()) if len(known) else None
+
+    roofs = np.flatnonzero(~surface.walls)
+    for k in roofs:
+        name, faces = surface.patches[k].name, surface.patch_of_face == k
+        edges = np.unique(topo.edge_of_face[faces])
+        boundary = np.unique(topo.edges[edges[topo.boundary_edge[edges] & ~surface.mirror_edge[edges]]])
+        add("apex", name, "length", float(height[surface.faces[faces]].max()))
+        add("area", name, "area", float(areas[k]))
+        add("volume", name, "volume", measure(surface, Target("volume", name)).value)
+        add("reaction", name, "tension", largest(sizes[boundary]))
+    add("apex", "", "length", float(height.max()))
+    add("area", "", "area", float(areas[roofs].sum()))
+    add("volume", "", "volume", float(certificate.volume))
+    add("reaction", "", "tension", largest(sizes))
+    for patch in surface.patches:
+        add("tension", patch.name, "tension", patch.tension)
+        if not patch.auxiliary:
+            add("pressure", patch.name, "pressure", patch.pressure)
+        if patch.weight:
+            add("weight", patch.name, "pressure", patch.weight)
+    for cable in surface.cables:
+        add("tension", cable.name, "force", cable.tension)
+    for room in surface.rooms:
+        add("volume", room.name, "volume", room.volume)
+    return rows
+
+
+def difference(surface: Surface, other: Surface) -> Floats:
+    """(n,) distance of each vertex from another surface, length; positive outside it, along its normals.
+
+    The meshes may differ.
+
+    >>> from pcmc import Patch
+    >>> corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0.0]])
+    >>> flat = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 1.0)], fixed=[0, 1, 2])
+    >>> lower = Surface(corners - [0, 0, 0.5], [[0, 1, 2]], [0], [Patch("roof", 1.0)], fixed=[0, 1, 2])
+    >>> difference(flat, lower).tolist(), difference(lower, flat).tolist()
+    ([0.5, 0.5, 0.5], [-0.5, -0.5, -0.5])
+    """
+    X, Y = surface.vertices, other.vertices
+    away = distances(X, Y, other.faces)
+    normal = vertex_sums(area_vectors(Y[other.faces]), other.faces, other.n)
+    nearest = cKDTree(Y).query(X)[1]
+    outside = np.einsum("ij,ij->i", X - Y[nearest], normal[nearest]) >= 0.0
+    return np.where(outside, away, -away)
