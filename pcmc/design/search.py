@@ -241,7 +241,7 @@ class Search:
         """The surface with the tensions and pressures that the unknowns stand for."""
         values: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
         for parameter, value in zip(self.parameters, self.converted(x).tolist(), strict=True):
-            values[parameter.kind][parameter.patch] = value
+            values[parameter.kind] |= dict.fromkeys(parameter.names, value)
         changed = with_pressures(surface, values["tension"], values["pressure"])
         others = {f"{kind}s": values[kind] for kind in ("volume", "weight", "cable") if values[kind]}
         return changed.retensioned(**others) if others else changed

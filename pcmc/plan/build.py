@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import NamedTuple
 
@@ -126,7 +126,9 @@ def _drafted(plan: PlanData) -> _Draft:
     spots = np.array([to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)])
     cut = [*on_edge, *(c.local(plan.plane) for c in (*(part.curve for part in plan.cables), *plan.mirrors))]
     stops = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in cut)])
-    drawn = arrange(lines, plan.edge_length, spots.reshape(-1, 3), stops)
+    named = np.array([[*point, np.nan] for point in plan.points.values()]).reshape(-1, 3)
+    drawn = arrange(lines, plan.edge_length, np.concatenate([spots.reshape(-1, 3), named]), stops)
+    drawn = replace(drawn, spots=drawn.spots[: len(spots)])  # the named points are vertices, but not held
     edges = np.concatenate([chain.edges for chain in drawn.chains])
     try:
         mesh = triangulate(drawn.points, edges, plan.edge_length, hole_points(drawn, lines))

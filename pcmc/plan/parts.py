@@ -281,6 +281,21 @@ def support_of(spec: Any, number: int) -> Any:
     return curve_of(spec, f"support {number}")
 
 
+def points_of(spec: Any) -> dict[str, tuple[float, float]]:
+    """Named points of the plan, by name."""
+    if not isinstance(spec, Mapping):
+        validate.refuse("points", spec, "a table of names and points [x, y]")
+    points = {}
+    for name, point in spec.items():
+        if not isinstance(point, Sequence | np.ndarray) or isinstance(point, str) or len(point) != 2:
+            validate.refuse("points", point, "a point [x, y]", name)
+        points[name] = (
+            validate.number("x", point[0], where=name),
+            validate.number("y", point[1], where=name),
+        )
+    return points
+
+
 def check_keys(values: Any, kind: Any, what: str) -> None:
     """Refuse a mapping with a key that is no attribute of the class ``kind``."""
     if not isinstance(values, Mapping):
@@ -312,3 +327,4 @@ class PlanData:
     cables: Sequence[Any] = ()
     mirrors: Sequence[Any] = ()
     rooms: Any = ()
+    points: Any = field(default_factory=dict)

@@ -24,6 +24,7 @@ from .parts import (
     edge_cable,
     hole_of,
     mirror_of,
+    points_of,
     rooms_of,
     support_of,
 )
@@ -54,6 +55,7 @@ class Plan(PlanData):
     plane : Π.
     rise : height of the initial surface above the one that the boundary spans, length; by default
         0.3 of the radius of the largest circle without supports.
+    points : points [x, y] by name; each becomes a vertex, and targets can name it.
     tension : α of all patches, instead of ``patches``, force/length.
     pressure, weight : of all patches, with ``tension``: force per area along the normal, and per area against
         Π's normal.
@@ -96,6 +98,7 @@ class Plan(PlanData):
             "holes": tuple(hole_of(h, k) for k, h in enumerate(self.holes, 1)),
             "patches": areas_of(self.patches),
             "supports": tuple(support_of(s, k) for k, s in enumerate(self.supports, 1)),
+            "points": points_of(self.points),
             "cables": tuple(cable_of(c, k) for k, c in enumerate(self.cables, 1)),
             "mirrors": tuple(mirror_of(m, k) for k, m in enumerate(self.mirrors, 1)),
         }

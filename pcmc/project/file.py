@@ -13,7 +13,7 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 from .. import io
-from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError
+from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError, unknown
 from ..base.files import check_name, check_regular
 from ..base.units import NO_UNITS, Units
 from ..plan import Plan, plan_from
@@ -227,16 +227,17 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
         _check_inside([*files, *([] if picture is None else [picture])])
         check_names(files, picture)
         check_picture(view, colour)
+        plan = plan_from(data["plan"])
         return Project(
             path=path,
-            plan=plan_from(data["plan"]),
+            plan=plan,
             units=Units(data.get("units", ""), data.get("force", "")),
             method=method,
             options=options,
             wanted=wanted,
             mesh_check=mesh_check,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
-            **(_search(data["targets"]) if "targets" in data else {}),
+            **(_search(data["targets"], plan) if "targets" in data else {}),
             structure=Structure(**data["structure"]) if "structure" in data else None,
             files=files,
             picture=picture,
@@ -257,7 +258,18 @@ def _check_inside(names: Sequence[str]) -> None:
             raise FileError(text, what="output", found=name)
 
 
-def _search(table: Mapping[str, Any]) -> dict[str, Any]:
+def _placed(entry: Mapping[str, Any], plan: Plan) -> Mapping[str, Any]:
+    """A target, with the point of the plan that a height names."""
+    if entry["quantity"] != "height" or not isinstance(entry.get("of"), str):
+        return entry
+    name = entry["of"]
+    if name not in plan.points:
+        text = f"targets.meet: {unknown('point', name, plan.points)}; name it in [plan.points]"
+        raise OptionError(text, what="targets.meet", found=name)
+    return {**entry, "of": plan.points[name]}
+
+
+def _search(table: Mapping[str, Any], plan: Plan) -> dict[str, Any]:
     """The targets of a project, and the parameters that may vary."""
     from ..design import Parameter, Target
 
@@ -265,6 +277,6 @@ def _search(table: Mapping[str, Any]) -> dict[str, Any]:
         if not table[key]:
             raise OptionError(f"targets.{key} is empty; give at least one", what=f"targets.{key}")
     return {
-        "targets": [Target(**entry) for entry in table["meet"]],
-        "vary": [Parameter(v) if isinstance(v, str) else Parameter(**v) for v in table["vary"]],
+        "targets": [Target(**_placed(entry, plan)) for entry in table["meet"]],
+        "vary": [Parameter(**v) if isinstance(v, Mapping) else Parameter(v) for v in table["vary"]],
     }

@@ -89,6 +89,8 @@ KINDS: dict[str, Callable[[Any], bool]] = {
     "a list of points and curves": _list_of(list, Mapping),
     "a list of names": _list_of(str),
     "a list of names or tables": _list_of(str, Mapping),
+    "a list of names, lists of names, or tables": _list_of(str, list, Mapping),
+    "a name or a list of names": lambda value: isinstance(value, str) or _list_of(str)(value),
     "a list of points": _list_of(list),
     "a curve": lambda value: isinstance(value, list | Mapping),
     "a point [x, y, z]": lambda value: _list_of(int, float)(value) and len(value) == 3,
@@ -138,7 +140,7 @@ def main_sections() -> tuple[Section, ...]:
     curve, curves = {"curve": "a curve"}, "a list of curves or tables"
     plan = {"outline": "a curve", "dividers": curves, "holes": curves, "patches": "a table"}
     plan |= {"supports": "a list of points and curves", "plane": "a table", "cables": "a list of tables"}
-    plan |= {"mirrors": "a list of curves or tables", "rooms": "a table"}
+    plan |= {"mirrors": "a list of curves or tables", "rooms": "a table", "points": "a table"}
     area = _of_class(Area, {"at": "a point [x, y] or a list of points"})
     directions = "of the picture: diagonal, elevation, plan, or [azimuth, elevation] in degrees"
     return (
@@ -234,8 +236,10 @@ def target_sections() -> tuple[Section, ...]:
     from ..design.quantities import QUANTITIES
     from ..design.targets import KINDS as KINDS_OF_PARAMETER
 
-    changing = _of_class(Parameter, choices={"kind": KINDS_OF_PARAMETER})
-    varied = "what may change; a name alone is a patch whose tension may"
+    changing = _of_class(
+        Parameter, {"patch": "a name or a list of names"}, choices={"kind": KINDS_OF_PARAMETER}
+    )
+    varied = "what may change; a name is a patch whose tension may, a list of names several with one tension"
     wanted = _of_class(Target, {"of": "a name or a point [x, y]"}, {"quantity": tuple(QUANTITIES)})
     return (
         Section(
@@ -243,7 +247,7 @@ def target_sections() -> tuple[Section, ...]:
             "Quantities to be met by changing tensions, pressures, cables, weights or volumes.",
             (
                 Key("meet", "a list of tables", REQUIRED, "the quantities and their values"),
-                Key("vary", "a list of names or tables", REQUIRED, varied),
+                Key("vary", "a list of names, lists of names, or tables", REQUIRED, varied),
             ),
         ),
         Section("targets.meet", "A quantity and what it is to be.", wanted),
