@@ -230,7 +230,8 @@ def test_the_manual_lists_every_key_that_is_read():
     for name, cls in classes.items():
         unused = {Area: {"name"}, Plane: {"name", "mirror"}}.get(cls, set())
         names = {f.name for f in fields(cls)} - unused
-        names |= {"drawing", "gap"} if cls is Plan else set()  # what Plan's lines are made from
+        # what Plan's lines are made from, and what stands for tensions
+        names |= {Plan: {"drawing", "gap", "apex", "span_ratio"}, Area: {"rise", "apex"}}.get(cls, set())
         assert {key.name for key in listed[name, ""].keys} == names
     for method in ("newton", "nesterov", "lbfgs"):
         options = {f.name: f.default for f in fields(find_method(method).options)}

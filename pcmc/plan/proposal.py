@@ -43,8 +43,8 @@ def parts_of(drawing: Drawing) -> list[Part]:
     noded = shapely.set_precision(shapely.union_all(lines, grid_size=1e-3 * drawing.gap), 0.0)
     roof = roof_area(drawing)
     polygons = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
-    inside = [p for p in polygons if shapely.contains_xy(roof, *_middle(p)[0])]
-    parts = [Part(p, *_middle(p)) for p in inside]
+    inside = [p for p in polygons if shapely.contains_xy(roof, *largest_circle(p)[0])]
+    parts = [Part(p, *largest_circle(p)) for p in inside]
     return sorted(parts, key=lambda part: (round(part.area.centroid.x, 6), round(part.area.centroid.y, 6)))
 
 
@@ -79,7 +79,7 @@ def _line(curve: Curve, further: float = 0.0) -> Any:
     return shapely.LineString(xy)
 
 
-def _middle(area: Any) -> tuple[tuple[float, float], float]:
+def largest_circle(area: Any) -> tuple[tuple[float, float], float]:
     """The centre and radius of the largest circle in a polygon."""
     radius_line = shapely.maximum_inscribed_circle(area, tolerance=0.01 * math.sqrt(area.area))
     x, y = radius_line.coords[0]

@@ -35,7 +35,7 @@ from .cache import clear as clear_cache
 from .cache import folder as cache_folder
 from .designed import designed
 from .drawn import files_of, is_drawing
-from .file import Project, build, load, surface_of
+from .file import Project, build, load, raised, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
 from .outcome import Outcome
 from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
@@ -73,6 +73,7 @@ __all__ = [
     "load",
     "paint",
     "project_text",
+    "raised",
     "proposal_text",
     "reference",
     "run",

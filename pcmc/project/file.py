@@ -24,6 +24,7 @@ from .checking import check_keys
 from .drawn import is_drawing, with_drawing
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
+from .rises import Rise, take_rises, with_rises
 from .structure import Structure
 
 if TYPE_CHECKING:
@@ -216,6 +217,8 @@ def start_of(project: Project) -> tuple[Surface, Units]:
 
 def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     """The project with the given data. Errors as in ``load``."""
+    with in_file(path, FileError):
+        data, rises = take_rises(data)
     data, drawing = with_drawing(path, data)
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
     method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
@@ -227,7 +230,10 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
         _check_inside([*files, *([] if picture is None else [picture])])
         check_names(files, picture)
         check_picture(view, colour)
-        plan = plan_from(data["plan"])
+        plan, targets, vary = with_rises(plan_from(data["plan"]), rises)
+        if "targets" in data:
+            given = _search(data["targets"], plan)
+            targets, vary = [*given[0], *targets], [*given[1], *vary]
         return Project(
             path=path,
             plan=plan,
@@ -237,7 +243,8 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             wanted=wanted,
             mesh_check=mesh_check,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
-            **(_search(data["targets"], plan) if "targets" in data else {}),
+            targets=targets,
+            vary=vary,
             structure=Structure(**data["structure"]) if "structure" in data else None,
             files=files,
             picture=picture,
@@ -246,6 +253,25 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             whole=output.get("whole", False),
             drawing=drawing,
         )
+
+
+def raised(project: Project, wanted: Mapping[str, float | None]) -> Project:
+    """The project whose whole roof gets the rise, apex or span ratio given, with one tension."""
+    rises = [Rise(None, kind, value) for kind, value in wanted.items() if value is not None]
+    if not rises:
+        return project
+    flag = f"--{rises[0].kind.replace('_', '-')}"
+    if len(rises) > 1:
+        text = f"{flag} and --{rises[1].kind.replace('_', '-')}: give one of them, the other follows"
+        raise OptionError(text, what=flag)
+    if project.plan is None:
+        text = f"{flag} is for a project or a drawing; {project.path.name} has no plan"
+        raise OptionError(text, what=flag, found=str(project.path))
+    if project.targets:
+        text = f"{flag}: {project.path.name} has targets already; change them there"
+        raise OptionError(text, what=flag)
+    plan, targets, vary = with_rises(project.plan, rises)
+    return replace(project, plan=plan, targets=targets, vary=vary)
 
 
 def _check_inside(names: Sequence[str]) -> None:
@@ -269,14 +295,12 @@ def _placed(entry: Mapping[str, Any], plan: Plan) -> Mapping[str, Any]:
     return {**entry, "of": plan.points[name]}
 
 
-def _search(table: Mapping[str, Any], plan: Plan) -> dict[str, Any]:
+def _search(table: Mapping[str, Any], plan: Plan) -> tuple[list[Target], list[Parameter]]:
     """The targets of a project, and the parameters that may vary."""
     from ..design import Parameter, Target
 
     for key in ("meet", "vary"):
         if not table[key]:
             raise OptionError(f"targets.{key} is empty; give at least one", what=f"targets.{key}")
-    return {
-        "targets": [Target(**_placed(entry, plan)) for entry in table["meet"]],
-        "vary": [Parameter(**v) if isinstance(v, Mapping) else Parameter(v) for v in table["vary"]],
-    }
+    targets = [Target(**_placed(entry, plan)) for entry in table["meet"]]
+    return targets, [Parameter(**v) if isinstance(v, Mapping) else Parameter(v) for v in table["vary"]]

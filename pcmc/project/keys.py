@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cache
 from inspect import cleandoc
@@ -18,6 +18,8 @@ from ..surface import Plane
 from .accuracy import AccuracyWanted
 from .output import COLOURS
 from .remeshing import WHEN, Remeshing
+from .rises import RISES
+from .rises import WHOLE as WHOLE_RISES
 from .structure import Structure
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
@@ -38,7 +40,7 @@ class Key:
     default : the value where the key is left out; ``REQUIRED`` if it must not be, None for none.
     help : what it means.
     choices : the texts that are allowed; empty if any is.
-    unless : the key that stands for a required one; empty if none does.
+    unless : the keys that may stand for a required one.
     """
 
     name: str
@@ -46,7 +48,7 @@ class Key:
     default: Any
     help: str
     choices: tuple[str, ...] = ()
-    unless: str = ""
+    unless: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -127,11 +129,22 @@ def _plan_keys(kinds: Mapping[str, str]) -> tuple[Key, ...]:
     drawing = "a .dxf or .3dm file beside the project: its layers are the lines, instead of ``outline``"
     gap = "gaps between its lines up to this length are closed; by default a thousandth of its size"
     return (
-        replace(outline, unless="drawing"),
+        replace(outline, unless=("drawing",)),
         Key("drawing", "a text", None, drawing),
         Key("gap", "a number", None, gap),
         *others,
+        *_rise_keys("instead of a tension: for the whole roof", WHOLE_RISES[1:]),
     )
+
+
+def _rise_keys(how: str, names: Sequence[str]) -> tuple[Key, ...]:
+    """Keys for the height of a roof, from which its tension is found."""
+    meanings = {
+        "rise": "the height over a level outline",
+        "apex": "the greatest height over the plane",
+        "span_ratio": "the smaller span of the plan over the rise",
+    }
+    return tuple(Key(name, "a number", None, f"{meanings[name]}, {how}") for name in names)
 
 
 @cache
@@ -160,7 +173,12 @@ def main_sections() -> tuple[Section, ...]:
         ),
         Section("plan", "The roof, by the lines of its plan.", _plan_keys(plan)),
         Section(
-            "plan.patches.NAME", "A patch; NAME is its name.", tuple(k for k in area if k.name != "name")
+            "plan.patches.NAME",
+            "A patch; NAME is its name.",
+            (
+                *(replace(k, unless=RISES) if k.name == "tension" else k for k in area if k.name != "name"),
+                *_rise_keys("instead of a tension, which is found", RISES),
+            ),
         ),
         Section(
             "plan.dividers",
