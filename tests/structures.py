@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pcmc import Cable, Material, Patch, Surface
+from pcmc import Cable, Material, Patch, SelfWeight, Snow, Surface, Wind
 from pcmc.structure import StructuralModel
 
 FABRIC = Material(young=1e6, poisson=0.3, density=0.1)
+LOADS = [SelfWeight(), Snow(0.5), (Snow(0.2), Wind({"roof": 0.3}))]
 COLUMNS = {
     "displacements": ("vx,vy,vz", "NALL"),
     "forces": ("fx,fy,fz", "HELD"),

@@ -12,12 +12,12 @@ from pcmc.contact.pinching import (
     lift,
     place_pinched_walls,
     place_wall_rows,
-    pull_and_capacity,
     remove_pinched_walls,
     resting_links,
     resting_vertices,
     top_spacing,
 )
+from pcmc.contact.pull import pull_and_capacity
 from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.meshing.quality import triangle_quality
 from pcmc.solvers.state import State

@@ -14,11 +14,10 @@ from pcmc.contact.pinching import (
     find_walls,
     lift,
     place_pinched_walls,
-    pull_and_capacity,
-    pull_directions,
     remove_pinched_walls,
     resting_vertices,
 )
+from pcmc.contact.pull import pull_and_capacity, pull_directions
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.solvers.newton import newton

@@ -6,7 +6,8 @@ from branches import tension_of_height
 
 from generators import four_fans, two_caps, two_squares
 from pcmc import Direction, certify, follow, solve
-from pcmc.contact.pinching import pull_and_capacity, standing_part
+from pcmc.contact.pinching import standing_part
+from pcmc.contact.pull import pull_and_capacity
 from pcmc.continuation import Ending
 from pcmc.plan import Divider, Plan
 from pcmc.surface.wall_pressures import with_pressures

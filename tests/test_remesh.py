@@ -11,9 +11,10 @@ import generators
 from pcmc import Patch, Surface, solve
 from pcmc.base.errors import MissingExtra, OptionError
 from pcmc.energy.functional import patch_areas
+from pcmc.meshing.curve_cutting import CurveMesh, cut_curves
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.meshing.refinement import refine
-from pcmc.meshing.remeshing import _cut_curves, _Mesh, _patch_angles, _remesh_with_mmg, remesh
+from pcmc.meshing.remeshing import _patch_angles, _remesh_with_mmg, remesh
 from pcmc.plan import Plan
 
 
@@ -39,9 +40,9 @@ def sharpest_corner(surface: Surface) -> float:
     return float(np.concatenate(corners).min())
 
 
-def cut_curves(surface: Surface, length: float) -> _Mesh:
+def cut_evenly(surface: Surface, length: float) -> CurveMesh:
     size = np.full(surface.n, length)
-    return _cut_curves(surface, size, size)[0]
+    return cut_curves(surface, size, size)[0]
 
 
 def curve_edges(surface: Surface) -> np.ndarray:
@@ -118,7 +119,7 @@ def test_a_thin_wall_keeps_its_triangles_where_they_are_better():
 
 
 def test_good_triangles_in_corners_are_left_alone():
-    mesh = cut_curves(generators.two_squares(), 0.5)
+    mesh = cut_evenly(generators.two_squares(), 0.5)
     done = _remesh_with_mmg(mesh, np.full(len(mesh.X), 0.5), 1.2, 0.05)
     assert _patch_angles(done, 3)[2] > 25.0
 
@@ -190,7 +191,7 @@ def test_the_same_mesh_twice():
 @pytest.mark.parametrize("length", [0.9, 0.45, 0.3, 0.19, 0.07])
 def test_cutting_curves_keeps_flat_areas_and_orientation(length):
     start = generators.two_squares(2, height=1e-3)
-    cut = cut_curves(start, length)
+    cut = cut_evenly(start, length)
     again = Surface(cut.X, cut.F, cut.patch, start.patches, *cut.support.T)
     np.testing.assert_allclose(patch_areas(again), patch_areas(start), rtol=1e-6)
     assert_same_curves(start, again)

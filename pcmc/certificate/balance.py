@@ -194,8 +194,8 @@ def unheld(surface: Surface, stable: bool) -> Unheld | None:
     """
     parts, used = surface.topology.components, surface.faces[:, 0]
     pressed = np.unique(parts[used[surface.pressures[surface.patch_of_face] != 0.0]])
-    held = surface.given.fixed.copy()
-    for _, along in surface.given.on_line:
+    held = surface.given_supports.fixed.copy()
+    for _, along in surface.given_supports.on_line:
         held |= along
     beyond = surface.room_signs.any(axis=0) | (surface.weights != 0.0)
     held[surface.faces[beyond[surface.patch_of_face]]] = True
@@ -207,7 +207,7 @@ def unheld(surface: Surface, stable: bool) -> Unheld | None:
 
 def _may_shrink(surface: Surface, part: Bools) -> bool:
     """Whether the planes that a part slides on meet in a point, towards which it can shrink."""
-    planes = [(surface.plane, surface.given.on_plane), *surface.on_planes]
+    planes = [(surface.plane, surface.given_supports.on_plane), *surface.on_planes]
     there = [plane for plane, mask in planes if (mask & part).any()]
     if len(there) < 2:
         return True

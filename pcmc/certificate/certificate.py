@@ -16,7 +16,8 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.units import NO_UNITS, Units
-from ..contact.pinching import excess_pull, standing_part
+from ..contact.pinching import standing_part
+from ..contact.pull import excess_pull
 from ..energy.curvature import METHODS, curvature_error, mean_curvature, target_curvature
 from ..energy.functional import energy_and_gradient, patch_areas, volume
 from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces

@@ -29,7 +29,7 @@ from .whole import KEY, Whole, read_whole
 MARKS: dict[str, Any] = {"is_support": False, SLIDES: False, GUIDE: None, PLANES: None}
 QUANTITIES = dict.fromkeys(("mean_curvature", "rx", "ry", "rz"))
 CARRIED = {"vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane", "on_line"}
-CARRIED |= {"on_planes", "cables", "rooms", "given"}
+CARRIED |= {"on_planes", "cables", "rooms", "given_supports"}
 
 
 def to_meshes(surface: Surface) -> list[Any]:
@@ -190,7 +190,7 @@ def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
     """A row per vertex: coordinates, support, curvature and reaction."""
     support, standing = given_support(surface), standing_part(surface).surface
     guide = np.full(surface.n, None)
-    for number, (_, along) in enumerate(surface.given.on_line):
+    for number, (_, along) in enumerate(surface.given_supports.on_line):
         guide[along] = number
     planes: list[list[int]] = [[] for _ in range(surface.n)]
     for number, (_, mask) in enumerate(surface.on_planes):

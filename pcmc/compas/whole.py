@@ -34,7 +34,7 @@ class Whole:
     @classmethod
     def of(cls, surface: Surface) -> Whole:
         """That of a surface."""
-        guides = tuple(guide for guide, _ in surface.given.on_line)
+        guides = tuple(guide for guide, _ in surface.given_supports.on_line)
         planes = tuple(plane for plane, _ in surface.on_planes)
         return cls(surface.plane, guides, planes, surface.rooms, tuple(c.name for c in surface.cables))
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..energy.functional import apply_supports, energy_and_gradient
+from ..energy.functional import apply_supports
 from ..energy.motion_space import MotionSpace, VertexClasses, vertex_classes
 from ..surface import Surface
 from ..surface.checks import lying
@@ -28,8 +28,6 @@ from ..surface.supports import guides_and_points
 from ..surface.topology import topology
 from .held_bottoms import across_bottom, held_walls
 from .wall_rows import WallRows, join_rows, wall_rows
-
-SLACK = 1e-9  # of the capacity: an excess below is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,8 +208,8 @@ def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surf
 def resting_supports(surface: Surface, resting: Bools) -> dict[str, object]:
     """The supports with vertices that come to rest on Π, some of which slide on other planes, too."""
     planes = ((surface.plane, surface.on_ground | resting), *surface.on_planes)
-    lines, points = guides_and_points(planes, surface.given.fixed, surface.given.on_line)
-    fixed = surface.given.fixed | points
+    lines, points = guides_and_points(planes, surface.given_supports.fixed, surface.given_supports.on_line)
+    fixed = surface.given_supports.fixed | points
     for _, along in lines:
         fixed |= along
     sliding = (surface.on_plane | resting) & ~fixed
@@ -277,38 +275,6 @@ def standing_part(surface: Surface) -> StandingPart:
     return part
 
 
-def pull_and_capacity(surface: Surface, walls: Walls, resting: Bools) -> tuple[Floats, Floats]:
-    """Pull (n,) on each resting vertex of a standing part and what the wall can take, force.
-
-    The pull is the force of the sheets away from Π, to the vertex's own side; negative to the other.
-    Lifting the vertex by dz to either side makes a wall of area ½ ℓ dz under each top edge there, ℓ
-    its length along Π, so the capacity is ½ Σ α_w ℓ; the vertex rests while |pull| ≤ capacity.
-    On a held bottom the pull is the force across its curve, to any side, and ℓ is taken on the bottom.
-    """
-    force = -energy_and_gradient(surface, supports=False)[1]
-    pull = np.where(resting, walls.side * (force @ np.array(surface.plane.normal)), 0.0)
-    held = resting & walls.held
-    pull[held] = np.linalg.norm(walls.across_bottom(force, surface.vertices)[held], axis=1)
-    ends = np.where(walls.foot >= 0, walls.foot, np.arange(surface.n))[walls.top_edges]
-    start, end = surface.vertices[ends.T]
-    tension = surface.tensions[walls.wall_below]
-    half = 0.5 * tension * np.linalg.norm(surface.plane.along(end - start), axis=1)
-    capacity = np.zeros(surface.n)
-    for end in walls.top_edges.T:
-        np.add.at(capacity, end, half)
-    return pull, np.where(resting, capacity, 0.0)
-
-
-def excess_pull(surface: Surface, walls: Walls, resting: Bools) -> Floats:
-    """(n,) the pull on each resting vertex of a standing part beyond what its wall can take, force.
-
-    Zero at equilibrium: a junction that is pulled harder stands off Π. Signed as the pull is.
-    """
-    pull, capacity = pull_and_capacity(surface, walls, resting)
-    beyond = np.where(np.abs(pull) > capacity * (1.0 + SLACK), np.abs(pull) - capacity, 0.0)
-    return np.copysign(beyond, pull)
-
-
 def top_spacing(surface: Surface, walls: Walls) -> Floats:
     """(n,) the shorter top edge at each vertex of one, length; infinite elsewhere."""
     lengths = segment_lengths(surface.vertices, walls.top_edges)
@@ -316,19 +282,6 @@ def top_spacing(surface: Surface, walls: Walls) -> Floats:
     for end in walls.top_edges.T:
         np.minimum.at(spacing, end, lengths)
     return spacing
-
-
-def pull_directions(surface: Surface, walls: Walls, resting: Bools) -> Floats:
-    """(n,3) the unit direction to lift each vertex of a standing part: off Π, or as a held one is pulled."""
-    direction = walls.side[:, None] * np.array(surface.plane.normal)
-    held = resting & walls.held
-    if held.any():
-        force = -energy_and_gradient(surface, supports=False)[1]
-        across = walls.across_bottom(force, surface.vertices)
-        length = np.linalg.norm(across, axis=1)
-        pulled = held & (length > 0.0)
-        direction[pulled] = across[pulled] / length[pulled, None]
-    return direction
 
 
 def lift(

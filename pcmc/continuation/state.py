@@ -8,14 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
-from ..contact.pinching import (
-    coming_down,
-    excess_pull,
-    place_pinched_walls,
-    place_wall_rows,
-    put_down,
-    standing_part,
-)
+from ..contact.pinching import coming_down, place_pinched_walls, place_wall_rows, put_down, standing_part
+from ..contact.pull import excess_pull
 from ..energy.functional import (
     apply_supports,
     energy_and_gradient,

@@ -27,7 +27,8 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
 from ..certificate.certificate import TOLERANCE
-from ..contact.pinching import StandingPart, excess_pull, place_wall_rows, standing_part
+from ..contact.pinching import StandingPart, place_wall_rows, standing_part
+from ..contact.pull import excess_pull
 from ..energy.functional import energy_and_gradient, gradient_by
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space

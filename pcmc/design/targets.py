@@ -139,8 +139,10 @@ class Parameter:
     @property
     def label(self) -> str:
         """The parameter in words."""
-        kind = "tension of cable" if self.kind == "cable" else f"{self.kind} of"
-        return f"{kind} {' and '.join(self.names)}"
+        names = " and ".join(self.names)
+        if self.kind == "cable":  # which may have the name "cable 1"
+            return f"tension of cable {names.removeprefix('cable ')}"
+        return f"{self.kind} of {names}"
 
     def value(self, surface: Surface) -> float:
         """Its value on a surface; of several patches that of the first."""

@@ -142,7 +142,7 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
     """Targets and parameters as plain data, for the page's form."""
     return {
         "targets": [{**vars(target), "label": target.label} for target in targets],
-        "vary": [vars(parameter) for parameter in vary],
+        "vary": [{"label": parameter.label, "parameter": vars(parameter)} for parameter in vary],
     }
 
 

@@ -213,5 +213,5 @@ def _array(tomlkit: Any, values: Sequence[Any]) -> Any:
             )
             array.append(table)
         else:
-            array.append(value)
+            array.append(list(value) if isinstance(value, tuple) else value)
     return array

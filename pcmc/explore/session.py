@@ -94,7 +94,8 @@ class Session:
         self._wanted, self._failure = start.wanted, start.failure
         self._start = self.surface
         self._steps, self._place = [self.surface], 0
-        self._message, self._compared = "", None
+        self._message = ""
+        self._compared: int | None = None
         self.variants: list[Variant] = []
         self.aims: Aims | None = None
 
@@ -227,8 +228,9 @@ class Session:
 
         def act(stop: Callable[[], bool]) -> None:
             self._start, self.aims = start.surface, None
-            self._go_on_with(start.surface)
-            self._failure = start.failure
+            self.surface, self._certificate = start.surface, start.certificate
+            self._wanted, self._failure = start.wanted, start.failure
+            self._add_step()
 
         return self._run(act)
 

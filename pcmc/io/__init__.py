@@ -262,7 +262,7 @@ def write(
             lost.append(f"colours of {colour!r}")
     if certificate is not None and not form.certificate:
         lost.append("certificate")
-    if surface.given.on_line and not form.lines:
+    if surface.given_supports.on_line and not form.lines:
         lost.append("lines or circles that vertices slide along (they are fixed in it)")
     if surface.weights.any() and "tensions" in form.loses:
         lost.append("weights")

@@ -26,7 +26,7 @@ from ..base.files import check_regular
 from ..base.units import Units
 from ..surface import Surface
 from ..surface.colours import linear, patch_colors, scalar_colors
-from ..surface.surface import FAR
+from ..surface.origin import file_origin
 from .flat_walls import KEY
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData, support_kinds, support_of
@@ -56,10 +56,8 @@ def write(
             data["_" + re.sub(r"\W+", "_", name)] = np.where(finite, values, NO_VALUE).astype(np.float32)
     turned = surface.vertices[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
     place = np.eye(4)
-    middle = turned.mean(axis=0)
-    if np.linalg.norm(middle) > FAR * surface.size:
-        place[:3, 3] = np.round(middle)
-        turned = turned - place[:3, 3]
+    place[:3, 3] = file_origin(turned, surface.size)
+    turned = turned - place[:3, 3]
     scene = trimesh.Scene()
     shades = None
     if colour:

@@ -22,7 +22,7 @@ from ..base.units import Units, length_factor
 from ..energy.functional import patch_areas
 from ..surface import Surface
 from ..surface.colours import patch_colors
-from ..surface.surface import FAR
+from ..surface.origin import file_origin
 from .ifc_units import assigned_units
 from .libraries import load_library
 from .mesh_data import MeshData, support_of, within
@@ -69,10 +69,7 @@ class _Model:
         for array in content:
             digest.update(np.ascontiguousarray(array).tobytes())
         self.digest = digest.hexdigest()
-        self.middle = np.zeros(3)
-        middle = surface.vertices.mean(axis=0)
-        if np.linalg.norm(middle) > FAR * surface.size:  # viewers work in single precision
-            self.middle = np.round(middle)
+        self.middle = file_origin(surface.vertices, surface.size)  # viewers work in single precision
 
     def rooted(self, kind: str, role: str, **values: Any) -> Any:
         """An entity with an identifier made from the surface and its role in the file."""

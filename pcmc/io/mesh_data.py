@@ -16,7 +16,6 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import NO_UNITS, Units
 from ..base.validate import choice
-from ..meshing.refinement import given_supports
 from ..surface import Cable, Guide, Patch, Plane, Room, Surface, checks
 from ..surface.geometry import bounding_size
 from ..surface.topology import topology
@@ -128,7 +127,7 @@ def support_of(surface: Surface) -> Ints:
 
 def given_support(surface: Surface) -> Ints:
     """(n,) the same for formats that have all planes: the supports as given, without these planes."""
-    fixed, sliding = given_supports(surface)
+    fixed, sliding = surface.given_supports.fixed_and_sliding()
     return np.where(fixed, FIXED, np.where(sliding, SLIDING, FREE)).astype(np.int8)
 
 

@@ -55,7 +55,7 @@ def write(
         meta["rooms"] = [[room.name, room.patches, room.volume] for room in surface.rooms]
     arrays: dict[str, Any] = {f"scalar {name}": value for name, value in scalars.items()}
     arrays |= {f"certificate {name}": value for name, value in tables.items()}
-    straight = [(line, along) for line, along in surface.given.on_line if isinstance(line, Line)]
+    straight = [(line, along) for line, along in surface.given_supports.on_line if isinstance(line, Line)]
     if surface.on_planes:
         meta["planes"] = [{"name": plane.name, "mirror": plane.mirror} for plane, _ in surface.on_planes]
         arrays["planes"] = np.array([[plane.point, plane.normal] for plane, _ in surface.on_planes])
@@ -67,7 +67,9 @@ def write(
         arrays["lines"] = np.array([[line.point, line.direction] for line, _ in straight])
         arrays["on_line"] = np.array([along for _, along in straight])
     if surface.on_circle:
-        round_ = [(guide, along) for guide, along in surface.given.on_line if isinstance(guide, Circle)]
+        round_ = [
+            (guide, along) for guide, along in surface.given_supports.on_line if isinstance(guide, Circle)
+        ]
         arrays["circles"] = np.array([[*c.centre, *c.normal, c.radius] for c, _ in round_])
         arrays["on_circle"] = np.array([along for _, along in round_])
     with path.open("wb") as file:

@@ -60,8 +60,8 @@ def scaled_surface(surface: Surface, factor: float) -> Surface:
     if factor == 1.0:
         return surface
     parts = {f.name: scaled(getattr(surface, f.name), factor) for f in fields(surface) if f.init}
-    given = {name: scaled(part, factor) for name, part in surface.given._asdict().items()}
-    return Surface(**parts | given | {"vertices": factor * surface.vertices})
+    supports = {name: scaled(part, factor) for name, part in surface.given_supports._asdict().items()}
+    return Surface(**parts | supports | {"vertices": factor * surface.vertices})
 
 
 def converted(data: MeshData, length: str) -> MeshData:

@@ -15,7 +15,7 @@ import numpy as np
 from ..base.errors import FileError
 from ..surface import Surface
 from ..surface.geometry import area_vectors
-from ..surface.surface import FAR
+from ..surface.origin import file_origin
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData
 from .metadata import Metadata
@@ -30,10 +30,10 @@ FACET = (
 
 def write(path: Path, surface: Surface, **_: Any) -> str:
     """Coordinates with nine digits, more than readers of STL keep; returns a note if they are shifted."""
-    middle = np.round(surface.vertices.mean(axis=0))
-    moved = bool(np.linalg.norm(middle) > FAR * surface.size)
+    middle = file_origin(surface.vertices, surface.size)
+    moved = bool(middle.any())
     middle[np.abs(middle) <= surface.size] = 0.0  # heights stay what they are
-    P = surface.vertices[surface.faces] - (middle if moved else 0.0)
+    P = surface.vertices[surface.faces] - middle
     normal = area_vectors(P)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     lines = np.concatenate([normal, P.reshape(-1, 9)], axis=1)

@@ -20,7 +20,7 @@ from ..base.errors import MissingExtra
 from ..base.units import Units, length_factor
 from ..surface import Surface
 from ..surface.colours import linear, patch_colors, scalar_colors
-from ..surface.surface import FAR
+from ..surface.origin import file_origin
 from .mesh_data import support_of
 from .metadata import metadata_text
 
@@ -51,10 +51,7 @@ def write(
     roof.GetPrim().SetCustomDataByKey("pcmc", metadata_text(surface, units))
     if walls is not None:
         roof.GetPrim().SetCustomDataByKey("walls", walls)
-    middle = surface.vertices.mean(axis=0)
-    if np.linalg.norm(middle) <= FAR * surface.size:
-        middle = np.zeros(3)
-    middle = np.round(middle)
+    middle = file_origin(surface.vertices, surface.size)
     if middle.any():
         roof.AddTranslateOp().Set(tuple(middle.tolist()))
     at_vertices = {SUPPORT: support_of(surface).astype(float)}

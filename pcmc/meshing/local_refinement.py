@@ -12,9 +12,10 @@ from ..base.errors import OptionError
 from ..contact.pinching import Walls, lift, standing_part
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
+from .curve_cutting import cut_triangles
 from .quality import edge_lengths
-from .refinement import Projection, carry_lines, carry_planes, given_supports, new_vertices
-from .remeshing import RAISED, cut_triangles
+from .refinement import Projection, new_vertices, with_vertices_on
+from .remeshing import RAISED
 
 TALL = 4.0  # heights of a wall over the length of its top edge: a higher column does not come to rest
 
@@ -117,12 +118,7 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
     middle, held, slides = new_vertices(surface, cut, project)
     ends, number = surface.topology.edges[cut], surface.n + np.arange(len(middle))
     F, patch = cut_triangles(surface.faces, surface.patch_of_face, ends, number, surface.n, longest)
-    X = np.concatenate([surface.vertices, middle])
-    fixed, sliding = (np.concatenate(p) for p in zip(given_supports(surface), (held, slides), strict=True))
-    lines, planes = carry_lines(surface, X, fixed, surface.n), carry_planes(surface, cut)
-    cables = tuple(cable.cut(ends, number) for cable in surface.cables)
-    supports = fixed, sliding, surface.plane, lines, planes
-    return Surface(X, F, patch, surface.patches, *supports, cables=cables, rooms=surface.rooms)
+    return with_vertices_on(surface, cut, F, patch, middle, held, slides)
 
 
 def _face_mask(surface: Surface, chosen: Bools | Ints) -> Bools:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..contact.midpoints import midpoints
 from ..surface import Circle, Guide, Plane, Surface, expect_surface
@@ -96,7 +96,7 @@ def prolongation(surface: Surface) -> csr_array:
 
 def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
     """(e,) masks of the edges whose midpoint is fixed, and of those whose midpoint slides on Π."""
-    topo, (fixed, sliding) = surface.topology, given_supports(surface)
+    topo, (fixed, sliding) = surface.topology, surface.given_supports.fixed_and_sliding()
     start, end = topo.edges.T
     boundary = topo.boundary_edge
     crossing = topo.on_boundary[start] & topo.on_boundary[end]
@@ -107,14 +107,6 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
     resting = sliding | (fixed & (np.abs(height) <= 1e-9 * surface.size))
     slides = boundary & resting[start] & resting[end] & (sliding[start] | sliding[end])
     return both_fixed, slides
-
-
-def given_supports(surface: Surface) -> tuple[Bools, Bools]:
-    """(n,) masks of vertices that are fixed or slide along a line, and of those that slide on Π, as given."""
-    fixed = surface.given.fixed.copy()
-    for _, along in surface.given.on_line:
-        fixed |= along
-    return fixed, surface.given.on_plane & ~fixed
 
 
 def carry_planes(surface: Surface, cut: Bools) -> tuple[tuple[Plane, Bools], ...]:
@@ -162,14 +154,32 @@ def _refine_once(surface: Surface, project: Projection | None) -> Surface:
     middle, held, slides = new_vertices(surface, every, project)
     a, b, c = surface.faces.T
     bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
-    X, patch = np.concatenate([surface.vertices, middle]), np.repeat(surface.patch_of_face, 4)
+    patch = np.repeat(surface.patch_of_face, 4)
     F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
-    fixed, sliding = (np.concatenate(p) for p in zip(given_supports(surface), (held, slides), strict=True))
-    lines, planes = carry_lines(surface, X, fixed, surface.n), carry_planes(surface, every)
-    edges = surface.topology.edges
-    cables = tuple(cable.cut(edges, surface.n + np.arange(len(edges))) for cable in surface.cables)
-    supports = fixed, sliding, surface.plane, lines, planes
-    return Surface(X, F, patch, surface.patches, *supports, cables=cables, rooms=surface.rooms)
+    return with_vertices_on(surface, every, F, patch, middle, held, slides)
+
+
+def with_vertices_on(
+    surface: Surface, cut: Bools, F: Ints, patch: Ints, middle: Floats, held: Bools, slides: Bools
+) -> Surface:
+    """The surface of triangles ``F`` whose last k vertices ``middle`` (k,3) lie on the edges ``cut`` (e,).
+
+    ``held`` and ``slides`` (k,) are their supports.
+    """
+    X, ends = np.concatenate([surface.vertices, middle]), surface.topology.edges[cut]
+    fixed, sliding = surface.given_supports.fixed_and_sliding()
+    fixed, sliding = np.concatenate([fixed, held]), np.concatenate([sliding, slides])
+    number = surface.n + np.arange(len(middle))
+    return surface.rebuilt(
+        vertices=X,
+        faces=F,
+        patch_of_face=patch,
+        fixed=fixed,
+        on_plane=sliding,
+        on_line=carry_lines(surface, X, fixed, surface.n),
+        on_planes=carry_planes(surface, cut),
+        cables=tuple(cable.cut(ends, number) for cable in surface.cables),
+    )
 
 
 def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tuple[tuple[Guide, Bools], ...]:
@@ -180,7 +190,7 @@ def carry_lines(surface: Surface, X: Floats, fixed: Bools, kept: int = 0) -> tup
     """
     lines: list[tuple[Guide, Bools]] = []
     near = 1e-9 * surface.size
-    for line, along in surface.given.on_line:
+    for line, along in surface.given_supports.on_line:
         if isinstance(line, Circle):
             inside = fixed & (line.distance(X) <= near)
             inside[inside] = _round_edges(surface, line, along, X[inside])[0]

@@ -10,7 +10,8 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import SurfaceError
-from ..certificate import Certificate, certify
+from ..certificate import Certificate
+from ..certificate.required import certified
 from ..surface import Surface, expect_surface
 from ..surface.geometry import edge_vectors, face_areas, segment_lengths
 from .families import families
@@ -185,18 +186,6 @@ def panels(
         flat=unfolded(corners),
         at_least=parts.at_least,
     )
-
-
-def certified(surface: Surface, anyway: bool) -> Certificate:
-    """The certificate of a surface; refuses one that is not certified, unless ``anyway``."""
-    validate.flag("anyway", anyway)
-    certificate = certify(surface)
-    if not (certificate.certified or anyway):
-        verdict = certificate.verdict
-        text = f"surface: not certified ({verdict.value}); solve it first, or accept it with"
-        text += " anyway=True (--anyway)"
-        raise SurfaceError(text, what="surface", found=verdict, expected="a certified surface")
-    return certificate
 
 
 def _panel_table(surface: Surface, faces: Ints, lengths: Floats, family: Ints, order: Ints) -> pd.DataFrame:

@@ -104,11 +104,23 @@ def build_surface(plan: PlanData) -> Surface:
         np.concatenate([sliding, walls.sliding]),
         plan.plane,
         on_planes=(*mirror_planes(plan, vertices), *_upright_planes(draft, walls, sides)),
-        cables=cables,
-        rooms=_rooms(plan, wall_patches, sides),
+        cables=tuple(cables),
+        rooms=tuple(_rooms(plan, wall_patches, sides)),
     )
-    check_rooms(surface)
+    _check_rooms(surface)
     return surface
+
+
+def _check_rooms(surface: Surface) -> None:
+    """Refuse a room that does not close, as the missing wall of a plan."""
+    try:
+        check_rooms(surface)
+    except SurfaceError as error:
+        problem, open_edges, _ = str(error).partition("; name the patches that are missing")
+        if not open_edges:
+            raise
+        problem += "; give the dividers around it walls, or make its patches one room with those beside them"
+        raise PlanError(problem, what="rooms", where=error.where, found=error.found) from None
 
 
 def _rise(draft: _Draft, patches: Sequence[Patch], held: Bools) -> Floats:
@@ -418,5 +430,5 @@ def _rooms(plan: PlanData, walls: Sequence[Patch], sides: Sequence[_Sides]) -> l
             sign = (side.left == number) - (side.right == number)
             if sign:
                 around[wall.name] = sign
-        rooms.append(Room(name, around, room.volume))
+        rooms.append(Room(name, tuple(around.items()), room.volume))
     return rooms

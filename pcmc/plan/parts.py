@@ -204,8 +204,8 @@ def cable_of(spec: Any, number: int) -> CableLine:
         spec = CableLine(**spec)
     if not isinstance(spec, CableLine):
         raise OptionError(f"{what}: expected a curve with a tension, found {spec!r}", what=what, found=spec)
+    tension = validate.number("tension", spec.tension, least=0.0, where=spec.name or what)
     what = f"cable {spec.name!r}" if spec.name else what
-    tension = validate.number("tension", spec.tension, least=0.0, where=what)
     return CableLine(curve_of(spec.curve, what), tension, spec.name)
 
 

@@ -103,9 +103,9 @@ class Plan(PlanData):
             "cables": tuple(cable_of(c, k) for k, c in enumerate(self.cables, 1)),
             "mirrors": tuple(mirror_of(m, k) for k, m in enumerate(self.mirrors, 1)),
         }
-        parsed["rooms"] = rooms_of(self.rooms, parsed["patches"])
         for key, value in parsed.items():
             object.__setattr__(self, key, value)
+        object.__setattr__(self, "rooms", rooms_of(self.rooms, self.patches))
         validate.choice("edge of the outline", self.edge, EDGES)
         object.__setattr__(self, "cable", edge_cable(self.edge, self.cable, "the outline"))
         for key in ("pressure", "weight", "snow"):

@@ -33,7 +33,7 @@ from .outcome import Outcome
 
 VARIABLE = "PCMC_CACHE"
 MOST = 100  # roofs kept; the one used longest ago goes first
-PARTS = ("plan", "method", "options", "wanted", "search", "remeshing", "targets", "vary")
+PARTS = ("plan", "method", "options", "wanted", "search", "remeshing", "targets", "vary", "misfit")
 
 
 def folder() -> Path | None:

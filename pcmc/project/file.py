@@ -13,6 +13,7 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 from .. import io
+from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError, unknown
 from ..base.files import check_name, check_regular
 from ..base.units import NO_UNITS, Units
@@ -21,6 +22,7 @@ from ..solvers import find_method
 from ..surface import Surface
 from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys
+from .documents import Documents, documents_of
 from .drawn import is_drawing, with_drawing
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
@@ -54,10 +56,12 @@ class Project:
     search : whether further starts are tried where the first leads to no equilibrium.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
+    misfit : ``tolerance`` of ``pcmc.meet``; None for the default.
     structure : of the structural model; None without [structure].
     files, picture : the output.
+    documents : drawings, schedule of panels, structural model and report to write.
     folder : made for the output if it is missing; None if the names include their folders.
-    view, colour : of the picture; ``colour`` is one of ``COLOURS``.
+    views, colour : of the picture, side by side; ``colour`` is one of ``COLOURS``.
     whole : whether the output is the whole roof that a surface with mirror planes is a part of.
     drawing : that the plan refers to, or that ``path`` is; None if there is none.
     """
@@ -73,11 +77,13 @@ class Project:
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
     vary: Sequence[Parameter] = ()
+    misfit: float | None = None
     structure: Structure | None = None
     files: Sequence[PathLike] = ()
     picture: PathLike | None = None
+    documents: Documents = field(default_factory=Documents)
     folder: Path | None = None
-    view: Any = "diagonal"
+    views: Sequence[Any] = ("diagonal",)
     colour: str = "patches"
     whole: bool = False
     drawing: Drawing | None = None
@@ -85,7 +91,8 @@ class Project:
     @property
     def outputs(self) -> list[Path]:
         """All files to write."""
-        return [Path(f) for f in (*self.files, *([] if self.picture is None else [self.picture]))]
+        pictures = [] if self.picture is None else [self.picture]
+        return [*(Path(f) for f in (*self.files, *pictures)), *self.documents.paths]
 
     def in_folder(self, folder: PathLike) -> Project:
         """The same project with its output in a folder; FileError for output that a link leads out of it."""
@@ -96,7 +103,8 @@ class Project:
                 text = f"{self.path}: {path} is outside the folder {base}, in {place}; {ELSEWHERE}"
                 raise FileError(text, what="output", found=str(path), expected=str(base))
         picture = None if self.picture is None else base / self.picture
-        return replace(self, files=[base / name for name in self.files], picture=picture, folder=base)
+        files, documents = [base / name for name in self.files], self.documents.in_folder(base)
+        return replace(self, files=files, picture=picture, documents=documents, folder=base)
 
 
 def load(path: PathLike) -> Project:
@@ -223,21 +231,28 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
     method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
     files, picture = output.get("files", []), output.get("picture")
-    view, colour = output.get("view", "diagonal"), output.get("colour", "patches")
+    colour = output.get("colour", "patches")
     with in_file(path, FileError):
         wanted = take_accuracy(options)
         find_method(method).options(**options)  # refuses bad values before the plan is meshed
-        _check_inside([*files, *([] if picture is None else [picture])])
+        documents = documents_of(output)
+        _check_inside([*files, *([] if picture is None else [picture]), *documents.names])
         check_names(files, picture)
-        check_picture(view, colour)
+        views = _views(output)
+        check_picture(views, colour)
+        units = Units(data.get("units", ""), data.get("force", ""))
+        structure = Structure(**data["structure"]) if "structure" in data else None
+        documents.check(units, structure)
         plan, targets, vary = with_rises(plan_from(data["plan"]), rises)
+        misfit = None
         if "targets" in data:
             given = _search(data["targets"], plan)
-            targets, vary = [*given[0], *targets], [*given[1], *vary]
+            targets, vary = [*given["targets"], *targets], [*given["vary"], *vary]
+            misfit = given["misfit"]
         return Project(
             path=path,
             plan=plan,
-            units=Units(data.get("units", ""), data.get("force", "")),
+            units=units,
             method=method,
             options=options,
             wanted=wanted,
@@ -245,10 +260,12 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
             targets=targets,
             vary=vary,
-            structure=Structure(**data["structure"]) if "structure" in data else None,
+            misfit=misfit,
+            structure=structure,
             files=files,
             picture=picture,
-            view=tuple(view) if isinstance(view, list) else view,
+            documents=documents,
+            views=[tuple(view) if isinstance(view, list) else view for view in views],
             colour=colour,
             whole=output.get("whole", False),
             drawing=drawing,
@@ -274,6 +291,13 @@ def raised(project: Project, wanted: Mapping[str, float | None]) -> Project:
     return replace(project, plan=plan, targets=targets, vary=vary)
 
 
+def _views(output: Mapping[str, Any]) -> list[Any]:
+    """The views of the picture: the key views, or view."""
+    if "view" in output and "views" in output:
+        raise OptionError("output: give view or views, not both", what="output.views")
+    return list(output.get("views", [output.get("view", "diagonal")]))
+
+
 def _check_inside(names: Sequence[str]) -> None:
     """Refuse output outside the project's folder: a project from others must not replace one's files."""
     for name in names:
@@ -295,12 +319,17 @@ def _placed(entry: Mapping[str, Any], plan: Plan) -> Mapping[str, Any]:
     return {**entry, "of": plan.points[name]}
 
 
-def _search(table: Mapping[str, Any], plan: Plan) -> tuple[list[Target], list[Parameter]]:
+def _search(table: Mapping[str, Any], plan: Plan) -> dict[str, Any]:
     """The targets of a project, and the parameters that may vary."""
     from ..design import Parameter, Target
 
+    if "tolerance" in table:
+        validate.positive("targets.tolerance", table["tolerance"])
     for key in ("meet", "vary"):
         if not table[key]:
             raise OptionError(f"targets.{key} is empty; give at least one", what=f"targets.{key}")
-    targets = [Target(**_placed(entry, plan)) for entry in table["meet"]]
-    return targets, [Parameter(**v) if isinstance(v, Mapping) else Parameter(v) for v in table["vary"]]
+    return {
+        "targets": [Target(**_placed(entry, plan)) for entry in table["meet"]],
+        "vary": [Parameter(**v) if isinstance(v, Mapping) else Parameter(v) for v in table["vary"]],
+        "misfit": table.get("tolerance"),
+    }

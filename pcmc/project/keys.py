@@ -11,11 +11,13 @@ from typing import Any
 
 from ..accuracy.adaptive import ACCURACY_OF
 from ..base.units import FORCES, LENGTHS
+from ..drawings import FORMATS
 from ..plan import Area, CableLine, Divider, Hole, Plan
 from ..plan.parts import BALANCED, BOTTOMS, EDGES, RoomData
 from ..solvers import METHODS, find_method
 from ..surface import Plane
 from .accuracy import AccuracyWanted
+from .documents import Documents
 from .output import COLOURS
 from .remeshing import WHEN, Remeshing
 from .rises import RISES
@@ -98,6 +100,7 @@ KINDS: dict[str, Callable[[Any], bool]] = {
     "a point [x, y, z]": lambda value: _list_of(int, float)(value) and len(value) == 3,
     "a point [x, y] or a list of points": lambda value: isinstance(value, list),
     "a name or a point [x, y]": lambda value: isinstance(value, str | list),
+    "a list of views": _list_of(str, list),
     "a name or two angles": lambda value: isinstance(value, str | list),
 }
 
@@ -156,6 +159,7 @@ def main_sections() -> tuple[Section, ...]:
     plan |= {"mirrors": "a list of curves or tables", "rooms": "a table", "points": "a table"}
     area = _of_class(Area, {"at": "a point [x, y] or a list of points"})
     directions = "of the picture: diagonal, elevation, plan, or [azimuth, elevation] in degrees"
+    documents = {"drawings": "a list of names", "panels": "a text", "structure": "a text", "report": "a text"}
     return (
         Section(
             "",
@@ -168,7 +172,7 @@ def main_sections() -> tuple[Section, ...]:
                 Key("remesh", "a table or a list of tables", None, "other triangles, once or more"),
                 Key("targets", "a table", None, "heights, areas, sags or other quantities to be met"),
                 Key("structure", "a table", None, "material, thickness and loads of the structural model"),
-                Key("output", "a table", None, "the files and the picture to write"),
+                Key("output", "a table", None, "the files, the picture and the documents to write"),
             ),
         ),
         Section("plan", "The roof, by the lines of its plan.", _plan_keys(plan)),
@@ -218,13 +222,15 @@ def main_sections() -> tuple[Section, ...]:
         ),
         Section(
             "output",
-            "What to write. Without it nothing is written.",
+            "What to write: all of it, or nothing. Without it nothing is written.",
             (
                 Key("files", "a list of names", [], "files of the surface; the suffix names the format"),
                 Key("picture", "a text", None, "name of a picture, .png, .svg or .pdf"),
                 Key("view", "a name or two angles", "diagonal", directions),
+                Key("views", "a list of views", None, "of the picture, side by side, instead of ``view``"),
                 Key("colour", "a text", "patches", "of the picture", COLOURS),
                 Key("whole", "true or false", False, WHOLE),
+                *_of_class(Documents, documents, {"sheet": tuple(FORMATS)}),
             ),
         ),
     )
@@ -266,6 +272,7 @@ def target_sections() -> tuple[Section, ...]:
             (
                 Key("meet", "a list of tables", REQUIRED, "the quantities and their values"),
                 Key("vary", "a list of names, lists of names, or tables", REQUIRED, varied),
+                Key("tolerance", "a number", 1e-7, "largest relative misfit of a target that counts as met"),
             ),
         ),
         Section("targets.meet", "A quantity and what it is to be.", wanted),

@@ -80,12 +80,14 @@ def _axes(surface: Surface) -> Floats:
 def _free_coordinates(surface: Surface, used: Bools, axes: Floats) -> tuple[list[Bools], Ints]:
     """The masks (n,) of the vertices that are free along some axis, and (3,) which of them each axis has."""
     held = surface.fixed.copy()
-    for _, along in surface.auto_lines:
+    for _, along in surface.meeting_lines:
         held &= ~along
+    on_plane = surface.on_plane | surface.given_supports.on_plane
+    planes = ((surface.plane, on_plane), *surface.on_planes)
     masks = []
     for axis in axes:
         stopped = held.copy()
-        for plane, mask in ((surface.plane, surface.on_plane | surface.given.on_plane), *surface.on_planes):
+        for plane, mask in planes:
             if np.linalg.norm(np.cross(axis, plane.normal)) <= ACROSS:
                 stopped |= mask
         masks.append(used & ~stopped)

@@ -11,12 +11,10 @@ from ..contact.pinching import (
     StandingPart,
     Walls,
     coming_down,
-    excess_pull,
     find_walls,
     lift,
     place_pinched_walls,
     place_wall_rows,
-    pull_directions,
     put_down,
     remove_pinched_walls,
     resting_vertices,
@@ -24,6 +22,7 @@ from ..contact.pinching import (
     standing_part,
     top_spacing,
 )
+from ..contact.pull import excess_pull, pull_directions
 from ..energy.functional import energy_and_gradient, energy_at, onto_circles
 from ..energy.loose_parts import relative_forces, rounding_left
 from ..energy.motion_space import MotionSpace, force_scale, motion_space

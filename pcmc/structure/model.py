@@ -11,8 +11,8 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array
-from ..base.errors import SurfaceError
 from ..certificate.certificate import certify
+from ..certificate.required import require_certified
 from ..contact.pinching import standing_faces, standing_part
 from ..energy.functional import apply_supports
 from ..solvers.result import Result
@@ -114,9 +114,7 @@ class StructuralModel:
         certificate = certify(self.surface, modes=0) if solved is None else solved.certify(modes=0)
         object.__setattr__(self, "verdict", certificate.verdict.value)
         object.__setattr__(self, "certified", certificate.certified)
-        if not (certificate.certified or validate.flag("anyway", self.anyway)):
-            text = f"the surface is not certified ({self.verdict}); solve it first, or use anyway=True"
-            raise SurfaceError(text, what="surface", found=certificate.verdict)
+        require_certified(certificate, self.anyway)
 
     def _single_loads(self) -> list[Load]:
         return [load for entry in self.loads for load in (entry if isinstance(entry, tuple) else (entry,))]

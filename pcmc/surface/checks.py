@@ -334,3 +334,13 @@ def refuse_rows(
     count = f" ({len(bad)} such entries)" if len(bad) > 1 else ""
     message = f"{what}[{first}] = {rows[first].tolist()} {fault}{limits}{count}{hint and f'; {hint}'}"
     raise SurfaceError(message, what=what, where=first, found=rows[first].tolist(), expected=expected)
+
+
+def refuse_snow(snow: float, patch: str, free: int, edge: Ints) -> NoReturn:
+    """Refuse snow as a change of pressure where edges are free; ``edge`` is the first of them."""
+    i, j = edge.tolist()
+    text = f"snow: {free} edges are free, the first from vertex {i} to {j}, and there a change of pressure is"
+    text += (
+        f" not the same as snow; give a weight instead, as in retensioned(weights={{{patch!r}: {snow:g}}})"
+    )
+    raise SurfaceError(text, what="snow", where=(i, j))

@@ -59,22 +59,21 @@ def cut(surface: Surface, plane: Plane) -> Surface:
     number = np.full(surface.n, -1)
     number[vertices] = np.arange(len(vertices))
     patches, patch = np.unique(surface.patch_of_face[stays], return_inverse=True)
-    given, X = surface.given, surface.vertices[vertices]
+    given, X = surface.given_supports, surface.vertices[vertices]
     X = X - (height[vertices] * (side[vertices] == 0))[:, None] * np.array(plane.normal)
     planes = tuple((other, mask[vertices]) for other, mask in surface.on_planes if mask[vertices].any())
     lines = tuple((guide, mask[vertices]) for guide, mask in given.on_line if mask[vertices].any())
-    return Surface(
-        X,
-        number[surface.faces[stays]],
-        patch,
-        tuple(surface.patches[p] for p in patches),
-        given.fixed[vertices],
-        given.on_plane[vertices],
-        surface.plane,
-        lines,
-        (*planes, (plane, side[vertices] == 0)),
-        _cut_cables(surface, side, number),
-        _cut_rooms(surface, stays),
+    return surface.rebuilt(
+        vertices=X,
+        faces=number[surface.faces[stays]],
+        patch_of_face=patch,
+        patches=tuple(surface.patches[p] for p in patches),
+        fixed=given.fixed[vertices],
+        on_plane=given.on_plane[vertices],
+        on_line=lines,
+        on_planes=(*planes, (plane, side[vertices] == 0)),
+        cables=_cut_cables(surface, side, number),
+        rooms=_cut_rooms(surface, stays),
     )
 
 

@@ -115,10 +115,18 @@ def unfolded(surface: Surface, planes: Sequence[Plane | str] | None = None) -> W
     patch = patch_label[:, surface.patch_of_face].ravel()
     patches = tuple(replace(surface.patches[p], name=name) for p, name in patch_names)
     fixed, lines, flat = _supports(surface, mirrors, images, place, len(X))
-    cables = _cables(surface, place)
-    rooms = _rooms(surface, mirrors, next_to, patch_label, [name for _, name in patch_names])
-    on_plane, others = flat[0][1], flat[1:]
-    whole = Surface(X, F, patch, patches, fixed, on_plane, surface.plane, lines, others, cables, rooms)
+    whole = surface.rebuilt(
+        vertices=X,
+        faces=F,
+        patch_of_face=patch,
+        patches=patches,
+        fixed=fixed,
+        on_plane=flat[0][1],
+        on_line=lines,
+        on_planes=flat[1:],
+        cables=_cables(surface, place),
+        rooms=_rooms(surface, mirrors, next_to, patch_label, [name for _, name in patch_names]),
+    )
     return Whole(whole, first % n, np.tile(np.arange(m), k), k)
 
 
@@ -266,7 +274,7 @@ def _supports(
 
     Those in the planes unfolded at are none any more.
     """
-    given, size = surface.given, surface.size
+    given, size = surface.given_supports, surface.size
     fixed = np.zeros(n, dtype=bool)
     fixed[place[:, given.fixed]] = True
     kept = [(surface.plane, given.on_plane)]

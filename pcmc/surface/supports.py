@@ -33,10 +33,23 @@ class Supports(NamedTuple):
     on_plane: Bools
     on_line: tuple[tuple[Guide, Bools], ...]
 
+    def fixed_and_sliding(self) -> tuple[Bools, Bools]:
+        """(n,) masks of vertices that are fixed or slide along a line, and of the others that slide on Π."""
+        fixed = np.any([self.fixed, *(along for _, along in self.on_line)], axis=0)
+        return fixed, self.on_plane & ~fixed
+
     def frozen(self) -> Supports:
         """The same with arrays that cannot be written to."""
         lines = tuple((line, read_only(along)) for line, along in self.on_line)
         return Supports(read_only(self.fixed), read_only(self.on_plane), lines)
+
+    @property
+    def bound(self) -> Bools:
+        """(n,) vertices that are fixed, on Π, or on a line."""
+        held = self.fixed | self.on_plane
+        for _, along in self.on_line:
+            held = held | along
+        return held
 
 
 def plane_masks(given: Any, n: int) -> tuple[tuple[Plane, Bools], ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, cast
 
@@ -18,16 +18,17 @@ from . import checks, supports
 from .cable import Cable, CableEdges, cable_edges, checked_cables
 from .circle import Circle, Guide
 from .geometry import bounding_size
+from .origin import uncancelled_pressures, volume_origin
 from .patch import Patch
 from .plane import Plane
+from .renewed import renewed
 from .room import Room, checked_rooms, room_signs
 from .summary import summary
 from .topology import Topology, topology
 
 MESH = ("vertices", "faces", "patch_of_face", "patches")
-FIELDS = (*MESH, "fixed", "on_plane", "plane", "on_line", "on_planes", "cables", "rooms", "given")
+FIELDS = (*MESH, "fixed", "on_plane", "plane", "on_line", "on_planes", "cables", "rooms", "given_supports")
 GROUND = Plane()
-FAR = 30.0  # sizes from the point of Π: farther, volumes seen from it lose over three digits
 
 
 def expect_surface(value: object) -> None:
@@ -66,8 +67,8 @@ class Surface:
 
     Attributes
     ----------
-    given : ``fixed``, ``on_plane`` and ``on_line`` as given. Those of the surface also have the vertices that
-        cannot move, or along a line only, because they slide on several planes.
+    given_supports : ``fixed``, ``on_plane`` and ``on_line`` as given. Those of the surface also count the
+        vertices that cannot move, or along a line only, because they slide on several planes.
 
     Raises
     ------
@@ -93,7 +94,7 @@ class Surface:
     on_planes: tuple[tuple[Plane, Bools], ...] = ()
     cables: tuple[Cable, ...] = ()
     rooms: tuple[Room, ...] = ()
-    given: supports.Supports = field(init=False, repr=False)
+    given_supports: supports.Supports = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.plane, Plane):
@@ -122,7 +123,7 @@ class Surface:
             fixed |= points
         for _, along in on_line:
             fixed |= along
-        object.__setattr__(self, "given", given.frozen())
+        object.__setattr__(self, "given_supports", given.frozen())
         object.__setattr__(self, "on_line", tuple((line, read_only(along)) for line, along in on_line))
         sliding = on_plane & ~fixed
         object.__setattr__(self, "on_planes", tuple((plane, read_only(mask)) for plane, mask in on_planes))
@@ -133,7 +134,8 @@ class Surface:
         object.__setattr__(self, "cables", checked_cables(self.cables, self.topology.edges, len(X)))
         object.__setattr__(self, "rooms", checked_rooms(self.rooms, [p.name for p in patches]))
         height = self.plane.height(X)
-        checks.mesh(X, F, patch, self.topology, self.patches, self.held, height)
+        # a vertex that slides on another plane alone may come down to Π like a free one
+        checks.mesh(X, F, patch, self.topology, self.patches, given.bound, height)
         self._check_planes(X)
         if not (self.held.any() or self.rooms):
             message = "no vertex is fixed or on the plane: translations are free, so only closed surfaces"
@@ -162,42 +164,21 @@ class Surface:
 
     @cached_array
     def uncancelled(self) -> Floats:
-        """(e,) the sum of the pressures at each edge that is not held, force/area.
-
-        A triangle's pressure counts with the sense in which the triangle runs along the edge. Where all
-        sums are zero, no force depends on the point of Π that volumes are seen from.
-        """
-        topo = self.topology
-        pressure = self.pressures[self.patch_of_face, None] * topo.sense
-        left = np.bincount(topo.edge_of_face.ravel(), pressure.ravel(), len(topo.edges))
-        held = (self.fixed | self.on_plane)[topo.edges].all(axis=1)
-        for _, mask in self.on_planes:
-            held |= mask[topo.edges].all(axis=1)
-        rounding = 1e-12 * np.abs(self.pressures).max(initial=0.0)
-        return np.where(held | (np.abs(left) <= rounding), 0.0, left)
+        """(e,) the sum of the pressures at each edge that no support holds, force/area."""
+        masks = [self.fixed | self.on_plane, *(mask for _, mask in self.on_planes)]
+        return uncancelled_pressures(self.topology, self.pressures[self.patch_of_face], masks)
 
     @cached_array
     def origin(self) -> Floats:
-        """(3,) the point that volumes are seen from: that of Π.
+        """(3,) the point that volumes are seen from: that of Π, or one near a surface far from it.
 
-        Far from that point, as in survey coordinates, volumes would lose their digits. There the origin
-        is the point of Π below the middle of the surface, so that a volume over Π does not depend on
-        where it is drawn; or the middle itself, if that is far above Π and nothing slides. Forces do not
-        change as long as the pressures cancel along all edges that are not held; where they do not
-        cancel, the origin stays the point of Π. Else it is moved along Π to lie on as many of the planes in
-        ``on_planes`` as possible: these then add nothing to volumes (``flat_pieces``).
+        Forces do not change with it as long as the pressures cancel along all edges that are not held; where
+        they do not cancel, the origin stays the point of Π.
         """
-        point, middle = np.array(self.plane.point), self.vertices.mean(axis=0)
         if self.uncancelled.any():
-            return point
-        if np.linalg.norm(middle - point) > FAR * self.size:
-            height = float(self.plane.height(middle))
-            if self.given.on_plane.any() or abs(height) <= FAR * self.size:
-                middle = middle - height * np.array(self.plane.normal)
-            point = middle
-        if self.on_planes:
-            point = supports.common_point(point, [self.plane, *(plane for plane, _ in self.on_planes)])
-        return np.asarray(point)
+            return np.array(self.plane.point)
+        planes = [self.plane, *(plane for plane, _ in self.on_planes)]
+        return volume_origin(self.vertices, self.size, planes, bool(self.given_supports.on_plane.any()))
 
     @cached_array
     def mirror_edge(self) -> Bools:
@@ -208,7 +189,7 @@ class Surface:
     def pinned(self) -> Bools:
         """(n,) ``fixed`` without the vertices that two planes let slide along their common line."""
         pinned = self.fixed.copy()
-        for _, along in self.auto_lines:
+        for _, along in self.meeting_lines:
             pinned &= ~along
         return pinned
 
@@ -216,14 +197,14 @@ class Surface:
     def on_ground(self) -> Bools:
         """(n,) vertices that slide on Π, also those that another plane lets slide along a line there only."""
         sliding = self.on_plane.copy()
-        for _, along in self.auto_lines:
-            sliding |= along & self.given.on_plane
+        for _, along in self.meeting_lines:
+            sliding |= along & self.given_supports.on_plane
         return sliding
 
     @cached_property
-    def auto_lines(self) -> tuple[tuple[Guide, Bools], ...]:
-        """The part of ``on_line`` that was not given: lines that two planes have in common."""
-        given = [line for line, _ in self.given.on_line]
+    def meeting_lines(self) -> tuple[tuple[Guide, Bools], ...]:
+        """The lines of ``on_line`` that were not given: there two planes meet."""
+        given = [line for line, _ in self.given_supports.on_line]
         return tuple(pair for pair in self.on_line if all(pair[0] is not line for line in given))
 
     @cached_array
@@ -303,6 +284,27 @@ class Surface:
         checks.on_lines(self.on_line, X)
         return self._with(vertices=read_only(X))
 
+    def rebuilt(self, **changes: Any) -> Surface:
+        """The surface with other parts, checked anew; all others as they were given to this one.
+
+        Parts with an entry per vertex (``fixed``, ``on_plane``, ``on_line``, ``on_planes``, ``cables``)
+        must be among the changes where the vertices are others.
+
+        Raises
+        ------
+        SurfaceError : as for ``Surface``.
+
+        Examples
+        --------
+        >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        >>> flat = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 2.0)], fixed=range(3))
+        >>> over = flat.rebuilt(faces=[[0, 2, 1]])
+        >>> over.faces.tolist(), over.fixed.all()
+        ([[0, 2, 1]], np.True_)
+        """
+        parts = {name: getattr(self, name) for name in FIELDS if name != "given_supports"}
+        return Surface(**parts | self.given_supports._asdict() | changes)
+
     def retensioned(
         self,
         tensions: Mapping[str, float] | None = None,
@@ -318,22 +320,17 @@ class Surface:
         ``walls`` names patches that are walls whatever their pressure; ``cables`` gives tensions by the name
         of the cable, ``volumes`` volumes by the name of the room.
         """
-        by_patch = {"tension": tensions, "pressure": pressures, "weight": weights}
+        by_patch: dict[str, Any] = {"tension": tensions, "pressure": pressures, "weight": weights}
         for key, given in (by_patch | {"cable": cables, "volume": volumes}).items():
             if not isinstance(given or {}, Mapping):
                 validate.refuse(f"{key}s", given, "a mapping from names to numbers", error=SurfaceError)
         if isinstance(walls, str) or not isinstance(walls, Iterable):
             validate.refuse("walls", walls, "a sequence of patch names", error=SurfaceError)
-        patches = list(self.patches)
-        changes: dict[int, dict[str, Any]] = {self.patch_index(name): {"wall": True} for name in walls}
-        for key, given in by_patch.items():
-            for name, value in (given or {}).items():
-                changes.setdefault(self.patch_index(name), {})[key] = value
-        for index, both in changes.items():
-            patches[index] = replace(patches[index], **both)
-        pulling = _renewed("cable", self.cables, "tension", cables)
+        walled = dict.fromkeys(walls, True)
         return self._with(
-            patches=tuple(patches), cables=pulling, rooms=_renewed("room", self.rooms, "volume", volumes)
+            patches=renewed("patch", self.patches, **by_patch, wall=walled),
+            cables=renewed("cable", self.cables, tension=cables),
+            rooms=renewed("room", self.rooms, volume=volumes),
         )
 
     def __repr__(self) -> str:
@@ -374,14 +371,7 @@ class Surface:
         loaded = self.retensioned(pressures=given, walls=set(kept) - set(names))
         edges = np.flatnonzero(loaded.uncancelled)
         if snow != 0.0 and len(edges):
-            i, j = (int(v) for v in self.topology.edges[edges[0]])
-            message = (
-                f"snow: {len(edges)} edges are free, the first from vertex {i} to {j}, and there a change of"
-            )
-            message += " pressure is not the same as snow; give a weight instead, as in"
-            raise SurfaceError(
-                f"{message} retensioned(weights={{{names[0]!r}: {snow:g}}})", what="snow", where=(i, j)
-            )
+            checks.refuse_snow(snow, names[0], len(edges), self.topology.edges[edges[0]])
         return loaded
 
     def __copy__(self) -> Surface:
@@ -401,7 +391,7 @@ class Surface:
             vars(self)[name] = read_only(value) if isinstance(value, np.ndarray) else value
         for _, along in (*self.on_line, *self.on_planes):
             read_only(along)
-        self.given.frozen()
+        self.given_supports.frozen()
 
     def patch_faces(self, patches: Sequence[int]) -> Bools:
         """(m,) mask of the triangles of the given patches."""
@@ -423,14 +413,3 @@ class Surface:
             if "flat_pieces" in vars(self) and "faces" not in changes:
                 vars(other)["flat_pieces"] = vars(self)["flat_pieces"]
         return other
-
-
-def _renewed(
-    kind: str, parts: tuple[Any, ...], key: str, values: Mapping[str, float] | None
-) -> tuple[Any, ...]:
-    """Cables or rooms with other values of a field, given by name."""
-    names, new = [part.name for part in parts], list(parts)
-    for name, value in (values or {}).items():
-        index = names.index(validate.choice(kind, name, names))
-        new[index] = replace(new[index], **{key: value})
-    return tuple(new)

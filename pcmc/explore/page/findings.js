@@ -122,10 +122,14 @@ const percentOf = (x) => (x === null ? "–" : `${digits(100 * x, 3)} %`);
 /** Values, limits and colour map of the chosen field; null for the patches' own colours. */
 export function fieldOf(choice, arrays) {
   if (choice === "patches" || !arrays[choice]) return null;
-  if (choice === "error" || choice === "difference") {
-    const values = choice === "error" ? arrays.error.map((x) => 100 * x) : arrays.difference;
-    const most = Math.max(choice === "error" ? 1e-4 : 1e-12, ...ends(values).map(Math.abs));
+  if (choice === "error") {
+    const values = arrays.error.map((x) => 100 * x);
+    const most = Math.max(1e-4, ...ends(values).map(Math.abs));
     return { values, limits: [-most, most], map: diverging };
+  }
+  if (choice === "difference") {
+    const most = Math.max(1e-12, ...ends(arrays.difference, arrays.underPressure).map(Math.abs));
+    return { values: arrays.difference, limits: [-most, most], map: diverging, skipWalls: true };
   }
   if (choice === "reactions") {
     const values = new Float32Array(arrays.reactions.length / 3);

@@ -1,0 +1,25 @@
+"""Refuse a surface that is not certified, where something is to be built after it."""
+
+from __future__ import annotations
+
+from ..base import validate
+from ..base.errors import SurfaceError
+from ..surface import Surface
+from .certificate import Certificate, certify
+
+
+def certified(surface: Surface, anyway: bool) -> Certificate:
+    """The certificate of a surface; SurfaceError if it is not certified, unless ``anyway``."""
+    validate.flag("anyway", anyway)
+    certificate = certify(surface)
+    require_certified(certificate, anyway)
+    return certificate
+
+
+def require_certified(certificate: Certificate, anyway: bool) -> None:
+    """SurfaceError for the certificate of a surface that is not certified, unless ``anyway``."""
+    if not (certificate.certified or validate.flag("anyway", anyway)):
+        verdict = certificate.verdict
+        text = f"surface: not certified ({verdict.value}); solve it first, or accept it with"
+        text += " anyway=True (--anyway)"
+        raise SurfaceError(text, what="surface", found=verdict, expected="a certified surface")

@@ -1,0 +1,188 @@
+"""A mesh with new vertices on its curves, which remeshing then keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.arrays import Bools, Floats, Ints
+from ..surface import Surface
+from ..surface.geometry import area_vectors
+from .quality import edge_lengths
+from .refinement import (
+    Projection,
+    edges_on_planes,
+    held_midpoints,
+    onto_round_edges,
+    projected,
+    prolongation,
+    refine,
+)
+from .sizes import SizeField, edges_between, place_between
+
+
+@dataclass(frozen=True, eq=False)
+class CurveMesh:
+    """Vertices, faces with a patch each, the edges (c,2) of curves, and supports.
+
+    ``support`` (n,2+p): whether a vertex is fixed, slides on Π, slides on each of ``Surface.on_planes``.
+    ``source`` (n,): the number of each vertex in the mesh before MMG, or -1. ``cable`` (c,): the number of
+    the cable on each of ``curves``, or -1.
+    """
+
+    X: Floats
+    F: Ints
+    patch: Ints
+    curves: Ints
+    support: Bools
+    source: Ints
+    cable: Ints
+
+
+def cut_curves(
+    surface: Surface, size: Floats, along_curves: Floats, project: Projection | None = None
+) -> tuple[CurveMesh, SizeField]:
+    """The mesh with new vertices on its curves, about ``along_curves`` (n,) apart, and its sizes."""
+    first = surface.n
+    background = SizeField(surface.vertices, size)
+    counts = _pieces(surface, along_curves)
+    # 1→4 keeps the triangles' shape, cutting single edges does not
+    while len(counts) and np.median(counts) >= 2.0:
+        along_curves = prolongation(surface) @ along_curves
+        surface = _refined_round(surface)
+        counts = _pieces(surface, along_curves)
+    topo, stay = surface.topology, _curve_edges(surface)
+    fixed_edge, sliding_edge = held_midpoints(surface)
+    X, F, patch, number = surface.vertices, surface.faces, surface.patch_of_face, np.arange(surface.n)
+    at_vertices = np.stack(
+        [*surface.given_supports.fixed_and_sliding(), *(mask for _, mask in surface.on_planes)], axis=1
+    )
+    mesh = CurveMesh(X, F, patch, topo.edges[stay], at_vertices, number, _cable_of_edge(surface)[stay])
+    support = np.stack([fixed_edge, sliding_edge, *edges_on_planes(surface)], axis=1)[stay]
+    while (counts > 1).any():
+        mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
+    new = mesh.support[:, 0] & (np.arange(len(mesh.X)) >= first)
+    if (project is not None or surface.on_circle) and new.any():
+        X = mesh.X.copy()
+        if project is not None:
+            X[new] = projected(project, X[new])
+        X[new] = onto_round_edges(surface, X[new])
+        mesh = replace(mesh, X=X)
+    return mesh, background
+
+
+def _curve_edges(surface: Surface) -> Bools:
+    """(e,) the edges that must stay: curves, cables, and edges held inside a patch."""
+    fixed, sliding = held_midpoints(surface)
+    return surface.topology.curve_edge | fixed | sliding | (_cable_of_edge(surface) >= 0)
+
+
+def _cable_of_edge(surface: Surface) -> Ints:
+    """(e,) the number of the cable on each edge; -1 for none."""
+    out = np.full(len(surface.topology.edges), -1)
+    for index, cable in enumerate(surface.cables):
+        out[surface.topology.edge_numbers(cable.edges)] = index
+    return out
+
+
+def _refined_round(surface: Surface) -> Surface:
+    """1→4 with the new vertices off the curves on cubics that end square to the vertex normals.
+
+    With t the components of the edge b - a across the normals at its ends, the middle of the cubic is
+    (a + b)/2 + (t_a - t_b)/8.
+    """
+    chosen = np.flatnonzero(~_curve_edges(surface))
+    ends, normals = surface.topology.edges[chosen], _edge_normals(surface, chosen)
+    edge = (surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]])[:, None]
+    across = edge - (edge * normals).sum(axis=2, keepdims=True) * normals
+    rise = (across[:, 0] - across[:, 1]) / 8.0
+    most = 0.2 * np.linalg.norm(edge[:, 0], axis=1)
+    rise *= np.minimum(1.0, most / np.maximum(np.linalg.norm(rise, axis=1), 1e-300))[:, None]
+    fine = refine(surface)
+    X = fine.vertices.copy()
+    X[surface.n + chosen] += rise
+    return fine.moved(X)
+
+
+def _edge_normals(surface: Surface, chosen: Ints) -> Floats:
+    """(c,2,3) unit normals at the ends of edges inside sheets, of the edge's own sheet."""
+    X, F, topo = surface.vertices, surface.faces, surface.topology
+    vector = area_vectors(X[F])
+    corner = surface.patch_of_face[:, None].astype(np.int64) * surface.n + F
+    key, place = np.unique(corner.ravel(), return_inverse=True)
+    total = np.zeros((len(key), 3))
+    np.add.at(total, place, np.repeat(vector, 3, axis=0))
+    total /= np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
+    patch_of_edge = np.zeros(len(topo.edges), dtype=np.int64)
+    patch_of_edge[topo.edge_of_face] = surface.patch_of_face[:, None]
+    return total[np.searchsorted(key, patch_of_edge[chosen, None] * surface.n + topo.edges[chosen])]
+
+
+def _pieces(surface: Surface, size: Floats) -> Ints:
+    """(c,) into how many pieces each curve edge is to be cut."""
+    chosen = _curve_edges(surface)
+    start, end = size[surface.topology.edges[chosen]].T
+    return np.maximum(1, np.rint(edges_between(edge_lengths(surface)[chosen], start, end))).astype(np.int64)
+
+
+def _cut_once(
+    mesh: CurveMesh, size: Floats, counts: Ints, support: Bools
+) -> tuple[CurveMesh, Floats, Ints, Bools]:
+    """Every curve edge that is to be cut, cut in two, with its triangles."""
+    cut = counts > 1
+    ends, pieces = mesh.curves[cut], counts[cut]
+    first = pieces // 2
+    size_start, size_end = size[ends].T
+    share = place_between(first / pieces, size_start, size_end)
+    start, end = mesh.X[ends[:, 0]], mesh.X[ends[:, 1]]
+    number = len(mesh.X) + np.arange(len(ends))
+    F, patch = cut_triangles(mesh.F, mesh.patch, ends, number, len(mesh.X))
+    halves = np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)
+    X = np.concatenate([mesh.X, start + share[:, None] * (end - start)])
+    size = np.concatenate([size, size_start + share * (size_end - size_start)])
+    curves = np.concatenate([mesh.curves[~cut], *halves])
+    at_vertices = np.concatenate([mesh.support, support[cut]])
+    cable = np.concatenate([mesh.cable[~cut], mesh.cable[cut], mesh.cable[cut]])
+    new = CurveMesh(X, F, patch, curves, at_vertices, np.arange(len(X)), cable)
+    counts = np.concatenate([counts[~cut], first, pieces - first])
+    return new, size, counts, np.concatenate([support[~cut], support[cut], support[cut]])
+
+
+def cut_triangles(
+    F: Ints, patch: Ints, ends: Ints, number: Ints, n: int, first: Ints | None = None
+) -> tuple[Ints, Ints]:
+    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four.
+
+    The edges ``ends`` (k,2) get the vertices ``number`` (k,); old vertices are below n. With two cut sides
+    a line leads to the middle of one of them from the corner opposite: of the side opposite corner
+    ``first`` (m,), where that is given.
+    """
+    key = ends.min(axis=1).astype(np.int64) * n + ends.max(axis=1)
+    order = np.argsort(key)
+    side = F[:, [[1, 2], [2, 0], [0, 1]]].astype(np.int64)
+    wanted = side.min(axis=2) * n + side.max(axis=2)
+    place = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
+    middle = np.where(key[order][place] == wanted, number[order][place], -1)
+    count = (middle >= 0).sum(axis=1)
+    # turn each triangle so that its cut sides come first: opposite corners 0, then 0 and 1
+    turn = np.argmax(middle >= 0, axis=1)
+    turn = np.where((count == 2) & (middle[:, 0] >= 0) & (middle[:, 2] >= 0), 2, turn)
+    roll = (np.arange(3) + turn[:, None]) % 3
+    a, b, c = np.take_along_axis(F.astype(np.int64), roll, axis=1).T
+    p, q, r = np.take_along_axis(middle, roll, axis=1).T  # on the sides opposite a, b, c
+    if first is not None:
+        count[(count == 2) & (first == (turn + 1) % 3)] = -2
+    templates = {
+        0: [(a, b, c)],
+        1: [(a, b, p), (a, p, c)],
+        2: [(c, q, p), (q, a, p), (a, b, p)],
+        -2: [(c, q, p), (q, b, p), (a, b, q)],
+        3: [(a, r, q), (b, p, r), (c, q, p), (p, q, r)],
+    }
+    faces, owner = [], []
+    for cuts, corners in templates.items():
+        chosen = np.flatnonzero(count == cuts)
+        faces.append(np.stack([np.stack(t, axis=1)[chosen] for t in corners], 1).reshape(-1, 3))
+        owner.append(np.repeat(patch[chosen], len(corners)))
+    return np.concatenate(faces), np.concatenate(owner)
