@@ -29,7 +29,8 @@ class Target:
     quantity : ``"apex"``, greatest height over Π of a patch; ``"height"`` over a point of Π;
         ``"volume"`` (V_i of a patch, seen from the point of Π) and ``"area"``; ``"curvature"``,
         p / (2α), a patch's mean curvature at rest; ``"reaction"``, the greatest force per length
-        on the held boundary of a patch; ``"pressure"`` of a room of prescribed volume; ``"sag"`` of a
+        on the held boundary of a patch; ``"lean"`` of a wall, its largest angle from the vertical, degrees;
+        ``"pressure"`` of a room of prescribed volume; ``"sag"`` of a
         cable, the largest distance of its vertices from the chord between its ends, its ``"length"``,
         and its ``"force"``, which is its tension.
     of : name of the patch, room or cable; for ``"height"`` the point (x, y) in the coordinates of Π. None:

@@ -16,6 +16,7 @@ from ..base.errors import PlanError, PlanWarning, SurfaceError
 from ..energy.rooms import check_rooms
 from ..meshing.angles import improve_angles
 from ..surface import Cable, Patch, Plane, Room, Surface
+from ..surface.geometry import segment_lengths
 from ..surface.wall_tensions import balanced_wall
 from .arrangement import Arrangement, arrange, hole_points
 from .corners import most_in_corners
@@ -36,12 +37,13 @@ from .heights import dome, harmonic_heights
 from .lines import SNAP, Kind, Line
 from .parts import BALANCED, Area, PlanData
 from .pieces import to_local, to_space
-from .planar import PlanarMesh, locate, signed_areas, triangulate
+from .planar import SIDES, PlanarMesh, locate, signed_areas, triangulate
 from .walls import UpperEdge, WallMesh, build_walls
 
 MAX_TRIANGLES = 5_000_000
 MAX_EDGES = 200_000  # along a line
 MAX_RISE = 10.0  # of the initial surface, over the size of the plan
+SHARE = 0.6  # of p R, R of the smallest part beside a wall: more would pull a flat roof down
 GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan
 
 
@@ -393,8 +395,21 @@ def _balanced(draft: _Draft, roof: _Roof, number: int) -> float:
     beside = [_beside(draft.mesh.triangles, *c.vertices[:2]) for c in draft.drawn.chains if c.line == line]
     pressure = min(float(np.abs(roof.pressure[faces]).min(initial=np.inf)) for faces in beside)
     curve, outline = draft.lines[line].curve, draft.lines[0].curve
-    most = most_in_corners(curve, outline, draft.plan.edge_length, pressure)
-    return balanced_wall([roof.tension[faces].tolist() for faces in beside], most or np.inf)
+    parts = np.unique(draft.mesh.region[np.concatenate(beside)])
+    width = min(_radius(draft.mesh, int(part)) for part in parts)
+    most = min(most_in_corners(curve, outline, draft.plan.edge_length, pressure), SHARE * pressure * width)
+    tensions = [roof.tension[faces].tolist() for faces in beside]
+    if draft.plan.dividers[number].upright:  # its plane takes the difference
+        tensions = [[min(part)] for part in tensions]
+    return balanced_wall(tensions, most or np.inf)
+
+
+def _radius(mesh: PlanarMesh, part: int) -> float:
+    """2 A / L of a part of the plan, with its area A and the length L of its edge: R of a circle, length."""
+    own = mesh.triangles[mesh.region == part]
+    sides, times = np.unique(np.sort(own[:, SIDES].reshape(-1, 2), axis=1), axis=0, return_counts=True)
+    length = segment_lengths(mesh.points, sides[times == 1]).sum()
+    return 2.0 * float(signed_areas(mesh.points, own).sum() / length)
 
 
 def _beside(triangles: Ints, one: int, two: int) -> Ints:

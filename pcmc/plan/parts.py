@@ -30,8 +30,8 @@ class Divider:
         or inside a hole are left out.
     wall : tension of the wall, force/length, ≥ 0; "balanced", chosen so that the junction balances with room
         to spare: the difference of the neighbours' tensions and 0.3 of the smaller one, less where the wall
-        runs into a corner; None or false for no wall. Between patches of different pressures the wall takes
-        the difference.
+        runs into a corner or the roof is flat; None or false for no wall. Between patches of different
+        pressures the wall takes the difference.
     name : of the wall's patch; by default "wall 1", "wall 2", … in order. Where the difference of
         pressure changes along the divider, each part is a patch of its own: "wall 1-1", "wall 1-2".
     bottom : "held" on Π in all directions; "sliding" on Π; or "sloped": held in all directions on the
