@@ -10,6 +10,7 @@ from volume_cases import cap, cap_height, order, raised
 
 import generators
 import pcmc
+from generators.grid import cut_squares
 from pcmc import Direction, Patch, Plane, Room, Surface, Target
 from pcmc.base.errors import FreeSurfaceWarning, OptionError, SurfaceError
 from pcmc.design import Parameter, meet, sensitivities
@@ -120,8 +121,7 @@ def test_a_piece_between_mirror_planes_has_its_share_of_the_volume():
     x, y = np.meshgrid(t, t, indexing="ij")
     X = np.stack([x, y, 0.3 * (1.0 - x**2) * (1.0 - y**2)], axis=-1).reshape(-1, 3)
     number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
-    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-    F = np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
+    F = cut_squares(number, np.ones((n, n), dtype=bool))
     mirrors = {
         Plane(normal=(1, 0, 0), name="x", mirror=True): number[0],
         Plane(normal=(0, 1, 0), name="y", mirror=True): number[:, 0],
