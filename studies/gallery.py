@@ -81,7 +81,7 @@ EXAMPLES = (
     Example("hemisphere", "hemisphere on Π", "hemisphere", 0.785),
     Example("sphere", "sphere", "sphere", 0.7),
     Example("double_bubble", "double bubble", "double_bubble", 0.8, exact=True),
-    Example("triple_bubble", "three bubbles of volume 1", "triple_bubble", 0.3, exact=True),
+    Example("triple_bubble", "three bubbles", "triple_bubble", 0.3, exact=True),
     Example("joined_caps", "joined caps", "joined_caps", 1.0),
     Example("lens", "lens, Young's law", "lens", 0.5),
     Example("lens_120", "lens, 120°", "lens", float(np.pi * lens_circle(**DEGREES_120) / 9.0), DEGREES_120),
