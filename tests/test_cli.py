@@ -159,13 +159,17 @@ def test_sweep(folder, capsys):
 
 def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
     seen = []
-    monkeypatch.setattr("pcmc.explore.start", lambda *given: given)
+    monkeypatch.setattr("pcmc.explore.start_roof", lambda *given: given)
     monkeypatch.setattr("pcmc.explore.open_and_wait", lambda given, page: seen.append((*given, page)))
     assert cli.main(["explore", "roof.pcmc", "--no-browser"]) == 0
     assert cli.main(["explore", "--example", "two_squares", "--set", "alpha_aux=1", "--port", "8"]) == 0
-    assert seen[0][1:] == ("127.0.0.1", 0, "roof.pcmc", NO_UNITS, False)
-    assert seen[1][1:] == ("127.0.0.1", 8, "two_squares", NO_UNITS, True)
-    assert seen[1][0].patches
+    assert cli.main(["explore", "roof.pcmc", "--watch"]) == 0
+    assert seen[0][1:] == ("127.0.0.1", 0, None, False)
+    assert (seen[0][0].title, seen[0][0].units) == ("roof.pcmc", NO_UNITS)
+    assert seen[1][1:] == ("127.0.0.1", 8, None, True)
+    assert seen[1][0].name == "two_squares"
+    assert seen[1][0].surface.patches
+    assert seen[2][3]().surface.m == seen[0][0].surface.m  # reads the file again
 
 
 @pytest.mark.parametrize(
@@ -204,6 +208,7 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["plot", "roof.toml", "away/x.png"], "there is no folder away"),
         (["plot", "roof.toml", "x.png", "--view", "1,2,3"], "unknown view"),
         (["explore"], "give a file or --example"),
+        (["explore", "--example", "two_squares", "--watch"], "--watch needs a file"),
         (["explore", "--example", "two_square"], "did you mean 'two_squares'"),
         (["explore", "--example", "no.such:thing"], "--example no.such:thing: No module"),
         (["explore", "--example", "two_squares", "--set", "a=1"], "'a'"),

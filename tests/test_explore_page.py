@@ -192,10 +192,11 @@ west = {tension = 5.0}  # left
 east = {tension = 5.0}
 [targets]
 meet = [{quantity = "apex", of = "west", value = 1.2}]
-vary = ["west", "east"]
+vary = ["west", "east", {patch = "east", kind = "pressure", low = 0.5, high = 2.0}]
 """
 
 
+@pytest.mark.slow
 def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(driver, tmp_path):
     path = tmp_path / "hall.toml"
     path.write_text(PROJECT)
@@ -209,6 +210,10 @@ def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(
         assert page.text("#targets .message").startswith("met")
         assert "kN/m" in page.text("#by-patch")
         assert "west 1.2 " in page.text("#by-patch")
+        page.driver.execute_script("document.querySelector('#targets details').open = true")
+        boxes = page.driver.find_elements("css selector", "#targets .vary input")
+        chosen = [box.get_attribute("aria-label") for box in boxes if box.is_selected()]
+        assert chosen == ["west may change", "east may change", "pressure of east may change"]
         # a target is met from the page; one that cannot be met keeps the surface
         page.find("#variants button[type=submit]").click()
         page.idle()
@@ -228,7 +233,7 @@ def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(
         page.idle()
         assert changed(before, page.picture()) > 0.1
         assert "Distance from Variant 1, m" in page.text("#legend .name")
-        assert "Apex of west 1.2 1.5 +0.3 (+25 %)" in page.text("#variants table")
+        assert "Apex of west 1.2 1.5 +0.3 +25 %" in page.text("#variants table")
         page.find("#variants button[aria-pressed]").click()
         page.idle()
         assert changed(before, page.picture()) == 0.0
@@ -280,6 +285,7 @@ def test_wrong_targets_are_named_on_the_page(page):
     assert page.complaints() == []
 
 
+@pytest.mark.slow
 def test_sliders_agree_with_their_numbers(page, explorer):
     """Also for values beyond the slider's ends, zero, and another sign."""
     for value in (40, 3, 0):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 import tomllib
 
 import numpy as np
@@ -21,6 +22,7 @@ from pcmc.certificate import Verdict
 from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
 from pcmc.explore import saving
+from pcmc.explore.page_data import outline
 from pcmc.explore.roof import Roof, read_roof
 from pcmc.explore.session import Session, solved_start
 from pcmc.explore.variants import difference, measures
@@ -90,7 +92,7 @@ def test_a_project_opens_at_its_targets(roof, client):
 
 def test_the_start_shape_is_shown_only_when_asked_for(folder, roof):
     shape = read_roof(folder / "hall.toml", start_shape=True)
-    assert shape.note == "The start shape"
+    assert "not met yet" in shape.note
     assert shape.surface.patches[0].tension == 5.0
     assert roof.surface.patches[0].tension != 5.0
 
@@ -121,6 +123,29 @@ def test_a_target_out_of_reach_keeps_the_surface_and_says_why(session):
     assert "nearest reachable" in state.message
     assert state.undo == 0
     assert session.undo().message == ""
+
+
+def test_a_search_tells_its_progress_and_can_be_stopped(session, monkeypatch):
+    told = []
+    real = Session.stop
+
+    def met(surface, targets, vary, callback):
+        callback(None)
+        told.append(session.progress)
+        stopping = threading.Thread(target=real, args=(session,))
+        stopping.start()
+        until(lambda: session._requests == 2, "the stop")
+        with pytest.raises(StopIteration):
+            callback(None)
+        return pcmc.meet(surface, targets, vary, solves=1)
+
+    monkeypatch.setattr("pcmc.explore.session.meet", met)
+    before = session.surface
+    state = session.meet((Target("apex", "west", 1.3),), (Parameter("west"),))
+    assert told == ["1 solves"]
+    assert state.superseded
+    assert session.state().surface is before
+    assert session.progress == ""
 
 
 @pytest.mark.parametrize(
@@ -221,6 +246,13 @@ def test_the_difference_of_two_caps_is_that_of_their_spheres():
     finer = pcmc.solve(spherical_cap(edge_length=0.05)).surface
     errors = [np.abs(difference(finer, s)).max() for s in (flat, higher)]
     assert errors[0] < 0.2 * errors[1]  # other triangles are hardly another shape
+
+
+def test_a_wall_nearby_does_not_hide_a_difference(roof):
+    higher = pcmc.solve(roof.surface.retensioned({"west": 2.6, "east": 3.0})).surface
+    on_roof = np.unique(roof.surface.faces[~roof.surface.walls[roof.surface.patch_of_face]])
+    away = difference(higher, roof.surface)[on_roof]
+    assert away.min() > -0.02 * away.max()  # lower tensions: higher everywhere
 
 
 def test_saving_keeps_comments_and_the_shape_found_by_sliders(roof, session, folder):
@@ -332,7 +364,7 @@ def test_the_page_follows_the_file_and_survives_a_broken_save(tmp_path):
         def news():
             return client.ask(f"/api/{name}/news")[0]
 
-        assert news() == {"version": 0, "working": False, "problem": ""}
+        assert news() == {"version": 0, "working": False, "problem": "", "progress": ""}
         path.write_text(TEXT.replace("edge_length", "edge_lenght"))
         until(lambda: "did you mean 'edge_length'" in news()["problem"], "the problem")
         assert str(tmp_path) not in news()["problem"]
@@ -394,8 +426,16 @@ def test_cables_weights_and_rooms_have_values_that_move_the_surface():
         [0] * 5,
         [pcmc.Patch("roof", 1.0, 0.5, weight=0.1)],
         fixed=[0, 1, 2, 3],
-        cables=[pcmc.Cable("edge", 3.0, [[0, 5], [5, 1]])],
+        cables=[pcmc.Cable("edge", 3.0, [[0, 5], [5, 1]]), pcmc.Cable("inner", 0.0, [[0, 4]])],
     )
+    about, arrays = outline(square.retensioned(cables={"inner": 0.1}))
+    assert [group["kinds"] for group in about["controls"]] == [
+        ["tensions", "pressures", "weights"],
+        ["cables"],
+        ["cables"],
+    ]
+    drawn = {tuple(sorted(pair)) for pair in arrays["curves"].tolist()}
+    assert {(0, 5), (1, 5), (0, 4)} < drawn
     session = Session(solved_start(square))
     state = session.settle({"cables": {"edge": 6.0}, "weights": {"roof": 0.2}})
     assert state.failure is None
@@ -406,6 +446,34 @@ def test_cables_weights_and_rooms_have_values_that_move_the_surface():
     assert depth[0] > depth[1] > 0.0  # a stronger cable is straighter
     with refused(OptionError, what="cable", found="egde"):
         session.follow({"cables": {"egde": 1.0}})
+
+
+def test_a_piece_between_mirror_planes_is_drawn_whole():
+    planes = [pcmc.Plane(normal=n, mirror=True) for n in ((1, 0, 0), (0, 1, 0))]
+    grid = np.linspace(0.0, 1.0, 5)
+    X = np.array([[x, y, 0.0] for y in grid for x in grid])
+    corner = np.array([5 * j + i for j in range(4) for i in range(4)])[:, None]
+    F = np.concatenate([corner + np.array([0, 1, 6]), corner + np.array([0, 6, 5])])
+    supports = {plane: np.flatnonzero(X[:, k] == 0.0) for k, plane in enumerate(planes)}
+    fixed = np.flatnonzero((X[:, :2] == 1.0).any(axis=1))
+    piece = pcmc.Surface(X, F, [0] * len(F), [pcmc.Patch("roof", 2.0)], fixed=fixed, on_planes=supports)
+    running = explore.start(piece)
+    try:
+        client = Client(running)
+        header, arrays = client.ask("/api/open")
+        assert header["whole"]
+        assert header["triangles"] == 4 * piece.m
+        corners = arrays["vertices"].reshape(-1, 3) + running.origin
+        assert corners.min(axis=0) == pytest.approx([-1.0, -1.0, 0.0])
+        client.ask(f"/api/{header['session']}/keep", {"name": "a"})
+        client.ask(f"/api/{header['session']}/compare", {"number": 0})
+        header, arrays = client.ask(f"/api/{header['session']}/settle", {"tensions": {"roof": 3.0}})
+        assert len(arrays["difference"]) == len(corners)
+        assert arrays["difference"].min() < -0.01
+        held = np.isfinite(arrays["reactions"].reshape(-1, 3)[:, 0])
+        assert held.sum() == 32
+    finally:
+        running.close()
 
 
 def test_names_of_downloads_are_those_of_files():

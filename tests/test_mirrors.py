@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from refusals import refused
@@ -207,6 +209,25 @@ def test_walls_at_an_axis_are_numbered():
 def test_refining_keeps_the_mirror():
     piece = refine(cut(two_squares(4), MIDDLE))
     assert pcmc.energy(mirrored(piece)) == pytest.approx(pcmc.energy(refine(two_squares(4))), rel=1e-13)
+
+
+def test_a_pinched_wall_ends_at_a_mirror_plane(tmp_path):
+    """There its triangles have no area, in the half as in the whole; cables run along its top and foot."""
+    whole = two_squares(6, alpha_aux=3.0)
+    edges, low = whole.topology.edges, whole.vertices[:, 2] == 0.0
+    on_wall = np.isin(np.arange(whole.n), whole.faces[whole.patch_of_face == 2])
+    foot = edges[(low & on_wall)[edges].all(axis=1)]
+    top = edges[whole.topology.junction_edge]
+    tied = dataclasses.replace(whole, cables=[Cable("foot", 0.5, foot), Cable("top", 0.25, top)])
+    result = pcmc.solve(cut(tied, MIDDLE))
+    assert result.certificate.verdict.name == "STABLE"
+    assert not result.surface.vertices[np.unique(result.surface.cables[1].edges), 2].any()
+    assert refine(result.surface).m == 4 * result.surface.m
+    path = tmp_path / "half.pcmc"
+    pcmc.write(path, result.surface)
+    again = pcmc.read(path)
+    assert pcmc.energy(again) == pcmc.energy(result.surface)
+    assert pcmc.certify(mirrored(again)).residual < 1e-10
 
 
 def half_tent(**more):

@@ -303,7 +303,7 @@ def raise_for_overwriting(path):
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        _project(path, None, [path], None)
+        project.run_project(_project(path, None, [path], None))
 
 
 def test_spans_of_a_nurbs_circle_are_on_the_circle():

@@ -190,6 +190,35 @@ def test_planes_through_the_origin_cost_nothing():
     assert patch_volumes(aside)[0] == pytest.approx(patch_volumes(corner)[0], rel=1e-12)
 
 
+def arches():
+    """Three sheets that meet in one edge between two feet on a plane beside Π; their pressures differ."""
+    X = [[1, 0, 0.5], [1, 1, 0.5], [0, 0, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0], [1.2, 0.5, 2]]
+    F = [[2, 0, 1], [2, 1, 3], [0, 4, 5], [0, 5, 1], [0, 1, 6]]
+    patches = [Patch("left", 1.0, 0.3), Patch("right", 1.0, 0.5), Patch("fin", 1.0, 0.0)]
+    beside = Plane((1, 0, 0), (1, 0, 0), name="beside")
+    return Surface(X, F, [0, 0, 1, 1, 2], patches, [2, 3, 4, 5, 6], on_planes={beside: [0, 1]})
+
+
+def test_an_arch_between_two_feet_on_a_plane_closes_nothing():
+    """As in refinement, where its middle leaves the plane; only the boundary is closed along a plane."""
+    surface = arches()
+    assert not flat_pieces(surface)
+    assert pcmc.energy(refine(surface)) == pytest.approx(pcmc.energy(surface), rel=1e-13)
+
+
+@pytest.mark.parametrize("height", [0.05, 0.0, -0.0, 1.5, -0.05])
+def test_datafiles_have_planes_at_any_height(tmp_path, height):
+    """A formula "z = 05" would be the plane at 5."""
+    surface = tube(3, 7)
+    lid = Plane((0, 0, height), (0, 0, 1))
+    X = surface.vertices + np.array([0.0, 0.0, height])
+    moved = Surface(X, surface.faces, surface.patch_of_face, surface.patches, [8], on_planes={lid: range(7)})
+    pcmc.write(tmp_path / "a.fe", moved)
+    again = pcmc.read(tmp_path / "a.fe")
+    assert again.on_planes[0][0].height([0, 0, height]) == pytest.approx(0.0, abs=1e-15)
+    assert pcmc.energy(again) == pytest.approx(pcmc.energy(moved), rel=1e-12)
+
+
 def test_supports_of_several_planes():
     roof = corner_roof()
     corners = np.isin(roof.vertices[:, :2], (0, 1)).all(axis=1)

@@ -153,6 +153,14 @@ def test_impossible_volumes_are_refused():
         pcmc.solve(slack)
 
 
+def test_a_volume_that_no_motion_changes_is_refused():
+    rigid = pyramid(fixed=range(5), rooms=[Room("room", {"roof": 1}, 1.0)])
+    with refused(SurfaceError, what="rooms", where="room") as caught:
+        pcmc.solve(rigid)
+    assert "no motion changes its volume" in str(caught.value)
+    assert pcmc.certify(rigid).verdict.name == "NOT_CONVERGED"
+
+
 def test_a_volume_is_prescribed_once_and_around_patches_that_are_there():
     roof = pyramid()
     with refused(SurfaceError, what="rooms", where="again"):

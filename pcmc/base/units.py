@@ -131,6 +131,26 @@ NO_UNITS = Units()
 """Those of numbers whose units are not given."""
 
 
+def expect_length(unit: object, purpose: str) -> str:
+    """The unit of lengths that a purpose such as "a drawing" cannot do without.
+
+    Raises
+    ------
+    OptionError : there is none, or it is unknown.
+
+    >>> expect_length("", "a drawing")
+    Traceback (most recent call last):
+    ...
+    pcmc.base.errors.OptionError: units: a drawing needs the unit of the lengths; add units = "m" to the
+    project, or use --units m (or another of m, mm, cm, ft, in)
+    """
+    if unit is None or unit == "":
+        text = f'units: {purpose} needs the unit of the lengths; add units = "m" to the project, or use'
+        text += f" --units m (or another of {', '.join(LENGTHS)})"
+        raise OptionError(text, what="units", found=unit, expected=LENGTHS)
+    return validate.choice("units", unit, LENGTHS)
+
+
 def length_factor(source: str, target: str) -> float:
     """What a length in ``source`` is multiplied by to be in ``target``; 1 where one of them is empty.
 

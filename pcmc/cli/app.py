@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .building import draw_, panels_
+from .building import draw_, panels_, report_
 from .caching import cache_
 from .planning import plan
 from .repairing import repair_
@@ -22,7 +22,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, the same on a terminal and in a pipe
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="""Roofs of patches in equilibrium: solve, certify, remesh, convert, draw, model, sweep, explore.
+    help="""Roofs of patches in equilibrium: solve, certify, remesh, convert, draw, report, sweep, explore.
 
     Exit codes: 0 the result is certified (or the command has done its work and certifies nothing), 1 the
     result is not certified, 2 bad input, 130 stopped by Ctrl-C.
@@ -57,6 +57,7 @@ for name, command, summary in (
     ("structure", structure, "Write a structural model for CalculiX."),
     ("panels", panels_, "Sort the panels of a roof into families; write a schedule."),
     ("draw", draw_, "Draw plan, elevations, sections and panels for those who build."),
+    ("report", report_, "Write a report with pictures, plan, verdict, forces and panels."),
     ("sweep", sweep, "Solve every combination of some values; write a table."),
     ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
     ("cache", cache_, "Show or remove the roofs that are kept."),

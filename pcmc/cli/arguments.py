@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,7 +18,7 @@ from ..energy.rooms import refuse_varied_pressure
 from ..io import FORMATS, READ_ONLY, read_bare
 from ..io.mesh_data import MeshData
 from ..project.output import OnStep
-from ..surface import Surface
+from ..surface import Surface, mirrored
 from ..surface.wall_pressures import with_pressures
 
 TOML, DXF = ".toml", ".dxf"
@@ -114,12 +114,44 @@ class Given:
     units : of its numbers.
     outcome : how the roof of a project was reached; None for a file and for a start shape.
     data : everything in a file; None for a project, and where its tensions or other loads are changed.
+    project : None for a file.
     """
 
     surface: Surface
     units: Units
     outcome: projects.Outcome | None = None
     data: MeshData | None = None
+    project: projects.Project | None = None
+
+    @property
+    def missed(self) -> bool:
+        """Whether the roof of a project is certified, but misses a target or its accuracy."""
+        return self.outcome is not None and self.outcome.certificate.certified and not self.outcome.good
+
+    @property
+    def documents(self) -> projects.Documents:
+        """What the project says about its documents."""
+        return projects.Documents() if self.project is None else self.project.documents
+
+
+def to_build(file: Path, say: OnStep, *, anyway: bool, cache: bool, whole: bool) -> Given:
+    """As ``given``, for what is built: a roof that misses its targets is refused, unless ``anyway``.
+
+    With ``whole``, or where its project says so, the roof is unfolded at its mirror planes.
+    """
+    shown = given(file, say, cache=cache)
+    refuse_missed(file, shown, anyway)
+    if whole or (shown.project is not None and shown.project.whole):
+        return replace(shown, surface=mirrored(shown.surface))
+    return shown
+
+
+def refuse_missed(file: Path, shown: Given, anyway: bool) -> None:
+    """Refuse a roof that is certified, but not the one that its project asks for."""
+    if shown.missed and not anyway:
+        hint = f"pcmc solve {file} shows them, --anyway accepts the roof"
+        text = f"{file}: the roof misses its targets or its accuracy; {hint}"
+        raise FileError(text, what=str(file))
 
 
 def given(
@@ -141,9 +173,9 @@ def given(
     project = projects.load(file)
     if start:
         surface = projects.surface_of(project)
-        return Given(surface if changed is None else changed(surface), project.units)
+        return Given(surface if changed is None else changed(surface), project.units, project=project)
     outcome = projects.designed(project, say, changed=changed, use_cache=cache)
-    return Given(outcome.surface, outcome.units, outcome)
+    return Given(outcome.surface, outcome.units, outcome, project=project)
 
 
 def check_input(file: Path) -> None:
@@ -164,6 +196,9 @@ def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, f
             amount = math.nan
         if (sign and not name) or math.isnan(amount):
             validate.refuse(flag, text, "NAME=NUMBER or NUMBER")
+        if not (name or names):
+            message = f"{flag} {text}: the surface has no {flag.removeprefix('--')} that this could replace"
+            raise OptionError(message, what=flag, found=text)
         values |= {name: amount} if name else dict.fromkeys(names, amount)
     return values
 

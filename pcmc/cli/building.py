@@ -1,7 +1,8 @@
-"""The commands panels and draw: from the shape to what is built. Each returns the exit code."""
+"""The commands panels, draw and report: from the shape to what is built. Each returns the exit code."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from .. import project as projects
+from ..accuracy import check_mesh
 from ..base import validate
 from ..base.errors import FileError
 from ..base.units import Units
@@ -17,15 +19,24 @@ from ..drawings.drawing_set import check_name
 from ..io import FORMATS, write
 from ..panels import Panels, fewer_families, panels
 from ..panels.schedule import MIRROR_IMAGES
-from . import NOT_CERTIFIED, OK, arguments
-from .arguments import MANY_FILES, Input, ViewName, number, option
+from ..report import roof_report
+from ..report.document import check_name as check_report
+from . import NOT_CERTIFIED, OK, arguments, checking
+from .arguments import MANY_FILES, Cache, Input, ViewName, Whole, number, option
+from .checking import CHECKED
 from .progress import working
 
 CSV = ".csv"
 CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."
 ANYWAY = "Accept a surface that is not certified."
 MARKED = "Draw a surface that is not certified; every sheet is marked."
-TOLERANCE = "Largest difference of edges within a family of panels; adds the schedule."
+TOLERANCE = (
+    "Largest difference of edges within a family of panels; adds the schedule. By default the project's."
+)
+SHEET = "Format of the sheets: A4, A3, A2, A1 or A0; by default the project's, or A1."
+FORCE = "Unit of the forces: N, kN, MN, lbf or kip; by default the file's."
+DATE = "Date to print; by default the project's. No clock is read."
+REPORTED = "Report on a surface that is not certified; every page is marked."
 UNITS = "Unit of the lengths: m, cm, mm, ft or in; by default the file's."
 TRUE_SIZE = "Draw every panel at true size; needs --tolerance."
 Anyway = Annotated[bool, typer.Option("--anyway", help=ANYWAY)]
@@ -44,6 +55,8 @@ def panels_(
         str, option("NAME", "alike: of one family; or apart.", "--mirror-images")
     ] = MIRROR_IMAGES[0],
     walls: Annotated[bool, typer.Option("--walls", help="Triangles of walls are panels, too.")] = False,
+    whole: Whole = False,
+    cache: Cache = True,
     anyway: Anyway = False,
 ) -> int:
     """Sort the panels of a roof into families of congruent triangles; write a schedule.
@@ -61,11 +74,11 @@ def panels_(
     if change is not None:
         validate.positive("--change", change)
     projects.check_names([], picture)
-    projects.check_picture(seen, "patches")
+    projects.check_picture([seen], "patches")
     projects.check_outputs([path for one in files for path in _paths(one)] + ([picture] if picture else []))
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": anyway}
     with working() as say:
-        shown = arguments.given(file, say)
+        shown = arguments.to_build(file, say, anyway=anyway, cache=cache, whole=whole)
         surface = shown.surface
         say("sorting panels")
         if change is None:
@@ -86,14 +99,14 @@ def panels_(
         print(f"\n{fewer}")
     if written:
         print(f"written: {', '.join(map(str, written))}")
-    return OK if schedule.certificate.certified else NOT_CERTIFIED
+    return OK if schedule.certificate.certified and not shown.missed else NOT_CERTIFIED
 
 
 def draw_(
     file: Input,
     output: Annotated[list[Path], MANY_FILES],
     units: Annotated[str | None, option("NAME", UNITS)] = None,
-    sheet: Annotated[str, option("NAME", "Format of the sheets: A4, A3, A2, A1 or A0.")] = "A1",
+    sheet: Annotated[str | None, option("NAME", SHEET)] = None,
     scale: Annotated[
         int | None, option("NUMBER", "1 to this; by default it fits.", parser=arguments.integer)
     ] = None,
@@ -103,6 +116,8 @@ def draw_(
     line: Annotated[list[str] | None, option("X,Y,X,Y", "Section along this line; may be repeated.")] = None,
     tolerance: Annotated[float | None, option("LENGTH", TOLERANCE, parser=number)] = None,
     panel_sheets: Annotated[bool, typer.Option("--panel-sheets", help=TRUE_SIZE)] = False,
+    whole: Whole = False,
+    cache: Cache = True,
     anyway: Annotated[bool, typer.Option("--anyway", help=MARKED)] = False,
 ) -> int:
     """Draw a roof: plan, elevations, sections, setting-out points, panels; in .dxf, .pdf or .svg.
@@ -118,23 +133,75 @@ def draw_(
     heights = None if height is None else [number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]
     with working() as say:
-        shown = arguments.given(file, say)
+        shown = arguments.to_build(file, say, anyway=anyway, cache=cache, whole=whole)
         say("drawing")
         drawings = drawing_set(
             shown.surface,
             units or shown.units.length,
-            sheet=sheet,
+            sheet=sheet or shown.documents.sheet,
             scale=scale,
             heights=heights,
             lines=lines,
-            tolerance=tolerance,
+            tolerance=shown.documents.tolerance if tolerance is None else tolerance,
             panel_sheets=panel_sheets,
             name=file.stem,
             anyway=anyway,
         )
         written = projects.write_all(drawings.files(*output), say)
-    print(f"{len(drawings.sheets)} sheets {sheet}; written: {', '.join(map(str, written))}")
-    return OK if drawings.certificate.certified else NOT_CERTIFIED
+    sheets = f"{len(drawings.sheets)} sheets {drawings.sheets[0].format}"
+    print(f"{sheets}; written: {', '.join(map(str, written))}")
+    return OK if drawings.certificate.certified and not shown.missed else NOT_CERTIFIED
+
+
+def report_(
+    file: Input,
+    output: Annotated[Path, option("PDF", "File to write, .pdf.", "-o", "--output")],
+    units: Annotated[str | None, option("NAME", UNITS)] = None,
+    force: Annotated[str | None, option("NAME", FORCE)] = None,
+    tolerance: Annotated[float | None, option("LENGTH", TOLERANCE, parser=number)] = None,
+    date: Annotated[str | None, option("TEXT", DATE)] = None,
+    mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
+    whole: Whole = False,
+    cache: Cache = True,
+    anyway: Annotated[bool, typer.Option("--anyway", help=REPORTED)] = False,
+) -> int:
+    """Write a report: pictures, plan to scale, verdict in words, forces, mesh check, panels; in .pdf.
+
+    \b
+    Examples:
+      pcmc report roof.toml -o roof.pdf
+      pcmc report roof.pcmc --units m --force kN --tolerance 0.005 -o roof.pdf
+    """
+    check_report(output)
+    projects.check_outputs([output])
+    with working() as say:
+        shown = arguments.to_build(file, say, anyway=anyway, cache=cache, whole=whole)
+        say("certifying")
+        outcome, project, documents = shown.outcome, shown.project, shown.documents
+        report = roof_report(
+            shown.surface,
+            Units(units or shown.units.length, force or shown.units.force),
+            name=file.stem,
+            tolerance=documents.tolerance if tolerance is None else tolerance,
+            targets=None if outcome is None or outcome.design is None else outcome.design.targets,
+            files={file.name: "surface" if outcome is None else "project"},
+            date=documents.date if date is None else date,
+            anyway=anyway,
+        )
+    if project is None or outcome is None or report.surface is not outcome.surface:
+        check = checking.mesh_check(
+            report.surface, report.certificate, mesh_check, lambda say: check_mesh(report.surface)
+        )
+    else:
+        wanted = project.mesh_check if mesh_check is None else mesh_check
+        run = partial(projects.check_of, project, outcome)
+        check = checking.mesh_check(report.surface, report.certificate, wanted, run)
+    with working() as say:
+        say("laying out the pages")
+        report = replace(report, mesh_check=check)
+        projects.write_all([(output, report.write)], say)
+    print(f"written: {output}")
+    return OK if report.certificate.certified and not shown.missed else NOT_CERTIFIED
 
 
 def _ends(text: str) -> Any:
@@ -152,21 +219,14 @@ def _paths(path: Path) -> list[Path]:
     if suffix not in (CSV, *FORMATS):
         text = f"{path}: expected {CSV} for a schedule, or a format of surfaces: {', '.join(FORMATS)}"
         raise FileError(text, what=str(path), found=suffix)
-    return [path] if suffix != CSV else [path, *(_beside(path, name) for name in ("families", "edges"))]
-
-
-def _beside(path: Path, name: str) -> Path:
-    return path.with_name(f"{path.stem}-{name}{path.suffix}")
+    return [path] if suffix != CSV else projects.schedule_paths(path)
 
 
 def _works(path: Path, schedule: Panels, units: Units) -> list[Any]:
     """Each file with the function that writes it."""
     if path.suffix.lower() != CSV:
         return [(path, partial(write, surface=schedule.surface, units=units))]
-    tables = (schedule.panels, schedule.families, schedule.edges)
-    return [
-        (one, partial(table.to_csv, index=False)) for one, table in zip(_paths(path), tables, strict=True)
-    ]
+    return projects.schedule_works(path, schedule)
 
 
 def _paint(schedule: Panels, view: Any, path: Path) -> None:

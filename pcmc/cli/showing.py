@@ -120,7 +120,7 @@ def plot(
     """
     projects.check_names([], picture)
     seen = arguments.view_of(view)
-    projects.check_picture(seen, colour)
+    projects.check_picture([seen], colour)
     projects.check_outputs([picture])
     with working() as say:
         loads = Loads(tension, pressure, weight, cable, volume)
@@ -128,7 +128,7 @@ def plot(
     if shown.outcome is not None and not _is_good(file, shown.outcome):
         return NOT_CERTIFIED
     surface = mirrored(shown.surface) if whole else shown.surface
-    painting = partial(projects.paint, surface, view=seen, colour=colour, units=shown.units)
+    painting = partial(projects.paint, surface, views=[seen], colour=colour, units=shown.units)
     projects.write_all([(picture, painting)])
     print(f"written: {picture}")
     return OK

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,11 +14,10 @@ from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
-from ..base.errors import FileError, PcmcError
 from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh
-from . import NOT_CERTIFIED, OK, arguments
+from . import NOT_CERTIFIED, OK, arguments, checking
 from .arguments import (
     MANY_FILES,
     Cables,
@@ -35,11 +33,10 @@ from .arguments import (
     number,
     option,
 )
+from .checking import CHECKED
 from .progress import working
 from .reports import report
 
-MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
-CHECKED = f"Solve on two finer meshes, too, for error bars; by default up to {MOST_CHECKED} triangles."
 MESHES = "Check the mesh on this many meshes in all, 3 for error bars and orders."
 ACCURACY = (
     "Error bar wanted, such as height=1e-3: finer triangles where the error comes from; may be repeated."
@@ -47,6 +44,9 @@ ACCURACY = (
 ACCURACY_OF = "mesh: the value on the mesh is to be so accurate; limit: the extrapolated one."
 MOST_TRIANGLES = f"The most that the mesh for an accuracy may have, {TRIANGLES} by default."
 WHOLE_INDEX = "Of a surface with mirror planes certify the whole: motions that are not symmetric count, too."
+RISE = "Find the tension with which the whole roof rises so much over its outline."
+APEX = "The same, over the plane."
+SPAN_RATIO = "The same: the smaller span of the plan over the rise."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
 
@@ -63,6 +63,9 @@ def solve_(
     weight: Weights = None,
     cable: Cables = None,
     volume: Volumes = None,
+    rise: Annotated[float | None, option("LENGTH", RISE, parser=number)] = None,
+    apex: Annotated[float | None, option("LENGTH", APEX, parser=number)] = None,
+    span_ratio: Annotated[float | None, option("NUMBER", SPAN_RATIO, "--span-ratio", parser=number)] = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
     anyway: Annotated[bool, typer.Option("--anyway", help="Write the output even if not certified.")] = False,
     accuracy: Annotated[list[str] | None, option("QUANTITY=NUMBER", ACCURACY, "--accuracy")] = None,
@@ -80,11 +83,13 @@ def solve_(
     \b
     Examples:
       pcmc solve roof.toml
+      pcmc solve hall.dxf --rise 2 -o hall.3dm
       pcmc solve roof.toml --accuracy height=1e-3
       pcmc solve sail.toml --cable "cable 1=12"
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
     project = _project(file, folder, output, picture)
+    project = projects.raised(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
         options["target"] = target
@@ -93,7 +98,9 @@ def solve_(
     goal = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
-    project = replace(project, mesh_check=False, whole=whole or project.whole)
+    # a report has the mesh check's numbers; else it comes after the files, so that Ctrl-C leaves them
+    wanted_before = False if project.documents.report is None else wanted
+    project = replace(project, mesh_check=wanted_before, whole=whole or project.whole)
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
     with working() as say:
@@ -103,25 +110,13 @@ def solve_(
     report(outcome)
     if project.outputs and not outcome.files:
         print("nothing written (use --anyway to write it)")
-    _check_mesh(project, outcome, wanted)
-    return OK if outcome.good else NOT_CERTIFIED
-
-
-def _check_mesh(project: projects.Project, outcome: projects.Outcome, wanted: bool | None) -> None:
-    """Check the mesh of a surface at rest and print its table, unless it is not wanted or too large."""
-    if outcome.certificate.index is None or wanted is False:
-        return
-    if wanted is None and outcome.surface.m > MOST_CHECKED:
-        print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
-        return
-    sys.stdout.flush()
-    try:
-        with working() as say:
-            check = projects.check_of(project, outcome, say)
-    except PcmcError as error:  # the surface and its files are good without it
-        print(f"no mesh check: {error}")
-    else:
+    check = outcome.mesh_check
+    if check is None:
+        run = partial(projects.check_of, project, outcome)
+        check = checking.mesh_check(outcome.surface, outcome.certificate, wanted, run)
+    if check is not None:
         print(f"\n{check.brief()}")
+    return OK if outcome.good else NOT_CERTIFIED
 
 
 def _project(
@@ -132,18 +127,7 @@ def _project(
     if not projects.is_project(file):
         return projects.Project(file, files=output or (), picture=picture, folder=folder)
     project = projects.load(file).in_folder(file.parent if folder is None else folder)
-    _keep_drawing(project, output or ())
     return replace(project, files=output or project.files, picture=picture or project.picture)
-
-
-def _keep_drawing(project: projects.Project, outputs: Sequence[Path]) -> None:
-    """Refuse to write a roof over the drawing that it is made from."""
-    if project.drawing is None:
-        return
-    for path in outputs:
-        if path.resolve() == project.drawing.path.resolve():
-            text = f"{path}: this is the drawing; name another file for the roof"
-            raise FileError(text, what=str(path))
 
 
 def certify_(
@@ -221,6 +205,7 @@ def remesh_(
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
     project = replace(_project(file, None, output, None), remeshing=(stage,), picture=None)
+    project = replace(project, documents=projects.Documents())
     with working() as say:
         outcome = projects.run_project(project, say)
     report(outcome)

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from .. import project as projects
-from ..base.errors import FileError
 from ..solvers.result import Result
 from ..structure import write_structure
-from ..surface import Surface
+from ..surface import Surface, mirrored
 from . import NOT_CERTIFIED, OK, arguments
-from .arguments import TOML, Cache, Input, number, option
+from .arguments import Cache, Input, Whole, number, option
 from .progress import working
 
 THICKNESS = "Thickness of a patch; a bare VALUE applies to every patch that is not named."
@@ -36,6 +36,7 @@ def structure(
     snow: Annotated[float | None, option("VALUE", "Load per plan area.", parser=number)] = None,
     wind: Annotated[list[str] | None, option("NAME=VALUE", WIND, "--wind")] = None,
     cable_area: Annotated[float | None, option("VALUE", "Section of the cables.", parser=number)] = None,
+    whole: Whole = False,
     cache: Cache = True,
     anyway: Annotated[bool, typer.Option("--anyway", help="Write it even if not certified.")] = False,
 ) -> int:
@@ -48,13 +49,11 @@ def structure(
       pcmc structure roof.pcmc -o roof.inp --thickness 0.001 --young 1e6 --snow 0.6
     """
     arguments.check_input(file)
-    if output.suffix.lower() != ".inp":
-        text = f"{output}: a structural model is written as .inp; change the suffix"
-        raise FileError(text, what=str(output), found=output.suffix, expected=".inp")
+    projects.check_model(output)
     projects.check_outputs([output])
     with working() as say:
-        project = projects.load(file) if file.suffix.lower() == TOML else None
-        start = arguments.given(file, say, start=True).surface
+        shown = arguments.given(file, say, start=True)
+        project, start = shown.project, shown.surface
         given = {
             "thickness": _thickness(start, thickness),
             "young": young,
@@ -69,20 +68,20 @@ def structure(
         wanted = projects.Structure(**values | {k: v for k, v in given.items() if v is not None})
         wanted.check(start)
         solved: Surface | Result = start
-        missed = False
         if project is not None:
             outcome = projects.designed(project, say, use_cache=cache)
-            solved, missed = outcome.result, outcome.certificate.certified and not outcome.good
-        if missed and not anyway:
-            hint = f"pcmc solve {file} shows them, --anyway writes the model"
-            raise FileError(f"{file}: the roof misses its targets; {hint}", what=str(file))
+            shown = replace(shown, surface=outcome.surface, outcome=outcome)
+            solved = outcome.result
+        arguments.refuse_missed(file, shown, anyway)
+        if whole or (project is not None and project.whole):
+            solved = mirrored(shown.surface)
         say("certifying")
         model = wanted.model(solved, anyway)
-        write_structure(output, model)
+        projects.write_all([(output, partial(write_structure, model=model))], say)
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
-    return OK if model.certified and not missed else NOT_CERTIFIED
+    return OK if model.certified and not shown.missed else NOT_CERTIFIED
 
 
 def _thickness(surface: Surface, given: list[str] | None) -> float | dict[str, float] | None:

@@ -16,7 +16,7 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import FileError, OptionError
 from ..base.files import atomic_writes, suffix_of
-from ..base.units import LENGTHS, length_factor
+from ..base.units import expect_length, length_factor
 from ..certificate import Certificate
 from ..certificate.required import certified
 from ..panels import Panels, panels
@@ -191,10 +191,7 @@ def check_name(path: Path) -> str:
 
 def _millimetres(units: object) -> float:
     """Millimetres in the unit of length."""
-    if units is None or units == "":
-        text = 'units: a drawing needs the unit of its lengths; say units="m" (cm, mm, ft, in)'
-        raise OptionError(text, what="units", found=units, expected=LENGTHS)
-    return length_factor(validate.choice("units", units, LENGTHS), "mm")
+    return length_factor(expect_length(units, "a drawing"), "mm")
 
 
 def _setting_out(curves: Sequence[views.Curve]) -> pd.DataFrame:

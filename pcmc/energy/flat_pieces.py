@@ -6,9 +6,11 @@ and a flat piece between the boundary and a point c of plane k is added, as seen
 
     V_i += -(1/6) Σ ⟨c, a × b⟩
 
-over the sides a → b of triangles that lie in plane k, all positions seen from o. Where the boundary leaves
-plane k for a plane j, the piece ends along the line that both have in common. c is chosen on as many of these
-lines as possible, and then as near to o as possible. On others, with c' the point of the line nearest to o,
+over the sides a → b of triangles on the boundary in plane k, all positions seen from o. Other curves between
+two vertices of plane k may rise from it like an arch; only in mirror planes they count, too. Where the
+boundary leaves plane k for a plane j, the piece ends along the line that both have in common. c is chosen on
+as many of these lines as possible, and then as near to o as possible. On others, with c' the point of the
+line nearest to o,
 V_i += ∓(1/6) ⟨c, v × c'⟩ for the vertex v there (- at the head of the last side, + at the tail of the first).
 """
 
@@ -75,13 +77,14 @@ def _flat_pieces(surface: Surface) -> FlatPieces:
     distance = np.array([-float(plane.height(origin)) for plane, _ in masks])
     rounding = 1e-12 * (surface.size + float(np.abs(origin).max()))
     away = np.flatnonzero(np.abs(distance) > rounding)
-    taken = ~topo.curve_edge
+    taken = np.zeros(len(topo.edges), dtype=bool)
     for k in np.flatnonzero(np.abs(distance) <= rounding):
         taken = taken | masks[k][1][topo.edges].all(axis=1)
     sides, ends = [], []
     for k in away:
         plane, mask = masks[k]
-        chosen = mask[topo.edges].all(axis=1) & ~taken
+        along = topo.curve_edge if plane.mirror else topo.boundary_edge
+        chosen = mask[topo.edges].all(axis=1) & along & ~taken
         taken = taken | chosen
         others = [other for number, other in enumerate(masks) if number != k]
         touching = [other for other, there in others if (there & mask).any()]

@@ -99,11 +99,11 @@ def values_of(surface: Surface) -> dict[str, dict[str, float]]:
 
     The pressures around a room of prescribed volume are results, and a wall's follows from its rooms'.
     """
-    result = surface.room_signs.any(axis=0) if surface.rooms else surface.walls
+    result = (surface.room_signs != 0.0).any(axis=0) | surface.walls
     return {
         "tensions": {p.name: p.tension for p in surface.patches},
         "pressures": {
-            p.name: p.pressure for p, r in zip(surface.patches, result, strict=True) if not (r or p.auxiliary)
+            p.name: p.pressure for p, r in zip(surface.patches, result.tolist(), strict=True) if not r
         },
         "weights": {p.name: p.weight for p in surface.patches if p.weight},
         "cables": {c.name: c.tension for c in surface.cables},

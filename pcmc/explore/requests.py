@@ -64,6 +64,8 @@ def _aim(key: str, name: str, value: Any, known: tuple[str, ...]) -> Any:
         raise RequestError(f"{key}: unknown key {name!r:.60}; known: {', '.join(known)}")
     if value is None and name in ("of", "value", "at_most", "at_least", "low", "high"):
         return None
+    if name == "patch" and isinstance(value, list):  # tied: they change together
+        return tuple(_name(f"{key}: {name}", one) for one in value)
     if name in ("quantity", "patch", "kind") or (name == "of" and isinstance(value, str)):
         return _name(f"{key}: {name}", value)
     if name == "of":

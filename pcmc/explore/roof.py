@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from .. import project as projects
 from ..base.errors import FileError
@@ -91,10 +92,11 @@ def read_roof(
         return Roof(surface, path.name, data.units, path, signature=before)
     project = projects.load(path)
     text = text_of(path) if path.suffix.lower() == ".toml" else ""
-    more = {"path": path, "text": text, "signature": before}
+    more: dict[str, Any] = {"path": path, "text": text, "signature": before}
     more |= {"targets": tuple(project.targets), "vary": tuple(project.vary)}
     if start_shape:
-        return Roof(projects.surface_of(project), path.name, project.units, note="The start shape", **more)
+        note = "the targets are not met yet: the page opened its start shape" if project.targets else ""
+        return Roof(projects.surface_of(project), path.name, project.units, note=note, **more)
     outcome = projects.designed(project, progress, use_cache=use_cache)
     if report is not None:
         report(outcome)

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 from .. import existence
@@ -94,9 +95,11 @@ class Session:
         self._wanted, self._failure = start.wanted, start.failure
         self._start = self.surface
         self._steps, self._place = [self.surface], 0
-        self._message, self._compared = "", None
+        self._message = ""
+        self._compared: int | None = None
         self.variants: list[Variant] = []
         self.aims: Aims | None = None
+        self.progress = ""  # of the search for targets
 
     def state(self) -> State:
         """The present state."""
@@ -158,11 +161,17 @@ class Session:
         """Move to tensions that meet the targets; if there are none, ``message`` says why."""
 
         def act(stop: Callable[[], bool]) -> None:
+            solves = count(1)
+
             def check(_: object) -> None:
+                self.progress = f"{next(solves)} solves"
                 if stop():
                     raise StopIteration
 
-            design = meet(self.surface, targets, vary, callback=check)
+            try:
+                design = meet(self.surface, targets, vary, callback=check)
+            finally:
+                self.progress = ""
             if stop():
                 return
             certificate = design.certificate
@@ -227,8 +236,9 @@ class Session:
 
         def act(stop: Callable[[], bool]) -> None:
             self._start, self.aims = start.surface, None
-            self._go_on_with(start.surface)
-            self._failure = start.failure
+            self.surface, self._certificate = start.surface, start.certificate
+            self._wanted, self._failure = start.wanted, start.failure
+            self._add_step()
 
         return self._run(act)
 

@@ -92,8 +92,8 @@ def _constraints(surface: Surface, origin: Floats) -> str:
             text += (
                 f"// plane {number} {'mirror' if plane.mirror else 'support'} {plane.name}".rstrip() + "\n"
             )
-        offset = -float(plane.height(origin)) + 0.0
-        text += f"CONSTRAINT {number}\nFORMULA: {formula} = {offset!r}\n".replace("= 0.0", "= 0")
+        offset = -float(plane.height(origin)) or 0  # and not -0.0
+        text += f"CONSTRAINT {number}\nFORMULA: {formula} = {offset!r}\n"
         own = np.flatnonzero(mask[tail] & mask[head])
         if number > 1 and len(own):
             x, y, z = (pieces.apex[own[0]] / -6.0).tolist()

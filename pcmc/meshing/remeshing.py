@@ -180,6 +180,9 @@ def _remesh_with_mmg(mesh: CurveMesh, size: Floats, growth: float, chord: float)
         raise SurfaceError(f"MMG cannot remesh this surface ({error}); {hint}", what="surface") from None
     X, reference = tool.get_vertices_with_refs()
     F, patch = tool.get_triangles_with_refs()
+    if not np.isin(patch, mesh.patch + 1).all():
+        message = "MMG cannot remesh this surface; repair its triangles first, or choose another edge length"
+        raise SurfaceError(message, what="surface")
     place = np.append(-1, fixed)[reference]
     known = place >= 0
     number = np.full(len(mesh.X), -1)

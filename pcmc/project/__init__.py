@@ -28,25 +28,38 @@ Gives ``designed``, ``run`` and ``load`` to sweeps, page, command. May import ``
     [output]
     files = ["roof.obj", "roof.glb"]
     picture = "roof.png"
+    drawings = ["roof.dxf"]
+    report = "roof.pdf"
 """
 
 from .cache import cached_files
 from .cache import clear as clear_cache
 from .cache import folder as cache_folder
 from .designed import designed
+from .documents import Documents, check_model, schedule_paths, schedule_works
 from .drawn import files_of, is_drawing
-from .file import Project, build, load, surface_of
+from .file import Project, build, load, raised, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
 from .outcome import Outcome
 from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
 from .planning import project_text, proposal_text
 from .remeshing import Remeshing
-from .running import check_of, check_project_mesh, run, run_project, solve_project, surface_files
+from .running import (
+    MOST_CHECKED,
+    check_of,
+    check_project_mesh,
+    run,
+    run_project,
+    solve_project,
+    surface_files,
+)
 from .structure import Structure
 from .varied import check_varied, digest, is_project, varied
 
 __all__ = [
     "COLOURS",
+    "MOST_CHECKED",
+    "Documents",
     "REQUIRED",
     "Key",
     "OnStep",
@@ -58,6 +71,7 @@ __all__ = [
     "build",
     "cache_folder",
     "cached_files",
+    "check_model",
     "check_names",
     "check_of",
     "check_outputs",
@@ -73,10 +87,13 @@ __all__ = [
     "load",
     "paint",
     "project_text",
+    "raised",
     "proposal_text",
     "reference",
     "run",
     "run_project",
+    "schedule_paths",
+    "schedule_works",
     "sections",
     "solve_project",
     "surface_files",

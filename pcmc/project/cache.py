@@ -33,7 +33,7 @@ from .outcome import Outcome
 
 VARIABLE = "PCMC_CACHE"
 MOST = 100  # roofs kept; the one used longest ago goes first
-PARTS = ("plan", "method", "options", "wanted", "search", "remeshing", "targets", "vary")
+PARTS = ("plan", "method", "options", "wanted", "search", "remeshing", "targets", "vary", "misfit")
 
 
 def folder() -> Path | None:
@@ -109,6 +109,7 @@ def _values(outcome: Outcome) -> dict[str, Any]:
     names = ("method", "energy", "iterations", "evaluations", "note")
     values: dict[str, Any] = {name: getattr(result, name) for name in names}
     values["status"] = result.status.name
+    values["notes"] = list(outcome.notes)
     if design is not None:
         tables = {name: getattr(design, name).to_dict("split") for name in ("targets", "parameters")}
         values["design"] = {"status": design.status.name, "solves": design.solves, **tables}
@@ -128,7 +129,8 @@ def _outcome(project: Project, values: Mapping[str, Any], surface: Any) -> Outco
         tables = {name: pd.DataFrame(**given[name]) for name in ("targets", "parameters")}
         status, solves = DesignStatus[given["status"]], given["solves"]
         design = Design(status, result, solves=solves, history=pd.DataFrame(), **tables)
-    return Outcome(result, (), design, units=project.units, cached=True)
+    notes = values.get("notes", ())
+    return Outcome(result, (), design, units=project.units, cached=True, notes=notes)
 
 
 def _path(project: Project) -> Path | None:

@@ -13,7 +13,8 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 from .. import io
-from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError
+from ..base import validate
+from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError, unknown
 from ..base.files import check_name, check_regular
 from ..base.units import NO_UNITS, Units
 from ..plan import Plan, plan_from
@@ -21,9 +22,11 @@ from ..solvers import find_method
 from ..surface import Surface
 from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys
+from .documents import Documents, documents_of
 from .drawn import is_drawing, with_drawing
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
+from .rises import Rise, take_rises, with_rises
 from .structure import Structure
 
 if TYPE_CHECKING:
@@ -53,10 +56,12 @@ class Project:
     search : whether further starts are tried where the first leads to no equilibrium.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
+    misfit : ``tolerance`` of ``pcmc.meet``; None for the default.
     structure : of the structural model; None without [structure].
     files, picture : the output.
+    documents : drawings, schedule of panels, structural model and report to write.
     folder : made for the output if it is missing; None if the names include their folders.
-    view, colour : of the picture; ``colour`` is one of ``COLOURS``.
+    views, colour : of the picture, side by side; ``colour`` is one of ``COLOURS``.
     whole : whether the output is the whole roof that a surface with mirror planes is a part of.
     drawing : that the plan refers to, or that ``path`` is; None if there is none.
     """
@@ -72,11 +77,13 @@ class Project:
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
     vary: Sequence[Parameter] = ()
+    misfit: float | None = None
     structure: Structure | None = None
     files: Sequence[PathLike] = ()
     picture: PathLike | None = None
+    documents: Documents = field(default_factory=Documents)
     folder: Path | None = None
-    view: Any = "diagonal"
+    views: Sequence[Any] = ("diagonal",)
     colour: str = "patches"
     whole: bool = False
     drawing: Drawing | None = None
@@ -84,7 +91,8 @@ class Project:
     @property
     def outputs(self) -> list[Path]:
         """All files to write."""
-        return [Path(f) for f in (*self.files, *([] if self.picture is None else [self.picture]))]
+        pictures = [] if self.picture is None else [self.picture]
+        return [*(Path(f) for f in (*self.files, *pictures)), *self.documents.paths]
 
     def in_folder(self, folder: PathLike) -> Project:
         """The same project with its output in a folder; FileError for output that a link leads out of it."""
@@ -95,7 +103,8 @@ class Project:
                 text = f"{self.path}: {path} is outside the folder {base}, in {place}; {ELSEWHERE}"
                 raise FileError(text, what="output", found=str(path), expected=str(base))
         picture = None if self.picture is None else base / self.picture
-        return replace(self, files=[base / name for name in self.files], picture=picture, folder=base)
+        files, documents = [base / name for name in self.files], self.documents.in_folder(base)
+        return replace(self, files=files, picture=picture, documents=documents, folder=base)
 
 
 def load(path: PathLike) -> Project:
@@ -216,35 +225,77 @@ def start_of(project: Project) -> tuple[Surface, Units]:
 
 def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     """The project with the given data. Errors as in ``load``."""
+    with in_file(path, FileError):
+        data, rises = take_rises(data)
     data, drawing = with_drawing(path, data)
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
     method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
     files, picture = output.get("files", []), output.get("picture")
-    view, colour = output.get("view", "diagonal"), output.get("colour", "patches")
+    colour = output.get("colour", "patches")
     with in_file(path, FileError):
         wanted = take_accuracy(options)
         find_method(method).options(**options)  # refuses bad values before the plan is meshed
-        _check_inside([*files, *([] if picture is None else [picture])])
+        documents = documents_of(output)
+        _check_inside([*files, *([] if picture is None else [picture]), *documents.names])
         check_names(files, picture)
-        check_picture(view, colour)
+        views = _views(output)
+        check_picture(views, colour)
+        units = Units(data.get("units", ""), data.get("force", ""))
+        structure = Structure(**data["structure"]) if "structure" in data else None
+        documents.check(units, structure)
+        plan, targets, vary = with_rises(plan_from(data["plan"]), rises)
+        misfit = None
+        if "targets" in data:
+            given = _search(data["targets"], plan)
+            targets, vary = [*given["targets"], *targets], [*given["vary"], *vary]
+            misfit = given["misfit"]
         return Project(
             path=path,
-            plan=plan_from(data["plan"]),
-            units=Units(data.get("units", ""), data.get("force", "")),
+            plan=plan,
+            units=units,
             method=method,
             options=options,
             wanted=wanted,
             mesh_check=mesh_check,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
-            **(_search(data["targets"]) if "targets" in data else {}),
-            structure=Structure(**data["structure"]) if "structure" in data else None,
+            targets=targets,
+            vary=vary,
+            misfit=misfit,
+            structure=structure,
             files=files,
             picture=picture,
-            view=tuple(view) if isinstance(view, list) else view,
+            documents=documents,
+            views=[tuple(view) if isinstance(view, list) else view for view in views],
             colour=colour,
             whole=output.get("whole", False),
             drawing=drawing,
         )
+
+
+def raised(project: Project, wanted: Mapping[str, float | None]) -> Project:
+    """The project whose whole roof gets the rise, apex or span ratio given, with one tension."""
+    rises = [Rise(None, kind, value) for kind, value in wanted.items() if value is not None]
+    if not rises:
+        return project
+    flag = f"--{rises[0].kind.replace('_', '-')}"
+    if len(rises) > 1:
+        text = f"{flag} and --{rises[1].kind.replace('_', '-')}: give one of them, the other follows"
+        raise OptionError(text, what=flag)
+    if project.plan is None:
+        text = f"{flag} is for a project or a drawing; {project.path.name} has no plan"
+        raise OptionError(text, what=flag, found=str(project.path))
+    if project.targets:
+        text = f"{flag}: {project.path.name} has targets already; change them there"
+        raise OptionError(text, what=flag)
+    plan, targets, vary = with_rises(project.plan, rises)
+    return replace(project, plan=plan, targets=targets, vary=vary)
+
+
+def _views(output: Mapping[str, Any]) -> list[Any]:
+    """The views of the picture: the key views, or view."""
+    if "view" in output and "views" in output:
+        raise OptionError("output: give view or views, not both", what="output.views")
+    return list(output.get("views", [output.get("view", "diagonal")]))
 
 
 def _check_inside(names: Sequence[str]) -> None:
@@ -257,14 +308,28 @@ def _check_inside(names: Sequence[str]) -> None:
             raise FileError(text, what="output", found=name)
 
 
-def _search(table: Mapping[str, Any]) -> dict[str, Any]:
+def _placed(entry: Mapping[str, Any], plan: Plan) -> Mapping[str, Any]:
+    """A target, with the point of the plan that a height names."""
+    if entry["quantity"] != "height" or not isinstance(entry.get("of"), str):
+        return entry
+    name = entry["of"]
+    if name not in plan.points:
+        text = f"targets.meet: {unknown('point', name, plan.points)}; name it in [plan.points]"
+        raise OptionError(text, what="targets.meet", found=name)
+    return {**entry, "of": plan.points[name]}
+
+
+def _search(table: Mapping[str, Any], plan: Plan) -> dict[str, Any]:
     """The targets of a project, and the parameters that may vary."""
     from ..design import Parameter, Target
 
+    if "tolerance" in table:
+        validate.positive("targets.tolerance", table["tolerance"])
     for key in ("meet", "vary"):
         if not table[key]:
             raise OptionError(f"targets.{key} is empty; give at least one", what=f"targets.{key}")
     return {
-        "targets": [Target(**entry) for entry in table["meet"]],
-        "vary": [Parameter(v) if isinstance(v, str) else Parameter(**v) for v in table["vary"]],
+        "targets": [Target(**_placed(entry, plan)) for entry in table["meet"]],
+        "vary": [Parameter(**v) if isinstance(v, Mapping) else Parameter(v) for v in table["vary"]],
+        "misfit": table.get("tolerance"),
     }

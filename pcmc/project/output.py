@@ -25,6 +25,7 @@ from ..plot.figure import SUFFIXES, check_suffix
 from ..surface import Surface
 
 PathLike = str | os.PathLike[str]
+Works = list[tuple[Path, Callable[[Path], Any]]]  # each file with the function that writes it
 OnStep = Callable[[str], object]  # called with a few words at each step of a project
 COLOURS = ("patches", "curvature", "error", "reactions")
 
@@ -43,14 +44,12 @@ def fields(surface: Surface, certificate: Certificate) -> dict[str, Floats]:
     }
 
 
-def write_all(
-    works: Iterable[tuple[Path, Callable[[Path], None]]], progress: OnStep | None = None
-) -> list[Path]:
+def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
     """Write files, each by its own function of a path; all of them appear together, or none.
 
     The functions write to temporary files; errors and warnings name the final ones.
     """
-    report, works = progress or ignore, list(works)
+    report = progress or ignore
     paths = [path for path, _ in works]
     check_outputs(paths)
     with atomic_writes(paths) as temporaries:
@@ -80,28 +79,48 @@ def _final_name_in_warnings(temporary: Path, path: Path) -> Iterator[None]:
             warnings.warn(text, warning.category, stacklevel=4)
 
 
-def paint(surface: Surface, path: PathLike, view: Any, colour: str, units: Units = NO_UNITS) -> None:
-    """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
+def paint(
+    surface: Surface, path: PathLike, views: Sequence[Any], colour: str, units: Units = NO_UNITS
+) -> None:
+    """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows.
+
+    Several views stand side by side; reactions have one.
+    """
     # needs the extra plot, which a project without a picture does not
-    from ..plot import draw, reactions
+    from ..plot import draw, panel, reactions
 
-    check_picture(view, colour)
+    check_picture(views, colour)
+    look: dict[str, Any] = {"legend": True}
+    scalars = None
+    if colour == "reactions":
+        reactions(surface, path, view=views[0], label=units.tension)
+        return
     if colour == "curvature":
-        label = f"mean curvature, {units.curvature}"
-        draw(surface, path, view=view, scalars=mean_curvature(surface), label=label)
+        scalars, look = mean_curvature(surface), {"label": f"mean curvature, {units.curvature}"}
     elif colour == "error":
-        draw(surface, path, view=view, scalars=curvature_error(surface), label="curvature error")
-    elif colour == "reactions":
-        reactions(surface, path, view=view, label=units.tension)
+        scalars, look = curvature_error(surface), {"label": "curvature error"}
+    if len(views) == 1:
+        draw(surface, path, view=views[0], scalars=scalars, **look)
     else:
-        draw(surface, path, view=view, legend=True)
+        count = len(views)
+        each = None if scalars is None else [scalars] * count
+        panel([surface] * count, path, views=views, scalars=each, **look)
 
 
-def check_picture(view: Any, colour: str) -> None:
-    """Refuse a view or colour that ``paint`` does not know."""
+def check_picture(views: Sequence[Any], colour: str) -> None:
+    """Refuse views or a colour that ``paint`` does not know."""
+    validate.choice("colour", colour, COLOURS)
+    if not views:
+        validate.refuse("views", views, "at least one view")
+    if colour == "reactions" and len(views) > 1:
+        validate.refuse("views", len(views), "one view for a picture of reactions")
+    for view in views:
+        _check_view(view)
+
+
+def _check_view(view: Any) -> None:
     from ..plot.scene import VIEWS
 
-    validate.choice("colour", colour, COLOURS)
     if isinstance(view, str):
         validate.choice("view", view, tuple(VIEWS))
     else:

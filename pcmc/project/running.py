@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import count
@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from .. import io, solvers
 from ..base.arrays import Ints
-from ..base.errors import BalanceWarning, OptionError
+from ..base.errors import BalanceWarning, FileError, OptionError, PcmcError
 from ..base.files import folder as made
 from ..certificate.balance import unbalanced
 from ..certificate.certificate import certify
@@ -25,15 +25,18 @@ from ..meshing.remeshing import remesh
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface, mirrored
 from . import cache
+from .advice import advice, chosen_walls
+from .documents import document_works
 from .file import Project, in_file, load, start_of
 from .outcome import Outcome, Whole
-from .output import OnStep, PathLike, check_names, check_outputs, fields, ignore, paint, write_all
+from .output import OnStep, PathLike, Works, check_names, check_outputs, fields, ignore, paint, write_all
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
-    from ..design import Design
+    from ..design import Design, Target
 
 
+MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
 SAME = 1e-9  # of the size: a vertex this near to a corner of the plan is that corner
 
 
@@ -79,13 +82,14 @@ def run_project(
 ) -> Outcome:
     """As ``run``, for a loaded project; ``changed`` is applied to its initial surface.
 
-    The mesh check comes after the files are written: Ctrl-C during it leaves them. A good roof is kept in
+    The mesh check comes after the files are written, so that Ctrl-C during it leaves them. Where a report is
+    among them, it comes before, unless ``mesh_check`` is false or the mesh is large. A good roof is kept in
     the cache, unless it was changed or ``use_cache`` is false; it is solved in any case.
     """
     outcome = _solve_and_write(project, progress or ignore, changed, anyway)
     if use_cache and changed is None:
         cache.keep(project, outcome)
-    if project.mesh_check and outcome.certificate.index is not None:
+    if project.mesh_check and outcome.mesh_check is None and outcome.certificate.index is not None:
         outcome = replace(outcome, mesh_check=check_of(project, outcome, progress))
     return outcome
 
@@ -124,6 +128,7 @@ def _solve_and_write(
     """The outcome of a project, its output written."""
     outputs = project.outputs
     check_names(project.files, project.picture)
+    _keep_drawing(project, outputs)
     check_outputs(outputs, project.folder)
     outcome = solve_from_start(project, report, changed)
     if project.whole:
@@ -132,17 +137,61 @@ def _solve_and_write(
         outcome = replace(outcome, whole=Whole(whole, certify(whole)))
     if not outputs or not (outcome.good or anyway):
         return outcome
+    if project.documents.report is not None:
+        outcome = replace(outcome, mesh_check=_reported_check(project, outcome, report))
     works = surface_files(outcome, project.files)
     if project.picture is not None:
-        look = {"view": project.view, "colour": project.colour, "units": outcome.units}
-        works.append((Path(project.picture), partial(paint, outcome.shown.surface, **look)))
+        painting = partial(paint, views=project.views, colour=project.colour, units=outcome.units)
+        works.append((Path(project.picture), partial(painting, outcome.shown.surface)))
+    works += _documents(project, outcome, anyway, report)
     with made(project.folder or Path()):
         return replace(outcome, files=write_all(works, report))
 
 
-def surface_files(
-    outcome: Outcome, files: Iterable[PathLike], colour: str = ""
-) -> list[tuple[Path, Callable[[Path], None]]]:
+def _reported_check(project: Project, outcome: Outcome, report: OnStep) -> MeshCheck | None:
+    """The mesh check for a report: where it is asked for, or left open and the mesh is small enough."""
+    small = outcome.shown.surface.m <= MOST_CHECKED
+    wanted = small if project.mesh_check is None else project.mesh_check
+    if not wanted or outcome.certificate.index is None:
+        return None
+    from ..accuracy import check_mesh
+
+    try:
+        if outcome.whole is None:
+            return check_of(project, outcome, report)
+        report("mesh check")
+        return check_mesh(outcome.whole.surface)
+    except PcmcError:
+        if project.mesh_check:
+            raise
+        return None  # the report is good without it
+
+
+def _keep_drawing(project: Project, outputs: Iterable[Path]) -> None:
+    """Refuse to write over the drawing that the roof is made from."""
+    for path in outputs:
+        if project.drawing is not None and path.resolve() == project.drawing.path.resolve():
+            text = f"{path}: this is the drawing of the plan; name another file for the roof"
+            raise FileError(text, what=str(path))
+
+
+def _documents(project: Project, outcome: Outcome, anyway: bool, report: OnStep) -> Works:
+    """The project's documents, each with the function that writes it."""
+    if not project.documents.names:
+        return []
+    report("drawing, sorting panels, modelling")
+    files = {project.path.name: "project"}
+    if project.drawing is not None:
+        files[project.drawing.path.name] = "drawing of the plan"
+    files |= {Path(file).name: "surface" for file in project.files}
+    if project.picture is not None:
+        files[Path(project.picture).name] = "picture"
+    name = project.path.stem
+    with in_file(project.path):
+        return document_works(project.documents, project.structure, outcome, name, files, anyway)
+
+
+def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> Works:
     """The files of a designed roof with all that their formats hold, for ``write_all``.
 
     ``colour`` names the scalar that colours vertices.
@@ -163,12 +212,20 @@ def solve_from_start(
     """Mesh a project, solve it, remesh it and meet its targets; write nothing."""
     report("reading" if project.plan is None else "meshing the plan")
     start, units = start_of(project)
-    start = start if changed is None else changed(start)
+    given, start = start, start if changed is None else changed(start)
+    if project.documents.structure is not None and project.structure is not None:
+        with in_file(project.path):
+            project.structure.check(start)
     if project.whole and not any(plane.mirror for plane, _ in start.on_planes):
         text = f"{project.path}: the roof has no mirror planes, so it is the whole already; leave out whole"
         raise OptionError(f"{text}, or give the plan mirrors", what="whole")
     _check_balance(start)
-    return replace(solve_project(project, start, report), units=units)
+    outcome = replace(solve_project(project, start, report), units=units)
+    notes = (*chosen_walls(project, start), *outcome.notes)
+    if outcome.good:
+        return replace(outcome, notes=notes)
+    report("looking for advice")
+    return replace(outcome, notes=notes, advice=advice(project, given, start, outcome))
 
 
 def _check_balance(surface: Surface) -> None:
@@ -199,7 +256,12 @@ def solve_project(project: Project, surface: Surface, progress: OnStep | None = 
         for stage in after:
             if outcome.good:
                 report("remeshing")
+                before = outcome
                 outcome = _again(project, remesh(outcome.surface, **stage.options), report)
+                outcome = replace(
+                    outcome,
+                    notes=(*before.notes, *outcome.notes, *_met_before(project.targets, before, outcome)),
+                )
         if project.wanted.accuracy and outcome.good:
             accurate = _solve_to_accuracy(project, outcome.surface, report)
             if not (project.targets and accurate.good):
@@ -214,6 +276,23 @@ def _again(project: Project, surface: Surface, report: OnStep) -> Outcome:
     if project.targets and outcome.good:  # otherwise its verdict is the better explanation
         outcome = _solve_or_meet(project, outcome.surface, report)
     return outcome
+
+
+def _met_before(targets: Sequence[Target], before: Outcome, after: Outcome) -> list[str]:
+    """That the targets were met on the mesh before, with which parameters, and what the finer one reaches."""
+    if before.design is None:
+        return []
+    values = ", ".join(f"{label} {value:.6g}" for label, value in before.design.parameters["value"].items())
+    met = f"targets met on the first mesh, {before.surface.m} triangles, with {values}"
+    where = f"on the new one, {after.surface.m} triangles"
+    if after.design is not None:
+        return [met if after.good else f"{met}; {where}, {after.design.status.value}"]
+    from ..design.targets import measure  # needed by projects with targets only
+
+    reached = ", ".join(f"{target.label} {measure(after.surface, target).value:.6g}" for target in targets)
+    return [
+        f"{met}; {where}, the surface does not come to rest with them, so they were not met again: {reached}"
+    ]
 
 
 def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Outcome:
@@ -245,15 +324,36 @@ def _newton_alone(project: Project, act: str) -> None:
 
 
 def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
-    """Solve the surface, or meet its targets, and certify it."""
-    design = _meet(project, surface, report) if project.targets else None
-    if design is not None:
-        result = design.result
-    else:
-        solver = solve if project.search else solvers.solve
-        result = solver(surface, project.method, reporter(report), **project.options)
-        if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
-            raise KeyboardInterrupt
+    """Solve the surface, or meet its targets, and certify it.
+
+    Where the search for the targets finds no equilibrium to start from, the surface is solved without them:
+    from a roof that is certified the search starts again, any other says why there is none.
+    """
+    if not project.targets:
+        return _certified(_solve(project, surface, report), None, report)
+    from ..design import NoStart  # needed by projects with targets only
+
+    try:
+        design = _meet(project, surface, report)
+    except NoStart:
+        outcome = _certified(_solve(project, surface, report), None, report)
+        if not outcome.good:
+            return replace(
+                outcome, notes=("targets not tried: without them there is no stable roof, either",)
+            )
+        design = _meet(project, outcome.surface, report)
+    return _certified(design.result, design, report)
+
+
+def _solve(project: Project, surface: Surface, report: OnStep) -> Result:
+    solver = solve if project.search else solvers.solve
+    result = solver(surface, project.method, reporter(report), **project.options)
+    if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
+        raise KeyboardInterrupt
+    return result
+
+
+def _certified(result: Result, design: Design | None, report: OnStep) -> Outcome:
     report("certifying")
     result.certificate  # noqa: B018 — computed here, while the progress is shown
     return Outcome(result, (), design)
@@ -278,7 +378,8 @@ def _meet(project: Project, surface: Surface, report: OnStep) -> Design:
     def callback(row: object) -> None:
         report(f"meeting the targets: solve {next(solves)}")
 
-    design = meet(surface, project.targets, project.vary, callback=callback, **project.options)
+    options = dict(project.options) | ({} if project.misfit is None else {"tolerance": project.misfit})
+    design = meet(surface, project.targets, project.vary, callback=callback, **options)
     if design.status is DesignStatus.STOPPED:  # by Ctrl-C
         raise KeyboardInterrupt
     return design

@@ -43,6 +43,14 @@ class Supports(NamedTuple):
         lines = tuple((line, read_only(along)) for line, along in self.on_line)
         return Supports(read_only(self.fixed), read_only(self.on_plane), lines)
 
+    @property
+    def bound(self) -> Bools:
+        """(n,) vertices that are fixed, on Π, or on a line."""
+        held = self.fixed | self.on_plane
+        for _, along in self.on_line:
+            held = held | along
+        return held
+
 
 def plane_masks(given: Any, n: int) -> tuple[tuple[Plane, Bools], ...]:
     """The planes besides Π, each with the (n,) mask of its vertices."""

@@ -134,7 +134,8 @@ class Surface:
         object.__setattr__(self, "cables", checked_cables(self.cables, self.topology.edges, len(X)))
         object.__setattr__(self, "rooms", checked_rooms(self.rooms, [p.name for p in patches]))
         height = self.plane.height(X)
-        checks.mesh(X, F, patch, self.topology, self.patches, self.held, height)
+        # a vertex that slides on another plane alone may come down to Π like a free one
+        checks.mesh(X, F, patch, self.topology, self.patches, given.bound, height)
         self._check_planes(X)
         if not (self.held.any() or self.rooms):
             message = "no vertex is fixed or on the plane: translations are free, so only closed surfaces"

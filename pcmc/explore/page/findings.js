@@ -81,6 +81,7 @@ export function showPatches(table, measures, units) {
   head.append(element("td"), ...columns.map(([, name, kind]) => {
     const th = element("th", "", name);
     th.scope = "col";
+    if (kind === "volume") th.title = "The patch's share as targets count it: the cone from the patch to the point of Π; all shares add up to the volume";
     if (units.given) th.append(element("span", "unit", units[kind]));
     return th;
   }));
@@ -122,10 +123,14 @@ const percentOf = (x) => (x === null ? "–" : `${digits(100 * x, 3)} %`);
 /** Values, limits and colour map of the chosen field; null for the patches' own colours. */
 export function fieldOf(choice, arrays) {
   if (choice === "patches" || !arrays[choice]) return null;
-  if (choice === "error" || choice === "difference") {
-    const values = choice === "error" ? arrays.error.map((x) => 100 * x) : arrays.difference;
-    const most = Math.max(choice === "error" ? 1e-4 : 1e-12, ...ends(values).map(Math.abs));
+  if (choice === "error") {
+    const values = arrays.error.map((x) => 100 * x);
+    const most = Math.max(1e-4, ...ends(values).map(Math.abs));
     return { values, limits: [-most, most], map: diverging };
+  }
+  if (choice === "difference") {
+    const most = Math.max(1e-12, ...ends(arrays.difference, arrays.underPressure).map(Math.abs));
+    return { values: arrays.difference, limits: [-most, most], map: diverging, skipWalls: true };
   }
   if (choice === "reactions") {
     const values = new Float32Array(arrays.reactions.length / 3);

@@ -9,7 +9,7 @@ const LIMITS = [["value", "="], ["at_most", "at most"], ["at_least", "at least"]
 export class Targets {
   /** `meet(aims)` is called to meet them, `stop()` to give up. */
   constructor(root, { controls, aims, units }, meet, stop) {
-    Object.assign(this, { root, units, aims, meet });
+    Object.assign(this, { root, units, meet });
     this.patches = controls.filter((g) => g.patch !== null && !g.wall).map((g) => g.name);
     this.list = root.querySelector(".list");
     this.message = root.querySelector(".message");
@@ -17,8 +17,17 @@ export class Targets {
     this.rows = [];
     const given = aims.targets.length ? aims.targets : [{ quantity: "apex", of: this.patches[0] ?? null }];
     given.forEach((target) => this.add(target));
-    this.vary = controls.filter((g) => g.kinds.includes("tensions") || g.kinds.includes("cables"))
-      .map((group) => this.parameter(group));
+    const tensions = controls.filter((g) => g.kinds.includes("tensions") || g.kinds.includes("cables"));
+    const possible = tensions.map(({ name, patch, wall }) => ({
+      label: name, usual: patch !== null && !wall, parameter: { patch: name, kind: patch === null ? "cable" : "tension" },
+    }));
+    const same = (a, b) => a.kind === b.kind && a.patch === b.patch;
+    for (const { label, parameter } of aims.vary) {
+      const known = possible.find((p) => same(p.parameter, parameter));
+      if (known) Object.assign(known, { parameter, given: true });
+      else possible.push({ label, parameter, given: true }); // such as a pressure
+    }
+    this.vary = possible.map((one) => this.parameter(one, aims.vary.length ? one.given : one.usual));
     root.querySelector(".vary").replaceChildren(...this.vary.map(({ label }) => label));
     root.querySelector(".add").onclick = () => this.add({ quantity: "apex", of: null }).focus();
     root.querySelector(".meet").onclick = () => this.send();
@@ -26,15 +35,13 @@ export class Targets {
     this.say(aims.targets.length ? "Targets of the project." : "");
   }
 
-  /** A tension that may change, checked if the project or the user lets it. */
-  parameter(group) {
-    const kind = group.patch === null ? "cable" : "tension";
-    const known = this.aims.vary.find((p) => p.patch === group.name && p.kind === kind);
+  /** A box for a tension, or another parameter, that may change. */
+  parameter({ label: text, parameter }, checked) {
     const label = element("label");
-    const box = input("checkbox", `Tension of ${group.name} may change`);
-    box.checked = this.aims.vary.length ? Boolean(known) : !group.wall && kind === "tension";
-    label.append(box, group.name);
-    return { label, box, parameter: known ?? { patch: group.name, kind } };
+    const box = input("checkbox", `${text} may change`);
+    box.checked = Boolean(checked);
+    label.append(box, text);
+    return { label, box, parameter };
   }
 
   add(target) {

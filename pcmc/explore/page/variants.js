@@ -58,11 +58,13 @@ export class Variants {
     table.querySelector("tbody").replaceChildren(...changed.map((row) => {
       const then = before.get(key(row));
       const change = row.value - then;
-      const part = then ? ` (${change > 0 ? "+" : ""}${digits((100 * change) / Math.abs(then), 3)} %)` : "";
+      const signed = (x) => `${x > 0 ? "+" : ""}${digits(x, 3)}`;
       const title = units.given ? units[row.kind] : "";
-      return tableRow(rowName(row), [digits(then), digits(row.value), `${change > 0 ? "+" : ""}${digits(change, 3)}${part}`], title);
+      return tableRow(rowName(row), [
+        digits(then), digits(row.value), signed(change), then ? `${signed((100 * change) / Math.abs(then))} %` : "",
+      ], title);
     }));
-    if (!changed.length) table.querySelector("tbody").replaceChildren(tableRow("No number differs", ["", "", ""]));
+    if (!changed.length) table.querySelector("tbody").replaceChildren(tableRow("No number differs", ["", "", "", ""]));
   }
 
   item(variant, number, compared) {

@@ -1,0 +1,214 @@
+"""The numbers of a roof as tables of texts: a head, and rows of equal length."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from ..base.units import Units
+from ..certificate import Certificate
+from ..certificate.balance import reactions_per_length
+from ..panels import Panels
+from ..surface import Surface
+
+if TYPE_CHECKING:
+    from ..accuracy import MeshCheck
+
+DIGITS = 4  # of the largest number of a column
+MOST_FAMILIES = 40  # rows of the panel schedule; the table of panels has all of them
+
+
+class Table(NamedTuple):
+    """A table: its title, the head, the rows, and how many columns at the left are words."""
+
+    title: str
+    head: list[str]
+    rows: list[list[str]]
+    words: int = 1
+
+
+def column(values: Iterable[float], digits: int = DIGITS) -> list[str]:
+    """Numbers with as many decimals as the largest of them needs; nothing for what is not known.
+
+    >>> column([6.0, 12.3456, -1e-14, math.nan])
+    ['6.00', '12.35', '0.00', '–']
+    """
+    numbers = np.asarray(list(values), dtype=float)
+    largest = float(np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0))
+    if largest > 0.0 and not 1e-6 <= largest < 1e9:
+        return ["–" if not math.isfinite(x) else f"{x:.{digits - 1}e}" for x in numbers]
+    decimals = min(max(digits - 1 - math.floor(math.log10(largest)), 0), 8) if largest else 0
+    texts = [f"{x:.{decimals}f}" if math.isfinite(x) else "–" for x in numbers]
+    return [text.removeprefix("-") if not text.strip("-0.") else text for text in texts]
+
+
+def one(value: float) -> str:
+    """A single number; see ``column``."""
+    return column([value])[0]
+
+
+def key_figures(surface: Surface, certificate: Certificate, units: Units) -> Table:
+    """Size, height, areas, volume, load, and the largest reaction per length."""
+    X, length = surface.vertices, units.length
+    width, depth, _ = np.ptp(X, axis=0).tolist()
+    heights = surface.plane.height(X)
+    area, roof = certificate.patches["area"].to_numpy(), ~surface.walls
+    per_length = np.linalg.norm(reactions_per_length(surface, certificate.reactions), axis=1)
+    rows = [
+        ["size in the plan", f"{one(width)} × {one(depth)} {length}"],
+        ["highest point above the plane", f"{one(float(heights.max()))} {length}"],
+        ["area of the roof", f"{one(float(area[roof].sum()))} {units.area}"],
+    ]
+    if not roof.all():
+        rows.append(["area of walls", f"{one(float(area[~roof].sum()))} {units.area}"])
+    force = units.force or "force"
+    rows += [
+        ["volume below it", f"{one(certificate.volume)} {units.volume}"],
+        ["pressure and weight, upwards", f"{one(certificate.load)} {force}"],
+        ["all reactions, upwards", f"{one(certificate.support)} {force}"],
+    ]
+    if np.isfinite(per_length).any():
+        rows.append(["largest reaction per length", f"{one(float(np.nanmax(per_length)))} {units.tension}"])
+    rows.append(["mesh", f"{surface.m} triangles, {surface.n} vertices"])
+    return Table("Key figures", [], rows)
+
+
+def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Table:
+    """A row per patch: tension, pressure, weight, area, mean curvature and its error."""
+    table, length = certificate.patches, units.length
+    columns = {
+        f"tension, {units.tension}": column(table["tension"]),
+        f"pressure, {units.pressure}": column(table["pressure"]),
+        f"area, {units.area}": column(table["area"]),
+        f"mean curvature, 1/{length}": column(table["mean_H"]),
+        "its largest error": [small(x) for x in table["variational_max"].tolist()],
+    }
+    weights = [patch.weight for patch in surface.patches]
+    if any(weights):
+        columns[f"weight, {units.pressure}"] = column(weights)
+    kind = ["wall" if wall else "roof" for wall in surface.walls]
+    words = [[name, what] for name, what in zip(table["patch"], kind, strict=True)]
+    return _table("Patches", ["patch", "kind"], words, columns)
+
+
+def junction_table(certificate: Certificate, units: Units) -> Table | None:
+    """A row per junction, numbered as in the plan."""
+    table = certificate.junctions
+    if not len(table):
+        return None
+    words = [[f"J{k}", name] for k, name in enumerate(table["junction"], start=1)]
+    columns = {
+        f"length, {units.length}": column(table["length"]),
+        **_middles(table, units),
+        f"force left, {units.tension}": [small(x) for x in table["force_left"].tolist()],
+    }
+    return _table("Junctions", ["", "between"], words, columns)
+
+
+def boundary_table(certificate: Certificate, units: Units) -> Table | None:
+    """A row per held boundary, numbered as in the plan: its reaction, and the largest per length."""
+    table, force = certificate.boundaries, units.force or "force"
+    if not len(table):
+        return None
+    words = [[f"B{k}", name] for k, name in enumerate(table["boundary"], start=1)]
+    reaction = table[[f"reaction_{axis}" for axis in "xyz"]]
+    texts = np.array(column(reaction.to_numpy().ravel())).reshape(-1, 3).T
+    columns = {f"length, {units.length}": column(table["length"])}
+    columns |= {f"R{axis}, {force}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
+    columns[f"largest, {units.tension}"] = column(table["per_length_max"])
+    return _table("Boundaries and their reactions", ["", "boundary of"], words, columns)
+
+
+def cable_tables(certificate: Certificate, units: Units) -> list[Table]:
+    """The cables with their forces, and what holds their ends."""
+    tables, force = [], units.force or "force"
+    if len(certificate.cables):
+        table = certificate.cables
+        columns = {
+            f"force, {force}": column(table["tension"]),
+            f"length, {units.length}": column(table["length"]),
+            **_middles(table, units),
+        }
+        tables.append(_table("Cables", ["cable"], [[name] for name in table["cable"]], columns))
+    if len(certificate.cable_ends):
+        table = certificate.cable_ends
+        held = ["held" if held else "free" for held in table["held"]]
+        words = [[name, end] for name, end in zip(table["cable"], held, strict=True)]
+        columns = {f"{axis}, {units.length}": column(table[axis]) for axis in "xyz"}
+        columns |= {f"F{axis}, {force}": column(table[f"force_{axis}"]) for axis in "xyz"}
+        tables.append(_table("Ends of cables, and the forces on them", ["cable", "end"], words, columns))
+    return tables
+
+
+def room_table(certificate: Certificate, units: Units) -> Table | None:
+    """The rooms of prescribed volume."""
+    table = certificate.rooms
+    if not len(table):
+        return None
+    columns = {
+        f"volume, {units.volume}": column(table["volume"]),
+        f"prescribed, {units.volume}": column(table["prescribed"]),
+        f"pressure, {units.pressure}": column(table["pressure"]),
+    }
+    return _table("Rooms of prescribed volume", ["room"], [[name] for name in table["room"]], columns)
+
+
+def target_table(targets: pd.DataFrame) -> Table:
+    """What was wanted, and what is reached."""
+    words = [[str(name)] for name in targets.index]
+    columns = {
+        "wanted": [one(x) for x in targets["wanted"].tolist()],
+        "reached": [one(x) for x in targets["value"].tolist()],
+        "met": ["yes" if met else "no" for met in targets["met"]],
+    }
+    return _table("Targets", ["quantity"], words, columns)
+
+
+def mesh_table(check: MeshCheck) -> Table:
+    """Each quantity with its error bar, and its limit on finer and finer meshes."""
+    table = check.table
+    words = [[quantity, of] for quantity, of in zip(table["quantity"], table["of"], strict=True)]
+    columns = {
+        "on this mesh": [one(x) for x in table["value"].tolist()],
+        "error bar": [_bar(x) for x in table["error"].tolist()],
+        "limit": [one(x) for x in table["limit"].tolist()],
+        "its error bar": [_bar(x) for x in table["limit_error"].tolist()],
+    }
+    return _table("", ["quantity", "of"], words, columns)
+
+
+def family_table(schedule: Panels, units: Units) -> Table:
+    """The first families of panels, the largest first."""
+    table = schedule.families.head(MOST_FAMILIES)
+    columns = {
+        "panels": [str(count) for count in table["count"]],
+        "turned over": [str(count) for count in table["mirrored"]],
+        **{f"{side}, {units.length}": column(table[side]) for side in "abc"},
+        f"area, {units.area}": column(table["area"]),
+    }
+    return _table("", ["family"], [[f"F{k}"] for k in table["family"]], columns)
+
+
+def _table(title: str, head: list[str], words: list[list[str]], columns: dict[str, list[str]]) -> Table:
+    rows = [[*start, *rest] for start, rest in zip(words, zip(*columns.values(), strict=True), strict=True)]
+    return Table(title, [*head, *columns], rows, len(head))
+
+
+def _middles(table: pd.DataFrame, units: Units) -> dict[str, list[str]]:
+    return {f"middle {axis}, {units.length}": column(table[f"middle_{axis}"]) for axis in "xyz"}
+
+
+def small(value: float) -> str:
+    """The size of an error."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.0e}" if value else "0"
+
+
+def _bar(value: float) -> str:
+    """An error bar, to two digits; nothing for one without bound."""
+    return f"± {column([value], 2)[0]}" if math.isfinite(value) else "–"

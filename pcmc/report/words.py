@@ -1,0 +1,78 @@
+"""The findings about a roof in plain sentences."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..base.units import Units
+from ..certificate import Certificate, Verdict
+from .tables import small
+
+if TYPE_CHECKING:
+    from ..accuracy import MeshCheck
+
+VERDICTS = {
+    Verdict.STABLE: "The roof is in equilibrium, and the equilibrium is stable: tension and pressure balance"
+    " everywhere, and after any small disturbance the roof returns to this shape.",
+    Verdict.NEUTRAL: "The roof is in equilibrium, but some change of shape needs almost no force. Hold the"
+    " roof against that change, or change tensions, before you build it.",
+    Verdict.SADDLE: "The roof is in equilibrium, but leaves this shape at the smallest disturbance. Do not"
+    " build it like this.",
+    Verdict.NOT_CONVERGED: "The roof is not in equilibrium yet: the forces do not balance. Solve it further.",
+    Verdict.NO_EQUILIBRIUM: "There is no equilibrium: no shape balances these tensions and pressures.",
+    Verdict.RAN_AWAY: "No equilibrium is known: the shape moved away without coming to rest.",
+    Verdict.UNDECIDED: "Rounding of numbers hides whether the roof is in equilibrium, or stable.",
+    Verdict.WALL_DOWN: "A ridge comes down on the bottom of its wall, where it cannot rest.",
+    Verdict.DEGENERATE: "Triangles of the mesh have collapsed: the shape says nothing about a roof.",
+}
+"""What each verdict means for those who build."""
+
+
+LEGEND = (
+    "J1, J2 and so on number the junctions, B1, B2 and so on the held boundaries, as in the tables. Black:"
+    " rims. Red: ridges. Green: bottoms and ends of walls. Violet: cables. Grey: edges of panels."
+)
+"""How to read the plan."""
+
+
+def verdict_sentences(certificate: Certificate, check: MeshCheck | None = None) -> list[str]:
+    """The verdict, its reason, and how exactly the roof keeps what it promises.
+
+    >>> from pcmc import Patch, Surface, certify
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
+    >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("roof", 1.0)], fixed=range(4))
+    >>> verdict_sentences(certify(roof))[0][:52]
+    'The roof is in equilibrium, and the equilibrium is s'
+    """
+    sentences = [VERDICTS[certificate.verdict]]
+    if certificate.detail:
+        sentences.append(f"In detail: {certificate.detail}.")
+    sentences.append(f"The forces left are {small(certificate.residual)} of the forces in the roof.")
+    if certificate.index is not None:
+        sentences.append(
+            "Each patch has the mean curvature that its tension and pressure ask for, up to"
+            f" {small(certificate.curvature_error)} of it."
+        )
+        share = f"{100.0 * certificate.load_ratio:.0f} %"
+        sentences.append(f"Pressure and weight use {share} of the most that the boundary could carry.")
+    if check is not None:
+        sentences.append(f"The mesh check: {check.verdict.value.partition(': ')[2]}.")
+    if certificate.symmetric_in:
+        planes = ", ".join(certificate.symmetric_in)
+        sentences.append(
+            f"This is the piece of the roof between its mirror planes ({planes}); the verdict is about"
+            " changes of shape that are symmetric in them."
+        )
+    if len(certificate.pinched):
+        sentences.append(f"The ridge rests on the plane at {len(certificate.pinched)} vertices.")
+    return sentences
+
+
+def about_forces(units: Units) -> str:
+    """How the signs and units of the tables are meant."""
+    force = units.force or "the unit of force of the tensions"
+    return (
+        f"Lengths are in {units.length}, forces in {force}. Reactions are the forces of the supports on the"
+        " roof: z is up, so a negative z holds the roof down."
+    )

@@ -1,0 +1,220 @@
+"""The report: the roof's numbers, the same bytes each time, and no page of a bad roof unmarked."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from functools import partial
+
+import numpy as np
+import pytest
+from refusals import refused
+from starts import joined_caps, stationary
+
+import pcmc
+from pcmc import Patch, Surface, Verdict, cli
+from pcmc.base.errors import FileError, MissingExtra, OptionError, SurfaceError
+from pcmc.base.units import Units
+from pcmc.report import RoofReport, roof_report, tables, words
+from pcmc.report.plan import paper_plan
+
+TEXT = pytest.mark.skipif(shutil.which("pdftotext") is None, reason="pdftotext is not installed")
+UNITS = Units("m", "kN")
+GOAL = """
+units = "m"
+force = "kN"
+[plan]
+edge_length = 1.0
+outline = [[0, 0], [4, 0], [4, 3], [0, 3]]
+patches = {roof = {tension = 2.0}}
+[targets]
+meet = [{quantity = "apex", of = "roof", value = %s}]
+vary = ["roof"]
+[output]
+tolerance = 0.02
+date = "1 May"
+"""
+
+
+def words_of(path):
+    """The text of each page, by another program."""
+    done = subprocess.run(["pdftotext", "-layout", path, "-"], capture_output=True, text=True, check=True)
+    return done.stdout.removesuffix("\f").split("\f")
+
+
+@pytest.fixture(scope="module")
+def caps():
+    return stationary(partial(joined_caps, 1.0)).surface
+
+
+@pytest.fixture(scope="module")
+def pages(caps, tmp_path_factory):
+    """The pages of a report with everything in it."""
+    path = tmp_path_factory.mktemp("report") / "caps.pdf"
+    report = roof_report(
+        caps,
+        UNITS,
+        name="<b>caps & more</b>",
+        tolerance=0.05,
+        mesh_check=pcmc.check_mesh(caps, 2),
+        files={"caps.3dm": "surface"},
+        date="1 May",
+    )
+    report.write(path)
+    first = path.read_bytes()
+    assert report.write(path).read_bytes() == first
+    if shutil.which("pdftotext") is None:
+        pytest.skip("pdftotext is not installed")
+    return words_of(path)
+
+
+def test_each_page_has_its_number_and_the_name(pages):
+    for number, page in enumerate(pages, start=1):
+        assert f"page {number} of {len(pages)}" in page
+        assert "<b>caps & more</b>" in page
+        assert "1 May" in page
+        assert "NOT CERTIFIED" not in page
+
+
+def test_it_has_every_number_of_the_certificate(pages, caps):
+    text, certificate = "\n".join(pages), pcmc.certify(caps)
+    assert words.VERDICTS[certificate.verdict][:40] in " ".join(text.split())
+    for k, row in enumerate(certificate.boundaries.itertuples(), start=1):
+        (line,) = re.findall(rf"^ *B{k} +{row.boundary} .*$", text, re.M)
+        found = [float(x) for x in line.split()[-5:]]
+        wanted = [row.length, row.reaction_x, row.reaction_y, row.reaction_z, row.per_length_max]
+        largest = max(map(abs, wanted))
+        np.testing.assert_allclose(found, wanted, atol=2e-3 * largest)
+    assert len(re.findall(r"^ *J\d+ ", text, re.M)) == len(certificate.junctions)
+    for patch in caps.patches:
+        assert re.search(rf"^ *{patch.name} +(roof|wall) ", text, re.M)
+    assert f"{pcmc.certify(caps).volume:.1f} m³" in text
+    for part in ("Mesh check", "Panels", "families", "caps.3dm", "reportlab", "kN/m²"):
+        assert part in text
+
+
+def test_the_plan_is_to_scale(caps):
+    plan = paper_plan(caps, pcmc.certify(caps), UNITS)
+    rims = np.concatenate([line.points for line in plan.lines if line.layer == "PCMC-RIM"])
+    factor = 1000.0 / float(plan.scale.removeprefix("1:"))
+    assert np.ptp(rims, axis=0) == pytest.approx(factor * np.ptp(caps.vertices[:, :2], axis=0))
+    every = np.concatenate([line.points for line in plan.lines])
+    assert (every >= 0.0).all()
+    assert (every <= plan.size).all()
+    assert plan.size[0] <= 174.0
+    certificate = pcmc.certify(caps)
+    names = [f"J{k + 1}" for k in range(len(certificate.junctions))]
+    names += [f"B{k + 1}" for k in range(len(certificate.boundaries))]
+    assert set(names) <= {text.text for text in plan.texts}
+    places = np.array([text.at for text in plan.texts if text.text in names])
+    away = np.linalg.norm(places[:, None] - places[None], axis=2) + 100.0 * np.eye(len(places))
+    assert away.min() > 2.0  # mm, also where a wall stands below its ridge
+
+
+def test_every_verdict_has_its_sentence():
+    assert set(words.VERDICTS) == set(Verdict)
+
+
+@pytest.mark.parametrize(
+    ("values", "texts"),
+    [
+        ([0.0, 0.0], ["0", "0"]),
+        ([1234.5678, 0.01], ["1235", "0"]),
+        ([np.nan, np.inf, 0.5], ["–", "–", "0.5000"]),
+        ([2e12, 1.0], ["2.000e+12", "1.000e+00"]),
+        ([-3e-9, 2.0], ["0.000", "2.000"]),
+    ],
+)
+def test_numbers_of_a_column_have_the_same_decimals(values, texts):
+    assert tables.column(values) == texts
+
+
+def bad_roof():
+    """A pyramid that is not at rest."""
+    corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.7]]
+    faces = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    return Surface(corners, faces, [0] * 4, [Patch("roof", 1.0)], fixed=range(4))
+
+
+@TEXT
+def test_a_roof_that_is_not_certified_is_refused_or_every_page_is_marked(tmp_path):
+    with refused(SurfaceError, what="surface", found=Verdict.NOT_CONVERGED):
+        roof_report(bad_roof(), "m")
+    path = roof_report(bad_roof(), "m", anyway=True).write(tmp_path / "bad.pdf")
+    pages = words_of(path)
+    assert len(pages) > 1
+    assert all("NOT CERTIFIED: not converged" in page for page in pages)
+
+
+@pytest.mark.parametrize(
+    ("units", "options", "fields"),
+    [
+        ("", {}, {"what": "units", "found": ""}),
+        (Units(), {}, {"what": "units"}),
+        ("parsec", {}, {"what": "units", "found": "parsec"}),
+        (3, {}, {"what": "units", "found": 3}),
+        ("m", {"tolerance": 0.0}, {"what": "tolerance", "found": 0.0}),
+    ],
+)
+def test_what_cannot_be_reported_is_refused(small_cap, units, options, fields):
+    with refused(OptionError, **fields):
+        roof_report(small_cap, units, **options)
+
+
+def test_it_is_written_whole_as_pdf_or_not_at_all(tmp_path, small_cap, monkeypatch):
+    report = roof_report(small_cap, "m")
+    with refused(FileError, found=".txt"):
+        report.write(tmp_path / "roof.txt")
+    monkeypatch.setattr(RoofReport, "pdf", lambda report: b"%PDF")
+    with refused(FileError, what=str(tmp_path / "no" / "roof.pdf")):
+        report.write(tmp_path / "no" / "roof.pdf")
+    monkeypatch.setitem(sys.modules, "reportlab.pdfbase", None)
+    with pytest.raises(MissingExtra, match=r"\[report\]"):
+        roof_report(small_cap, "m")
+    assert not list(tmp_path.iterdir())
+
+
+@TEXT
+def test_the_command_reports_on_the_designed_roof(tmp_path, monkeypatch, capsys):
+    """Targets, and the project's tolerance and date."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "roof.toml").write_text(GOAL % 0.6)
+    assert cli.main(["report", "roof.toml", "-o", "roof.pdf", "--no-mesh-check"]) == 0
+    text = "\n".join(words_of("roof.pdf"))
+    assert re.search(r"apex of roof +0\.6000 +0\.6000 +yes", text)
+    assert "1 May" in text
+    assert re.search(r"F1 +\d+", text)
+    assert "Mesh check" not in text
+    capsys.readouterr()
+    for arguments in (["roof.toml", "-o", "x.doc"], ["roof.toml", "-o", "x.pdf", "--tolerance", "0"]):
+        assert cli.main(["report", *arguments]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    (tmp_path / "roof.toml").write_text(GOAL.replace('units = "m"\nforce = "kN"\n', "") % 0.6)
+    assert cli.main(["report", "roof.toml", "-o", "x.pdf"]) == 2
+    assert 'units = "m"' in capsys.readouterr().err
+    assert not (tmp_path / "x.pdf").exists()
+
+
+@TEXT
+@pytest.mark.parametrize(
+    ("command", "output"),
+    [
+        (["report", "--no-mesh-check"], "roof.pdf"),
+        (["draw"], "roof.pdf"),
+        (["panels", "--tolerance", "0.1"], "roof.csv"),
+    ],
+)
+def test_a_roof_that_misses_its_targets_is_refused(tmp_path, monkeypatch, capsys, command, output):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "roof.toml").write_text(GOAL % 30.0)
+    name, *options = command
+    assert cli.main([name, "roof.toml", "-o", output, *options]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "misses its targets" in error
+    assert not (tmp_path / output).exists()
+    assert cli.main([name, "roof.toml", "-o", output, *options, "--anyway"]) == 1
+    if name == "report":
+        assert all("TARGETS NOT MET" in page for page in words_of(output))
