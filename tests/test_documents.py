@@ -197,3 +197,39 @@ def test_remesh_writes_no_documents(tmp_path, monkeypatch):
     (tmp_path / "roof.toml").write_text(UNITS + SMALL + OUTPUT + 'report = "a.pdf"\n', encoding="utf-8")
     assert cli.main(["remesh", "roof.toml", "--edge-length", "0.8", "-o", "fine.pcmc"]) == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["fine.pcmc", "roof.toml"]
+
+
+@pytest.mark.parametrize("command", ["solve", "report", "draw", "structure"])
+def test_documents_of_a_symmetric_roof_show_the_whole(tmp_path, monkeypatch, command):
+    """The plan is one half; the drawing has all of its triangles, the report its full width."""
+    import ezdxf
+
+    monkeypatch.chdir(tmp_path)
+    half = SMALL.replace("patches", "mirrors = [[[4, 0], [4, 3]]]\npatches")
+    output = 'whole = true\ndrawings = ["roof.dxf"]\nreport = "roof.pdf"\nstructure = "roof.inp"\n'
+    (tmp_path / "roof.toml").write_text(UNITS + half + STRUCTURE + OUTPUT + output, encoding="utf-8")
+    name = {"report": "roof.pdf", "draw": "roof.dxf", "structure": "roof.inp"}.get(command)
+    quick = ["--no-mesh-check"] if command in ("solve", "report") else []
+    assert cli.main([command, "roof.toml", *(["-o", name] if name else []), *quick]) == 0
+    if (tmp_path / "roof.pdf").exists() and shutil.which("pdftotext"):
+        assert "8.000 × 3.000 m" in "\n".join(words_of("roof.pdf"))
+    if (tmp_path / "roof.dxf").exists():
+        faces = ezdxf.readfile("roof.dxf").modelspace().query("3DFACE")
+        x = [corner[0] for face in faces for corner in face.wcs_vertices()]
+        assert (min(x), max(x)) == pytest.approx((0.0, 8.0))
+    if (tmp_path / "roof.inp").exists():
+        lines = (tmp_path / "roof.inp").read_text(encoding="utf-8").splitlines()
+        nodes = lines[lines.index(next(line for line in lines if line.startswith("*NODE"))) + 1 :]
+        x = [float(line.split(",")[1]) for line in nodes[: next(k for k, n in enumerate(nodes) if "*" in n)]]
+        assert (min(x), max(x)) == pytest.approx((0.0, 8.0))
+
+
+def test_a_picture_has_its_views_side_by_side(tmp_path):
+    text = SMALL + OUTPUT + 'picture = "a.png"\ncolour = "error"\nviews = ["plan", [30, 20]]\n'
+    (tmp_path / "roof.toml").write_text(text, encoding="utf-8")
+    assert project.run(tmp_path / "roof.toml").good
+    with Image.open(tmp_path / "a.png") as picture:
+        pixels = np.asarray(picture.convert("RGB")).mean(axis=2)
+    upper = (pixels[: pixels.shape[0] // 2] < 250).any(axis=0)
+    parts = np.flatnonzero(np.diff(upper.astype(int)) == 1)
+    assert len(parts) == 2

@@ -88,7 +88,7 @@ def build_surface(plan: PlanData) -> Surface:
     base = harmonic_heights(mesh.points, mesh.triangles, given)
     patches, patch_of_face = _patches(plan, mesh)
     cables = _cables(draft, fixed | sliding)
-    _check_free_pressure(draft, cables, patches, patch_of_face)
+    check_pressures(draft.edges, mesh.triangles, patch_of_face, patches)
     height = base + _rise(draft, patches, fixed | sliding)
     inner = np.arange(len(base)) >= len(draft.drawn.points)
     raised = improve_angles(np.column_stack([mesh.points, height]), mesh.triangles, inner, GOOD_ANGLE)
@@ -252,17 +252,6 @@ def _cables(draft: _Draft, held: Bools) -> list[Cable]:
         name = divider.name if named else f"cable {next(numbers)}"
         cables.append(Cable(name, divider.cable, np.concatenate(parts)))
     return cables
-
-
-def _check_free_pressure(
-    draft: _Draft, cables: Sequence[Cable], patches: Sequence[Patch], patch_of_face: Ints
-) -> None:
-    """Refuse pressure, and snow, on a patch with a free edge."""
-    loads = []
-    for k, patch in enumerate(patches):
-        F = draft.mesh.triangles[patch_of_face == k]
-        loads.append((patch.name, patch.pressure, F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)))
-    check_pressures(draft.edges, cables, loads)
 
 
 def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:

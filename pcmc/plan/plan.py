@@ -90,6 +90,14 @@ class Plan(PlanData):
     ...             patches={"west": {"tension": 2.0}, "east": {"tension": 2.5}})
     >>> [p.name for p in plan.surface().patches]
     ['west', 'east', 'wall 1']
+
+    A sail on four masts:
+
+    >>> masts = [[0, 0, 4], [10, 0, 0], [10, 10, 4], [0, 10, 0]]
+    >>> sail = Plan([[0, 0], [10, 0], [10, 10], [0, 10]], edge="cable", cable=9.0, supports=masts,
+    ...             tension=1.0, pressure=0.0).surface()
+    >>> [cable.name for cable in sail.cables], int(sail.fixed.sum())
+    (['cable 1', 'cable 2', 'cable 3', 'cable 4'], 4)
     """
 
     def __post_init__(self) -> None:

@@ -46,7 +46,7 @@ def _laid_out(story: list[Any], title: str, foot: str, mark: str, count: int) ->
         canvas.setFont(FONT, 8.0)
         canvas.setFillColor(HexColor(GREY))
         canvas.drawString(left, upper, _cut(canvas, title, 90.0 * mm if mark else right - left))
-        canvas.drawString(left, lower, foot)
+        canvas.drawString(left, lower, _cut(canvas, foot, right - left - 30.0 * mm))
         canvas.drawRightString(right, lower, f"page {document.page} of {count}")
         if mark:
             canvas.setFont(BOLD, 9.0)

@@ -85,7 +85,7 @@ def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Tab
         f"pressure, {units.pressure}": column(table["pressure"]),
         f"area, {units.area}": column(table["area"]),
         f"mean curvature, 1/{length}": column(table["mean_H"]),
-        "its largest error": [_small(x) for x in table["variational_max"].tolist()],
+        "its largest error": [small(x) for x in table["variational_max"].tolist()],
     }
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
@@ -104,7 +104,7 @@ def junction_table(certificate: Certificate, units: Units) -> Table | None:
     columns = {
         f"length, {units.length}": column(table["length"]),
         **_middles(table, units),
-        f"force left, {units.tension}": [_small(x) for x in table["force_left"].tolist()],
+        f"force left, {units.tension}": [small(x) for x in table["force_left"].tolist()],
     }
     return _table("Junctions", ["", "between"], words, columns)
 
@@ -202,9 +202,11 @@ def _middles(table: pd.DataFrame, units: Units) -> dict[str, list[str]]:
     return {f"middle {axis}, {units.length}": column(table[f"middle_{axis}"]) for axis in "xyz"}
 
 
-def _small(value: float) -> str:
+def small(value: float) -> str:
     """The size of an error."""
-    return f"{value:.0e}" if math.isfinite(value) else "–"
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.0e}" if value else "0"
 
 
 def _bar(value: float) -> str:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..base.units import Units
 from ..certificate import Certificate, Verdict
+from .tables import small
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
@@ -47,11 +48,11 @@ def verdict_sentences(certificate: Certificate, check: MeshCheck | None = None) 
     sentences = [VERDICTS[certificate.verdict]]
     if certificate.detail:
         sentences.append(f"In detail: {certificate.detail}.")
-    sentences.append(f"The forces left are {certificate.residual:.0e} of the forces in the roof.")
+    sentences.append(f"The forces left are {small(certificate.residual)} of the forces in the roof.")
     if certificate.index is not None:
         sentences.append(
             "Each patch has the mean curvature that its tension and pressure ask for, up to"
-            f" {certificate.curvature_error:.0e} of it."
+            f" {small(certificate.curvature_error)} of it."
         )
         share = f"{100.0 * certificate.load_ratio:.0f} %"
         sentences.append(f"Pressure and weight use {share} of the most that the boundary could carry.")

@@ -8,8 +8,6 @@ from itertools import count
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
@@ -21,7 +19,7 @@ from .plane import Plane
 from .room import Room
 from .supports import NEAR
 from .surface import Surface, expect_surface
-from .topology import topology
+from .topology import components, topology
 
 Held = TypeVar("Held", Plane, Guide)  # what holds vertices
 MOST_IMAGES = 120  # of the planes through one point no more are possible, but of a prism
@@ -203,13 +201,8 @@ def _moved_plane(plane: Plane, image: Image) -> Plane:
 
 def _joined(links: Ints, size: int) -> tuple[Ints, Ints]:
     """The new number (size,) of each element where linked ones are one, and the first element of each."""
-    graph = coo_array((np.ones(links.shape[1], dtype=bool), tuple(links)), shape=(size, size))
-    group = connected_components(graph, directed=False)[1]
-    first, place = np.unique(group, return_index=True)[1], group
-    order = np.argsort(first, kind="stable")
-    number = np.empty(len(first), dtype=np.int64)
-    number[order] = np.arange(len(first))
-    return number[place], first[order]
+    number = components(links.T, size)
+    return number, np.unique(number, return_index=True)[1]
 
 
 def _meets(surface: Surface, mirrors: Sequence[tuple[Plane, Bools]]) -> Bools:
