@@ -7,6 +7,8 @@ import numpy as np
 from pcmc import Patch, Plane, Surface
 from pcmc.base import validate
 
+from .grid import cut_squares
+
 
 def barrel(
     n: int = 8,
@@ -40,11 +42,7 @@ def barrel(
     t, y = np.meshgrid(np.linspace(-1.0, 1.0, n + 1), np.linspace(0.0, length, rows + 1), indexing="ij")
     X = np.stack([0.5 * span * t, y, rise * (1.0 - t**2)], axis=-1).reshape(-1, 3)
     number = np.arange(len(X)).reshape(n + 1, rows + 1)
-    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-    rising = (np.add.outer(np.arange(n), np.arange(rows)) % 2 == 0).ravel()
-    one = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 6)
-    other = np.stack([a, b, d, b, c, d], axis=-1).reshape(-1, 6)
-    faces = np.where(rising[:, None], one, other).reshape(-1, 3)
+    faces = cut_squares(number, np.add.outer(np.arange(n), np.arange(rows)) % 2 == 0)
     ends = tuple(
         (Plane((0.0, place, 0.0), (0.0, 1.0, 0.0), name, mirror=True), X[:, 1] == place)
         for place, name in ((0.0, "front"), (length, "back"))

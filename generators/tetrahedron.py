@@ -11,6 +11,7 @@ from pcmc.base.arrays import Floats, Ints
 
 from .builder import Builder
 from .exact import ExactSolution, FlatPlane, Shape
+from .grid import cut_squares
 from .weierstrass import Complexes, MinimalSurface
 
 CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]]) / np.sqrt(8.0)  # edges of length 1
@@ -118,12 +119,8 @@ def skew_quadrilateral(
     weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=-1).reshape(-1, 4)
     mesh = Builder()
     number = mesh.add_points(side * weights @ WIRE).reshape(n + 1, n + 1)
-    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
     low = np.arange(n) < half
-    rising = (low[:, None] != low)[:, :, None]  # diagonals cut the corners off
-    first = np.where(rising, np.stack([a, b, c], -1), np.stack([a, b, d], -1))
-    second = np.where(rising, np.stack([a, c, d], -1), np.stack([b, c, d], -1))
-    mesh.add_faces(np.concatenate([first, second]).reshape(-1, 3), 0)
+    mesh.add_faces(cut_squares(number, low[:, None] != low), 0)  # diagonals cut the corners off
     rim = np.concatenate([number[0], number[-1], number[1:-1, 0], number[1:-1, -1]])
     surface = mesh.surface([Patch("film", alpha, pressure=0.0)], fixed=rim)
     if not exact:

@@ -9,6 +9,7 @@ from pcmc.base import validate
 from pcmc.base.arrays import Floats, Ints
 
 from .builder import Builder
+from .grid import cut_squares
 
 LEFT, RIGHT, WALL = range(3)
 DIAGONALS = ("symmetric", "parallel")
@@ -72,13 +73,8 @@ def _roof(n: int, side: float, height: float) -> Floats:
 
 def _squares(number: Ints, n: int, diagonals: str) -> Ints:
     """(4n²,3) faces: every square cut along one diagonal."""
-    a, b = number[:-1, :-1], number[1:, :-1]
-    d, c = number[:-1, 1:], number[1:, 1:]
-    i, j = np.indices(a.shape)
-    rising = np.ones(a.shape, dtype=bool)
-    if diagonals == "symmetric":
-        left = (2 * i + 1 < n) == (2 * j + 1 < n)
-        rising = np.where(i < n, left, ~left[::-1])
-    first = np.where(rising[..., None], np.stack([a, b, c], -1), np.stack([a, b, d], -1))
-    second = np.where(rising[..., None], np.stack([a, c, d], -1), np.stack([b, c, d], -1))
-    return np.stack([first, second], axis=2).reshape(-1, 3)
+    i, j = np.indices((2 * n, n))
+    if diagonals == "parallel":
+        return cut_squares(number, np.ones(i.shape, dtype=bool))
+    left = (2 * i + 1 < n) == (2 * j + 1 < n)
+    return cut_squares(number, np.where(i < n, left, ~left[::-1]))

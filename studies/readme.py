@@ -13,7 +13,7 @@ from .folder import Folder, write_bytes
 from .paper import CONDITIONAL, HOLDS, NEAR, NOT, OWN, REPRODUCED
 from .report import HEADS, comparison_cells, table, write_report
 
-ROWS = 10
+ROWS = 5
 
 
 def write_readme(readme: Path, results: Path) -> None:
@@ -36,7 +36,7 @@ def up_to_date(readme: str, results: Path) -> str:
 
 
 def summary(comparison: pd.DataFrame) -> pd.DataFrame:
-    """Ten of the numbers that the paper prints: all that fail first, then in the paper's order."""
+    """Some of the numbers that the paper prints: all that fail first, then in the paper's order."""
     printed = of_the_paper(comparison, "number")
     agrees = printed.verdict.isin([HOLDS, NEAR])
     return printed.loc[agrees.sort_values(kind="stable").index[:ROWS].sort_values()]

@@ -1,4 +1,4 @@
-"""Small random meshes: triangles glued at random, walls, supports, tensions and pressures at random."""
+"""Small random meshes: triangles glued at random; walls, supports, tensions and other forces at random."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import itertools
 import numpy as np
 from scipy.spatial import Delaunay
 
-from pcmc import Patch, Plane, Surface
+from pcmc import Cable, Patch, Plane, Room, Surface
 
 TENSIONS = (0.0, 0.1, 1.0, 1.0, 2.0, 5.0)
+WEIGHTS = (0.0, 0.2, -0.3, 1.0)
 PRESSURES = (0.0, 0.0, 0.3, 1.0, 1.0, -0.5)
 
 
@@ -27,6 +28,36 @@ def random_surface(seed: int) -> Surface:
     fixed = rng.random(len(X)) < rng.choice([0.0, 0.2, 0.5])
     fixed[rng.integers(len(X))] = True
     return Surface(X, F, patch, patches, fixed, low & (rng.random(len(X)) < share), plane)
+
+
+def loaded_surface(seed: int) -> Surface:
+    """The surface of this seed with cables, weights, a room, sliding planes and mirrors at random."""
+    bare, rng = random_surface(seed), np.random.default_rng([seed, 7])
+    edges, X = bare.topology.edges, bare.vertices
+    at = np.split(rng.permutation(len(edges)), np.cumsum(rng.integers(1, 5, int(rng.integers(0, 4)))))[:-1]
+    cables = [
+        Cable(f"c{k}", float(rng.choice(TENSIONS)), edges[some]) for k, some in enumerate(at) if some.size
+    ]
+    heavy = {p.name: float(rng.choice(WEIGHTS)) for p in bare.patches if p.tension > 0.0}
+    signs = {p.name: int(rng.choice([-1, 1, 1, 1])) for p in bare.patches if rng.random() < 0.7}
+    rooms = [Room("r", signs, float(rng.choice([0.1, 1.0, -0.5])))] if signs and rng.random() < 0.5 else []
+    fixed = bare.fixed.copy()
+    if rooms and rng.random() < 0.7:
+        fixed[np.unique(edges[bare.topology.boundary_edge])] = True
+    planes = dict(_plane(rng, bare, k) for k in range(int(rng.integers(0, 3))))
+    mesh = X, bare.faces, bare.patch_of_face, bare.retensioned(weights=heavy).patches
+    return Surface(*mesh, fixed, bare.on_plane, bare.plane, on_planes=planes, cables=cables, rooms=rooms)
+
+
+def _plane(rng: np.random.Generator, surface: Surface, k: int) -> tuple[Plane, np.ndarray]:
+    """A sliding plane through a vertex, or a mirror plane beside all, with the vertices that lie on it."""
+    X, normal = surface.vertices, rng.standard_normal(3)
+    if rng.random() < 0.5:
+        normal = np.eye(3)[rng.integers(3)]
+    mirror = bool(rng.random() < 0.4)
+    vertex = int(np.argmin(X @ normal)) if mirror else int(rng.integers(len(X)))
+    plane = Plane(tuple(X[vertex]), tuple(normal), f"plane {k}", mirror=mirror)
+    return plane, np.flatnonzero(np.abs(plane.height(X)) < 1e-9)
 
 
 def _patch(rng: np.random.Generator, k: int, mild: bool) -> Patch:

@@ -149,3 +149,9 @@ def rotation(seed: int) -> np.ndarray:
     Q, R = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))
     Q = Q * np.sign(np.diag(R))
     return Q * np.sign(np.linalg.det(Q))
+
+
+def placed(surface: Surface, R: np.ndarray, shift: np.ndarray) -> Surface:
+    """The surface turned by ``R`` (3,3) and moved by ``shift`` (3,), its Π with it."""
+    plane = Plane(R @ surface.plane.point + shift, R @ surface.plane.normal)
+    return surface.rebuilt(vertices=surface.vertices @ R.T + shift, plane=plane)

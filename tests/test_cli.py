@@ -184,7 +184,7 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["solve", "roof"], "Known: .toml, .pcmc"),
         (["certify", "roof.txt"], "Known: .toml, .pcmc"),
         (["solve", "roof.toml", "-o", "roof.png"], "a picture has its own option"),
-        (["solve", "roof.toml", "--picture", "roof.obj"], "roof.obj: pictures are .png, .svg, .pdf"),
+        (["solve", "roof.toml", "--picture", "roof.obj"], "roof.obj: the suffix of a picture is .png"),
         (["convert", "roof.toml", "roof.png"], "roof.png: unknown suffix"),
         (["remesh", "roof.toml", "--edge-length", "1", "-o", "x.png"], "x.png: unknown suffix"),
         (["solve", "roof.toml", "--folder", "roof.toml/new"], "roof.toml is a file"),

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from shapes import rotation, shaken
+from shapes import placed, rotation, shaken
 from starts import double_bubble, four_fans, two_caps, two_squares
 
-from pcmc import Patch, Plane, Surface, Verdict, certify, energy, solve
+from pcmc import Patch, Surface, Verdict, certify, energy, solve
 from pcmc.contact.pinching import (
     beside_resting,
     find_walls,
@@ -45,17 +45,7 @@ def pressed(n=6, count=2, **arguments):
 def elsewhere(surface, seed=0):
     """The surface turned and moved, its plane with it, and the map of points."""
     R, shift = rotation(seed), np.array([3.0, -1.0, 2.0])
-    plane = Plane(R @ surface.plane.point + shift, R @ surface.plane.normal)
-    turned = Surface(
-        surface.vertices @ R.T + shift,
-        surface.faces,
-        surface.patch_of_face,
-        surface.patches,
-        fixed=surface.fixed,
-        on_plane=surface.on_plane,
-        plane=plane,
-    )
-    return turned, lambda X: X @ R.T + shift
+    return placed(surface, R, shift), lambda X: X @ R.T + shift
 
 
 def test_which_walls_can_pinch():
@@ -380,16 +370,7 @@ def test_a_wall_under_pressure_pinches_like_one_without():
     patches = [Patch(p.name, p.tension, p.pressure, wall=p.auxiliary) for p in given.patches]
     wall = given.patch_index("wall")
     patches[wall] = Patch("wall", 3.0, 1e-3, wall=True)
-    pressed = solve(
-        Surface(
-            given.vertices,
-            given.faces,
-            given.patch_of_face,
-            patches,
-            fixed=given.fixed,
-            on_plane=given.on_plane,
-        )
-    )
+    pressed = solve(given.rebuilt(patches=patches))
     assert pressed.converged
     assert len(pressed.certificate.pinched) == 5
     assert pressed.energy == pytest.approx(plain.energy, rel=1e-6)  # vertices lie elsewhere

@@ -8,11 +8,11 @@ import pytest
 import pyvista
 import rhino3dm
 from refusals import refused
-from shapes import rotation
+from shapes import placed, rotation
 from starts import stationary, two_squares
 
 import pcmc
-from pcmc import Plane, Surface, certify
+from pcmc import certify
 from pcmc.base.errors import FileError, FileWarning, SurfaceError
 from pcmc.contact.pinching import find_walls, resting_vertices
 from pcmc.io import load
@@ -36,16 +36,7 @@ def partly():
 def turned():
     """The same with Π somewhere else, so that its vertices lie on it to rounding only."""
     surface, R, shift = partly(), rotation(3), np.array([3.0, -1.0, 2.0])
-    plane = Plane(R @ surface.plane.point + shift, R @ surface.plane.normal)
-    return Surface(
-        surface.vertices @ R.T + shift,
-        surface.faces,
-        surface.patch_of_face,
-        surface.patches,
-        fixed=surface.fixed,
-        on_plane=surface.on_plane,
-        plane=plane,
-    )
+    return placed(surface, R, shift)
 
 
 @pytest.mark.parametrize("suffix", WHOLE)

@@ -4,11 +4,11 @@ from functools import partial
 
 import numpy as np
 import pytest
-from shapes import rotation
+from shapes import placed, rotation
 from starts import four_fans, stationary, two_squares
 
 import pcmc
-from pcmc import Patch, Plane, Surface, Verdict, certify, energy, solve
+from pcmc import Patch, Surface, Verdict, certify, energy, solve
 from pcmc.contact.pinching import (
     coming_down,
     find_walls,
@@ -25,14 +25,7 @@ from pcmc.solvers.newton import newton
 
 def held(surface):
     """The same surface with the bottoms of its walls fixed."""
-    return Surface(
-        surface.vertices,
-        surface.faces,
-        surface.patch_of_face,
-        surface.patches,
-        fixed=surface.fixed | surface.on_plane,
-        plane=surface.plane,
-    )
+    return surface.rebuilt(fixed=surface.held)
 
 
 def example(n, alpha_aux, right=2.0):
@@ -62,15 +55,7 @@ def pressed(n=6, count=2, right=2.0):
 def elsewhere(surface, seed=0):
     """The surface turned and moved, its plane with it."""
     R, shift = rotation(seed), np.array([3.0, -1.0, 2.0])
-    return Surface(
-        surface.vertices @ R.T + shift,
-        surface.faces,
-        surface.patch_of_face,
-        surface.patches,
-        fixed=surface.fixed,
-        on_plane=surface.on_plane,
-        plane=Plane(R @ surface.plane.point + shift, R @ surface.plane.normal),
-    )
+    return placed(surface, R, shift)
 
 
 def test_a_standing_wall_that_is_held_pinches_only_when_asked():

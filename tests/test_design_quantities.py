@@ -111,15 +111,7 @@ def test_heights_are_the_meshs_own(roof):
 
 
 def drawn_at(surface, shift):
-    return pcmc.Surface(
-        surface.vertices + shift,
-        surface.faces,
-        surface.patch_of_face,
-        surface.patches,
-        surface.fixed,
-        surface.on_plane,
-        surface.plane,
-    )
+    return surface.rebuilt(vertices=surface.vertices + shift)
 
 
 @pytest.mark.parametrize("make", [cap, lambda: two_caps(1.2)], ids=["cap", "two caps"])

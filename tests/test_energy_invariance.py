@@ -32,9 +32,7 @@ def test_rigid_motions_turn_the_gradient(seed, shift):
     plane = Plane(shift + R @ surface.plane.point, R @ surface.plane.normal)
     X = surface.vertices @ R.T + shift
     # Rounding may lift sliding vertices off the turned plane by far less than the check allows.
-    other = Surface(
-        X, surface.faces, surface.patch_of_face, surface.patches, surface.fixed, surface.on_plane, plane
-    )
+    other = surface.rebuilt(vertices=X, plane=plane)
     assert energy(other) == pytest.approx(energy(surface), rel=1e-12)
     np.testing.assert_allclose(gradient(other), gradient(surface) @ R.T, atol=1e-11)
 

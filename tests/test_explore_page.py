@@ -196,6 +196,7 @@ vary = ["west", "east", {patch = "east", kind = "pressure", low = 0.5, high = 2.
 """
 
 
+@pytest.mark.slow
 def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(driver, tmp_path):
     path = tmp_path / "hall.toml"
     path.write_text(PROJECT)
@@ -284,6 +285,7 @@ def test_wrong_targets_are_named_on_the_page(page):
     assert page.complaints() == []
 
 
+@pytest.mark.slow
 def test_sliders_agree_with_their_numbers(page, explorer):
     """Also for values beyond the slider's ends, zero, and another sign."""
     for value in (40, 3, 0):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 import tomllib
 
 import numpy as np
@@ -21,6 +22,7 @@ from pcmc.certificate import Verdict
 from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
 from pcmc.explore import saving
+from pcmc.explore.page_data import outline
 from pcmc.explore.roof import Roof, read_roof
 from pcmc.explore.session import Session, solved_start
 from pcmc.explore.variants import difference, measures
@@ -123,6 +125,29 @@ def test_a_target_out_of_reach_keeps_the_surface_and_says_why(session):
     assert session.undo().message == ""
 
 
+def test_a_search_tells_its_progress_and_can_be_stopped(session, monkeypatch):
+    told = []
+    real = Session.stop
+
+    def met(surface, targets, vary, callback):
+        callback(None)
+        told.append(session.progress)
+        stopping = threading.Thread(target=real, args=(session,))
+        stopping.start()
+        until(lambda: session._requests == 2, "the stop")
+        with pytest.raises(StopIteration):
+            callback(None)
+        return pcmc.meet(surface, targets, vary, solves=1)
+
+    monkeypatch.setattr("pcmc.explore.session.meet", met)
+    before = session.surface
+    state = session.meet((Target("apex", "west", 1.3),), (Parameter("west"),))
+    assert told == ["1 solves"]
+    assert state.superseded
+    assert session.state().surface is before
+    assert session.progress == ""
+
+
 @pytest.mark.parametrize(
     ("body", "line"),
     [
@@ -221,6 +246,13 @@ def test_the_difference_of_two_caps_is_that_of_their_spheres():
     finer = pcmc.solve(spherical_cap(edge_length=0.05)).surface
     errors = [np.abs(difference(finer, s)).max() for s in (flat, higher)]
     assert errors[0] < 0.2 * errors[1]  # other triangles are hardly another shape
+
+
+def test_a_wall_nearby_does_not_hide_a_difference(roof):
+    higher = pcmc.solve(roof.surface.retensioned({"west": 2.6, "east": 3.0})).surface
+    on_roof = np.unique(roof.surface.faces[~roof.surface.walls[roof.surface.patch_of_face]])
+    away = difference(higher, roof.surface)[on_roof]
+    assert away.min() > -0.02 * away.max()  # lower tensions: higher everywhere
 
 
 def test_saving_keeps_comments_and_the_shape_found_by_sliders(roof, session, folder):
@@ -332,7 +364,7 @@ def test_the_page_follows_the_file_and_survives_a_broken_save(tmp_path):
         def news():
             return client.ask(f"/api/{name}/news")[0]
 
-        assert news() == {"version": 0, "working": False, "problem": ""}
+        assert news() == {"version": 0, "working": False, "problem": "", "progress": ""}
         path.write_text(TEXT.replace("edge_length", "edge_lenght"))
         until(lambda: "did you mean 'edge_length'" in news()["problem"], "the problem")
         assert str(tmp_path) not in news()["problem"]
@@ -394,8 +426,16 @@ def test_cables_weights_and_rooms_have_values_that_move_the_surface():
         [0] * 5,
         [pcmc.Patch("roof", 1.0, 0.5, weight=0.1)],
         fixed=[0, 1, 2, 3],
-        cables=[pcmc.Cable("edge", 3.0, [[0, 5], [5, 1]])],
+        cables=[pcmc.Cable("edge", 3.0, [[0, 5], [5, 1]]), pcmc.Cable("inner", 0.0, [[0, 4]])],
     )
+    about, arrays = outline(square.retensioned(cables={"inner": 0.1}))
+    assert [group["kinds"] for group in about["controls"]] == [
+        ["tensions", "pressures", "weights"],
+        ["cables"],
+        ["cables"],
+    ]
+    drawn = {tuple(sorted(pair)) for pair in arrays["curves"].tolist()}
+    assert {(0, 5), (1, 5), (0, 4)} < drawn
     session = Session(solved_start(square))
     state = session.settle({"cables": {"edge": 6.0}, "weights": {"roof": 0.2}})
     assert state.failure is None

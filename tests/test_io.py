@@ -101,14 +101,8 @@ def test_gltf_says_that_face_scalars_are_lost(tmp_path):
 def test_single_precision_is_enough_in_a_survey_s_coordinates(tmp_path, suffix):
     near = tent()
     shift = np.array([5e5, 5e6, 0.0])
-    far = pcmc.Surface(
-        near.vertices + shift,
-        near.faces,
-        near.patch_of_face,
-        near.patches,
-        fixed=near.fixed,
-        on_plane=near.on_plane,
-        plane=pcmc.Plane(near.plane.point + shift, near.plane.normal),
+    far = near.rebuilt(
+        vertices=near.vertices + shift, plane=pcmc.Plane(near.plane.point + shift, near.plane.normal)
     )
     pcmc.write(tmp_path / f"far{suffix}", far)
     back = pcmc.read(tmp_path / f"far{suffix}")

@@ -346,11 +346,7 @@ def test_a_prescribed_volume_in_an_eighth():
     """An eighth of a bubble with an eighth of its volume: stable; the whole keeps volume and energy."""
     volume, start = np.pi / 6.0, octant(3)
     room = Room("inside", {"bubble": 1}, volume)
-    piece = Surface(
-        *(start.vertices, start.faces, start.patch_of_face, start.patches),
-        on_planes=start.on_planes,
-        rooms=[room],
-    )
+    piece = start.rebuilt(rooms=[room])
     result = pcmc.solve(piece)
     assert result.converged
     assert result.certify().index == 0

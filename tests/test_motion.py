@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from motion_cases import SURFACES, TILTED, against, seam, touching
-from shapes import disc, pyramid, rotation, shaken, three_patches
+from shapes import disc, placed, pyramid, rotation, shaken, three_patches
 
 from generators import two_squares
 from pcmc import Patch, Plane, Surface, energy, gradient, solve
@@ -117,15 +117,7 @@ def test_the_space_turns_with_the_surface(seed):
     surface = shaken(three_patches(plane=TILTED), seed=seed)
     R = rotation(seed)
     shift = np.array([1.0, -2.0, 0.5])
-    turned = Surface(
-        surface.vertices @ R.T + shift,
-        surface.faces,
-        surface.patch_of_face,
-        surface.patches,
-        fixed=surface.fixed,
-        on_plane=surface.on_plane,
-        plane=Plane(R @ surface.plane.point + shift, R @ surface.plane.normal),
-    )
+    turned = placed(surface, R, shift)
     v = np.random.default_rng(seed).standard_normal((surface.n, 3))
     here, there = frame_and_space(surface)[1], frame_and_space(turned)[1]
     np.testing.assert_array_equal(here.dimension, there.dimension)

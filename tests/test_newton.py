@@ -16,7 +16,7 @@ from starts import (
     two_squares,
 )
 
-from pcmc import Surface, certify, curvature_error, solve
+from pcmc import certify, curvature_error, solve
 from pcmc.certificate import Verdict
 from pcmc.solvers import solve as one_start
 from pcmc.solvers.result import Status
@@ -154,13 +154,7 @@ def test_a_wall_whose_bottom_is_held_does_not_slip(tensions):
 
 def bottom_held(surface):
     """The surface with all that slides on Π held instead."""
-    return Surface(
-        surface.vertices,
-        surface.faces,
-        surface.patch_of_face,
-        surface.patches,
-        fixed=surface.fixed | surface.on_plane,
-    )
+    return surface.rebuilt(fixed=surface.held)
 
 
 @pytest.mark.parametrize(

@@ -260,6 +260,19 @@ def test_half_and_quarter_of_a_roof_are_the_whole():
     assert (mask == (np.abs(quarter.vertices[:, 0] - 5.0) < 1e-9)).all()
 
 
+def test_half_of_a_sail_is_at_rest_as_the_whole():
+    """On a diagonal through two masts; the whole has the images of the cables."""
+    half = Plan(SQUARE[:3], mirrors=[[SQUARE[0], SQUARE[2]]], **(SAIL | {"supports": MASTS[:3]})).surface()
+    assert cables(half).keys() == {"cable 1", "cable 2"}
+    assert half.vertices[half.on_planes[0][1], 2].min() > 1.0  # not the height of the outline there, 0
+    whole = pcmc.mirrored(pcmc.solve(half, tolerance=1e-12).surface)
+    certificate = pcmc.certify(whole)
+    assert certificate.verdict is Verdict.STABLE
+    assert certificate.residual < 1e-10
+    assert whole.fixed.sum() == 4
+    assert sum(count for _, count in cables(whole).values()) == whole.topology.boundary_edge.sum()
+
+
 def test_a_mirror_across_a_tilted_plane_stands_on_it():
     plane = pcmc.Plane((1, 2, 3), (1, 0, 2))
     piece = Plan(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pcmc import Plane, Surface, Verdict, certify, solve
+from pcmc import Plane, Verdict, certify, solve
 from pcmc.plan import Area, Divider, Plan, add_walls
 from tests.test_plan import vertices_of
 
@@ -36,15 +36,7 @@ def test_the_difference_pushes_the_wall_from_the_fuller_room():
 
 def test_two_pressures_give_one_roof_whatever_the_point_of_the_plane():
     here = two_rooms().surface()
-    there = Surface(
-        here.vertices,
-        here.faces,
-        here.patch_of_face,
-        here.patches,
-        fixed=here.fixed,
-        on_plane=here.on_plane,
-        plane=Plane((40.0, -30.0, 0.0)),
-    )
+    there = here.rebuilt(plane=Plane((40.0, -30.0, 0.0)))
     one, two = solve(here), solve(there)
     assert two.energy == pytest.approx(one.energy, rel=1e-12)
     assert two.certificate.volume == pytest.approx(one.certificate.volume, rel=1e-12)

@@ -80,14 +80,7 @@ def test_what_is_behind_is_hidden(renderer):
 
 def test_light_falls_on_both_sides_alike():
     surface = two_squares(4)
-    under = pcmc.Surface(
-        surface.vertices,
-        surface.faces[:, ::-1],
-        surface.patch_of_face,
-        surface.patches,
-        surface.fixed,
-        surface.on_plane,
-    )
+    under = surface.rebuilt(faces=surface.faces[:, ::-1])
     one, other = plot.draw(surface).astype(int), plot.draw(under).astype(int)
     assert np.abs(one - other).max() <= 1  # rounding of colours
 

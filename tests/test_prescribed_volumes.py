@@ -10,6 +10,7 @@ from volume_cases import cap, cap_height, order, raised
 
 import generators
 import pcmc
+from generators.grid import cut_squares
 from pcmc import Direction, Patch, Plane, Room, Surface, Target
 from pcmc.base.errors import FreeSurfaceWarning, OptionError, SurfaceError
 from pcmc.design import Parameter, meet, sensitivities
@@ -120,8 +121,7 @@ def test_a_piece_between_mirror_planes_has_its_share_of_the_volume():
     x, y = np.meshgrid(t, t, indexing="ij")
     X = np.stack([x, y, 0.3 * (1.0 - x**2) * (1.0 - y**2)], axis=-1).reshape(-1, 3)
     number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
-    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-    F = np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
+    F = cut_squares(number, np.ones((n, n), dtype=bool))
     mirrors = {
         Plane(normal=(1, 0, 0), name="x", mirror=True): number[0],
         Plane(normal=(0, 1, 0), name="y", mirror=True): number[:, 0],
@@ -151,6 +151,14 @@ def test_impossible_volumes_are_refused():
     slack = replace(ball.retensioned({"bubble": 0.0}, {"bubble": 0.0}), rooms=[Room("r", {"bubble": 1}, 1.0)])
     with refused(SurfaceError, what="rooms", where="bubble"):
         pcmc.solve(slack)
+
+
+def test_a_volume_that_no_motion_changes_is_refused():
+    rigid = pyramid(fixed=range(5), rooms=[Room("room", {"roof": 1}, 1.0)])
+    with refused(SurfaceError, what="rooms", where="room") as caught:
+        pcmc.solve(rigid)
+    assert "no motion changes its volume" in str(caught.value)
+    assert pcmc.certify(rigid).verdict.name == "NOT_CONVERGED"
 
 
 def test_a_volume_is_prescribed_once_and_around_patches_that_are_there():

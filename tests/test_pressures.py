@@ -73,14 +73,7 @@ def test_far_from_the_plane_s_point_volumes_are_seen_from_near_by():
     """Forces keep their digits, and energies and volumes differ by a constant at most."""
     near = two_caps(1.2)
     shift = np.array([5e5, 5e6, 0.0])
-    far = Surface(
-        near.vertices + shift,
-        near.faces,
-        near.patch_of_face,
-        near.patches,
-        fixed=near.fixed,
-        on_plane=near.on_plane,
-    )
+    far = near.rebuilt(vertices=near.vertices + shift)
     assert np.linalg.norm(far.origin - far.vertices.mean(axis=0)) < near.size
     assert far.origin[2] == 0.0
     np.testing.assert_allclose(gradient(far), gradient(near), atol=1e-8 * np.abs(gradient(near)).max())
@@ -92,14 +85,7 @@ def test_where_pressures_do_not_cancel_the_point_of_the_plane_stays():
     """The force of what is left over depends on it."""
     near = two_caps(1.2)
     patches = [Patch(p.name, p.tension, p.pressure * (1 + (k == 0))) for k, p in enumerate(near.patches)]
-    far = Surface(
-        near.vertices + np.array([5e5, 0, 0]),
-        near.faces,
-        near.patch_of_face,
-        patches,
-        fixed=near.fixed,
-        on_plane=near.on_plane,
-    )
+    far = near.rebuilt(vertices=near.vertices + np.array([5e5, 0, 0]), patches=patches)
     assert far.uncancelled.any()
     assert far.origin.tolist() == [0.0, 0.0, 0.0]
     assert not near.uncancelled.any()

@@ -158,7 +158,11 @@ def test_a_bad_value_is_one_line_with_the_file(small, old, new, fields):
         ("patches = {roof = 3}", "patches.roof", "a table"),
         ('patches = {roof = {tension = "b"}}', "patches.roof.tension", "a number"),
         ("patches = {roof = {tension = true}}", "patches.roof.tension", "a number"),
-        ('dividers = [{curve = [[2, 0], [2, 3]], wall = "a"}]', "dividers.wall", "a number or false"),
+        (
+            'dividers = [{curve = [[2, 0], [2, 3]], wall = "a"}]',
+            "dividers.wall",
+            'a number, "balanced" or false',
+        ),
         ("outline = 3", "outline", "a curve"),
         ('rise = "x"', "rise", "a number"),
         ("plane = {normal = 3}", "plane.normal", "a point [x, y, z]"),
@@ -226,7 +230,8 @@ def test_the_manual_lists_every_key_that_is_read():
     for name, cls in classes.items():
         unused = {Area: {"name"}, Plane: {"name", "mirror"}}.get(cls, set())
         names = {f.name for f in fields(cls)} - unused
-        names |= {"drawing", "gap"} if cls is Plan else set()  # what Plan's lines are made from
+        # what Plan's lines are made from, and what stands for tensions
+        names |= {Plan: {"drawing", "gap", "apex", "span_ratio"}, Area: {"rise", "apex"}}.get(cls, set())
         assert {key.name for key in listed[name, ""].keys} == names
     for method in ("newton", "nesterov", "lbfgs"):
         options = {f.name: f.default for f in fields(find_method(method).options)}

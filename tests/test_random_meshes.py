@@ -4,12 +4,13 @@ import warnings
 
 import numpy as np
 import pytest
-from random_meshes import random_surface
+from random_meshes import loaded_surface, random_surface
 
 import pcmc
 from pcmc import Patch, Surface, Verdict, solvers
-from pcmc.base.errors import FreeSurfaceWarning, SurfaceError
+from pcmc.base.errors import FreeSurfaceWarning, OptionError, PcmcError, SurfaceError
 from pcmc.meshing.refinement import refine
+from studies import evolver
 
 METHODS = (
     {"method": "newton", "iterations": 15},
@@ -45,6 +46,74 @@ def test_random_meshes_end_in_a_verdict_or_a_named_error(hundred):
         solved += 1
     assert solved > 80
     assert None not in refusals
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hundred", range(2))
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
+def test_random_forces_end_in_a_verdict_or_a_named_error(hundred):
+    built, solved, refusals = 0, 0, []
+    for seed in range(100 * hundred, 100 * hundred + 100):
+        try:
+            surface = loaded_surface(seed)
+        except SurfaceError as error:
+            refusals.append(error.what)
+            continue
+        built += 1
+        assert np.isfinite(pcmc.energy(surface)), f"seed {seed}"
+        try:
+            assert isinstance(pcmc.certify(surface).verdict, Verdict), f"seed {seed}"
+            result = solvers.solve(surface, **METHODS[seed // 2 % 4])
+            assert str(result.certificate), f"seed {seed}"
+        except (SurfaceError, OptionError) as error:
+            refusals.append(error.what)
+            continue
+        solved += 1
+        X = result.surface.vertices
+        assert np.isfinite(X).all(), f"seed {seed}"
+        for plane, mask in surface.on_planes:
+            assert np.abs(plane.height(X))[mask].max(initial=0.0) < 1e-8 * result.surface.size, f"seed {seed}"
+    assert None not in refusals
+    assert "pressure" not in refusals  # a pressure that is no number: a volume that nothing changes
+    assert built > 85
+    assert solved > 40
+
+
+@pytest.mark.parametrize("suffix", [".pcmc", ".fe"])
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
+def test_files_carry_random_forces(suffix, tmp_path):
+    carried = 0
+    for seed in range(60):
+        try:
+            surface = loaded_surface(seed)
+            pcmc.write(tmp_path / f"a{suffix}", surface)
+        except PcmcError:
+            continue
+        again = pcmc.read(tmp_path / f"a{suffix}")
+        carried += 1
+        assert pcmc.energy(again) == pytest.approx(pcmc.energy(surface), rel=1e-10, abs=1e-10), f"seed {seed}"
+        assert len(again.cables) == len(surface.cables), f"seed {seed}"
+        assert [p.mirror for p, _ in again.on_planes] == [p.mirror for p, _ in surface.on_planes], (
+            f"seed {seed}"
+        )
+    assert carried > 30
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
+def test_the_reference_program_has_the_energy_of_random_forces():
+    compared = 0
+    for seed in range(80):
+        try:
+            surface = loaded_surface(seed)
+        except SurfaceError:
+            continue
+        if not surface.rooms:  # their pressures are not in its energy
+            energy = pcmc.energy(surface)
+            assert evolver.energy(surface) == pytest.approx(energy, rel=1e-11, abs=1e-11), f"seed {seed}"
+            compared += 1
+    assert compared > 30
 
 
 def bridge() -> Surface:

@@ -116,14 +116,7 @@ def test_seam_across_the_plan_is_free_but_a_held_chain_along_a_junction_is_fixed
     square = Surface(X, [[0, 1, 2], [0, 2, 3]], [0, 1], [Patch("a", 1.0), Patch("b", 1.0)], fixed=range(4))
     assert not refine(square).fixed[middle_of(square, 0, 2)]
     base = tent()
-    held = Surface(
-        base.vertices,
-        base.faces,
-        base.patch_of_face,
-        base.patches,
-        fixed=[0, 1, 2, 3, 6, 7, 8, 9],
-        on_plane=[4, 5],
-    )
+    held = base.rebuilt(fixed=[0, 1, 2, 3, 6, 7, 8, 9], on_plane=[4, 5])
     fine = refine(held)
     assert fine.fixed[middle_of(held, 2, 3)]
     assert fine.fixed[middle_of(held, 0, 2)]
@@ -150,15 +143,7 @@ def test_sliding_on_a_tilted_plane():
     turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     base, shift = tent(), np.array([3.0, -2.0, 5.0])
-    tilted = Surface(
-        base.vertices @ turn.T + shift,
-        base.faces,
-        base.patch_of_face,
-        base.patches,
-        base.fixed,
-        base.on_plane,
-        Plane(shift, turn[:, 2]),
-    )
+    tilted = base.rebuilt(vertices=base.vertices @ turn.T + shift, plane=Plane(shift, turn[:, 2]))
     fine = refine(tilted, levels=2)
     assert fine.on_plane.sum() == refine(base, levels=2).on_plane.sum()
     np.testing.assert_allclose(fine.vertices, refine(base, levels=2).vertices @ turn.T + shift, atol=1e-13)

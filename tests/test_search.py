@@ -165,7 +165,9 @@ def test_tensions_that_cannot_balance_are_the_proof():
     surface = two_squares(4, alpha_aux=1.0).retensioned({"left": 4.0, "right": 2.0})
     result = solve(surface)
     assert result.status is Status.NO_EQUILIBRIUM
-    assert result.proofs == (UnbalancedJunction(("left", "right", "wall"), 4.0, (1.0, 2.0)),)
+    remedy = ("wall", 2.6, True)
+    assert solve(surface.retensioned({"wall": 2.6})).converged
+    assert result.proofs == (UnbalancedJunction(("left", "right", "wall"), 4.0, (1.0, 2.0), remedy),)
     assert result.certificate.verdict is Verdict.NO_EQUILIBRIUM
     assert certify(surface).proofs == result.proofs
 

@@ -116,7 +116,7 @@ def test_parquet_writes_mixed_types_as_text(tmp_path):
 
 def test_tables_that_cannot_be_written_are_refused(tmp_path):
     frame = pd.DataFrame({"a": [1]})
-    with pytest.raises(FileError, match=r"a table is written as \.csv or \.parquet"):
+    with pytest.raises(FileError, match=r"the suffix of a table is \.csv or \.parquet"):
         write_table(tmp_path / "t.xls", frame)
     with pytest.raises(FileError, match="cannot be written"):
         write_table(tmp_path / "missing" / "t.csv", frame)

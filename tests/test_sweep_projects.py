@@ -284,7 +284,7 @@ def test_a_project_changed_while_it_is_swept_is_noticed(roof):
     [
         (["roof.toml", "wst.tension=1,2"], "did you mean 'west.tension'"),
         (["roof.toml", "wst.tension=3"], "did you mean 'west.tension'"),
-        (["roof.toml", "west.tension=3,4", "--plot", "t.gif"], "t.gif: pictures are"),
+        (["roof.toml", "west.tension=3,4", "--plot", "t.gif"], "t.gif: the suffix of a picture is"),
         (["roof.toml", "west.tension=3,4", "west.tension=5"], "west.tension is given twice"),
         (["roof.tml", "west.tension=3,4"], "roof.tml: expected a project"),
         (["none.toml", "west.tension=3,4"], "none.toml: cannot be read"),

@@ -48,6 +48,24 @@ def check_name(path: Path) -> None:
         raise FileError(text, what=str(path), found="\0")
 
 
+def suffix_of(path: str | os.PathLike[str], known: Iterable[str], thing: str) -> str:
+    """The suffix of a path in small letters; FileError unless it is one of those known for a thing.
+
+    >>> suffix_of("roof.CSV", (".csv", ".parquet"), "a table")
+    '.csv'
+    >>> suffix_of("roof.xls", (".csv", ".parquet"), "a table")
+    Traceback (most recent call last):
+    ...
+    pcmc.base.errors.FileError: roof.xls: the suffix of a table is .csv or .parquet, found '.xls'; change it
+    """
+    suffix, endings = os.path.splitext(path)[1].lower(), tuple(known)
+    if suffix not in endings:
+        listed = " or ".join(filter(None, (", ".join(endings[:-1]), endings[-1])))
+        text = f"{os.fspath(path)}: the suffix of {thing} is {listed}, found {suffix!r}; change it"
+        raise FileError(text, what=os.fspath(path), found=suffix, expected=endings)
+    return suffix
+
+
 @contextmanager
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary path beside ``path``. It replaces ``path`` when the block ends without error.

@@ -15,6 +15,7 @@ from ..surface import Surface
 from ..surface.geometry import area_vectors, edge_vectors, segment_lengths, vertex_sums
 from ..surface.supports import common_point, symmetric_part
 from ..surface.topology import Curve
+from ..surface.wall_tensions import balanced_wall
 from .proof import UnbalancedJunction, Unheld
 
 HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets meet at about 20°
@@ -123,14 +124,19 @@ def hardly_balanced(surface: Surface, pinchable: Bools) -> str:
     At the limit, 5 = 4.5 + 0.5, two of three lie on each other, and no mesh can follow. Arguments as
     for ``unbalanced``.
     """
-    strained = _strained(surface, pinchable, HARDLY)
+    strained = strained_junction(surface, pinchable)
     if strained is None:
         return ""
     others = " + ".join(f"{tension:g}" for tension in strained.others)
     return (
         f"the tensions at the junction {' | '.join(strained.junction)} could balance only with its sheets"
-        f" nearly on each other: {strained.strongest:g} against {others}"
+        f" nearly on each other: {strained.strongest:g} against {others}{strained.hint}"
     )
+
+
+def strained_junction(surface: Surface, pinchable: Bools) -> UnbalancedJunction | None:
+    """A junction as in ``hardly_balanced``, or None."""
+    return _strained(surface, pinchable, HARDLY)
 
 
 def _strained(surface: Surface, pinchable: Bools, share: float) -> UnbalancedJunction | None:
@@ -143,8 +149,26 @@ def _strained(surface: Surface, pinchable: Bools, share: float) -> UnbalancedJun
         excused = excused or surface.weights[list(curve.sheets)].any() or _carries_cable(surface, curve)
         if largest > share * sum(others) and not excused:
             names = tuple(surface.patches[i].name for i in curve.sheets)
-            return UnbalancedJunction(names, float(largest), tuple(float(t) for t in others))
+            remedy = _remedy(surface, curve.sheets)
+            return UnbalancedJunction(names, float(largest), tuple(float(t) for t in others), remedy)
     return None
+
+
+def _remedy(surface: Surface, sheets: Sequence[int]) -> tuple[str, float, bool] | None:
+    """A patch of a junction, a tension of it with which the junction balances, and whether it is a wall.
+
+    A single wall is balanced; else the weakest sheet is made stronger. None if the sheets are one patch.
+    """
+    tensions, walls = surface.tensions, [i for i in sheets if surface.walls[i]]
+    if len(walls) == 1:
+        changed = walls[0]
+        value = balanced_wall([[float(tensions[i]) for i in sheets if i != changed]])
+    else:
+        changed = min(sheets, key=lambda i: tensions[i])
+        *others, largest = sorted(float(tensions[i]) for i in sheets if i != changed) or [0.0]
+        value = largest if not others else 1.25 * largest - sum(others)
+    name = surface.patches[changed].name
+    return (name, float(value), bool(surface.walls[changed])) if value > 0.0 else None
 
 
 def _carries_cable(surface: Surface, curve: Curve) -> bool:

@@ -32,6 +32,7 @@ from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
 from .balance import boundary_table, junction_table, load, load_ratio, pressures_left_over, reactions
 from .cables import cable_end_table, cable_table
+from .leaning import lean_table, lean_texts
 from .proof import Proof
 from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
 
@@ -52,6 +53,7 @@ class Certificate:
     energy, volume : E (force·length) and the volume under the roof (length³).
     index : Morse index; None where the surface is not at rest. Rigid motions are not counted, nor motions
         that change a prescribed volume.
+    leaning : a row per wall: its largest angle from the vertical of Π, degrees, and the place.
     symmetric_in : the mirror planes of the surface. Index, eigenvalues and verdict are about motions that are
         symmetric in these; ``certify(surface, whole=True)`` is about all.
     eigenvalues : lowest second variations per unit area and displacement, force/length³, ascending.
@@ -103,6 +105,7 @@ class Certificate:
     cable_ends: pd.DataFrame = field(default_factory=pd.DataFrame)
     rooms: pd.DataFrame = field(default_factory=pd.DataFrame)
     symmetric_in: tuple[str, ...] = ()
+    leaning: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     @property
     def certified(self) -> bool:
@@ -144,6 +147,7 @@ class Certificate:
             ("curvature error", f"{self.curvature_error:.2e}"),
             ("triangle quality", f"{self.quality:.3f} (sliding walls {self.walls_quality:.3f})"),
             ("pinched vertices", str(len(self.pinched))),
+            ("walls lean", ", ".join(lean_texts(self.leaning))),
             ("load over capacity", f"{self.load_ratio:.3f}"),
             ("load, reactions", f"{self.load:.6g}, {self.support:.6g} along the plane's normal"),
         ]
@@ -266,6 +270,7 @@ def certify(
         cables=cable_table(standing, left),
         cable_ends=cable_end_table(standing),
         rooms=rooms,
+        leaning=lean_table(standing),
         symmetric_in=tuple(str(plane) for plane, _ in surface.on_planes if plane.mirror),
     )
 

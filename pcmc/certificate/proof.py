@@ -32,19 +32,33 @@ class UnbalancedJunction:
     ----------
     junction : names of the patches that meet there.
     strongest, others : the largest tension, and those of the other patches, force/length.
+    remedy : a patch, a tension of it with which they balance, force/length, and whether it is a wall.
 
     >>> print(UnbalancedJunction(("left", "right", "wall"), 5.0, (1.0, 3.0)))
     the tensions at the junction left | right | wall cannot balance: 5 > 1 + 3
+    >>> UnbalancedJunction(("left", "right", "wall"), 5.0, (1.0, 3.0), ("wall", 2.3, True)).hint
+    "; try a tension of 2.3 for 'wall' (in a plan, wall = 2.3)"
     """
 
     junction: tuple[str, ...]
     strongest: float
     others: tuple[float, ...]
+    remedy: tuple[str, float, bool] | None = None
 
     def __str__(self) -> str:
         others = " + ".join(f"{tension:g}" for tension in self.others)
         names = " | ".join(self.junction)
-        return f"the tensions at the junction {names} cannot balance: {self.strongest:g} > {others}"
+        text = f"the tensions at the junction {names} cannot balance: {self.strongest:g} > {others}"
+        return f"{text}{self.hint}"
+
+    @property
+    def hint(self) -> str:
+        """The remedy in words, after a semicolon; empty if there is none."""
+        if self.remedy is None:
+            return ""
+        name, tension, wall = self.remedy
+        key = f" (in a plan, wall = {tension:g})" if wall else ""
+        return f"; try a tension of {tension:g} for {name!r}{key}"
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..surface import Surface
+from .collapse import KEY
 
 SLIPS = 0.25  # of the mode's largest motion: that much beside a fixed end is a slip of this end
 
@@ -19,6 +20,7 @@ class SlippingEnd:
     Attributes
     ----------
     junction : names of the patches that meet there.
+    walls : names of the walls among them.
     place : (3,) the end.
     share : the mode's motion at the junction's next vertex over its largest motion. A mode that the end
         holds rises from 0 along the junction, to about π h / L after an edge h of the length L; one
@@ -26,6 +28,7 @@ class SlippingEnd:
     """
 
     junction: str
+    walls: tuple[str, ...]
     place: Floats
     share: float
 
@@ -40,7 +43,8 @@ def slipping_ends(surface: Surface, mode: Floats) -> list[SlippingEnd]:
             if curve.closed or not surface.fixed[end] or motion[beside] < SLIPS * largest or largest == 0.0:
                 continue
             share = float(motion[beside] / largest)
-            ends.append(SlippingEnd(_name(surface, curve.sheets), surface.vertices[end], share))
+            walls = tuple(surface.patches[i].name for i in curve.sheets if surface.walls[i])
+            ends.append(SlippingEnd(_name(surface, curve.sheets), walls, surface.vertices[end], share))
     return sorted(ends, key=lambda end: -end.share)
 
 
@@ -62,10 +66,12 @@ def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
         return text
     junctions = " and of ".join(dict.fromkeys(end.junction for end in ends))
     places = " and ".join(_text(end.place) for end in ends[:4])
+    walls = " and of ".join(dict.fromkeys(repr(name) for end in ends for name in end.walls))
+    advice = f"hold the bottom of {walls} ({KEY.format('held')})" if walls else "put a wall below it"
     which, verb = ("end", "slips") if len(ends) == 1 else ("ends", "slip")
     return (
         f"{text}; the {which} of {junctions} at {places} {verb}: one edge away the junction moves"
-        f" {ends[0].share:.2f} as far, so only the mesh holds it there; hold the bottom of its wall"
+        f" {ends[0].share:.2f} as far, so only the mesh holds it there; {advice}"
     )
 
 

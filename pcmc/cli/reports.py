@@ -5,10 +5,14 @@ from __future__ import annotations
 import pandas as pd
 
 from ..base.units import Units
+from ..certificate.leaning import lean_texts
 from ..project import Outcome
 
 UNIT_OF = {"apex": "length", "height": "length", "sag": "length", "reaction": "tension", "weight": "pressure"}
 """The unit of quantities and parameters; others are named as their units."""
+
+FAR = 10.0  # degrees: walls that lean less are not told
+UPRIGHT = 'a divider with upright = true keeps its wall in its plane, a target "lean" limits it'
 
 
 def report(outcome: Outcome, *, verdict: bool = True) -> None:
@@ -22,6 +26,8 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         if outcome.design.met:  # otherwise the message has the values
             tables = (outcome.design.targets["value"], outcome.design.parameters["value"])
             print(", with ".join(_values(table, outcome.units) for table in tables))
+    for note in outcome.notes:
+        print(note)
     if verdict and outcome.units:
         print(outcome.units.sentence)
     if verdict:
@@ -31,6 +37,11 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         if outcome.whole is not None:
             whole = outcome.whole
             print(f"the whole roof, {whole.surface.m} triangles: {whole.certificate.verdict.value}")
+        leaning = lean_texts(outcome.certificate.leaning, FAR)
+        if leaning and outcome.certificate.certified:
+            print(f"walls lean from the vertical: {', '.join(leaning)}; {UPRIGHT}")
+    if outcome.advice:
+        print("\n  ".join(outcome.advice))
     if outcome.files:
         print(f"written: {', '.join(map(str, outcome.files))}")
 
@@ -40,6 +51,7 @@ def _values(values: pd.Series, units: Units) -> str:
     shown = []
     for label, value in values.items():
         quantity = "force" if str(label).startswith("tension of cable ") else str(label).split()[0]
-        unit = f" {getattr(units, UNIT_OF.get(quantity, quantity))}" if units else ""
+        unit = f" {getattr(units, UNIT_OF.get(quantity, quantity))}" if units and quantity != "lean" else ""
+        unit = "°" if quantity == "lean" else unit
         shown.append(f"{label} {value:.6g}{unit}")
     return ", ".join(shown)

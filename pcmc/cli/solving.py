@@ -44,6 +44,9 @@ ACCURACY = (
 ACCURACY_OF = "mesh: the value on the mesh is to be so accurate; limit: the extrapolated one."
 MOST_TRIANGLES = f"The most that the mesh for an accuracy may have, {TRIANGLES} by default."
 WHOLE_INDEX = "Of a surface with mirror planes certify the whole: motions that are not symmetric count, too."
+RISE = "Find the tension with which the whole roof rises so much over its outline."
+APEX = "The same, over the plane."
+SPAN_RATIO = "The same: the smaller span of the plan over the rise."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
 
@@ -60,6 +63,9 @@ def solve_(
     weight: Weights = None,
     cable: Cables = None,
     volume: Volumes = None,
+    rise: Annotated[float | None, option("LENGTH", RISE, parser=number)] = None,
+    apex: Annotated[float | None, option("LENGTH", APEX, parser=number)] = None,
+    span_ratio: Annotated[float | None, option("NUMBER", SPAN_RATIO, "--span-ratio", parser=number)] = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
     anyway: Annotated[bool, typer.Option("--anyway", help="Write the output even if not certified.")] = False,
     accuracy: Annotated[list[str] | None, option("QUANTITY=NUMBER", ACCURACY, "--accuracy")] = None,
@@ -77,11 +83,13 @@ def solve_(
     \b
     Examples:
       pcmc solve roof.toml
+      pcmc solve hall.dxf --rise 2 -o hall.3dm
       pcmc solve roof.toml --accuracy height=1e-3
       pcmc solve sail.toml --cable "cable 1=12"
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
     project = _project(file, folder, output, picture)
+    project = projects.raised(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
         options["target"] = target

@@ -9,7 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ..base.errors import FileError, MissingExtra, OptionError
+from ..base.errors import MissingExtra, OptionError
+from ..base.files import suffix_of
 from ..io import FORMATS, READ_ONLY
 from ..plot.figure import check_suffix
 from ..project import check_outputs
@@ -17,7 +18,6 @@ from . import INTERRUPTED, NOT_CERTIFIED, OK
 from .arguments import DXF, TOML, integer, number, option, values_of
 from .progress import sweeping
 
-TABLES = (".csv", ".parquet")
 WHAT = "A project (.toml), a surface, or package.module:function that returns a Surface."
 SEARCH = "Try further starts where the first leads to no equilibrium: slower, but with the proof."
 PLOT = "Picture to write: apexes over one varied number, or the rise over two."
@@ -66,12 +66,10 @@ def sweep(
     """
     from ..sweep import draw_sweep, run, short_table, write_table
     from ..sweep.store import FAILED
+    from ..sweep.table import TABLES
 
     check_outputs([path for path in (csv, store, plot) if path is not None])
-    if csv is not None and csv.suffix not in TABLES:
-        text = f"{csv}: a table is written as {' or '.join(TABLES)}; change the suffix"
-        raise FileError(text, what=str(csv), found=csv.suffix, expected=TABLES)
-    if csv is not None and csv.suffix == ".parquet" and find_spec("pyarrow") is None:
+    if csv is not None and suffix_of(csv, TABLES, "a table") == ".parquet" and not find_spec("pyarrow"):
         raise MissingExtra("pyarrow", "files")
     if plot is not None:
         check_suffix(plot)

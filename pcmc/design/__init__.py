@@ -3,9 +3,9 @@
 Gives ``meet``, ``sensitivities`` and their values. May import ``solvers`` and the rooms below it.
 """
 
-from .outcome import Design, DesignStatus
+from .outcome import Design, DesignStatus, NoStart
 from .search import meet
 from .sensitivity import sensitivities
 from .targets import Parameter, Target
 
-__all__ = ["Design", "DesignStatus", "Parameter", "Target", "meet", "sensitivities"]
+__all__ = ["Design", "DesignStatus", "NoStart", "Parameter", "Target", "meet", "sensitivities"]

@@ -8,6 +8,7 @@ from enum import Enum
 
 import pandas as pd
 
+from ..base.errors import SurfaceError
 from ..certificate.certificate import Certificate
 from ..solvers.result import Result
 from ..surface import Surface
@@ -22,6 +23,10 @@ class DesignStatus(Enum):
     CONFLICT = "out of reach: no values of these parameters meet all targets"
     SOLVES = "not met: stopped at the limit of solves"
     STOPPED = "not met: stopped on request; the returned surface is the best so far"
+
+
+class NoStart(SurfaceError):
+    """There is no equilibrium to start a search for targets from; the message says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +46,7 @@ class Design:
     history : a row per point tried: parameters, quantities, status, misfit. The status is the solve's
         in small letters, or ``"overloaded"`` if the load is more than the tension of the boundary could
         carry and no solve was tried.
+    reason : why there was no equilibrium at the last point that was tried and failed; empty if none did.
     """
 
     status: DesignStatus
@@ -49,6 +55,7 @@ class Design:
     parameters: pd.DataFrame
     solves: int
     history: pd.DataFrame
+    reason: str = ""
 
     @property
     def met(self) -> bool:
@@ -77,4 +84,5 @@ class Design:
         if len(missed):
             values = (f"{name} {value:.6g}" for name, value in self.parameters["value"].items())
             text += f" ({', '.join(values)})"
+            text += f"; a step further, {self.reason}" if self.reason else ""
         return text

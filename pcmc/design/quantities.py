@@ -24,6 +24,7 @@ from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d, vertex_sums
 from ..surface.supports import symmetric_part
 from . import cable_quantities
+from .lean import lean
 from .measurement import Measurement
 
 
@@ -207,6 +208,7 @@ QUANTITIES = {
     "area": Quantity(_area, lambda surface: surface.size**2),
     "curvature": Quantity(_curvature, lambda surface: 1.0 / surface.size),
     "pressure": Quantity(_pressure, lambda surface: float(surface.tensions.max()) / surface.size),
+    "lean": Quantity(lean, lambda surface: 90.0),
     "sag": Quantity(cable_quantities.sag, lambda surface: surface.size),
     "length": Quantity(cable_quantities.length, lambda surface: surface.size),
     "force": Quantity(

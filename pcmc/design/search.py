@@ -24,11 +24,12 @@ from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError, SurfaceError
 from ..certificate.balance import coarseness, load_is_given, load_ratio
+from ..certificate.proof import Overload
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
-from .outcome import Design, DesignStatus
+from .outcome import Design, DesignStatus, NoStart
 from .sensitivity import sensitivities
 from .targets import KINDS, Parameter, Target, as_parameters, as_targets, measure
 
@@ -79,7 +80,7 @@ def meet(
     ------
     OptionError : an unknown patch, a target without a value, bad bounds, a quantity that cannot be
         measured.
-    SurfaceError : no equilibrium was found to start from, however high the tensions.
+    NoStart : a SurfaceError; no equilibrium was found to start from, however high the tensions, and why.
 
     Examples
     --------
@@ -151,6 +152,13 @@ class Search:
         self.solves = 0
         self.best: Trial | None = None
         self.rows: list[dict[str, Any]] = []
+        self.failed: Result | Overload | None = None
+
+    @property
+    def failure(self) -> str:
+        """Why the last point that failed has no equilibrium, by its certificate; empty if none failed."""
+        failed = self.failed
+        return failed.certificate.detail if isinstance(failed, Result) else str(failed or "")
 
     def converted(self, values: Floats) -> Floats:
         """Parameters to unknowns, or back: reciprocals of the tensions of patches under pressure."""
@@ -195,16 +203,17 @@ class Search:
 
     def first_iterate(self) -> Iterate:
         """The first solution; tensions are raised until there is one."""
-        x, first = self.initial_unknowns(), None
+        x, first, reason = self.initial_unknowns(), None, ""
         while self.solves < min(STARTS, self.max_solves):
             first = self.solve_from(self.surface, x, {})
+            reason = reason or self.failure  # that of the tensions given says most
             stiffer = np.clip(np.where(self.reciprocal, x / STIFFEN, x), *self.bounds)
             if first is not None or np.array_equal(stiffer, x):
                 break
             x = stiffer
         if first is None:
-            hint = "raise the tensions that do not vary, or the bounds of those that do"
-            raise SurfaceError(f"meet: no equilibrium was found to start from; {hint}", what="surface")
+            hint = reason or "raise the tensions that do not vary, or the bounds of those that do"
+            raise NoStart(f"meet: no equilibrium was found to start from: {hint}", what="surface")
         return first
 
     def solve_from(self, start: Surface, x: Floats, quality: dict[str, float]) -> Iterate | None:
@@ -214,11 +223,13 @@ class Search:
         """
         surface = self.with_unknowns(start, x)
         if load_is_given(surface) and load_ratio(surface) > 1.0 + coarseness(surface):
+            self.failed = Overload(load_ratio(surface))
             self.record(x, OVERLOADED)
             return None
         result = solve(surface, "newton", **{**quality, **self.options})
         self.solves += 1
         trial = self.trial(x, result) if result.converged else None
+        self.failed = result if trial is None else self.failed
         if trial is not None and (self.best is None or trial.phi < self.best.phi):
             self.best = trial
         self.record(x, result.status.name.lower(), trial)
@@ -230,7 +241,7 @@ class Search:
         """The surface with the tensions and pressures that the unknowns stand for."""
         values: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
         for parameter, value in zip(self.parameters, self.converted(x).tolist(), strict=True):
-            values[parameter.kind][parameter.patch] = value
+            values[parameter.kind] |= dict.fromkeys(parameter.names, value)
         changed = with_pressures(surface, values["tension"], values["pressure"])
         others = {f"{kind}s": values[kind] for kind in ("volume", "weight", "cable") if values[kind]}
         return changed.retensioned(**others) if others else changed
@@ -336,7 +347,8 @@ class Search:
             },
             index=[p.label for p in self.parameters],
         )
-        return Design(status, here.result, targets, parameters, self.solves, pd.DataFrame(self.rows))
+        reason = self.failure if status is DesignStatus.AT_FOLD else ""
+        return Design(status, here.result, targets, parameters, self.solves, pd.DataFrame(self.rows), reason)
 
 
 @dataclass(frozen=True, eq=False)

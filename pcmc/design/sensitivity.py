@@ -119,10 +119,11 @@ def _rates(surface: Surface, parameter: Parameter, parameters: Sequence[Paramete
     """(k,) d/dλ of each patch's or cable's own number; wall pressures change with those of the rooms."""
     of_cable = parameter.kind == "cable"
     one = np.zeros(len(surface.cables) if of_cable else len(surface.patches))
-    one[surface.cable_index(parameter.patch) if of_cable else surface.patch_index(parameter.patch)] = 1.0
+    for name in parameter.names:
+        one[surface.cable_index(name) if of_cable else surface.patch_index(name)] = 1.0
     if parameter.kind != "pressure":
         return one
-    named = {surface.patch_index(p.patch) for p in parameters if p.kind == "pressure"}
+    named = {surface.patch_index(name) for p in parameters if p.kind == "pressure" for name in p.names}
     return one + wall_pressure_changes(surface, one, named)
 
 
@@ -172,7 +173,7 @@ class _LinearResponse:
         shown, rooms = self.part.surface, len(self.volume_units)
         right = np.append(self._force_rates(parameter, parameters), np.zeros(rooms))
         if parameter.kind == "volume":
-            room = room_index(shown, parameter.patch)
+            room = room_index(shown, parameter.names[0])
             right[self.space.size + room] = self.volume_units[room]
         if not np.any(right):
             return np.zeros_like(shown.vertices), np.zeros(rooms)

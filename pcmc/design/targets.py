@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +29,8 @@ class Target:
     quantity : ``"apex"``, greatest height over Π of a patch; ``"height"`` over a point of Π;
         ``"volume"`` (V_i of a patch, seen from the point of Π) and ``"area"``; ``"curvature"``,
         p / (2α), a patch's mean curvature at rest; ``"reaction"``, the greatest force per length
-        on the held boundary of a patch; ``"pressure"`` of a room of prescribed volume; ``"sag"`` of a
+        on the held boundary of a patch; ``"lean"`` of a wall, its largest angle from the vertical, degrees;
+        ``"pressure"`` of a room of prescribed volume; ``"sag"`` of a
         cable, the largest distance of its vertices from the chord between its ends, its ``"length"``,
         and its ``"force"``, which is its tension.
     of : name of the patch, room or cable; for ``"height"`` the point (x, y) in the coordinates of Π. None:
@@ -103,7 +104,7 @@ class Parameter:
 
     Parameters
     ----------
-    patch : name of the patch, or of the room or cable.
+    patch : name of the patch, or of the room or cable; or several names, which all get one value.
     kind : ``"tension"``, ``"pressure"`` or ``"weight"`` of a patch, ``"cable"``, the tension of a cable, or
         ``"volume"`` of a room. Where the pressure of a room varies, those of its walls, the differences
         between rooms, are updated, unless they are parameters themselves.
@@ -113,46 +114,59 @@ class Parameter:
     'tension of wall'
     """
 
-    patch: str
+    patch: str | Sequence[str]
     kind: str = "tension"
     low: float | None = None
     high: float | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.patch, str):
-            validate.refuse("patch", self.patch, "the name of a patch")
+            names = tuple(self.patch) if isinstance(self.patch, Sequence) else ()
+            if not names or not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
+                validate.refuse("patch", self.patch, "the name of a patch, or several different ones")
+            object.__setattr__(self, "patch", names if len(names) > 1 else names[0])
         validate.choice("kind of parameter", self.kind, KINDS)
+        if self.kind == "volume" and len(self.names) > 1:
+            validate.refuse("patch", self.patch, "the name of one room")
         for key in ("low", "high"):
             if getattr(self, key) is not None:
                 validate.number(key, getattr(self, key), where=self.label)
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """The names as a tuple, also of a single one."""
+        return (self.patch,) if isinstance(self.patch, str) else tuple(self.patch)
+
+    @property
     def label(self) -> str:
         """The parameter in words."""
+        names = " and ".join(self.names)
         if self.kind == "cable":  # which may have the name "cable 1"
-            return f"tension of cable {self.patch.removeprefix('cable ')}"
-        return f"{self.kind} of {self.patch}"
+            return f"tension of cable {names.removeprefix('cable ')}"
+        return f"{self.kind} of {names}"
 
     def value(self, surface: Surface) -> float:
-        """Its value on a surface."""
+        """Its value on a surface; of several patches that of the first."""
+        name = self.names[0]
         if self.kind == "volume":
-            return surface.rooms[room_index(surface, self.patch)].volume
+            return surface.rooms[room_index(surface, name)].volume
         if self.kind == "cable":
-            return surface.cables[surface.cable_index(self.patch)].tension
-        return float(getattr(surface.patches[surface.patch_index(self.patch)], self.kind))
+            return surface.cables[surface.cable_index(name)].tension
+        return float(getattr(surface.patches[surface.patch_index(name)], self.kind))
 
     def check(self, surface: Surface) -> None:
         """Refuse a patch or room that is not there, and a pressure that follows from a prescribed volume."""
-        self.value(surface)
+        for name in self.names:
+            Parameter(name, self.kind).value(surface)
         if self.kind == "pressure":
-            refuse_varied_pressure(surface, [surface.patch_index(self.patch)])
+            refuse_varied_pressure(surface, [surface.patch_index(name) for name in self.names])
 
     def tension_under_pressure(self, surface: Surface) -> bool:
         """Whether it is the tension of a patch with a pressure or weight; such a tension is never 0."""
         if self.kind != "tension":
             return False
-        patch = surface.patches[surface.patch_index(self.patch)]
-        return patch.pressure != 0.0 or patch.weight != 0.0
+        patches = [surface.patches[surface.patch_index(name)] for name in self.names]
+        return any(patch.pressure != 0.0 or patch.weight != 0.0 for patch in patches)
 
     def bounds(self, surface: Surface) -> tuple[float, float]:
         """(low, high), with the defaults that follow from its present value."""
@@ -185,12 +199,11 @@ def measure(surface: Surface, target: Target) -> Measurement:
 
 
 def as_parameters(given: Parameter | str | Iterable[Parameter | str]) -> list[Parameter]:
-    """One parameter or several as a list; a name stands for that patch's tension."""
-    parameters = [
-        Parameter(p) if isinstance(p, str) else p
-        for p in _as_list(given, (Parameter, str), "a Parameter or the name of a patch")
-    ]
-    labels = [p.label for p in parameters]
+    """One parameter or several as a list; a name, or a list of names, stands for the tension of these."""
+    kinds = (Parameter, str, list, tuple)
+    several = _as_list(given, kinds, "a Parameter or the name of a patch")
+    parameters = [p if isinstance(p, Parameter) else Parameter(p) for p in several]
+    labels = [Parameter(name, p.kind).label for p in parameters for name in p.names]
     for k, label in enumerate(labels):
         if label in labels[:k]:
             raise OptionError(f"the {label} is given twice; remove one", what=label, where=k)
@@ -204,7 +217,7 @@ def as_targets(given: Target | Iterable[Target]) -> list[Target]:
 
 def _as_list(given: Any, kinds: tuple[type, ...], expected: str) -> list[Any]:
     """One value or several, by any iterable, as a list of values of these kinds."""
-    if isinstance(given, kinds):
+    if isinstance(given, kinds) and not isinstance(given, list | tuple):
         return [given]
     single = isinstance(given, str | bytes) or not isinstance(given, Iterable)
     values = [] if single else list(given)

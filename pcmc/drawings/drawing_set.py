@@ -14,8 +14,8 @@ import pandas as pd
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import FileError, OptionError, unknown
-from ..base.files import atomic_writes
+from ..base.errors import FileError, OptionError
+from ..base.files import atomic_writes, suffix_of
 from ..base.units import expect_length, length_factor
 from ..certificate import Certificate
 from ..certificate.required import certified
@@ -186,10 +186,7 @@ def drawing_set(
 
 def check_name(path: Path) -> str:
     """The suffix of a drawing's file; another is refused."""
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise FileError(f"{path}: {unknown('suffix', suffix, SUFFIXES)}", what=str(path), found=suffix)
-    return suffix
+    return suffix_of(path, SUFFIXES, "a drawing")
 
 
 def _millimetres(units: object) -> float:

@@ -30,6 +30,7 @@ from .motion_space import MotionSpace
 from .plane_pieces import add_plane_forces, add_plane_volumes
 
 ROUNDING = 1e-13  # of the largest pressure: a wall between rooms of one pressure has none
+UNCHANGED = 1e-13  # of the size, squared: a gradient of a volume that is rounding
 ON_PLANE = 1e-9  # of the size: a vertex as high as this over Π is on it
 
 
@@ -157,12 +158,17 @@ def check_rooms(surface: Surface) -> None:
 
     Raises
     ------
-    SurfaceError : a room does not close, a patch around it does not pull, or it is closed on all sides
-        and its volume is negative, or its normals point into it.
+    SurfaceError : a room does not close, no motion changes its volume, a patch around it does not pull, or it
+        is closed on all sides and its volume is negative, or its normals point into it.
     """
     if not surface.rooms:
         return
     closing_volumes(surface)
+    by_motion = np.abs(room_volume_gradients(surface)).max(axis=(1, 2))
+    for room, change in zip(surface.rooms, by_motion, strict=True):
+        if change <= UNCHANGED * surface.size**2:
+            message = f"room {room.name!r}: no motion changes its volume, as supports hold all its vertices"
+            raise SurfaceError(f"{message}; free some, or remove the room", what="rooms", where=room.name)
     for room, row, volume in zip(surface.rooms, surface.room_signs, room_volumes(surface), strict=True):
         for k in np.flatnonzero(row):
             patch = surface.patches[k]

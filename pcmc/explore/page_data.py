@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..accuracy.mesh_check import MeshCheck, with_bar
-from ..base.arrays import Floats
+from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
 from ..base.units import Units
 from ..certificate.balance import reactions, reactions_per_length
@@ -55,7 +55,8 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
         "up": surface.plane.normal,
         "ground": float(surface.plane.height(centre(surface))),
     }
-    inner, curves = ~topo.curve_edge, topo.curve_edge
+    curves = topo.curve_edge | on_cables(surface)
+    inner = ~curves
     of_wall = np.ones(len(topo.edges), dtype=bool)  # edges all of whose triangles belong to walls
     of_wall[topo.edge_of_face[~surface.walls[surface.patch_of_face]]] = False
     return header, {
@@ -80,6 +81,13 @@ def control_groups(surface: Surface, values: dict[str, dict[str, float]]) -> lis
     for kind in ("cables", "volumes"):
         groups += [{"name": name, "patch": None, "wall": False, "kinds": [kind]} for name in values[kind]]
     return groups
+
+
+def on_cables(surface: Surface) -> Bools:
+    """(e,) edges that carry a cable."""
+    ends, _ = surface.cable_edges
+    number = np.sort(surface.topology.edges, axis=1) @ np.array([surface.n, 1])
+    return np.isin(number, np.sort(ends, axis=1) @ np.array([surface.n, 1]))
 
 
 def mesh_key(surface: Surface, origin: Floats) -> int:

@@ -170,7 +170,7 @@ def _set_targets(
     if aims is not None and _meets(surface, aims[0]):
         table = tomlkit.table()
         table["meet"] = _array(tomlkit, [{k: getattr(t, k) for k in FIELDS} for t in aims[0]])
-        table["vary"] = _array(tomlkit, [p.patch if _bare(p) else vars(p) for p in aims[1]])
+        table["vary"] = _array(tomlkit, [_plain(p) for p in aims[1]])
         document["targets"] = table
         return f"with its targets: {', '.join(t.label for t in aims[0])}"
     if not roof.targets or _meets(surface, roof.targets):
@@ -189,6 +189,12 @@ def _meets(surface: Surface, targets: tuple[Target, ...]) -> bool:
         abs(value - t.nearest(value)) <= HELD * t.scale(surface)
         for t, value in zip(targets, values, strict=True)
     )
+
+
+def _plain(parameter: Parameter) -> Any:
+    """A parameter as in a project: its name, a list of names, or a table."""
+    names = list(parameter.names) if len(parameter.names) > 1 else parameter.names[0]
+    return names if _bare(parameter) else {**vars(parameter), "patch": names}
 
 
 def _bare(parameter: Parameter) -> bool:

@@ -260,7 +260,7 @@ class _Handler(BaseHTTPRequestHandler):
         elif act == "news":
             watch = explorer.watch
             news = {"working": bool(watch and watch.working), "problem": watch.problem if watch else ""}
-            self._send_header({"version": explorer.version, **news})
+            self._send_header({"version": explorer.version, "progress": session.progress, **news})
         elif act == "save":
             self._send_header(explorer.save(session, *requests.file_to_save(asked)))
         else:

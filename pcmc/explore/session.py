@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 from .. import existence
@@ -98,6 +99,7 @@ class Session:
         self._compared: int | None = None
         self.variants: list[Variant] = []
         self.aims: Aims | None = None
+        self.progress = ""  # of the search for targets
 
     def state(self) -> State:
         """The present state."""
@@ -159,11 +161,17 @@ class Session:
         """Move to tensions that meet the targets; if there are none, ``message`` says why."""
 
         def act(stop: Callable[[], bool]) -> None:
+            solves = count(1)
+
             def check(_: object) -> None:
+                self.progress = f"{next(solves)} solves"
                 if stop():
                     raise StopIteration
 
-            design = meet(self.surface, targets, vary, callback=check)
+            try:
+                design = meet(self.surface, targets, vary, callback=check)
+            finally:
+                self.progress = ""
             if stop():
                 return
             certificate = design.certificate

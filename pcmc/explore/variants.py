@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Ints
 from ..certificate import Certificate
 from ..certificate.balance import reactions_per_length
 from ..design import Target
@@ -81,7 +81,7 @@ def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]
 def difference(surface: Surface, other: Surface) -> Floats:
     """(n,) distance of each vertex from another surface, length; positive outside it, along its normals.
 
-    The meshes may differ.
+    The meshes may differ. Walls are no part of it, except for the vertices of walls.
 
     >>> from pcmc import Patch
     >>> corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0.0]])
@@ -90,9 +90,23 @@ def difference(surface: Surface, other: Surface) -> Floats:
     >>> difference(flat, lower).tolist(), difference(lower, flat).tolist()
     ([0.5, 0.5, 0.5], [-0.5, -0.5, -0.5])
     """
-    X, Y = surface.vertices, other.vertices
-    away = distances(X, Y, other.faces)
-    normal = vertex_sums(area_vectors(Y[other.faces]), other.faces, other.n)
-    nearest = cKDTree(Y).query(X)[1]
-    outside = np.einsum("ij,ij->i", X - Y[nearest], normal[nearest]) >= 0.0
+    roof, other_roof = (s.faces[~s.walls[s.patch_of_face]] for s in (surface, other))
+    if not (len(roof) and len(other_roof)):
+        return _away(surface.vertices, other.vertices, other.faces)
+    on_roof = np.zeros(surface.n, dtype=bool)
+    on_roof[roof] = True
+    away = np.empty(surface.n)
+    away[on_roof] = _away(surface.vertices[on_roof], other.vertices, other_roof)  # a wall may be nearer
+    away[~on_roof] = _away(surface.vertices[~on_roof], other.vertices, other.faces)
+    return away
+
+
+def _away(points: Floats, Y: Floats, F: Ints) -> Floats:
+    """(k,) signed distance of points (k,3) from the triangles F of vertices Y."""
+    if not len(points):
+        return np.empty(0)
+    away = distances(points, Y, F)
+    normal, used = vertex_sums(area_vectors(Y[F]), F, len(Y)), np.unique(F)
+    nearest = used[cKDTree(Y[used]).query(points)[1]]
+    outside = np.einsum("ij,ij->i", points - Y[nearest], normal[nearest]) >= 0.0
     return np.where(outside, away, -away)

@@ -79,7 +79,7 @@ def arrange(lines: Sequence[Line], edge_length: float, spots: Floats, stops: Flo
     contains = inside(lines)
     for xy, places in zip(spots[:, :2], passing, strict=True):
         if not places and not contains(xy):
-            problem = f"the support at {point_text(xy)} is outside the plan or in a hole"
+            problem = f"the support or point at {point_text(xy)} is outside the plan or in a hole"
             raise PlanError(problem, what="supports", where=tuple(xy.tolist()))
     meetings += [*(lines_at(lines, xy, snap) for xy in stops), *passing]
     nodes = _nodes(lines, meetings, snap)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import NamedTuple
 
@@ -15,8 +15,11 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, PlanWarning, SurfaceError
 from ..energy.rooms import check_rooms
 from ..meshing.angles import improve_angles
-from ..surface import Cable, Patch, Room, Surface
+from ..surface import Cable, Patch, Plane, Room, Surface
+from ..surface.geometry import segment_lengths
+from ..surface.wall_tensions import balanced_wall
 from .arrangement import Arrangement, arrange, hole_points
+from .corners import most_in_corners
 from .curves import Curve
 from .edges import (
     NONE,
@@ -32,14 +35,15 @@ from .edges import (
 )
 from .heights import dome, harmonic_heights
 from .lines import SNAP, Kind, Line
-from .parts import Area, PlanData
+from .parts import BALANCED, Area, PlanData
 from .pieces import to_local, to_space
-from .planar import PlanarMesh, locate, signed_areas, triangulate
+from .planar import SIDES, PlanarMesh, locate, signed_areas, triangulate
 from .walls import UpperEdge, WallMesh, build_walls
 
 MAX_TRIANGLES = 5_000_000
 MAX_EDGES = 200_000  # along a line
 MAX_RISE = 10.0  # of the initial surface, over the size of the plan
+SHARE = 0.6  # of p R, R of the smallest part beside a wall: more would pull a flat roof down
 GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan
 
 
@@ -57,14 +61,15 @@ class _Draft:
 
 @dataclass(frozen=True, eq=False)
 class _Roof:
-    """Positions (n,3), heights (n,) of the surface that the boundary spans, fixed (n,), pressures (m,), and
-    the number (m,) of the room of prescribed volume below, -1 for none."""
+    """Positions (n,3), heights (n,) of the surface that the boundary spans, fixed (n,); of each triangle (m,)
+    the pressure, the number of the room of prescribed volume below, -1 for none, and the tension."""
 
     positions: Floats
     base: Floats
     fixed: Bools
     pressure: Floats
     room: Ints
+    tension: Floats
 
 
 def build_surface(plan: PlanData) -> Surface:
@@ -83,13 +88,13 @@ def build_surface(plan: PlanData) -> Surface:
     base = harmonic_heights(mesh.points, mesh.triangles, given)
     patches, patch_of_face = _patches(plan, mesh)
     cables = _cables(draft, fixed | sliding)
-    _check_free_pressure(draft, cables, patches, patch_of_face)
+    check_pressures(draft.edges, mesh.triangles, patch_of_face, patches)
     height = base + _rise(draft, patches, fixed | sliding)
     inner = np.arange(len(base)) >= len(draft.drawn.points)
     raised = improve_angles(np.column_stack([mesh.points, height]), mesh.triangles, inner, GOOD_ANGLE)
-    pressure = np.array([p.pressure for p in patches])[patch_of_face]
+    pressure, tension = np.array([[p.pressure, p.tension] for p in patches])[patch_of_face].T
     rooms = _room_of_face(plan, patches, patch_of_face)
-    roof = _Roof(to_space(raised, plan.plane), base, fixed, pressure, rooms)
+    roof = _Roof(to_space(raised, plan.plane), base, fixed, pressure, rooms, tension)
     walls, wall_patches, sides = _walls(draft, roof)
     vertices = np.concatenate([roof.positions, walls.vertices])
     surface = Surface(
@@ -100,7 +105,7 @@ def build_surface(plan: PlanData) -> Surface:
         np.concatenate([fixed, walls.fixed]),
         np.concatenate([sliding, walls.sliding]),
         plan.plane,
-        on_planes=tuple(mirror_planes(plan, vertices)),
+        on_planes=(*mirror_planes(plan, vertices), *_upright_planes(draft, walls, sides, len(vertices))),
         cables=tuple(cables),
         rooms=tuple(_rooms(plan, wall_patches, sides)),
     )
@@ -135,7 +140,9 @@ def _drafted(plan: PlanData) -> _Draft:
     spots = np.array([to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)])
     cut = [*on_edge, *(c.local(plan.plane) for c in (*(part.curve for part in plan.cables), *plan.mirrors))]
     stops = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in cut)])
-    drawn = arrange(lines, plan.edge_length, spots.reshape(-1, 3), stops)
+    named = np.array([[*point, np.nan] for point in plan.points.values()]).reshape(-1, 3)
+    drawn = arrange(lines, plan.edge_length, np.concatenate([spots.reshape(-1, 3), named]), stops)
+    drawn = replace(drawn, spots=drawn.spots[: len(spots)])  # the named points are vertices, but not held
     edges = np.concatenate([chain.edges for chain in drawn.chains])
     try:
         mesh = triangulate(drawn.points, edges, plan.edge_length, hole_points(drawn, lines))
@@ -247,17 +254,6 @@ def _cables(draft: _Draft, held: Bools) -> list[Cable]:
     return cables
 
 
-def _check_free_pressure(
-    draft: _Draft, cables: Sequence[Cable], patches: Sequence[Patch], patch_of_face: Ints
-) -> None:
-    """Refuse pressure, and snow, on a patch with a free edge."""
-    loads = []
-    for k, patch in enumerate(patches):
-        F = draft.mesh.triangles[patch_of_face == k]
-        loads.append((patch.name, patch.pressure, F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)))
-    check_pressures(draft.edges, cables, loads)
-
-
 def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
     """The plan's patches and the patch of each triangle."""
     count = int(mesh.region.max()) + 1
@@ -317,6 +313,30 @@ def _located(areas: Sequence[Area], mesh: PlanarMesh, count: int, centroid: Floa
     return owner
 
 
+def _upright_planes(
+    draft: _Draft, walls: WallMesh, sides: Sequence[_Sides], n: int
+) -> tuple[tuple[Plane, Bools], ...]:
+    """The vertical plane of each upright divider, and the (n,) mask of its wall and junction."""
+    planes = []
+    divider_of_wall = np.array([side.divider for side in sides], dtype=np.int64)
+    for number, divider in enumerate(draft.plan.dividers):
+        if not divider.upright:
+            continue
+        line = draft.lines[1 + len(draft.plan.holes) + number]
+        along = line.curve.at(line.curve.dense)[:, :2]
+        start, way = along[0], along[-1] - along[0]
+        across = np.array([-way[1], way[0]]) / (np.linalg.norm(way) or 1.0)
+        if line.curve.closed or np.abs((along - start) @ across).max() > SNAP * draft.plan.edge_length:
+            raise line.error("is not straight, so no plane can hold its wall upright; remove upright = true")
+        foot, tip = to_space(np.array([[*start, 0.0], [*(start + across), 0.0]]), draft.plan.plane)
+        chains = [c.vertices for c in draft.drawn.chains if c.line == 1 + len(draft.plan.holes) + number]
+        own = walls.faces[divider_of_wall[walls.label] == number]
+        inside = np.zeros(n, dtype=bool)
+        inside[np.concatenate([*chains, own.ravel()])] = True
+        planes.append((Plane(tuple(foot), tuple(tip - foot)), inside))
+    return tuple(planes)
+
+
 def _room_of_face(plan: PlanData, patches: Sequence[Patch], patch_of_face: Ints) -> Ints:
     """(m,) the room of prescribed volume below each face, -1 for none."""
     rooms = [room.patches for room in plan.rooms.values()]
@@ -352,17 +372,48 @@ def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], list[_Sid
     for number, sides in kinds:
         divider, alike = plan.dividers[number], [kind for kind in kinds if kind[0] == number]
         suffix = f"-{alike.index((number, sides)) + 1}" if len(alike) > 1 else ""
-        patches.append(Patch(divider.name + suffix, divider.wall, sides.difference, wall=True))
+        tension = _balanced(draft, roof, number) if divider.wall == BALANCED else divider.wall
+        patches.append(Patch(divider.name + suffix, tension, sides.difference, wall=True))
     walls = build_walls(X, tops, plan.edge_length, plan.plane, roof.fixed, floor)
-    return walls, patches, [sides for _, sides in kinds]
+    return walls, patches, [sides._replace(divider=number) for number, sides in kinds]
+
+
+def _balanced(draft: _Draft, roof: _Roof, number: int) -> float:
+    """A tension for the wall of a divider with which all of its junctions balance, if there is one."""
+    line = 1 + len(draft.plan.holes) + number
+    beside = [_beside(draft.mesh.triangles, *c.vertices[:2]) for c in draft.drawn.chains if c.line == line]
+    pressure = min(float(np.abs(roof.pressure[faces]).min(initial=np.inf)) for faces in beside)
+    curve, outline = draft.lines[line].curve, draft.lines[0].curve
+    parts = np.unique(draft.mesh.region[np.concatenate(beside)])
+    width = min(_radius(draft.mesh, int(part)) for part in parts)
+    most = min(most_in_corners(curve, outline, draft.plan.edge_length, pressure), SHARE * pressure * width)
+    tensions = [roof.tension[faces].tolist() for faces in beside]
+    if draft.plan.dividers[number].upright:  # its plane takes the difference
+        tensions = [[min(part)] for part in tensions]
+    return balanced_wall(tensions, most or np.inf)
+
+
+def _radius(mesh: PlanarMesh, part: int) -> float:
+    """2 A / L of a part of the plan, with its area A and the length L of its edge: R of a circle, length."""
+    own = mesh.triangles[mesh.region == part]
+    sides, times = np.unique(np.sort(own[:, SIDES].reshape(-1, 2), axis=1), axis=0, return_counts=True)
+    length = segment_lengths(mesh.points, sides[times == 1]).sum()
+    return 2.0 * float(signed_areas(mesh.points, own).sum() / length)
+
+
+def _beside(triangles: Ints, one: int, two: int) -> Ints:
+    """The triangles at the edge between two vertices."""
+    return np.flatnonzero((triangles == one).any(axis=1) & (triangles == two).any(axis=1))
 
 
 class _Sides(NamedTuple):
-    """Of a wall: the pressure on the left less that on the right, and the rooms there, -1 for none."""
+    """Of a wall: the pressure on the left less that on the right, the rooms there, -1 for none, and its
+    divider."""
 
     difference: float
     left: int
     right: int
+    divider: int = NONE
 
 
 def _sides(triangles: Ints, roof: _Roof, one: int, two: int) -> _Sides:

@@ -11,7 +11,7 @@ import shapely
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
-from ..surface import Cable, Plane
+from ..surface import Cable, Patch, Plane
 from .arrangement import Arrangement
 from .curves import Curve
 from .lines import SNAP, Kind, Line, point_text
@@ -182,22 +182,19 @@ def raised_heights(plan: PlanData, edges: Boundary, drawn: Arrangement, held: Bo
     return heights
 
 
-def check_pressures(
-    edges: Boundary, cables: Sequence[Cable], loads: Sequence[tuple[str, float, Ints]]
-) -> None:
-    """Refuse pressure on a patch with a free edge: it would push on the cone below that edge, too.
-
-    ``loads`` are name, pressure and edges (k,2) of each patch.
-    """
-    free = edges.ends[np.isin(edges.state, [STATES.index("free"), STATES.index("cable")])]
-    carried = np.sort(np.concatenate([np.zeros((0, 2), dtype=np.int64), *(c.edges for c in cables)]), axis=1)
-    loose = {tuple(edge) for edge in np.sort(free, axis=1).tolist()} & set(map(tuple, carried.tolist()))
-    for name, pressure, sides in loads:
-        if pressure != 0.0 and loose & set(map(tuple, np.sort(sides, axis=1).tolist())):
+def check_pressures(edges: Boundary, triangles: Ints, patch: Ints, patches: Sequence[Patch]) -> None:
+    """Refuse pressure on a patch with a cable along a free edge: it would push on the cone below, too."""
+    free = np.sort(edges.ends[edges.cable != NONE], axis=1)
+    n = np.array([int(triangles.max()) + 1, 1])
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+    beside = np.isin(sides @ n, free @ n).any(axis=1)
+    for k in np.unique(patch[beside]):
+        name, pressure = patches[k].name, patches[k].pressure
+        if pressure != 0.0:
             problem = (
-                f"patch {name!r} has the pressure {pressure:g} and a free edge with a cable, which closes no"
+                f"patch {name!r} has the pressure {pressure:g} and a free edge with a cable, which closes"
             )
-            problem += " space for it; give the patch pressure = 0 (and a weight), or hold that edge"
+            problem += " no space for it; give the patch pressure = 0 (and a weight), or hold that edge"
             raise PlanError(problem, what="pressure", where=name, found=pressure)
 
 

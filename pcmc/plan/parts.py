@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from .curves import Curve, curve
 
 EDGES = ("fixed", "sliding", "free", "cable")
 BOTTOMS = ("sliding", "held", "sloped")
+BALANCED = "balanced"  # in place of a wall's tension: chosen from those of its neighbours
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,23 +28,28 @@ class Divider:
     ----------
     curve : the line. Each end is on the outline, a hole or another divider; parts outside the outline
         or inside a hole are left out.
-    wall : tension of the wall, force/length, ≥ 0; None or false for no wall. Between patches of different
+    wall : tension of the wall, force/length, ≥ 0; "balanced", chosen so that the junction balances with room
+        to spare: the difference of the neighbours' tensions and 0.3 of the smaller one, less where the wall
+        runs into a corner or the roof is flat; None or false for no wall. Between patches of different
         pressures the wall takes the difference.
     name : of the wall's patch; by default "wall 1", "wall 2", … in order. Where the difference of
         pressure changes along the divider, each part is a patch of its own: "wall 1-1", "wall 1-2".
     bottom : "held" on Π in all directions; "sliding" on Π; or "sloped": held in all directions on the
         surface that the boundary curves span (for boundaries that leave Π). A junction over a sliding
         bottom is held at its ends by the mesh alone: on finer meshes it slips, or the shape is a saddle.
+    upright : whether a vertical plane holds the wall and the junction on it, in which they slide; the line
+        must be straight. The plane takes the pull across it.
     cable : tension of a cable along the line, force; None for no cable. Without a wall the cable has the
         name of the divider, otherwise "cable 1", "cable 2", … in order. For a cable across one patch, give
         the parts on both sides to that patch with ``at``.
     """
 
     curve: Any
-    wall: float | None = 1.0
+    wall: float | str | None = BALANCED
     name: str = ""
     bottom: str = "held"
     cable: float | None = None
+    upright: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,9 +158,13 @@ def divider_of(spec: Any, number: int) -> Divider:
     what = f"divider {number}"
     part = _part_of(Divider, spec, what)
     validate.choice(f"bottom of {what}", part.bottom, BOTTOMS)
-    cable = cable_tension(part.cable, what)
+    if isinstance(part.wall, str):
+        validate.choice(f"wall of {what}", part.wall, (BALANCED,))
+    if not isinstance(part.upright, bool):
+        validate.refuse("upright", part.upright, "True or False", what)
     wall, kind = (None, "divider") if part.wall is None or part.wall is False else (part.wall, "wall")
-    return Divider(curve_of(part.curve, what), wall, part.name or f"{kind} {number}", part.bottom, cable)
+    given = {"curve": curve_of(part.curve, what), "cable": cable_tension(part.cable, what)}
+    return replace(part, **given, wall=wall, name=part.name or f"{kind} {number}")
 
 
 def hole_of(spec: Any, number: int) -> Hole:
@@ -271,6 +281,21 @@ def support_of(spec: Any, number: int) -> Any:
     return curve_of(spec, f"support {number}")
 
 
+def points_of(spec: Any) -> dict[str, tuple[float, float]]:
+    """Named points of the plan, by name."""
+    if not isinstance(spec, Mapping):
+        validate.refuse("points", spec, "a table of names and points [x, y]")
+    points = {}
+    for name, point in spec.items():
+        if not isinstance(point, Sequence | np.ndarray) or isinstance(point, str) or len(point) != 2:
+            validate.refuse("points", point, "a point [x, y]", name)
+        points[name] = (
+            validate.number("x", point[0], where=name),
+            validate.number("y", point[1], where=name),
+        )
+    return points
+
+
 def check_keys(values: Any, kind: Any, what: str) -> None:
     """Refuse a mapping with a key that is no attribute of the class ``kind``."""
     if not isinstance(values, Mapping):
@@ -302,3 +327,4 @@ class PlanData:
     cables: Sequence[Any] = ()
     mirrors: Sequence[Any] = ()
     rooms: Any = ()
+    points: Any = field(default_factory=dict)

@@ -24,6 +24,7 @@ from .parts import (
     edge_cable,
     hole_of,
     mirror_of,
+    points_of,
     rooms_of,
     support_of,
 )
@@ -39,7 +40,7 @@ class Plan(PlanData):
     Attributes
     ----------
     outline : a closed curve; it may leave Π, but its course in plan must not cross itself.
-    dividers : lines between patches: Dividers, or curves (with walls of tension 1).
+    dividers : lines between patches: Dividers, or curves (with walls whose tension is chosen).
     holes : openings: Holes, or curves (with fixed edges).
     patches : an Area for each part into which the dividers cut the plan, or a mapping from names to
         their attributes; without patches ``tension`` holds for every part.
@@ -53,7 +54,9 @@ class Plan(PlanData):
         edge starts straight.
     plane : Π.
     rise : height of the initial surface above the one that the boundary spans, length; by default
-        0.3 of the radius of the largest circle without supports.
+        0.3 of the radius of the largest circle without supports. In a project without tensions it is the
+        height wanted over the outline, for which the tension is found.
+    points : points [x, y] by name; each becomes a vertex, and targets can name it.
     tension : α of all patches, instead of ``patches``, force/length.
     pressure, weight : of all patches, with ``tension``: force per area along the normal, and per area against
         Π's normal.
@@ -87,6 +90,14 @@ class Plan(PlanData):
     ...             patches={"west": {"tension": 2.0}, "east": {"tension": 2.5}})
     >>> [p.name for p in plan.surface().patches]
     ['west', 'east', 'wall 1']
+
+    A sail on four masts:
+
+    >>> masts = [[0, 0, 4], [10, 0, 0], [10, 10, 4], [0, 10, 0]]
+    >>> sail = Plan([[0, 0], [10, 0], [10, 10], [0, 10]], edge="cable", cable=9.0, supports=masts,
+    ...             tension=1.0, pressure=0.0).surface()
+    >>> [cable.name for cable in sail.cables], int(sail.fixed.sum())
+    (['cable 1', 'cable 2', 'cable 3', 'cable 4'], 4)
     """
 
     def __post_init__(self) -> None:
@@ -96,6 +107,7 @@ class Plan(PlanData):
             "holes": tuple(hole_of(h, k) for k, h in enumerate(self.holes, 1)),
             "patches": areas_of(self.patches),
             "supports": tuple(support_of(s, k) for k, s in enumerate(self.supports, 1)),
+            "points": points_of(self.points),
             "cables": tuple(cable_of(c, k) for k, c in enumerate(self.cables, 1)),
             "mirrors": tuple(mirror_of(m, k) for k, m in enumerate(self.mirrors, 1)),
         }

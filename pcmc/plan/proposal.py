@@ -11,19 +11,17 @@ import numpy as np
 import shapely
 
 from ..base.errors import OptionError, PlanError, unknown
+from ..surface.wall_tensions import balanced_wall
+from .corners import most_in_corners
 from .curves import Curve
 from .drawing import Drawing, Label
-from .parts import Area, Divider, Hole, check_keys
+from .parts import Area, Divider, Hole, PlanData, check_keys
 
 TRIANGLES = 1500  # of a first roof, about
 FINEST = 6000  # triangles at most, where a part is small
 ACROSS = 2.5  # edges from the middle of the smallest part to its edge, at least
 ROOM = 1.6  # tension, over the least at which a roof over the plan exists
-WALL_ROOM = 0.3  # of the smaller tension: a wall's tension above the difference of its neighbours'
 SAMPLES = 16  # points of a divider at which its neighbours are looked up
-WEDGE = 1.5  # edges from a corner, where the width of the sheets there is taken
-CORNER_SHARE = 0.6  # of what those sheets carry
-NARROW = 0.82  # sine of the angle, 55 degrees, below which a sheet in a corner counts as narrow
 SMALL_HOLE = 0.05  # of the plan's area; smaller holes change its least tension little
 NEAR = 1e-4  # of the plan's size: a part this near to a point of a divider is beside it
 
@@ -45,16 +43,26 @@ def parts_of(drawing: Drawing) -> list[Part]:
     noded = shapely.set_precision(shapely.union_all(lines, grid_size=1e-3 * drawing.gap), 0.0)
     roof = roof_area(drawing)
     polygons = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
-    inside = [p for p in polygons if shapely.contains_xy(roof, *_middle(p)[0])]
-    parts = [Part(p, *_middle(p)) for p in inside]
+    inside = [p for p in polygons if shapely.contains_xy(roof, *largest_circle(p)[0])]
+    parts = [Part(p, *largest_circle(p)) for p in inside]
     return sorted(parts, key=lambda part: (round(part.area.centroid.x, 6), round(part.area.centroid.y, 6)))
+
+
+def plan_area(plan: PlanData) -> Any:
+    """The plan on Π without its holes, as ``roof_area``."""
+    holes = [hole.curve.local(plan.plane) for hole in plan.holes]
+    return _area(plan.outline.local(plan.plane), holes, SMALL_HOLE)
 
 
 def roof_area(drawing: Drawing, smallest: float = 0.0) -> Any:
     """The plan without its holes, as a polygon; level holes below a share of its area are filled."""
-    whole = shapely.make_valid(shapely.Polygon(drawing.outline.at(drawing.outline.dense)[:, :2]))
+    return _area(drawing.outline, list(drawing.holes.values()), smallest)
+
+
+def _area(outline: Curve, holes: Sequence[Curve], smallest: float) -> Any:
+    whole = shapely.make_valid(shapely.Polygon(outline.at(outline.dense)[:, :2]))
     area = whole
-    for curve in drawing.holes.values():
+    for curve in holes:
         hole = shapely.make_valid(shapely.Polygon(curve.at(curve.dense)[:, :2]))
         level = curve.pieces[0].points.shape[1] == 2  # a raised one carries the roof
         if not level or hole.area > smallest * whole.area:
@@ -71,7 +79,7 @@ def _line(curve: Curve, further: float = 0.0) -> Any:
     return shapely.LineString(xy)
 
 
-def _middle(area: Any) -> tuple[tuple[float, float], float]:
+def largest_circle(area: Any) -> tuple[tuple[float, float], float]:
     """The centre and radius of the largest circle in a polygon."""
     radius_line = shapely.maximum_inscribed_circle(area, tolerance=0.01 * math.sqrt(area.area))
     x, y = radius_line.coords[0]
@@ -229,37 +237,11 @@ def _changed(drawn: Mapping[str, Curve], given: Sequence[Any], what: str, kind: 
 
 
 def wall_tension(curve: Curve, parts: Sequence[Part], tensions: Sequence[float], most: float) -> float:
-    """The tension of a wall: the difference of its neighbours' and 0.3 of the smaller one, at most ``most``.
-
-    A junction balances if the wall's tension is between the difference and the sum. Of several neighbours
-    along the divider the largest value counts. Two digits.
-    """
+    """The tension of a wall along a curve; see ``balanced_wall``."""
     size = sum(part.area.length for part in parts)
-    wanted = [0.0]
+    neighbours = []
     for t in (len(curve.pieces) * (k + 0.5) / SAMPLES for k in range(SAMPLES)):
         point = shapely.Point(curve.at([t])[0, :2])
         beside = [part.area.distance(point) <= NEAR * size for part in parts]
-        near = [tension for tension, there in zip(tensions, beside, strict=True) if there]
-        if near:
-            wanted.append(max(near) - min(near) + min(WALL_ROOM * min(near), most))
-    return float(f"{max(wanted):.2g}")
-
-
-def most_in_corners(curve: Curve, outline: Curve, edge_length: float, pressure: float = 1.0) -> float:
-    """The most by which a wall may exceed the difference of its neighbours, where it runs into a corner.
-
-    There the sheets on both sides get narrow, and carry the wall only as long as its tension is less than
-    p w, with w their width, which is taken an edge and a half from the corner; 0.6 of that leaves room.
-    Infinite where both sides are wide.
-    """
-    edge = _line(outline)
-    corners = outline.at(outline.corners)[:, :2] if len(outline.corners) else np.empty((0, 2))
-    most = math.inf
-    for one in () if curve.closed else (curve, curve.reversed()):
-        away = one.at(one.parameter(np.array([0.0, WEDGE * edge_length])))[:, :2]
-        if not len(corners) or np.linalg.norm(corners - away[0], axis=1).min() > 1e-3 * outline.length:
-            continue
-        width = float(edge.distance(shapely.Point(away[1])))
-        if width < NARROW * WEDGE * edge_length:
-            most = min(most, CORNER_SHARE * pressure * width)
-    return most
+        neighbours.append([tension for tension, there in zip(tensions, beside, strict=True) if there])
+    return balanced_wall(neighbours, most)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.errors import FileError, MissingExtra
-from ..base.files import atomic_write
+from ..base.files import atomic_write, suffix_of
 
 DPI = 200.0
 TEXT, SMALL = 7.0, 6.0  # points
@@ -97,10 +97,7 @@ def overlap_style(k: int, count: int) -> dict[str, Any]:
 
 def check_suffix(path: str | os.PathLike[str]) -> None:
     """Refuse a path that is not a picture's."""
-    suffix = os.path.splitext(path)[1].lower()
-    if suffix not in SUFFIXES:
-        text = f"{os.fspath(path)}: pictures are {', '.join(SUFFIXES)}; end the name with one of these"
-        raise FileError(text, what=os.fspath(path), found=suffix, expected=SUFFIXES)
+    suffix_of(path, SUFFIXES, "a picture")
 
 
 def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:

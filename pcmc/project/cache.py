@@ -109,6 +109,7 @@ def _values(outcome: Outcome) -> dict[str, Any]:
     names = ("method", "energy", "iterations", "evaluations", "note")
     values: dict[str, Any] = {name: getattr(result, name) for name in names}
     values["status"] = result.status.name
+    values["notes"] = list(outcome.notes)
     if design is not None:
         tables = {name: getattr(design, name).to_dict("split") for name in ("targets", "parameters")}
         values["design"] = {"status": design.status.name, "solves": design.solves, **tables}
@@ -125,10 +126,11 @@ def _outcome(project: Project, values: Mapping[str, Any], surface: Any) -> Outco
         from ..design import Design, DesignStatus
 
         given = values["design"]
-        tables = {name: pd.DataFrame(**given[name]) for name in ("targets", "parameters")}
+        targets, parameters = (pd.DataFrame(**given[name]) for name in ("targets", "parameters"))
         status, solves = DesignStatus[given["status"]], given["solves"]
-        design = Design(status, result, solves=solves, history=pd.DataFrame(), **tables)
-    return Outcome(result, (), design, units=project.units, cached=True)
+        design = Design(status, result, targets, parameters, solves, history=pd.DataFrame())
+    notes = values.get("notes", ())
+    return Outcome(result, (), design, units=project.units, cached=True, notes=notes)
 
 
 def _path(project: Project) -> Path | None:

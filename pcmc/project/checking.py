@@ -75,7 +75,7 @@ def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
             message = unknown(f"key of {title}", name, known)
             raise _error(text, (*place, name), message, found=name, expected=tuple(known))
     for name, key in known.items():
-        if key.default is REQUIRED and name not in table and key.unless not in table:
+        if key.default is REQUIRED and name not in table and not any(other in table for other in key.unless):
             message = f"{title} needs the key {name!r}"
             raise _error(text, (*place, name), message, at=place, expected=key.kind)
 

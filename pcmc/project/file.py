@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import io
 from ..base import validate
-from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError
+from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError, unknown
 from ..base.files import check_name, check_regular
 from ..base.units import NO_UNITS, Units
 from ..plan import Plan, plan_from
@@ -26,6 +26,7 @@ from .documents import Documents, documents_of
 from .drawn import is_drawing, with_drawing
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
+from .rises import Rise, take_rises, with_rises
 from .structure import Structure
 
 if TYPE_CHECKING:
@@ -224,6 +225,8 @@ def start_of(project: Project) -> tuple[Surface, Units]:
 
 def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     """The project with the given data. Errors as in ``load``."""
+    with in_file(path, FileError):
+        data, rises = take_rises(data)
     data, drawing = with_drawing(path, data)
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
     method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
@@ -240,16 +243,24 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
         units = Units(data.get("units", ""), data.get("force", ""))
         structure = Structure(**data["structure"]) if "structure" in data else None
         documents.check(units, structure)
+        plan, targets, vary = with_rises(plan_from(data["plan"]), rises)
+        misfit = None
+        if "targets" in data:
+            given = _search(data["targets"], plan)
+            targets, vary = [*given["targets"], *targets], [*given["vary"], *vary]
+            misfit = given["misfit"]
         return Project(
             path=path,
-            plan=plan_from(data["plan"]),
+            plan=plan,
             units=units,
             method=method,
             options=options,
             wanted=wanted,
             mesh_check=mesh_check,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
-            **(_search(data["targets"]) if "targets" in data else {}),
+            targets=targets,
+            vary=vary,
+            misfit=misfit,
             structure=structure,
             files=files,
             picture=picture,
@@ -259,6 +270,25 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             whole=output.get("whole", False),
             drawing=drawing,
         )
+
+
+def raised(project: Project, wanted: Mapping[str, float | None]) -> Project:
+    """The project whose whole roof gets the rise, apex or span ratio given, with one tension."""
+    rises = [Rise(None, kind, value) for kind, value in wanted.items() if value is not None]
+    if not rises:
+        return project
+    flag = f"--{rises[0].kind.replace('_', '-')}"
+    if len(rises) > 1:
+        text = f"{flag} and --{rises[1].kind.replace('_', '-')}: give one of them, the other follows"
+        raise OptionError(text, what=flag)
+    if project.plan is None:
+        text = f"{flag} is for a project or a drawing; {project.path.name} has no plan"
+        raise OptionError(text, what=flag, found=str(project.path))
+    if project.targets:
+        text = f"{flag}: {project.path.name} has targets already; change them there"
+        raise OptionError(text, what=flag)
+    plan, targets, vary = with_rises(project.plan, rises)
+    return replace(project, plan=plan, targets=targets, vary=vary)
 
 
 def _views(output: Mapping[str, Any]) -> list[Any]:
@@ -278,7 +308,18 @@ def _check_inside(names: Sequence[str]) -> None:
             raise FileError(text, what="output", found=name)
 
 
-def _search(table: Mapping[str, Any]) -> dict[str, Any]:
+def _placed(entry: Mapping[str, Any], plan: Plan) -> Mapping[str, Any]:
+    """A target, with the point of the plan that a height names."""
+    if entry["quantity"] != "height" or not isinstance(entry.get("of"), str):
+        return entry
+    name = entry["of"]
+    if name not in plan.points:
+        text = f"targets.meet: {unknown('point', name, plan.points)}; name it in [plan.points]"
+        raise OptionError(text, what="targets.meet", found=name)
+    return {**entry, "of": plan.points[name]}
+
+
+def _search(table: Mapping[str, Any], plan: Plan) -> dict[str, Any]:
     """The targets of a project, and the parameters that may vary."""
     from ..design import Parameter, Target
 
@@ -288,7 +329,7 @@ def _search(table: Mapping[str, Any]) -> dict[str, Any]:
         if not table[key]:
             raise OptionError(f"targets.{key} is empty; give at least one", what=f"targets.{key}")
     return {
-        "targets": [Target(**entry) for entry in table["meet"]],
-        "vary": [Parameter(v) if isinstance(v, str) else Parameter(**v) for v in table["vary"]],
+        "targets": [Target(**_placed(entry, plan)) for entry in table["meet"]],
+        "vary": [Parameter(**v) if isinstance(v, Mapping) else Parameter(v) for v in table["vary"]],
         "misfit": table.get("tolerance"),
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cache
 from inspect import cleandoc
@@ -13,18 +13,21 @@ from ..accuracy.adaptive import ACCURACY_OF
 from ..base.units import FORCES, LENGTHS
 from ..drawings import FORMATS
 from ..plan import Area, CableLine, Divider, Hole, Plan
-from ..plan.parts import BOTTOMS, EDGES, RoomData
+from ..plan.parts import BALANCED, BOTTOMS, EDGES, RoomData
 from ..solvers import METHODS, find_method
 from ..surface import Plane
 from .accuracy import AccuracyWanted
 from .documents import Documents
 from .output import COLOURS
 from .remeshing import WHEN, Remeshing
+from .rises import RISES
+from .rises import WHOLE as WHOLE_RISES
 from .structure import Structure
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
 WHOLE = "whether to write and draw the whole roof that a plan with mirrors is a part of, and to certify it"
 FIRST = "First lines"  # the keys before any table
+WALL = 'a number, "balanced" or false'
 REQUIRED = MISSING  # the default of a key that must be given
 
 
@@ -39,7 +42,7 @@ class Key:
     default : the value where the key is left out; ``REQUIRED`` if it must not be, None for none.
     help : what it means.
     choices : the texts that are allowed; empty if any is.
-    unless : the key that stands for a required one; empty if none does.
+    unless : the keys that may stand for a required one.
     """
 
     name: str
@@ -47,7 +50,7 @@ class Key:
     default: Any
     help: str
     choices: tuple[str, ...] = ()
-    unless: str = ""
+    unless: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ def _list_of(*kinds: type) -> Callable[[Any], bool]:
 KINDS: dict[str, Callable[[Any], bool]] = {
     "a value": lambda value: True,
     "a number": _number,
-    "a number or false": lambda value: value is False or _number(value),
+    WALL: lambda value: value is False or _number(value) or value == BALANCED,
     "a whole number": lambda value: _number(value) and isinstance(value, int),
     "true or false": lambda value: isinstance(value, bool),
     "a text": lambda value: isinstance(value, str),
@@ -90,6 +93,8 @@ KINDS: dict[str, Callable[[Any], bool]] = {
     "a list of points and curves": _list_of(list, Mapping),
     "a list of names": _list_of(str),
     "a list of names or tables": _list_of(str, Mapping),
+    "a list of names, lists of names, or tables": _list_of(str, list, Mapping),
+    "a name or a list of names": lambda value: isinstance(value, str) or _list_of(str)(value),
     "a list of points": _list_of(list),
     "a curve": lambda value: isinstance(value, list | Mapping),
     "a point [x, y, z]": lambda value: _list_of(int, float)(value) and len(value) == 3,
@@ -127,11 +132,22 @@ def _plan_keys(kinds: Mapping[str, str]) -> tuple[Key, ...]:
     drawing = "a .dxf or .3dm file beside the project: its layers are the lines, instead of ``outline``"
     gap = "gaps between its lines up to this length are closed; by default a thousandth of its size"
     return (
-        replace(outline, unless="drawing"),
+        replace(outline, unless=("drawing",)),
         Key("drawing", "a text", None, drawing),
         Key("gap", "a number", None, gap),
         *others,
+        *_rise_keys("instead of a tension: for the whole roof", WHOLE_RISES[1:]),
     )
+
+
+def _rise_keys(how: str, names: Sequence[str]) -> tuple[Key, ...]:
+    """Keys for the height of a roof, from which its tension is found."""
+    meanings = {
+        "rise": "the height over a level outline",
+        "apex": "the greatest height over the plane",
+        "span_ratio": "the smaller span of the plan over the rise",
+    }
+    return tuple(Key(name, "a number", None, f"{meanings[name]}, {how}") for name in names)
 
 
 @cache
@@ -140,7 +156,7 @@ def main_sections() -> tuple[Section, ...]:
     curve, curves = {"curve": "a curve"}, "a list of curves or tables"
     plan = {"outline": "a curve", "dividers": curves, "holes": curves, "patches": "a table"}
     plan |= {"supports": "a list of points and curves", "plane": "a table", "cables": "a list of tables"}
-    plan |= {"mirrors": "a list of curves or tables", "rooms": "a table"}
+    plan |= {"mirrors": "a list of curves or tables", "rooms": "a table", "points": "a table"}
     area = _of_class(Area, {"at": "a point [x, y] or a list of points"})
     directions = "of the picture: diagonal, elevation, plan, or [azimuth, elevation] in degrees"
     documents = {"drawings": "a list of names", "panels": "a text", "structure": "a text", "report": "a text"}
@@ -161,12 +177,17 @@ def main_sections() -> tuple[Section, ...]:
         ),
         Section("plan", "The roof, by the lines of its plan.", _plan_keys(plan)),
         Section(
-            "plan.patches.NAME", "A patch; NAME is its name.", tuple(k for k in area if k.name != "name")
+            "plan.patches.NAME",
+            "A patch; NAME is its name.",
+            (
+                *(replace(k, unless=RISES) if k.name == "tension" else k for k in area if k.name != "name"),
+                *_rise_keys("instead of a tension, which is found", RISES),
+            ),
         ),
         Section(
             "plan.dividers",
             "A line between patches, with a wall below it. A curve alone is a divider, too.",
-            _of_class(Divider, curve | {"wall": "a number or false"}, {"bottom": BOTTOMS}),
+            _of_class(Divider, curve | {"wall": WALL}, {"bottom": BOTTOMS}),
         ),
         Section(
             "plan.holes", "An opening. A curve alone is a hole, too.", _of_class(Hole, curve, {"edge": EDGES})
@@ -239,8 +260,10 @@ def target_sections() -> tuple[Section, ...]:
     from ..design.quantities import QUANTITIES
     from ..design.targets import KINDS as KINDS_OF_PARAMETER
 
-    changing = _of_class(Parameter, choices={"kind": KINDS_OF_PARAMETER})
-    varied = "what may change; a name alone is a patch whose tension may"
+    changing = _of_class(
+        Parameter, {"patch": "a name or a list of names"}, choices={"kind": KINDS_OF_PARAMETER}
+    )
+    varied = "what may change; a name is a patch whose tension may, a list of names several with one tension"
     wanted = _of_class(Target, {"of": "a name or a point [x, y]"}, {"quantity": tuple(QUANTITIES)})
     return (
         Section(
@@ -248,7 +271,7 @@ def target_sections() -> tuple[Section, ...]:
             "Quantities to be met by changing tensions, pressures, cables, weights or volumes.",
             (
                 Key("meet", "a list of tables", REQUIRED, "the quantities and their values"),
-                Key("vary", "a list of names or tables", REQUIRED, varied),
+                Key("vary", "a list of names, lists of names, or tables", REQUIRED, varied),
                 Key("tolerance", "a number", 1e-7, "largest relative misfit of a target that counts as met"),
             ),
         ),

@@ -39,6 +39,8 @@ class Outcome:
     whole : the whole roof, if the project asks for it: ``surface`` is the part between its mirror planes.
     cached : whether the roof was solved before and comes from the cache. Then ``accurate`` is None, and the
         histories of ``result`` and ``design`` are empty.
+    notes : what was chosen where the project does not say it, and what happened on the way.
+    advice : where the roof is not good, what to type, a line each; empty if no remedy is known.
     """
 
     result: Result
@@ -49,6 +51,8 @@ class Outcome:
     units: Units = NO_UNITS
     cached: bool = False
     whole: Whole | None = None
+    notes: Sequence[str] = ()
+    advice: Sequence[str] = ()
 
     @property
     def surface(self) -> Surface:

@@ -107,7 +107,9 @@ def proposal_text(project: Project) -> str:
     """
     assert project.plan is not None
     tensions = sorted({area.tension for area in project.plan.patches})
-    walls = sorted({divider.wall for divider in project.plan.dividers if divider.wall is not None})
+    walls = sorted(
+        {divider.wall for divider in project.plan.dividers if isinstance(divider.wall, int | float)}
+    )
     parts = [f"tension {' or '.join(f'{value:g}' for value in tensions)}"]
     parts += [f"walls of {' or '.join(f'{value:g}' for value in walls)}"] if walls else []
     parts.append(f"edges of {project.plan.edge_length:g}")

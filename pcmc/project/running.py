@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import count
@@ -25,6 +25,7 @@ from ..meshing.remeshing import remesh
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface, mirrored
 from . import cache
+from .advice import advice, chosen_walls
 from .documents import document_works
 from .file import Project, in_file, load, start_of
 from .outcome import Outcome, Whole
@@ -32,7 +33,7 @@ from .output import OnStep, PathLike, Works, check_names, check_outputs, fields,
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
-    from ..design import Design
+    from ..design import Design, Target
 
 
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
@@ -211,7 +212,7 @@ def solve_from_start(
     """Mesh a project, solve it, remesh it and meet its targets; write nothing."""
     report("reading" if project.plan is None else "meshing the plan")
     start, units = start_of(project)
-    start = start if changed is None else changed(start)
+    given, start = start, start if changed is None else changed(start)
     if project.documents.structure is not None and project.structure is not None:
         with in_file(project.path):
             project.structure.check(start)
@@ -219,7 +220,12 @@ def solve_from_start(
         text = f"{project.path}: the roof has no mirror planes, so it is the whole already; leave out whole"
         raise OptionError(f"{text}, or give the plan mirrors", what="whole")
     _check_balance(start)
-    return replace(solve_project(project, start, report), units=units)
+    outcome = replace(solve_project(project, start, report), units=units)
+    notes = (*chosen_walls(project, start), *outcome.notes)
+    if outcome.good:
+        return replace(outcome, notes=notes)
+    report("looking for advice")
+    return replace(outcome, notes=notes, advice=advice(project, given, start, outcome))
 
 
 def _check_balance(surface: Surface) -> None:
@@ -250,7 +256,12 @@ def solve_project(project: Project, surface: Surface, progress: OnStep | None = 
         for stage in after:
             if outcome.good:
                 report("remeshing")
+                before = outcome
                 outcome = _again(project, remesh(outcome.surface, **stage.options), report)
+                outcome = replace(
+                    outcome,
+                    notes=(*before.notes, *outcome.notes, *_met_before(project.targets, before, outcome)),
+                )
         if project.wanted.accuracy and outcome.good:
             accurate = _solve_to_accuracy(project, outcome.surface, report)
             if not (project.targets and accurate.good):
@@ -265,6 +276,21 @@ def _again(project: Project, surface: Surface, report: OnStep) -> Outcome:
     if project.targets and outcome.good:  # otherwise its verdict is the better explanation
         outcome = _solve_or_meet(project, outcome.surface, report)
     return outcome
+
+
+def _met_before(targets: Sequence[Target], before: Outcome, after: Outcome) -> list[str]:
+    """That the targets were met on the mesh before, with which parameters, and what the finer one reaches."""
+    if before.design is None:
+        return []
+    values = ", ".join(f"{label} {value:.6g}" for label, value in before.design.parameters["value"].items())
+    met = f"targets met on the first mesh, {before.surface.m} triangles, with {values}"
+    where = f"on the new one, {after.surface.m} triangles"
+    if after.design is not None:
+        return [met if after.good else f"{met}; {where}, {after.design.status.value}"]
+    from ..design.targets import measure  # needed by projects with targets only
+
+    reached = ", ".join(f"{target.label} {measure(after.surface, target).value:.6g}" for target in targets)
+    return [f"{met}; {where}, the surface does not come to rest with them; it has {reached}"]
 
 
 def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Outcome:
@@ -296,15 +322,36 @@ def _newton_alone(project: Project, act: str) -> None:
 
 
 def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
-    """Solve the surface, or meet its targets, and certify it."""
-    design = _meet(project, surface, report) if project.targets else None
-    if design is not None:
-        result = design.result
-    else:
-        solver = solve if project.search else solvers.solve
-        result = solver(surface, project.method, reporter(report), **project.options)
-        if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
-            raise KeyboardInterrupt
+    """Solve the surface, or meet its targets, and certify it.
+
+    Where the search for the targets finds no equilibrium to start from, the surface is solved without them:
+    from a roof that is certified the search starts again, any other says why there is none.
+    """
+    if not project.targets:
+        return _certified(_solve(project, surface, report), None, report)
+    from ..design import NoStart  # needed by projects with targets only
+
+    try:
+        design = _meet(project, surface, report)
+    except NoStart:
+        outcome = _certified(_solve(project, surface, report), None, report)
+        if not outcome.good:
+            return replace(
+                outcome, notes=("targets not tried: without them there is no stable roof, either",)
+            )
+        design = _meet(project, outcome.surface, report)
+    return _certified(design.result, design, report)
+
+
+def _solve(project: Project, surface: Surface, report: OnStep) -> Result:
+    solver = solve if project.search else solvers.solve
+    result = solver(surface, project.method, reporter(report), **project.options)
+    if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
+        raise KeyboardInterrupt
+    return result
+
+
+def _certified(result: Result, design: Design | None, report: OnStep) -> Outcome:
     report("certifying")
     result.certificate  # noqa: B018 — computed here, while the progress is shown
     return Outcome(result, (), design)

@@ -92,13 +92,14 @@ def lumped_mass(space: MotionSpace, classes: VertexClasses, X: Floats) -> Floats
 def excluded_columns(surface: Surface, space: MotionSpace, rigid: Floats, X: Floats) -> Floats:
     """(N,k) the rigid motions given, and the unit gradients of the volumes that rooms prescribe.
 
-    Motions that cross all of them deform the surface and keep the volumes.
+    Motions that cross all of them deform the surface and keep the volumes. A volume that no motion changes
+    excludes none.
     """
     if not surface.rooms:
         return rigid
     columns = volume_columns(surface, space, X)
     length = np.linalg.norm(columns, axis=0)
-    return np.hstack([rigid, columns / np.where(length > 0.0, length, 1.0)])
+    return np.hstack([rigid, columns[:, length > 0.0] / length[length > 0.0]])
 
 
 def negatives_without(factor: Factor, columns: Floats) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
-from ..base.files import atomic_write, check_name
+from ..base.files import atomic_write, check_name, suffix_of
 from ..io.text import format_rows
 from ..surface.geometry import area_vectors
 from . import cables
@@ -58,9 +58,7 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> Non
     """
     path = Path(path)
     check_name(path)
-    if path.suffix.lower() != ".inp":
-        text = f"{path}: a structural model is written as .inp; change the suffix"
-        raise FileError(text, what=str(path), found=path.suffix, expected=".inp")
+    suffix_of(path, (".inp",), "a structural model")
     if not isinstance(model, StructuralModel):
         validate.refuse("model", type(model).__name__, "a StructuralModel")
     text = "".join(_sections(model))

@@ -154,8 +154,7 @@ def _snow(surface: Surface, snow: Snow) -> Floats:
 
 def _dead_weight(surface: Surface) -> Floats:
     """(n,3) forces of the patches' own weights per area, which belong to the form-finding load."""
-    weights = np.array([patch.weight for patch in surface.patches])[surface.patch_of_face]
-    per_face = weights * face_areas(surface.vertices[surface.faces])
+    per_face = surface.weights[surface.patch_of_face] * face_areas(surface.vertices[surface.faces])
     downwards = -np.array(surface.plane.normal) / 3.0
     return vertex_sums(per_face[:, None] * downwards, surface.faces, surface.n)
 

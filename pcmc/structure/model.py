@@ -15,6 +15,7 @@ from ..certificate.certificate import certify
 from ..certificate.required import require_certified
 from ..contact.pinching import standing_faces, standing_part
 from ..energy.functional import apply_supports
+from ..energy.weight import effective_tensions
 from ..solvers.result import Result
 from ..surface import Surface, expect_surface
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
@@ -134,10 +135,8 @@ class StructuralModel:
         has it, whose tension carries the part of the weight along the surface.
         """
         s = self.standing
-        patch = s.patch_of_face[self.active]
-        weights = np.array([p.weight for p in s.patches])[patch]
-        height = s.plane.height(s.vertices[s.faces[self.active]].mean(axis=1))
-        return (s.tensions[patch] + weights * height) / self.thicknesses[patch]
+        faces, patch = s.faces[self.active], s.patch_of_face[self.active]
+        return effective_tensions(s, s.vertices, faces, patch) / self.thicknesses[patch]
 
     @cached_property
     def cable_areas(self) -> tuple[float, ...]:

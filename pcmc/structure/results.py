@@ -12,8 +12,8 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats, Ints, cached_array
-from ..base.errors import FileError, unknown
-from ..base.files import check_regular
+from ..base.errors import FileError
+from ..base.files import check_regular, suffix_of
 from ..surface.geometry import area_vectors
 from . import dat, frd
 from .blocks import TENSOR, Block
@@ -94,10 +94,7 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
     if not isinstance(model, StructuralModel):
         validate.refuse("model", type(model).__name__, "a StructuralModel")
     check_regular(path)
-    suffix = path.suffix.lower()
-    if suffix not in READERS:
-        text = f"{path}: {unknown('suffix', suffix, READERS)}"
-        raise FileError(text, what=str(path), found=suffix, expected=list(READERS))
+    suffix = suffix_of(path, READERS, "a result of CalculiX")
     try:
         text = path.read_text(encoding="ascii")
         steps = READERS[suffix](text)

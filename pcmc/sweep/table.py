@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import FileError, MissingExtra
-from ..base.files import atomic_write
+from ..base.files import atomic_write, suffix_of
 from .store import Record
+
+TABLES = (".csv", ".parquet")
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,12 +56,10 @@ def write_table(path: str | os.PathLike[str], frame: pd.DataFrame) -> None:
     MissingExtra : ``.parquet`` without pyarrow.
     """
     path = Path(path)
-    if path.suffix not in (".csv", ".parquet"):
-        text = f"{path}: a table is written as .csv or .parquet; change the suffix"
-        raise FileError(text, what=str(path), found=path.suffix, expected=(".csv", ".parquet"))
+    suffix = suffix_of(path, TABLES, "a table")
     try:
         with atomic_write(path) as temporary:
-            if path.suffix == ".csv":
+            if suffix == ".csv":
                 frame.to_csv(temporary, lineterminator="\n")
             else:
                 _to_parquet(temporary, frame)

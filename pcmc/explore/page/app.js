@@ -156,9 +156,14 @@ class Page {
       card.removeAttribute("aria-busy");
       return;
     }
-    const tell = () => {
+    const ticket = this.busy;
+    const tell = async () => {
+      const seconds = Math.round((performance.now() - this.since) / 1000);
       work.hidden = false;
-      work.textContent = `Working… ${Math.round((performance.now() - this.since) / 1000)} s`;
+      work.textContent = `Working… ${seconds} s`;
+      const news = await ask(`api/${this.name}/news`).catch(() => null);
+      if (this.busy !== ticket) return;
+      if (news?.header.progress) work.textContent = `Working… ${seconds} s, ${news.header.progress}`;
       this.slow = setTimeout(tell, 1000);
     };
     this.slow = setTimeout(() => {

@@ -81,6 +81,7 @@ export function showPatches(table, measures, units) {
   head.append(element("td"), ...columns.map(([, name, kind]) => {
     const th = element("th", "", name);
     th.scope = "col";
+    if (kind === "volume") th.title = "The patch's share as targets count it: the cone from the patch to the point of Π; all shares add up to the volume";
     if (units.given) th.append(element("span", "unit", units[kind]));
     return th;
   }));

@@ -1,0 +1,156 @@
+"""What was chosen for a project, and what to type where its roof has no equilibrium."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import replace
+from typing import Any
+
+from ..base.errors import PcmcError
+from ..certificate.balance import strained_junction
+from ..certificate.proof import Fold, Overload
+from ..certificate.verdict import Verdict
+from ..contact.pinching import standing_part
+from ..existence import solve
+from ..plan import Divider, Plan
+from ..plan.parts import BALANCED
+from ..solvers.result import Status
+from ..surface import Surface
+from .file import Project
+from .outcome import Outcome
+
+BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of it
+FARTHEST = 20.0  # times the tensions: a fold beyond has another reason, such as an end that slips
+TRIES = 3  # plans tried
+TRIANGLES = 5000  # of the meshes that these are tried on, at most about
+INFLATED = (Overload, Fold)
+
+
+def chosen_walls(project: Project, surface: Surface) -> list[str]:
+    """The tensions of the walls that the project leaves open, in a line."""
+    if project.plan is None or project.drawing is not None:
+        return []
+    left_open = [divider for divider in project.plan.dividers if divider.wall == BALANCED]
+    chosen = [p for p in surface.patches if any(_is_wall_of(divider, p.name) for divider in left_open)]
+    if not chosen:
+        return []
+    values = ", ".join(f"{patch.name!r} {patch.tension:g}" for patch in chosen)
+    return [f"walls balanced with their neighbours: {values} (to choose one, type wall = under its divider)"]
+
+
+def advice(project: Project, given: Surface, start: Surface, outcome: Outcome) -> list[str]:
+    """What to type so that a project, or a surface, comes to rest: a heading, and a line for each change.
+
+    Parameters
+    ----------
+    given, start : the start shape of the project, and the one that was solved, with the command's tensions.
+    """
+    if outcome.certificate.certified:
+        return []
+    plan = project.plan
+    if plan is None or start is not given:
+        strained = strained_junction(start, standing_part(start).walls.pinchable)
+        if strained is None or strained.remedy is None:
+            return []
+        return ["add to the command:", f"--tension {strained.remedy[0]!r}={strained.remedy[1]:g}"]
+    name = project.path.with_suffix(".toml").name
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the project's own warnings were shown
+        better, works = _tried(project, plan, outcome)
+        lines = _lines(plan, better)
+    tried = "which was tried and comes to rest" if works else "as a first step"
+    return [f"type in {name}, {tried}:", *lines] if lines else []
+
+
+def _tried(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, bool]:
+    """The plan mended until it comes to rest, on a mesh that is not fine; and whether it does."""
+    for _ in range(TRIES):
+        better = mended(plan, outcome)
+        if not _lines(plan, better):
+            break
+        plan, share = better, outcome.surface.m / TRIANGLES
+        trial = replace(plan, edge_length=plan.edge_length * max(1.0, math.sqrt(share)))
+        try:
+            result = solve(trial.surface(), project.method, **project.options)
+        except PcmcError:  # too coarse for this plan
+            break
+        outcome = Outcome(result, ())
+        if outcome.certificate.certified:
+            return plan, True
+        if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
+            raise KeyboardInterrupt
+    return plan, False
+
+
+def mended(plan: Plan, outcome: Outcome) -> Plan:
+    """The plan with the tensions and supports that remove what its certificate complains of."""
+    certificate = outcome.certificate
+    grew = any(isinstance(proof, INFLATED) for proof in certificate.proofs)
+    if grew or certificate.verdict is Verdict.RAN_AWAY:
+        plan = _stiffer(plan, outcome)
+    sliding = {divider.name for divider in plan.dividers if divider.bottom == "sliding"}
+    plan = _with_dividers(plan, sliding, bottom="held")  # only the mesh holds the ends of their junctions
+    if certificate.verdict is Verdict.WALL_DOWN:
+        plan = _with_dividers(plan, {d.name for d in plan.dividers}, wall=BALANCED)
+    return _balanced(plan)
+
+
+def _stiffer(plan: Plan, outcome: Outcome) -> Plan:
+    """All tensions at least at those with which a first roof succeeds, and well beyond a fold."""
+    from ..plan.proposal import ROOM, least_tension, plan_area  # needs shapely
+
+    pressures = [abs(area.pressure) for area in plan.patches] or [1.0]
+    least = ROOM * least_tension(plan_area(plan), max(pressures))
+    folds = [1.0 / proof.value for proof in outcome.certificate.proofs if isinstance(proof, Fold)]
+    factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
+
+    def raised(tension: float) -> float:
+        return float(f"{max(least, factor * tension, tension):.2g}")
+
+    if plan.tension is not None:
+        return replace(plan, tension=raised(plan.tension))
+    return replace(plan, patches=[replace(area, tension=raised(area.tension)) for area in plan.patches])
+
+
+def _balanced(plan: Plan) -> Plan:
+    """The plan with those walls balanced at which tensions do not, or hardly, balance."""
+    for _ in range(len(plan.dividers) + len(plan.patches)):
+        surface = plan.surface()
+        strained = strained_junction(surface, standing_part(surface).walls.pinchable)
+        if strained is None or strained.remedy is None:
+            break
+        name, tension, _ = strained.remedy
+        own = {divider.name for divider in plan.dividers if _is_wall_of(divider, name)}
+        areas = [replace(area, tension=tension) if area.name == name else area for area in plan.patches]
+        plan = replace(_with_dividers(plan, own, wall=BALANCED), patches=areas)
+    return plan
+
+
+def _with_dividers(plan: Plan, names: set[str], **changes: Any) -> Plan:
+    dividers = [replace(d, **changes) if d.name in names else d for d in plan.dividers]
+    return replace(plan, dividers=dividers)
+
+
+def _lines(plan: Plan, other: Plan) -> list[str]:
+    """The lines to type that make the one plan the other: tensions, walls and bottoms."""
+    lines = [("[plan]", "tension", plan.tension, other.tension)]
+    for before, after in zip(plan.patches, other.patches, strict=True):
+        lines.append((f"[plan.patches] {before.name}:", "tension", before.tension, after.tension))
+    made = other.surface().patches
+    for number, (was, new) in enumerate(zip(plan.dividers, other.dividers, strict=True), 1):
+        place = f"[[plan.dividers]] number {number} ({was.name!r}):"
+        wall = next((p.tension for p in made if _is_wall_of(new, p.name)), None)
+        lines.append((place, "wall", was.wall, was.wall if new.wall == was.wall else wall))
+        lines.append((place, "bottom", was.bottom, new.bottom))
+    return [f"{a} {key} = {_toml(new)}  (now {_toml(old)})" for a, key, old, new in lines if new != old]
+
+
+def _toml(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, int | float) else f'"{value}"'
+
+
+def _is_wall_of(divider: Divider, name: str) -> bool:
+    """Whether a patch is the wall of a divider, or a part of it."""
+    stem, dash, number = name.rpartition("-")
+    return name == divider.name or (bool(dash) and stem == divider.name and number.isdigit())

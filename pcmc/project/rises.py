@@ -1,0 +1,144 @@
+"""Rises instead of tensions: a first tension for each, and the target that finds the right one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base import validate
+from ..base.errors import MissingExtra, OptionError
+from ..plan import Plan
+
+if TYPE_CHECKING:
+    from ..design import Parameter, Target
+
+RISES = ("rise", "apex")  # of a patch
+WHOLE = (*RISES, "span_ratio")  # of all patches together
+LEAST = 1.15  # times the tension below which no roof over the plan is in equilibrium: the first one at least
+LEVEL = 1e-9  # of the outline's length: heights that differ by less are one
+
+
+@dataclass(frozen=True)
+class Rise:
+    """A height that a patch, or all patches together, are to have.
+
+    Attributes
+    ----------
+    patch : its name; None for all together, which get one tension.
+    kind : "rise", height of the highest point over a level outline; "apex", over Π; "span_ratio", the smaller
+        span of the plan over its rise.
+    value : > 0.
+    """
+
+    patch: str | None
+    kind: str
+    value: float
+
+    def __post_init__(self) -> None:
+        validate.positive(self.kind, self.value)
+
+
+def take_rises(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Rise]]:
+    """The data of a project without the rises that stand for tensions, and these.
+
+    >>> take_rises({"plan": {"outline": [], "rise": 2.0}})[1]
+    [Rise(patch=None, kind='rise', value=2.0)]
+    """
+    plan = dict(data["plan"])
+    patches = {name: dict(values) for name, values in plan.get("patches", {}).items()}
+    rises = []
+    for name, values in patches.items():
+        rises += _taken(values, RISES, name)
+    if not patches and "tension" not in plan:
+        rises += _taken(plan, WHOLE, None)
+    elif misplaced := [key for key in WHOLE[1:] if key in plan]:
+        text = f"plan.{misplaced[0]} is for a plan without tensions; remove it, or the tensions"
+        raise OptionError(text, what=f"plan.{misplaced[0]}")
+    if patches:
+        plan["patches"] = patches
+    return {**data, "plan": plan}, rises
+
+
+def _taken(values: dict[str, Any], kinds: Sequence[str], patch: str | None) -> list[Rise]:
+    """The rise in a table, which is taken out; the tension 1 stands for it."""
+    given = [kind for kind in kinds if kind in values]
+    if not given:
+        return []
+    where = "the plan" if patch is None else f"patch {patch!r}"
+    if len(given) > 1 or "tension" in values:
+        both = " and a ".join([*given, *(["tension"] if "tension" in values else [])])
+        text = f"{where} has a {both}; give one of them, the others follow"
+        raise OptionError(text, what=given[0], where=patch)
+    values["tension"] = 1.0
+    return [Rise(patch, given[0], values.pop(given[0]))]
+
+
+def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], list[Parameter]]:
+    """The plan with a first tension for each rise, the targets, and the tensions that are to be found.
+
+    The first tension is that of a cap with this rise over a round plan of the same least tension,
+    α = p (R² + h²) / (4 h), R twice the least tension over p.
+    """
+    from ..design import Parameter, Target
+
+    targets, vary = [], []
+    for one in rises:
+        height = _height(plan, one)
+        if one.patch is None:
+            plan = _retensioned(plan, None, height - _level(plan))
+            names = [patch.name for patch in plan.surface().patches if not patch.auxiliary]
+            vary.append(Parameter(names))
+        else:
+            plan = _retensioned(plan, one.patch, height - _level(plan))
+            vary.append(Parameter(one.patch))
+        targets.append(Target("apex", one.patch, height))
+    return plan, targets, vary
+
+
+def _retensioned(plan: Plan, patch: str | None, rise: float) -> Plan:
+    """The plan with the first tension for a rise, of a patch or of all."""
+    least, _ = _sizes(plan)
+
+    def first(pressure: float) -> float:
+        radius = 2.0 * least
+        cap = abs(pressure or 1.0) * (radius**2 + rise**2) / (4.0 * rise)
+        return float(f"{max(cap, LEAST * least * abs(pressure or 1.0)):.3g}")
+
+    if plan.tension is not None:
+        return replace(plan, tension=first(plan.pressure))
+    areas = [replace(a, tension=first(a.pressure)) if patch in (None, a.name) else a for a in plan.patches]
+    if patch is None:
+        highest = max(area.tension for area in areas)
+        areas = [replace(area, tension=highest) for area in areas]
+    return replace(plan, patches=areas)
+
+
+def _height(plan: Plan, rise: Rise) -> float:
+    """The height over Π that a rise asks for."""
+    if rise.kind == "apex":
+        return rise.value
+    heights = plan.outline.local(plan.plane).at(plan.outline.dense)
+    if heights.shape[1] > 2 and np.ptp(heights[:, 2]) > LEVEL * plan.outline.length:
+        text = f"{rise.kind}: the outline is not level, so a rise over it is not defined; give apex instead"
+        raise OptionError(f"{text}, the greatest height over the plane", what=rise.kind, where=rise.patch)
+    over = rise.value if rise.kind == "rise" else 2.0 * _sizes(plan)[1] / rise.value
+    return _level(plan) + over
+
+
+def _level(plan: Plan) -> float:
+    """The mean height of the outline over Π."""
+    heights = plan.outline.local(plan.plane).at(plan.outline.dense)
+    return float(heights[:, 2].mean()) if heights.shape[1] > 2 else 0.0
+
+
+def _sizes(plan: Plan) -> tuple[float, float]:
+    """The least tension of a roof over the plan per pressure, and the radius of the largest circle in it."""
+    try:
+        from ..plan.proposal import largest_circle, least_tension, plan_area
+    except ModuleNotFoundError:
+        raise MissingExtra("shapely", "plan") from None
+    area = plan_area(plan)
+    return least_tension(area), largest_circle(area)[1]

@@ -1,0 +1,76 @@
+"""Walls that lean: how much, as a target, and the derivative."""
+
+import numpy as np
+import pytest
+from refusals import refused
+
+from pcmc import Parameter, Target, certify, cli, meet, solve
+from pcmc.base.errors import OptionError
+from pcmc.design import sensitivities
+from pcmc.design.targets import measure
+from pcmc.plan import Divider, Plan
+
+HALL = [[0, 0], [12, 0], [12, 6], [0, 6]]
+LEAN = Target("lean", "wall 1")
+
+
+def hall(east=4.0, edge_length=1.0, **more):
+    patches = {"west": {"tension": 6.0}, "east": {"tension": east}}
+    return Plan(
+        HALL, [Divider([[6, 0], [6, 6]], 3.0, **more)], patches=patches, edge_length=edge_length
+    ).surface()
+
+
+def test_a_wall_turned_by_an_angle_leans_by_it():
+    surface = hall()
+    X = surface.vertices.copy()
+    wall = np.unique(surface.faces[surface.patch_of_face == 2])
+    X[wall, 0] += np.tan(np.radians(20.0)) * X[wall, 2]
+    turned = surface.moved(X)
+    assert measure(turned, LEAN).value == pytest.approx(20.0)
+    assert certify(turned).leaning["lean"].tolist() == pytest.approx([20.0])
+    assert "'wall 1' by 20.0° near [" in certify(turned).text()
+
+
+def test_the_derivative_by_positions_is_exact():
+    surface = solve(hall()).surface
+    rng, step = np.random.default_rng(3), 1e-6
+    direction = rng.normal(size=(surface.n, 3)) * surface.free[:, None]
+    slope = float((measure(surface, LEAN).by_position * direction).sum())
+    ends = [measure(surface.moved(surface.vertices + s * step * direction), LEAN).value for s in (1, -1)]
+    assert slope == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-6)
+
+
+def test_a_limit_of_the_lean_is_met():
+    start = solve(hall())
+    assert measure(start.surface, LEAN).value > 8.0
+    design = meet(start.surface, Target("lean", "wall 1", at_most=4.0), Parameter("east", high=8.0))
+    assert design.met
+    assert certify(design.surface).leaning["lean"].max() <= 4.0 * (1.0 + 1e-6)
+
+
+def test_the_lean_answers_to_tensions_as_solves_do():
+    surface, step = solve(hall(), tolerance=1e-12).surface, 1e-4
+    slope = sensitivities(surface, LEAN, "east").to_numpy().item()
+    ends = [solve(surface.retensioned({"east": 4.0 + s * step}), tolerance=1e-12).surface for s in (1, -1)]
+    difference = measure(ends[0], LEAN).value - measure(ends[1], LEAN).value
+    assert slope == pytest.approx(difference / (2.0 * step), rel=1e-3)
+
+
+def test_only_walls_lean():
+    with refused(OptionError, what="of"):
+        measure(hall(), Target("lean", "west"))
+    with refused(OptionError, what="of"):
+        measure(Plan(HALL, tension=4.0, edge_length=1.5).surface(), Target("lean"))
+
+
+@pytest.mark.parametrize("upright", ["true", "false"])
+def test_the_command_says_which_walls_lean(tmp_path, capsys, upright):
+    path = tmp_path / "roof.toml"
+    path.write_text(
+        "[plan]\nedge_length = 1.0\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
+        f"dividers = [{{curve = [[6, 0], [6, 6]], upright = {upright}}}]\n"
+        "[plan.patches]\nwest = {tension = 7.0}\neast = {tension = 3.5}\n"
+    )
+    assert cli.main(["solve", str(path), "--no-mesh-check"]) == 0
+    assert ("walls lean from the vertical: 'wall 1'" in capsys.readouterr().out) is (upright == "false")

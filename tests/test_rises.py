@@ -1,0 +1,86 @@
+"""Projects with a rise in place of a tension: the tension is found."""
+
+import pytest
+from refusals import refused
+
+from pcmc import cli
+from pcmc.base.errors import FileError
+from pcmc.project import load, run_project
+
+ROUND = "[plan]\nedge_length = 1.0\noutline = {circle = {centre = [0, 0], radius = 5}}\n"
+HALL = "[plan]\nedge_length = 0.9\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
+SEAM = "dividers = [[[7, 0], [7, 6]]]\n"
+
+
+@pytest.fixture
+def given(tmp_path):
+    def project(text):
+        path = tmp_path / "roof.toml"
+        path.write_text(text)
+        return load(path)
+
+    return project
+
+
+def apex(outcome, name=None):
+    surface = outcome.surface
+    chosen = (
+        surface.faces if name is None else surface.faces[surface.patch_of_face == surface.patch_index(name)]
+    )
+    return surface.vertices[chosen, 2].max()
+
+
+@pytest.mark.parametrize(("key", "rise"), [("rise = 2.0", 2.0), ("apex = 1.0", 1.0), ("span_ratio = 4", 2.5)])
+def test_a_cap_gets_its_tension_from_its_rise(given, key, rise):
+    outcome = run_project(given(f"{ROUND}{key}\n"), use_cache=False)
+    assert outcome.good
+    assert apex(outcome) == pytest.approx(rise, rel=0.01)  # of the circle that the mesh holds
+    assert outcome.surface.patches[0].tension == pytest.approx((25.0 + rise**2) / (4.0 * rise), rel=0.04)
+
+
+def test_each_patch_may_have_its_own_rise(given):
+    patches = "[plan.patches]\nwest = {rise = 1.5}\neast = {apex = 1.0}\n"
+    outcome = run_project(given(HALL + SEAM + patches), use_cache=False)
+    assert outcome.good
+    assert (apex(outcome, "west"), apex(outcome, "east")) == pytest.approx((1.5, 1.0), rel=1e-6)
+
+
+def test_one_rise_for_all_gives_them_one_tension(given):
+    outcome = run_project(given(f"{HALL}{SEAM}rise = 1.2\n"), use_cache=False)
+    west, east, *_ = outcome.surface.patches
+    assert outcome.good
+    assert west.tension == east.tension
+
+
+def test_a_rise_is_over_the_outline_and_an_apex_over_the_plane(given):
+    high = HALL.replace(
+        "[[0, 0], [12, 0], [12, 6], [0, 6]]", "[[0, 0, 2], [12, 0, 2], [12, 6, 2], [0, 6, 2]]"
+    )
+    for key in ("rise = 1.2", "apex = 3.2"):
+        project = given(f"{high}{key}\n")
+        assert [target.value for target in project.targets] == [pytest.approx(3.2)]
+    with refused(FileError, what="rise"):
+        given(high.replace("[12, 6, 2]", "[12, 6, 3]") + "rise = 1.2\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        (f"{HALL}rise = -1\n", "rise"),
+        (f"{HALL}rise = 1\napex = 2\n", "rise"),
+        (f"{HALL}tension = 3.0\napex = 2\n", "plan.apex"),
+        (f"{HALL}[plan.patches]\nroof = {{tension = 3, rise = 1}}\n", "rise"),
+        (f"{HALL}[plan.patches]\nroof = {{pressure = 1}}\n", "plan.patches.roof.tension"),
+    ],
+)
+def test_a_rise_that_means_nothing_is_refused(given, text, what):
+    with refused(FileError, what=what):
+        given(text)
+
+
+def test_the_command_takes_a_rise(given, tmp_path, capsys):
+    path = given(f"{HALL}tension = 9.0\n").path
+    assert cli.main(["solve", str(path), "--rise", "1.2", "--no-mesh-check"]) == 0
+    assert "apex 1.2" in capsys.readouterr().out
+    assert cli.main(["solve", str(path), "--rise", "1.2", "--apex", "2"]) == 2
+    assert "--rise and --apex: give one of them" in capsys.readouterr().err
