@@ -1,10 +1,15 @@
 """Wrong first projects: the advice printed for each, typed as it is printed, gives a certified roof."""
 
 import re
+from dataclasses import replace
 
+import numpy as np
 import pytest
 import tomlkit
 
+from pcmc import cli
+from pcmc.certificate.slipping import describe_saddle
+from pcmc.plan import Divider, Plan
 from pcmc.project import load, run_project
 
 HALL = "[plan]\nedge_length = 0.8\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
@@ -50,3 +55,90 @@ def test_the_advice_typed_as_it_is_printed_gives_a_roof(tmp_path, text):
     assert heading == "type in roof.toml, which was tried and comes to rest:"
     assert lines
     assert outcome_of(tmp_path, typed(text, lines)).certificate.certified
+
+
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.BalanceWarning")
+def test_a_failed_target_keeps_the_diagnosis_of_a_plain_solve(tmp_path, capsys):
+    text = WRONG["a wall too weak for its neighbours"]
+    targets = "[targets]\nmeet = [{quantity = 'apex', of = 'nave', value = 1.0}]\nvary = ['nave']\n"
+    plain, aimed = outcome_of(tmp_path, text), outcome_of(tmp_path, text + targets)
+    assert aimed.certificate.detail == plain.certificate.detail
+    assert aimed.advice == plain.advice
+    assert cli.main(["solve", str(tmp_path / "roof.toml"), "--no-mesh-check"]) == 1
+    said = capsys.readouterr().out
+    assert "cannot balance: 7 > 1 + 4; try a tension of 4.2 for 'chancel' (in a plan, wall = 4.2)" in said
+    assert "targets not tried: without them there is no stable roof, either" in said
+    assert "number 1 ('chancel'): wall = 4.2  (now 1)" in said
+
+
+def test_a_target_that_needs_a_further_start_is_met(tmp_path, monkeypatch):
+    """Where the search finds nothing to start from, the roof of a plain solve is its start."""
+    from pcmc.design import NoStart, meet
+
+    def fails_once(surface, *args, **options):
+        tried.append(surface)
+        if len(tried) == 1:
+            raise NoStart("no equilibrium")
+        return meet(surface, *args, **options)
+
+    tried = []
+    monkeypatch.setattr("pcmc.design.meet", fails_once)
+    targets = "[targets]\nmeet = [{quantity = 'apex', value = 1.0}]\nvary = ['patch 1']\n"
+    outcome = outcome_of(tmp_path, f"{HALL}tension = 5.0\n{targets}")
+    assert outcome.good
+    assert len(tried) == 2
+
+
+def test_a_library_search_says_why_it_cannot_start(tmp_path):
+    from pcmc import Target, meet
+    from pcmc.design import NoStart
+
+    path = tmp_path / "roof.toml"
+    path.write_text(WRONG["a wall too weak for its neighbours"])
+    with pytest.raises(NoStart, match=r"cannot balance: 7 > 1 [+] 4; try a tension of 4.2 for 'chancel'"):
+        meet(load(path).plan.surface(), Target("apex", "apse", 1.0), "chancel")
+
+
+REMESHED = f"""{HALL}tension = 4.0
+[targets]
+meet = [{{quantity = "apex", value = 1.0}}]
+vary = ["patch 1"]
+[remesh]
+edge_length = 0.6
+"""
+
+
+def test_targets_met_on_the_first_mesh_are_told_with_their_tensions(tmp_path):
+    outcome = outcome_of(tmp_path, REMESHED)
+    assert outcome.good
+    (note,) = outcome.notes
+    assert re.fullmatch(r"targets met on the first mesh, \d+ triangles, with tension of patch 1 [\d.]+", note)
+
+
+def test_a_finer_mesh_that_is_not_at_rest_says_what_it_reaches(tmp_path, monkeypatch):
+    from pcmc.project import running
+
+    def again(project, surface, report):
+        return running._solve_or_meet(
+            replace(project, targets=(), options={"iterations": 1, "levels": 0}), surface, report
+        )
+
+    monkeypatch.setattr(running, "_again", again)
+    outcome = outcome_of(tmp_path, REMESHED)
+    assert not outcome.good
+    (note,) = outcome.notes
+    assert re.search(
+        r"on the new one, \d+ triangles, the surface does not come to rest with them; it has apex \d", note
+    )
+
+
+def test_a_slipping_end_names_its_wall_and_the_key():
+    seam = Divider([[6, 0], [6, 6]], 1.0, name="chancel", bottom="sliding")
+    surface = Plan([[0, 0], [12, 0], [12, 6], [0, 6]], [seam], tension=5.0, edge_length=1.0).surface()
+    curve = next(curve for curve in surface.topology.junctions if len(curve.sheets) == 3)
+    mode = np.zeros((surface.n, 3))
+    mode[curve.vertices[1:-1], 0] = 1.0
+    text = describe_saddle(surface, 1, mode)
+    assert text.endswith(
+        "only the mesh holds it there; hold the bottom of 'chancel' (in a plan, bottom = \"held\")"
+    )

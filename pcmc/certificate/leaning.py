@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Floats
 from ..surface import Surface
 from ..surface.geometry import area_vectors
 
 THIN = 1e-6  # of the wall's mean triangle: smaller ones have no direction worth telling
 
 
-def lean_sines(surface: Surface, wall: int) -> tuple[Floats, Floats]:
-    """(m,) ⟨ν, n⟩ of a wall's triangles with the normal n of Π, 0 for all others; (m,3) twice A ν.
+def lean_sines(surface: Surface) -> tuple[Floats, Floats]:
+    """(m,) ⟨ν, n⟩ of the walls' triangles with the normal n of Π, 0 for all others; (m,3) twice A ν.
 
     A triangle leans from the vertical by the angle arcsin |⟨ν, n⟩|.
     """
     vectors = area_vectors(surface.vertices[surface.faces]) * 2.0
     twice = np.linalg.norm(vectors, axis=1)
-    own: Bools = surface.patch_of_face == wall
+    own = surface.walls[surface.patch_of_face]
     own &= twice > THIN * (twice[own].mean() if own.any() else 0.0)
     sines = np.zeros(surface.m)
     sines[own] = vectors[own] @ np.array(surface.plane.normal) / twice[own]
@@ -38,9 +38,10 @@ def lean_table(surface: Surface) -> pd.DataFrame:
     [['wall 1', 0.0]]
     """
     rows = []
+    sines, _ = lean_sines(surface)
     for wall in np.flatnonzero(surface.walls) if not surface.walls.all() else ():
-        sines, _ = lean_sines(surface, int(wall))
-        face = int(np.abs(sines).argmax())
+        faces = np.flatnonzero(surface.patch_of_face == wall)
+        face = faces[np.abs(sines[faces]).argmax()]
         x, y, z = surface.vertices[surface.faces[face]].mean(axis=0).tolist()
         angle = float(np.degrees(np.arcsin(min(1.0, abs(sines[face])))))
         rows.append({"wall": surface.patches[wall].name, "lean": angle, "x": x, "y": y, "z": z})
@@ -52,5 +53,5 @@ def lean_texts(table: pd.DataFrame, least: float = 0.05) -> list[str]:
     if not len(table):
         return []
     leaning = table[table["lean"] >= least].sort_values("lean", ascending=False)
-    rows = leaning.to_dict("records")
-    return ["{wall!r} by {lean:.1f}° near [{x:.4g}, {y:.4g}, {z:.4g}]".format(**row) for row in rows]
+    rows = leaning[["wall", "lean", "x", "y", "z"]].itertuples(index=False, name=None)
+    return [f"{wall!r} by {lean:.1f}° near [{x:.4g}, {y:.4g}, {z:.4g}]" for wall, lean, x, y, z in rows]

@@ -23,8 +23,8 @@ def lean(surface: Surface, of: str | None) -> Measurement:
             raise OptionError(text, what="of", found=of)
     if not walls:
         raise OptionError("lean: the surface has no walls", what="of", found=of)
-    each = [lean_sines(surface, wall) for wall in walls]
-    sines, vectors = max(each, key=lambda pair: float(np.abs(pair[0]).max()))
+    sines, vectors = lean_sines(surface)
+    sines = np.where(np.isin(surface.patch_of_face, walls), sines, 0.0)
     face = int(np.abs(sines).argmax())
     s, length = float(sines[face]), float(np.linalg.norm(vectors[face]))
     across = (np.array(surface.plane.normal) - s * vectors[face] / length) / length

@@ -290,9 +290,7 @@ def _met_before(targets: Sequence[Target], before: Outcome, after: Outcome) -> l
     from ..design.targets import measure  # needed by projects with targets only
 
     reached = ", ".join(f"{target.label} {measure(after.surface, target).value:.6g}" for target in targets)
-    return [
-        f"{met}; {where}, the surface does not come to rest with them, so they were not met again: {reached}"
-    ]
+    return [f"{met}; {where}, the surface does not come to rest with them; it has {reached}"]
 
 
 def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Outcome:
