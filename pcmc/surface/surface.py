@@ -198,7 +198,7 @@ class Surface:
 
     @cached_array
     def on_ground(self) -> Bools:
-        """(n,) vertices that slide on Π: ``on_plane``, and those that slide along its line with another plane."""
+        """(n,) vertices that slide on Π, also those on another plane, which slide along the common line."""
         sliding = self.on_plane.copy()
         for _, along in self.meeting_lines:
             sliding |= along & self.given_supports.on_plane
