@@ -11,7 +11,7 @@ from ..project import Outcome
 UNIT_OF = {"apex": "length", "height": "length", "sag": "length", "reaction": "tension", "weight": "pressure"}
 """The unit of quantities and parameters; others are named as their units."""
 
-FAR = 10.0  # degrees: walls that lean less are not told
+FAR = 10.0  # degrees: walls that lean less are not reported
 UPRIGHT = 'a divider with upright = true keeps its wall in its plane, a target "lean" limits it'
 
 
