@@ -41,6 +41,8 @@ def lean_table(surface: Surface) -> pd.DataFrame:
     sines, _ = lean_sines(surface)
     for wall in np.flatnonzero(surface.walls) if not surface.walls.all() else ():
         faces = np.flatnonzero(surface.patch_of_face == wall)
+        if not len(faces):  # a wall that is pinched all along
+            continue
         face = faces[np.abs(sines[faces]).argmax()]
         x, y, z = surface.vertices[surface.faces[face]].mean(axis=0).tolist()
         angle = float(np.degrees(np.arcsin(min(1.0, abs(sines[face])))))
@@ -53,5 +55,5 @@ def lean_texts(table: pd.DataFrame, least: float = 0.05) -> list[str]:
     if not len(table):
         return []
     leaning = table[table["lean"] >= least].sort_values("lean", ascending=False)
-    rows = leaning.to_dict("records")
-    return ["{wall!r} by {lean:.1f}° near [{x:.4g}, {y:.4g}, {z:.4g}]".format(**row) for row in rows]
+    text = "{!r} by {:.1f}° near [{:.4g}, {:.4g}, {:.4g}]"
+    return [text.format(*row) for row in leaning.to_numpy().tolist()]

@@ -126,9 +126,9 @@ def _outcome(project: Project, values: Mapping[str, Any], surface: Any) -> Outco
         from ..design import Design, DesignStatus
 
         given = values["design"]
-        tables = {name: pd.DataFrame(**given[name]) for name in ("targets", "parameters")}
+        targets, parameters = (pd.DataFrame(**given[name]) for name in ("targets", "parameters"))
         status, solves = DesignStatus[given["status"]], given["solves"]
-        design = Design(status, result, solves=solves, history=pd.DataFrame(), **tables)
+        design = Design(status, result, targets, parameters, solves, history=pd.DataFrame())
     notes = values.get("notes", ())
     return Outcome(result, (), design, units=project.units, cached=True, notes=notes)
 
