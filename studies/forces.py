@@ -137,7 +137,7 @@ def table(folder: Folder) -> dict[str, float]:
     orders = pd.DataFrame(rows)
     folder.write_table("orders", orders)
     compared = folder.read_table("terms")
-    measured = {f"order {row.what}": row.order for row in orders.itertuples()}
+    measured = {f"order {what}": float(order) for what, order in orders.set_index("what").order.items()}
     return measured | {
         "largest_energy_difference": compared.energy_within.max(),
         "largest_gradient_difference": compared.gradient_within.max(),
@@ -187,17 +187,17 @@ def figure(folder: Folder) -> None:
     for case in CASES:
         mine = records[records.example == case.name]
         curves = {
-            DRAWN_AS.get(str(name), str(name)): (of.edge_length, of.error.abs())
+            DRAWN_AS.get(str(name), str(name)): (of.edge_length.to_numpy(), of.error.abs().to_numpy())
             for name, of in mine.groupby("quantity", sort=False)
         }
-        h = mine.edge_length.unique()
+        h = np.unique(mine.edge_length)
         panels[case.title] = curves | {"h²: second order": (h, 0.1 * h**2)}
     curve_panels(panels, folder.figure("errors"), columns=4, xlabel="edge length", ylabel="error")
     branches = folder.read_table("branches")
     volumes = np.linspace(*limits.VOLUMES, 200)
     curves = {"exact": (volumes, limits.cap_pressure(volumes))}
     for edge_length, mine in branches.groupby("edge_length", sort=False):
-        curves[f"edge length {edge_length:g}"] = (mine.volume, mine.pressure)
+        curves[f"edge length {edge_length:g}"] = (mine.volume.to_numpy(), mine.pressure.to_numpy())
     lines(
         curves,
         folder.figure("fold"),

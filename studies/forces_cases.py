@@ -73,7 +73,7 @@ def _hanging_barrel(surface: Surface) -> Values:
     X, z = surface.vertices, catenary(2.0, 2.0)
     return {
         "distance": (float(np.abs(X[:, 2] - z(X[:, 0])).max()), 0.0),
-        "lowest point": (float(X[:, 2].min()), float(z(0.0))),
+        "lowest point": (float(X[:, 2].min()), float(z(np.zeros(1))[0])),
     }
 
 
@@ -95,7 +95,7 @@ def heavy_bubble(edge_length: float) -> Surface:
     """A bubble on Π of prescribed volume, its edge sliding, that weighs 1.5 per area."""
     half = generators.hemisphere(edge_length, alpha=0.5)
     heavy = half.retensioned({"bubble": 1.0}, weights={"bubble": WEIGHT})
-    return replace(heavy, rooms=[Room("inside", {"bubble": 1}, HEAVY)])
+    return replace(heavy, rooms=(Room("inside", (("bubble", 1),), HEAVY),))
 
 
 def _heavy_bubble(surface: Surface) -> Values:
@@ -140,14 +140,14 @@ def heavy_profile(volume: float, alpha: float, weight: float) -> tuple[float, fl
 def tube(edge_length: float, length: float, between: str = "plates") -> Surface:
     """A cylinder of radius 1 and of the volume it has, between rings or plates on which its ends slide."""
     surface = generators.cylinder(edge_length, length=length, exact=True)
-    rooms = [Room("inside", {"tube": 1}, 1.0)]
+    rooms = (Room("inside", (("tube", 1),), 1.0),)
     if between == "rings":
         surface = replace(surface, rooms=rooms)
     else:
         lid, z = Plane((0.0, 0.0, length), (0.0, 0.0, 1.0), "lid"), surface.vertices[:, 2]
         mesh = surface.vertices, surface.faces, surface.patch_of_face, surface.patches
         ends = np.isclose(z, 0.0), np.isclose(z, length)
-        surface = Surface(*mesh, on_plane=ends[0], on_planes={lid: ends[1]}, rooms=rooms)
+        surface = Surface(*mesh, on_plane=ends[0], on_planes=((lid, ends[1]),), rooms=rooms)
     return surface.retensioned(volumes={"inside": float(room_volumes(surface)[0])})
 
 
@@ -160,7 +160,7 @@ def pressed_tube(edge_length: float) -> Surface:
 def _pressed_tube(surface: Surface) -> Values:
     X = surface.vertices
     radius = np.linalg.norm(X[:, :2] - X[:, :2].mean(axis=0), axis=1)
-    enclosed = room_volumes(replace(surface, rooms=[Room("inside", {"tube": 1}, 1.0)]))
+    enclosed = room_volumes(replace(surface, rooms=(Room("inside", (("tube", 1),), 1.0),)))
     return {"radius": (float(radius.max()), 1.0), "volume": (float(enclosed[0]), 2.0 * np.pi)}
 
 

@@ -42,7 +42,7 @@ def _softest(length: float, edge_length: float, between: str) -> float:
 def cap(volume: float, edge_length: float) -> Surface:
     """A cap over the unit disc of prescribed volume."""
     start = generators.spherical_cap(edge_length, alpha=ALPHA)
-    return replace(start, rooms=[Room("room", {"cap": 1}, volume)])
+    return replace(start, rooms=(Room("room", (("cap", 1),), volume),))
 
 
 def cap_pressure(volume: Floats) -> Floats:

@@ -55,5 +55,5 @@ def lean_texts(table: pd.DataFrame, least: float = 0.05) -> list[str]:
     if not len(table):
         return []
     leaning = table[table["lean"] >= least].sort_values("lean", ascending=False)
-    text = "{!r} by {:.1f}° near [{:.4g}, {:.4g}, {:.4g}]"
-    return [text.format(*row) for row in leaning.to_numpy().tolist()]
+    rows = leaning[["wall", "lean", "x", "y", "z"]].itertuples(index=False, name=None)
+    return [f"{wall!r} by {lean:.1f}° near [{x:.4g}, {y:.4g}, {z:.4g}]" for wall, lean, x, y, z in rows]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -23,6 +23,7 @@ from .reading_process import read_arrays
 
 WELD = 1e-5  # of the size
 HOLES = 8  # edges of a hole
+MESHLAB_READS = (".obj", ".ply", ".stl")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,16 +33,18 @@ class Repaired:
     Attributes
     ----------
     surface : a patch per group of the file, its boundary fixed; tensions and pressures are the file's, or 1.
-    changes : how many of what was changed, only what is not 0; empty if the mesh was clean.
+    changes : what was done and how often, as in {"vertices welded": 12}; empty if the mesh was clean.
+    notes : other changes, a sentence each, as that the mesh was cut into new triangles.
     """
 
     surface: Surface
     changes: Mapping[str, int]
+    notes: Sequence[str] = ()
 
     def __str__(self) -> str:
-        """The changes in one line."""
-        parts = [f"{number} {what}" for what, number in self.changes.items()]
-        return "; ".join(parts) or "nothing to repair"
+        """The changes and notes in one line."""
+        counts = (f"{number} {done}" for done, number in self.changes.items())
+        return "; ".join([*counts, *self.notes]) or "nothing to repair"
 
 
 def repair(
@@ -119,15 +122,15 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
         answer["points"], answer["faces"], patch, tuple(data.patches[k] for k in kept), plane=data.plane
     )
     surface = to_surface(clean)
-    changes = {what: number for what, number in answer["changes"].items() if number}
+    changes = {done: number for done, number in answer["changes"].items() if number}
+    notes = tuple(data.notes)
     if edge_length is not None:
         if several:
             from ..meshing.remeshing import remesh  # needs the extra remesh
 
             surface = remesh(surface, edge_length)
-        changes[f"triangles became {surface.m}"] = len(F)
-    notes = dict.fromkeys(data.notes, 1)
-    return Repaired(surface, changes | notes)
+        notes = (*notes, f"{len(F)} triangles became {surface.m}")
+    return Repaired(surface, changes, notes)
 
 
 def _loaded(path: Path) -> MeshData:
@@ -149,9 +152,6 @@ def _loaded(path: Path) -> MeshData:
         ) from None
     except FileError as error:
         raise FileError(f"{path}: {error}", what=str(path), where=error.where, found=error.found) from None
-
-
-MESHLAB_READS = (".obj", ".ply", ".stl")
 
 
 def _read(path: Path, module: str) -> MeshData:

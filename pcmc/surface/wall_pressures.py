@@ -16,12 +16,15 @@ def with_pressures(
     surface: Surface,
     tensions: Mapping[str, float] | None = None,
     pressures: Mapping[str, float] | None = None,
-    **loads: Mapping[str, float] | None,
+    *,
+    weights: Mapping[str, float] | None = None,
+    cables: Mapping[str, float] | None = None,
+    volumes: Mapping[str, float] | None = None,
 ) -> Surface:
     """``surface.retensioned``, with the pressures of walls updated to those of their rooms.
 
     A wall's pressure is the difference of its two rooms' pressures. It changes with that difference,
-    unless ``pressures`` names the wall itself. ``loads`` are ``weights``, ``cables`` and ``volumes``.
+    unless ``pressures`` names the wall itself.
 
     >>> from pcmc.plan import Divider, Plan
     >>> hall = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], [Divider([[4, 0], [4, 4]])], edge_length=1.0,
@@ -29,7 +32,7 @@ def with_pressures(
     >>> with_pressures(hall, None, {"west": 1.25}).pressures.tolist()
     [1.25, 1.0, 0.25]
     """
-    changed = surface.retensioned(tensions, pressures, **loads)
+    changed = surface.retensioned(tensions, pressures, weights=weights, cables=cables, volumes=volumes)
     named = {surface.patch_index(name) for name in pressures or ()}
     follow = wall_pressure_changes(surface, changed.pressures - surface.pressures, named)
     walls = {surface.patches[k].name: float(surface.pressures[k] + follow[k]) for k in np.flatnonzero(follow)}
