@@ -17,6 +17,7 @@ import pcmc
 from pcmc import Patch, Surface, Verdict, cli
 from pcmc.base.errors import FileError, MissingExtra, OptionError, SurfaceError
 from pcmc.base.units import Units
+from pcmc.plan import Plan
 from pcmc.report import RoofReport, roof_report, tables, words
 from pcmc.report.plan import paper_plan
 
@@ -218,3 +219,20 @@ def test_a_roof_that_misses_its_targets_is_refused(tmp_path, monkeypatch, capsys
     assert cli.main([name, "roof.toml", "-o", output, *options, "--anyway"]) == 1
     if name == "report":
         assert all("TARGETS NOT MET" in page for page in words_of(output))
+
+
+@TEXT
+def test_masts_have_their_reactions(tmp_path):
+    """Four held corners between free edges with cables: forces at points, none per length."""
+    edge = {"edge": "cable", "cable": 30.0, "supports": [[0, 0, 0], [8, 0, 1], [8, 6, 0], [0, 6, 1]]}
+    patches = {"roof": {"tension": 4.0, "pressure": 0.0, "weight": 0.2}}
+    plan = Plan([[0, 0], [8, 0], [8, 6], [0, 6]], edge_length=1.5, patches=patches, **edge)
+    roof = pcmc.solve(plan.surface()).surface
+    text = "\n".join(words_of(roof_report(roof, UNITS).write(tmp_path / "mast.pdf")))
+    rows = np.array([row.split()[1:] for row in re.findall(r"^ *S\d +-?\d.*$", text, re.M)], dtype=float)
+    points = np.flatnonzero(roof.fixed)
+    np.testing.assert_allclose(rows[:, :3], roof.vertices[points], atol=1e-3)
+    np.testing.assert_allclose(rows[:, 3:], pcmc.certify(roof).reactions[points], atol=0.01)
+    assert "Ends of cables" in text
+    assert re.search(r"^ *roof +roof +4.000", text, re.M)  # no wall, though its pressure is 0
+    assert "weight," in text

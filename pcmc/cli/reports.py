@@ -12,7 +12,7 @@ UNIT_OF = dict.fromkeys(("apex", "height", "sag"), "length")
 UNIT_OF |= {"reaction": "tension", "weight": "pressure", "lean": "angle"}
 """The unit of quantities and parameters; others are named as their units."""
 
-FAR = 10.0  # degrees: walls that lean less are not told
+FAR = 10.0  # degrees: walls that lean less are not reported
 UPRIGHT = 'a divider with upright = true keeps its wall in its plane, a target "lean" limits it'
 
 

@@ -19,9 +19,10 @@ from ..base.errors import FileError
 from ..base.files import atomic_write
 from ..base.units import Units, expect_length
 from ..certificate import Certificate
+from ..certificate.balance import held_lengths
 from ..panels import Panels, panels
 from ..panels.schedule import certified
-from ..plot import draw, families, reactions
+from ..plot import draw, families, reactions, vectors
 from ..surface import Surface, expect_surface
 from . import pages, tables, words
 from .plan import PaperPlan, paper_plan
@@ -92,9 +93,12 @@ class RoofReport:
             "The roof": draw(surface, view="diagonal", legend=True, width=PIXELS),
             "Elevation": draw(surface, view="elevation", width=PIXELS),
         }
-        if len(self.certificate.boundaries):
+        if held_lengths(surface).any():
             label = f"{self.units.tension}, reactions per length of boundary"
             pictures["Reactions"] = reactions(surface, label=label, width=PIXELS)
+        elif surface.fixed.any():
+            label = f"{self.units.force or 'force'}, reactions"
+            pictures["Reactions"] = vectors(surface, self.certificate.reactions, label=label, width=PIXELS)
         if self.schedule is not None:
             pictures["Panels"] = families(self.schedule, width=PIXELS)
         return {name: _png(picture) for name, picture in pictures.items()}
@@ -122,6 +126,7 @@ class RoofReport:
             tables.patch_table(surface, certificate, units),
             tables.junction_table(certificate, units),
             tables.boundary_table(certificate, units),
+            tables.support_table(surface, certificate, units),
             *tables.cable_tables(certificate, units),
             tables.room_table(certificate, units),
         ]

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
+from ..base.arrays import Bools, Ints
 from ..base.units import Units
 from ..certificate import Certificate
-from ..certificate.balance import reactions_per_length
+from ..certificate.balance import held_lengths, reactions_per_length
 from ..panels import Panels
 from ..surface import Surface
 
@@ -51,12 +52,17 @@ def one(value: float) -> str:
     return column([value])[0]
 
 
+def walls(surface: Surface) -> Bools:
+    """(k,) the patches that are walls; one that hangs under its weight alone is a roof."""
+    return surface.walls & np.array([patch.weight == 0.0 for patch in surface.patches])
+
+
 def key_figures(surface: Surface, certificate: Certificate, units: Units) -> Table:
     """Size, height, areas, volume, load, and the largest reaction per length."""
     X, length = surface.vertices, units.length
     width, depth, _ = np.ptp(X, axis=0).tolist()
     heights = surface.plane.height(X)
-    area, roof = certificate.patches["area"].to_numpy(), ~surface.walls
+    area, roof = certificate.patches["area"].to_numpy(), ~walls(surface)
     per_length = np.linalg.norm(reactions_per_length(surface, certificate.reactions), axis=1)
     rows = [
         ["size in the plan", f"{one(width)} × {one(depth)} {length}"],
@@ -90,7 +96,7 @@ def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Tab
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
         columns[f"weight, {units.pressure}"] = column(weights)
-    kind = ["wall" if wall else "roof" for wall in surface.walls]
+    kind = ["wall" if wall else "roof" for wall in walls(surface)]
     words = [[name, what] for name, what in zip(table["patch"], kind, strict=True)]
     return _table("Patches", ["patch", "kind"], words, columns)
 
@@ -121,6 +127,24 @@ def boundary_table(certificate: Certificate, units: Units) -> Table | None:
     columns |= {f"R{axis}, {force}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
     columns[f"largest, {units.tension}"] = column(table["per_length_max"])
     return _table("Boundaries and their reactions", ["", "boundary of"], words, columns)
+
+
+def point_supports(surface: Surface) -> Ints:
+    """(k,) fixed vertices apart from held boundaries, such as masts; in the plan the first is S1."""
+    return np.flatnonzero(surface.fixed & (held_lengths(surface) == 0.0))
+
+
+def support_table(surface: Surface, certificate: Certificate, units: Units) -> Table | None:
+    """A row per fixed point: its place, and its reaction."""
+    points, force = point_supports(surface), units.force or "force"
+    if not len(points):
+        return None
+    places, reactions = surface.vertices[points], certificate.reactions[points]
+    columns = {f"{axis}, {units.length}": column(part) for axis, part in zip("xyz", places.T, strict=True)}
+    texts = np.array(column(reactions.ravel())).reshape(-1, 3).T
+    columns |= {f"R{axis}, {force}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
+    names = [[f"S{k}"] for k in range(1, len(points) + 1)]
+    return _table("Supports at points", ["support"], names, columns)
 
 
 def cable_tables(certificate: Certificate, units: Units) -> list[Table]:
