@@ -93,6 +93,8 @@ def add_walls(
         np.concatenate([surface.fixed, walls.fixed]),
         np.concatenate([surface.on_plane, walls.sliding]),
         surface.plane,
+        cables=surface.cables,
+        rooms=surface.rooms,
     )
 
 
