@@ -21,7 +21,12 @@ def test_families_are_those_of_the_schedule():
     assert np.nanmax(family) == schedule.count
 
 
-def test_a_surface_of_walls_alone_has_no_families():
+def test_a_sail_is_a_roof_and_declared_walls_are_not():
     surface = two_squares(4)
-    walls = surface.retensioned(pressures={"left": 0.0, "right": 0.0})
+    sail = surface.retensioned(pressures={"left": 0.0, "right": 0.0})
+    assert sail.walls.all()
+    assert sail.roof.all()
+    assert pcmc.panels(sail, tolerance=0.1, anyway=True).panels.shape[0] == sail.m
+    walls = sail.retensioned(walls=["left", "right", "wall"])
+    assert not walls.roof.any()
     assert np.isnan(family_of_face(walls)).all()

@@ -190,7 +190,7 @@ def _force_by_patch(surface: Surface, v: int) -> tuple[Floats, Floats]:
 def _chosen_patches(surface: Surface, of: str | None) -> Floats:
     """(k,) 1 for the chosen patches, 0 for the others."""
     if of is None:
-        return (~surface.walls).astype(float)
+        return surface.roof.astype(float)
     one = np.zeros(len(surface.patches))
     one[surface.patch_index(of)] = 1.0
     return one

@@ -65,7 +65,7 @@ def document(model: Model, units: str, sheets: Sequence[Sheet]) -> Any:
 
 def _add_model(space: Any, model: Model) -> None:
     surface = model.surface
-    roof = ~surface.walls[surface.patch_of_face]
+    roof = surface.roof[surface.patch_of_face]
     for corners in surface.vertices[surface.faces[roof]].tolist():
         space.add_3dface(corners, dxfattribs={"layer": "PCMC-PANEL"})
     for curve in model.curves:

@@ -65,7 +65,7 @@ def model_curves(surface: Surface) -> list[Curve]:
 def plan(surface: Surface, curves: Sequence[Curve], points: Sequence[tuple[str, Floats]]) -> View:
     """From above: panels, curves, setting-out points, and the overall size."""
     view = View("plan")
-    roof = ~surface.walls[surface.patch_of_face]
+    roof = surface.roof[surface.patch_of_face]
     edges = surface.topology.edges[np.unique(surface.topology.edge_of_face[roof])]
     view.lines += [Line(pair, "PCMC-PANEL") for pair in surface.vertices[edges][:, :, :2]]
     view.lines += [Line(c.points[:, :2], c.layer, c.closed) for c in curves]
@@ -76,7 +76,7 @@ def plan(surface: Surface, curves: Sequence[Curve], points: Sequence[tuple[str, 
 def elevations(surface: Surface, curves: Sequence[Curve]) -> list[View]:
     """From four sides: curves, and the edges of the panels that face the viewer."""
     topo, X = surface.topology, surface.vertices
-    roof = ~surface.walls[surface.patch_of_face]
+    roof = surface.roof[surface.patch_of_face]
     normal = area_vectors(X[surface.faces])
     views = []
     for title, (right, towards) in ELEVATIONS.items():
@@ -112,7 +112,7 @@ def profile(surface: Surface, name: str, start: Floats, along: Floats, lines: li
 
 def section_layer(surface: Surface, line: Polyline) -> str:
     """The layer of a section's line: of the roof, or of a wall."""
-    return "PCMC-SECTION-WALL" if surface.walls[line.patch] else "PCMC-SECTION"
+    return "PCMC-SECTION" if surface.roof[line.patch] else "PCMC-SECTION-WALL"
 
 
 def placed(views: Sequence[View], title: str, name: str, millimetres: float, scale: int | None) -> Sheet:

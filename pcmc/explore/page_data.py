@@ -48,8 +48,10 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
     topo = surface.topology
     header = {
         "patches": [
-            {"name": p.name, "wall": p.auxiliary, "color": color}
-            for p, color in zip(surface.patches, patch_colors(surface).tolist(), strict=True)
+            {"name": p.name, "wall": not roof, "color": color}
+            for p, roof, color in zip(
+                surface.patches, surface.roof.tolist(), patch_colors(surface).tolist(), strict=True
+            )
         ],
         "controls": groups,
         "whole": whole is not None,
@@ -63,7 +65,7 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
     curves = topo.curve_edge | on_cables(surface)
     inner = ~curves
     of_wall = np.ones(len(topo.edges), dtype=bool)  # edges all of whose triangles belong to walls
-    of_wall[topo.edge_of_face[~surface.walls[surface.patch_of_face]]] = False
+    of_wall[topo.edge_of_face[surface.roof[surface.patch_of_face]]] = False
     return header, {
         "sheet_faces": faces.reshape(-1, 3),
         "sheet_vertex": corners % surface.n,
@@ -148,7 +150,7 @@ def fields(state: State, origin: Floats) -> Arrays:
 
 def family_of_face(surface: Surface) -> Floats:
     """(m,) the family of congruent panels that each triangle belongs to, from 1; NaN for those of walls."""
-    roof = ~surface.walls[surface.patch_of_face]
+    roof = surface.roof[surface.patch_of_face]
     family = np.full(surface.m, np.nan)
     if roof.any():
         lengths = np.linalg.norm(edge_vectors(surface.vertices[surface.faces[roof]]), axis=2)
@@ -174,7 +176,7 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
 def findings(surface: Surface, certificate: Certificate) -> dict[str, Any]:
     """Numbers of the surface and its certificate, for the page's table."""
     height = surface.plane.height(surface.vertices)
-    roof = ~surface.walls
+    roof = surface.roof
     return {
         **certificate.numbers(),
         "height": float(height.max()),

@@ -52,7 +52,7 @@ def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]
         known = reactions[np.isfinite(reactions)]
         return float(known.max()) if len(known) else None
 
-    roofs = np.flatnonzero(~surface.walls)
+    roofs = np.flatnonzero(surface.roof)
     for k in roofs:
         name, faces = surface.patches[k].name, surface.patch_of_face == k
         edges = np.unique(topo.edge_of_face[faces])
@@ -90,7 +90,7 @@ def difference(surface: Surface, other: Surface) -> Floats:
     >>> difference(flat, lower).tolist(), difference(lower, flat).tolist()
     ([0.5, 0.5, 0.5], [-0.5, -0.5, -0.5])
     """
-    roof, other_roof = (s.faces[~s.walls[s.patch_of_face]] for s in (surface, other))
+    roof, other_roof = (s.faces[s.roof[s.patch_of_face]] for s in (surface, other))
     if not (len(roof) and len(other_roof)):
         return _away(surface.vertices, other.vertices, other.faces)
     on_roof = np.zeros(surface.n, dtype=bool)

@@ -166,7 +166,7 @@ def panels(
     validate.choice("mirror_images", mirror_images, MIRROR_IMAGES)
     validate.flag("walls", walls)
     certificate = certified(surface, anyway)
-    faces = np.flatnonzero(~surface.walls[surface.patch_of_face] | walls)
+    faces = np.flatnonzero(surface.roof[surface.patch_of_face] | walls)
     if not len(faces):
         hint = "; pass walls=True to count walls as panels" if surface.m else ""
         text = f"surface: no panels: every patch is a wall{hint}"

@@ -54,7 +54,7 @@ def one(value: float) -> str:
 
 def walls(surface: Surface) -> Bools:
     """(k,) the patches that are walls; one that hangs under its weight alone is a roof."""
-    return surface.walls & np.array([patch.weight == 0.0 for patch in surface.patches])
+    return ~surface.roof & np.array([patch.weight == 0.0 for patch in surface.patches])
 
 
 def key_figures(surface: Surface, certificate: Certificate, units: Units) -> Table:

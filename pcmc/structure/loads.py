@@ -140,7 +140,7 @@ def _added(step: Step, load: Load, surface: Surface) -> Step:
 def _snow(surface: Surface, snow: Snow) -> Floats:
     """(n,3) a third of each triangle's load at each of its corners; triangles below others carry none."""
     named = [surface.patch_index(name) for name in snow.patches]
-    carrying = named or np.flatnonzero(~surface.walls).tolist()
+    carrying = named or np.flatnonzero(surface.roof).tolist()
     if not carrying:
         hint = "all patches are walls; name those that carry snow"
         validate.refuse("Snow.patches", snow.patches, "names of patches", hint=hint)

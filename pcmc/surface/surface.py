@@ -216,6 +216,12 @@ class Surface:
         return np.array([p.auxiliary for p in self.patches])
 
     @cached_array
+    def roof(self) -> Bools:
+        """(k,) bool: the patches that are no walls; of a sail, where none has pressure, those not declared so."""
+        declared = np.array([p.wall for p in self.patches])
+        return ~declared if self.walls.all() else ~self.walls
+
+    @cached_array
     def tensions(self) -> Floats:
         """(k,) tension α of each patch."""
         return np.array([p.tension for p in self.patches])
