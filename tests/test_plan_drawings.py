@@ -251,6 +251,16 @@ def test_walls_stand_on_the_ground_beside_a_raised_hole(tmp_path):
     assert divider["bottom"] == "sloped"
 
 
+def test_without_an_outline_only_layers_without_a_meaning_are_left_out(tmp_path):
+    lines = [("circle", "outlin", (4, 3), 9.0), ("line", "divider A", (4, 0), (4, 6))]
+    file = drawing(tmp_path, *lines, outline=False)
+    with pytest.raises(PlanError, match=r"left out: 'outlin' \(1 entity, did you mean 'outline'\?\); under"):
+        read_drawing(file)
+    file = drawing(tmp_path, lines[1], outline=False)
+    with pytest.raises(PlanError, match=r"no curve on a layer 'outline'; all are on 'divider A'$"):
+        read_drawing(file)
+
+
 def test_a_height_in_the_drawing_is_met(tmp_path):
     file = drawing(tmp_path, ("point", "height", (5, 3, 1.25)))
     outcome = project.run(file)
