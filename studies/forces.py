@@ -180,6 +180,7 @@ def figure(folder: Folder) -> None:
         titles=list(titles.values()),
         columns=3,
         one_scale=False,
+        edges=False,
         width=1200,
         supports=False,
     )

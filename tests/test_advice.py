@@ -47,6 +47,7 @@ def outcome_of(tmp_path, text):
 
 
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.BalanceWarning")
+@pytest.mark.slow
 @pytest.mark.parametrize("text", WRONG.values(), ids=WRONG)
 def test_the_advice_typed_as_it_is_printed_gives_a_roof(tmp_path, text):
     first = outcome_of(tmp_path, text)

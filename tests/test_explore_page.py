@@ -390,7 +390,8 @@ def test_units_stand_behind_the_numbers_where_they_are_given(driver):
 def test_colours_come_with_their_scale(page):
     before = page.picture()
     assert not page.find("#legend").is_displayed()
-    for name, words in (("curvature", "1/length"), ("error", "%"), ("reactions", "force/length")):
+    units = {"curvature": "1/length", "error": "%", "reactions": "force/length", "family": "1 %"}
+    for name, words in units.items():
         page.find(f"#colours input[value={name}]").click()
         page.idle()
         assert words in page.text("#legend .name")

@@ -92,6 +92,11 @@ class Units:
         return f"{self.length or 'length'}²"
 
     @property
+    def angle(self) -> str:
+        """The unit of angles, degrees."""
+        return "°"
+
+    @property
     def volume(self) -> str:
         """The unit of volumes: "m³"."""
         return f"{self.length or 'length'}³"

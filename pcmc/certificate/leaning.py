@@ -41,6 +41,8 @@ def lean_table(surface: Surface) -> pd.DataFrame:
     sines, _ = lean_sines(surface)
     for wall in np.flatnonzero(surface.walls) if not surface.walls.all() else ():
         faces = np.flatnonzero(surface.patch_of_face == wall)
+        if not len(faces):  # a wall that is pinched all along
+            continue
         face = faces[np.abs(sines[faces]).argmax()]
         x, y, z = surface.vertices[surface.faces[face]].mean(axis=0).tolist()
         angle = float(np.degrees(np.arcsin(min(1.0, abs(sines[face])))))

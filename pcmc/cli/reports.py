@@ -8,10 +8,11 @@ from ..base.units import Units
 from ..certificate.leaning import lean_texts
 from ..project import Outcome
 
-UNIT_OF = {"apex": "length", "height": "length", "sag": "length", "reaction": "tension", "weight": "pressure"}
+UNIT_OF = dict.fromkeys(("apex", "height", "sag"), "length")
+UNIT_OF |= {"reaction": "tension", "weight": "pressure", "lean": "angle"}
 """The unit of quantities and parameters; others are named as their units."""
 
-FAR = 10.0  # degrees: walls that lean less are not told
+FAR = 10.0  # degrees: walls that lean less are not reported
 UPRIGHT = 'a divider with upright = true keeps its wall in its plane, a target "lean" limits it'
 
 
@@ -58,7 +59,6 @@ def _values(values: pd.Series, units: Units) -> str:
     shown = []
     for label, value in values.items():
         quantity = "force" if str(label).startswith("tension of cable ") else str(label).split()[0]
-        unit = f" {getattr(units, UNIT_OF.get(quantity, quantity))}" if units and quantity != "lean" else ""
-        unit = "°" if quantity == "lean" else unit
+        unit = f" {getattr(units, UNIT_OF.get(quantity, quantity))}" if units else ""
         shown.append(f"{label} {value:.6g}{unit}")
     return ", ".join(shown)

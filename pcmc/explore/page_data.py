@@ -18,14 +18,19 @@ from ..contact.pinching import standing_part
 from ..design import Parameter, Target
 from ..energy.curvature import curvature_error, mean_curvature
 from ..energy.functional import patch_areas
+from ..panels.families import families
 from ..surface import Surface
 from ..surface.colours import patch_colors
+from ..surface.geometry import edge_vectors
 from ..surface.mirroring import Whole, unfolded
 from .following import values_of
 from .session import State
 from .variants import Variant, difference
 
 Arrays = dict[str, npt.NDArray[Any]]
+
+MOST_PANELS = 20_000  # triangles up to which families of panels are sorted at every answer
+ALIKE = 0.01  # of the mean edge: panels of a family differ by at most this
 
 
 def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
@@ -131,12 +136,24 @@ def fields(state: State, origin: Floats) -> Arrays:
         "error": curvature_error(drawn, "cotangent"),
         "reactions": reactions_per_length(drawn, forces),
     }
+    if drawn.m <= MOST_PANELS:
+        arrays["family"] = family_of_face(drawn)
     if len(certificate.modes) and whole is None:
         arrays["mode"] = certificate.modes[0] / (np.abs(certificate.modes[0]).max() or 1.0)
     if state.compared is not None:
         away = difference(surface, state.variants[state.compared].surface)
         arrays["difference"] = away if whole is None else away[whole.vertex]
     return arrays
+
+
+def family_of_face(surface: Surface) -> Floats:
+    """(m,) the family of congruent panels that each triangle belongs to, from 1; NaN for those of walls."""
+    roof = ~surface.walls[surface.patch_of_face]
+    family = np.full(surface.m, np.nan)
+    if roof.any():
+        lengths = np.linalg.norm(edge_vectors(surface.vertices[surface.faces[roof]]), axis=2)
+        family[roof] = 1 + families(lengths, ALIKE * float(lengths.mean())).family
+    return family
 
 
 def variant_data(variant: Variant) -> dict[str, Any]:

@@ -105,7 +105,7 @@ def build_surface(plan: PlanData) -> Surface:
         np.concatenate([fixed, walls.fixed]),
         np.concatenate([sliding, walls.sliding]),
         plan.plane,
-        on_planes=(*mirror_planes(plan, vertices), *_upright_planes(draft, walls, sides, len(vertices))),
+        on_planes=(*mirror_planes(plan, vertices), *_upright_planes(draft, walls, sides)),
         cables=tuple(cables),
         rooms=tuple(_rooms(plan, wall_patches, sides)),
     )
@@ -313,9 +313,7 @@ def _located(areas: Sequence[Area], mesh: PlanarMesh, count: int, centroid: Floa
     return owner
 
 
-def _upright_planes(
-    draft: _Draft, walls: WallMesh, sides: Sequence[_Sides], n: int
-) -> tuple[tuple[Plane, Bools], ...]:
+def _upright_planes(draft: _Draft, walls: WallMesh, sides: Sequence[_Sides]) -> list[tuple[Plane, Bools]]:
     """The vertical plane of each upright divider, and the (n,) mask of its wall and junction."""
     planes = []
     divider_of_wall = np.array([side.divider for side in sides], dtype=np.int64)
@@ -331,10 +329,10 @@ def _upright_planes(
         foot, tip = to_space(np.array([[*start, 0.0], [*(start + across), 0.0]]), draft.plan.plane)
         chains = [c.vertices for c in draft.drawn.chains if c.line == 1 + len(draft.plan.holes) + number]
         own = walls.faces[divider_of_wall[walls.label] == number]
-        inside = np.zeros(n, dtype=bool)
-        inside[np.concatenate([*chains, own.ravel()])] = True
-        planes.append((Plane(tuple(foot), tuple(tip - foot)), inside))
-    return tuple(planes)
+        held = np.zeros(len(draft.mesh.points) + len(walls.vertices), dtype=bool)
+        held[np.concatenate([*chains, own.ravel()])] = True
+        planes.append((Plane(tuple(foot), tuple(tip - foot)), held))
+    return planes
 
 
 def _room_of_face(plan: PlanData, patches: Sequence[Patch], patch_of_face: Ints) -> Ints:

@@ -30,8 +30,8 @@ VERDICTS = {
 
 LEGEND = (
     "J1, J2 and so on number the junctions, B1, B2 and so on the held boundaries, S1, S2 and so on the"
-    " supports at points, as in the tables. Black: rims. Red: ridges. Green: bottoms and ends of walls. Violet:"
-    " cables. Grey: edges of panels."
+    " supports at points, as in the tables. Black: rims. Red: ridges. Green: bottoms and ends of walls."
+    " Violet: cables. Grey: edges of panels."
 )
 """How to read the plan."""
 

@@ -60,7 +60,7 @@ class StructuralModel:
     thickness : t > 0, length, or one for each patch, by name.
     loads : a step of the analysis for each; a tuple of loads acts in one step. The form-finding pressure is
         the first step and acts in all others, too, as self-weight does once it has come.
-    anyway : take a surface that is not certified, too; the file's heading tells it.
+    anyway : accept a surface that is not certified; the file's heading then names its verdict.
     elements : "membrane", without bending stiffness, or "shell". CalculiX's shells of three nodes are too
         stiff in bending where triangles are much wider than thick: their deflections are too small.
     cable_area : length², of the sections of the surface's cables, or one for each, by name.

@@ -187,7 +187,10 @@ class Surface:
 
     @cached_array
     def pinned(self) -> Bools:
-        """(n,) ``fixed`` without the vertices that two planes let slide along their common line."""
+        """(n,) vertices that cannot move, or only along a line that was given.
+
+        These are the ``fixed`` ones but for those that slide along the line where two planes meet.
+        """
         pinned = self.fixed.copy()
         for _, along in self.meeting_lines:
             pinned &= ~along
@@ -195,7 +198,7 @@ class Surface:
 
     @cached_array
     def on_ground(self) -> Bools:
-        """(n,) vertices that slide on Π, also those that another plane lets slide along a line there only."""
+        """(n,) vertices that slide on Π, also those on another plane, which slide along the common line."""
         sliding = self.on_plane.copy()
         for _, along in self.meeting_lines:
             sliding |= along & self.given_supports.on_plane

@@ -261,7 +261,8 @@ class Page {
   // -- controls ------------------------------------------------------------------------------------
 
   addChoices() {
-    const possible = Object.keys(COLOURS).filter((name) => name !== "difference" || this.arrays.difference);
+    const possible = Object.keys(COLOURS).filter(
+      (name) => !["difference", "family"].includes(name) || this.arrays[name]);
     const known = [...document.querySelectorAll("#colours input")];
     if (known.map((radio) => radio.value).join() === possible.join()) {
       for (const radio of known) radio.checked = radio.value === this.choice;

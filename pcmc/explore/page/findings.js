@@ -14,6 +14,7 @@ export const COLOURS = {
   curvature: { label: "Mean curvature", name: (u) => `Mean curvature H, ${u.curvature} (walls grey)` },
   error: { label: "Curvature error", name: () => "Error (H − H̄) / H̄ of Meyer's mean curvature, %" },
   reactions: { label: "Reactions", name: (u) => `Reaction of the supports, ${u.tension}` },
+  family: { label: "Panels", name: () => "Family of congruent panels, the largest first; edges alike within 1 % of the mean edge" },
   difference: { label: "Difference", name: (u, than) => `Distance from ${than}, ${u.length}; positive outside it` },
 };
 
@@ -131,6 +132,9 @@ export function fieldOf(choice, arrays) {
   if (choice === "difference") {
     const most = Math.max(1e-12, ...ends(arrays.difference, arrays.underPressure).map(Math.abs));
     return { values: arrays.difference, limits: [-most, most], map: diverging, skipWalls: true };
+  }
+  if (choice === "family") {
+    return { values: arrays.family, limits: [1, Math.max(2, ends(arrays.family)[1])], map: sequential, byFace: true };
   }
   if (choice === "reactions") {
     const values = new Float32Array(arrays.reactions.length / 3);

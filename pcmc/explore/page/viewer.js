@@ -96,10 +96,20 @@ export class Viewer {
     else this.fillPlaces();
   }
 
-  /** Values (n,) with limits and a colour map, or null for the patches' colours. */
+  /** Values by vertex, or by face, with limits and a colour map; or null for the patches' colours. */
   setField(field) {
+    const apart = Boolean(field?.byFace) !== Boolean(this.field?.byFace);
     this.field = field;
-    this.fillField();
+    if (apart) this.refill();
+    else this.fillField();
+  }
+
+  /** The corners to draw: shared within a patch, or each triangle's own where its colour is flat. */
+  corners() {
+    const { sheet_faces: faces, sheet_vertex: vertex, sheet_patch: patch } = this.mesh;
+    if (!this.field?.byFace) return { faces, vertex, patch };
+    const own = (array) => Uint32Array.from(faces, (corner) => array[corner]);
+    return { faces: Uint32Array.from(faces.keys()), vertex: own(vertex), patch: own(patch) };
   }
 
   /** Arrows as [vertex, vector, colour], or null. */
@@ -117,23 +127,25 @@ export class Viewer {
     if (!this.X) return;
     const { gl } = this;
     const m = this.mesh;
+    this.sheet = this.corners();
+    const { faces, vertex, patch } = this.sheet;
     const wall = m.header.patches.map((p) => p.wall);
     const chosen = [];
     const onSheet = new Uint8Array(m.header.vertices);
-    for (let f = 0; f < m.sheet_faces.length; f += 3) {
-      const isWall = wall[m.sheet_patch[m.sheet_faces[f]]];
+    for (let f = 0; f < faces.length; f += 3) {
+      const isWall = wall[patch[faces[f]]];
       if (isWall && !this.options.walls) continue;
       for (let k = 0; k < 3; k++) {
-        chosen.push(m.sheet_faces[f + k]);
-        onSheet[m.sheet_vertex[m.sheet_faces[f + k]]] = 1;
+        chosen.push(faces[f + k]);
+        onSheet[vertex[faces[f + k]]] = 1;
       }
     }
     this.chosen = new Uint32Array(chosen);
     gl.bindVertexArray(null);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.elements);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this.chosen, gl.STATIC_DRAW);
-    const colours = new Float32Array(3 * m.sheet_patch.length);
-    m.sheet_patch.forEach((p, i) => colours.set(m.header.patches[p].color, 3 * i));
+    const colours = new Float32Array(3 * patch.length);
+    patch.forEach((p, i) => colours.set(m.header.patches[p].color, 3 * i));
     this.fill(this.surface, 2, colours);
     this.visible = onSheet;
     const shown = (ends, ofWall) => this.options.walls
@@ -149,15 +161,15 @@ export class Viewer {
   }
 
   fillPlaces() {
-    const { X, mesh: m } = this;
-    const places = new Float32Array(3 * m.sheet_vertex.length);
-    m.sheet_vertex.forEach((v, i) => {
+    const { X, sheet: { faces, vertex } } = this;
+    const places = new Float32Array(3 * vertex.length);
+    vertex.forEach((v, i) => {
       places[3 * i] = X[3 * v];
       places[3 * i + 1] = X[3 * v + 1];
       places[3 * i + 2] = X[3 * v + 2];
     });
     this.fill(this.surface, 0, places);
-    this.fill(this.surface, 1, normals(places, m.sheet_faces));
+    this.fill(this.surface, 1, normals(places, faces));
     const dots = new Float32Array(3 * this.held.length);
     this.held.forEach((v, i) => dots.set(X.subarray(3 * v, 3 * v + 3), 3 * i));
     this.fill(this.dots, 0, dots);
@@ -255,14 +267,15 @@ export class Viewer {
 
   fillField() {
     if (!this.X) return;
-    const { field, mesh: m } = this;
-    const known = new Float32Array(2 * m.sheet_vertex.length);
+    const { field, mesh: m, sheet: { vertex, patch } } = this;
+    const known = new Float32Array(2 * vertex.length);
     if (field) {
-      m.sheet_vertex.forEach((v, i) => {
-        const wall = m.header.patches[m.sheet_patch[i]].wall;
+      vertex.forEach((v, i) => {
+        const wall = m.header.patches[patch[i]].wall;
         const skip = field.linesOnly || (field.skipWalls && wall);
-        if (!skip && Number.isFinite(field.values[v])) {
-          known[2 * i] = field.values[v];
+        const value = field.values[field.byFace ? Math.floor(i / 3) : v];
+        if (!skip && Number.isFinite(value)) {
+          known[2 * i] = value;
           known[2 * i + 1] = 1;
         }
       });
