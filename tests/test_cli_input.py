@@ -74,6 +74,16 @@ def test_letters_that_the_locale_lacks_are_escaped(folder, monkeypatch, errors):
     assert b"Nordfl\\xfcgel" in shown.getvalue()
 
 
+def test_signs_that_the_locale_lacks_are_written_as_one_types_them(folder, monkeypatch):
+    (folder / "roof.toml").write_text('units = "m"\n' + SMALL, encoding="utf-8")
+    shown = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(shown, encoding="ascii"))
+    assert cli.main(["certify", "roof.toml"]) == 0
+    sys.stdout.flush()
+    assert b"pressures in force/m^2" in shown.getvalue()
+    assert b"\\x" not in shown.getvalue()
+
+
 def test_without_stderr_it_works_all_the_same(folder, monkeypatch, capsys):
     monkeypatch.setattr(sys, "stderr", None)  # as where the shell closes it: pcmc ... 2>&-
     assert cli.main(["solve", "roof.toml"]) == 0

@@ -222,7 +222,7 @@ def test_heights_masts_and_levels(tmp_path):
     np.testing.assert_allclose(plan.heights, [[2, 3, 1.1], [5, 3, 1.2]])
     np.testing.assert_allclose(plan.supports, [[8, 3, 2]])
     assert list(plan.holes) == ["ring"]
-    assert not plan.flat
+    assert plan.flat
     with pytest.warns(FileWarning, match="draw a mast's top as a ring"):
         loaded = project.load(file)
     assert [(t.quantity, t.of, t.value) for t in loaded.targets] == [
@@ -235,6 +235,30 @@ def test_heights_masts_and_levels(tmp_path):
     surface = project.build(tmp_path / "high.dxf")
     assert surface.plane.point == (0.0, 0.0, 105.0)
     assert surface.vertices[:, 2].min() == 105.0
+
+
+def test_walls_stand_on_the_ground_beside_a_raised_hole(tmp_path):
+    file = drawing(tmp_path, ("line", "divider", (4, 0), (4, 6)), ("circle", "hole", (7, 3, 1.5), 0.8))
+    surface = project.build(file)
+    wall = np.unique(surface.faces[surface.walls[surface.patch_of_face]])
+    assert (surface.vertices[wall[surface.fixed[wall]], 2] == 0.0).all()
+    document, space = drawn.new()
+    corners = [(x, y, 0.1 * x) for x, y in BOX]
+    space.add_polyline3d(corners, close=True, dxfattribs=drawn.on("outline"))
+    space.add_line((4, 0), (4, 6), dxfattribs=drawn.on("divider"))
+    document.saveas(tmp_path / "tilted.dxf")
+    (divider,) = proposed(read_drawing(tmp_path / "tilted.dxf"))["dividers"]
+    assert divider["bottom"] == "sloped"
+
+
+def test_without_an_outline_only_layers_without_a_meaning_are_left_out(tmp_path):
+    lines = [("circle", "outlin", (4, 3), 9.0), ("line", "divider A", (4, 0), (4, 6))]
+    file = drawing(tmp_path, *lines, outline=False)
+    with pytest.raises(PlanError, match=r"left out: 'outlin' \(1 entity, did you mean 'outline'\?\); under"):
+        read_drawing(file)
+    file = drawing(tmp_path, lines[1], outline=False)
+    with pytest.raises(PlanError, match=r"no curve on a layer 'outline'; all are on 'divider A'$"):
+        read_drawing(file)
 
 
 def test_a_height_in_the_drawing_is_met(tmp_path):
@@ -289,9 +313,7 @@ def test_curves_of_rhino_stay_exact(tmp_path):
     assert np.linalg.norm(half.points[1]) == pytest.approx(4.0, rel=1e-12)
     assert abs(half.sweep) == pytest.approx(math.pi, rel=1e-12)
     assert curve_data(plan.holes["eye"]) == {"circle": {"centre": [4.0, 9.0, 2.0], "radius": 1.2}}
-    assert {name: d["bottom"] for d in proposed(plan)["dividers"] for name in [d["name"]]} == {
-        "chancel": "sloped"
-    }
+    assert [(d["name"], d["bottom"]) for d in proposed(plan)["dividers"]] == [("chancel", "held")]
     with refused(FileError, what=str(path)):
         raise_for_overwriting(path)
     pcmc.write(tmp_path / "roof.3dm", plan_from(proposed(plan)).surface())

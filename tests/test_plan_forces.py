@@ -495,3 +495,12 @@ def test_the_sail_of_the_notebooks_is_certified(folder):
     outcome = run("sail.toml")
     assert outcome.good
     assert {cable.name for cable in outcome.surface.cables} == {"cable 1", "cable 2", "cable 3", "cable 4"}
+
+
+def test_the_pressure_that_keeps_a_volume_is_printed(tmp_path, capsys):
+    plan = "[plan]\noutline = [[0, 0], [6, 0], [6, 6], [0, 6]]\nedge_length = 1.5\n"
+    text = f'units = "m"\nforce = "kN"\n{plan}[plan.patches]\ndome = {{tension = 4.0, volume = 20.0}}\n'
+    (tmp_path / "dome.toml").write_text(text, encoding="utf-8")
+    assert cli.main(["solve", str(tmp_path / "dome.toml"), "--no-mesh-check"]) == 0
+    (pressure,) = run(tmp_path / "dome.toml").certificate.rooms["pressure"]
+    assert f"pressures that keep the volumes: 'dome' {pressure:.6g} kN/m²" in capsys.readouterr().out

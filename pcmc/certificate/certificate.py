@@ -132,6 +132,8 @@ class Certificate:
     def __str__(self) -> str:
         return self.text()
 
+    __repr__ = __str__  # what a prompt shows: the findings, not arrays
+
     def text(self, units: Units = NO_UNITS) -> str:
         """The findings as a table, with the units of its numbers if they are given."""
         rows = [

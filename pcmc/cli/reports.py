@@ -31,6 +31,13 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         print(note)
     if verdict and outcome.units:
         print(outcome.units.sentence)
+    if verdict and len(rooms := outcome.certificate.rooms):
+        unit = f" {outcome.units.pressure}" if outcome.units else ""
+        held = [
+            f"{room!r} {pressure:.6g}{unit}"
+            for room, pressure in zip(rooms["room"], rooms["pressure"], strict=True)
+        ]
+        print(f"pressures that keep the volumes: {', '.join(held)}")
     if verdict:
         print(outcome.certificate.verdict.value)
         if outcome.certificate.detail:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import sys
 import warnings
@@ -15,7 +16,26 @@ from ..base.interrupts import termination_as_interrupt
 from . import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
 SHOWN = (errors.BalanceWarning, errors.FileWarning, errors.FreeSurfaceWarning, errors.PlanWarning)
-FAILING = ("strict", "surrogateescape")  # error handlers; the second is the locale C's
+FAILING = ("strict", "surrogateescape", "backslashreplace")  # error handlers; the second is the locale C's
+PLAIN = str.maketrans(
+    {
+        "²": "^2",
+        "³": "^3",
+        "±": "+-",
+        "°": " deg",
+        "×": "x",
+        "·": "*",
+        "≥": ">=",
+        "≤": "<=",
+        "–": "-",
+        "…": "...",
+        "→": "->",
+        "α": "alpha",
+        "λ": "lambda",
+        "Π": "Pi",
+    }
+)
+"""Signs of the field, as one types them in ASCII."""
 
 
 def run(arguments: list[str]) -> int:
@@ -25,7 +45,7 @@ def run(arguments: list[str]) -> int:
         for kind in SHOWN:
             warnings.simplefilter("always", kind)
         warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")
-        _escape_missing_letters(sys.stdout)
+        _replace_missing_letters(sys.stdout, sys.stderr)
         with termination_as_interrupt():
             return _run(arguments)
 
@@ -75,10 +95,20 @@ def _command() -> tuple[Callable[..., Any], ModuleType]:
     return typer.main.get_command(app), typer
 
 
-def _escape_missing_letters(stream: Any) -> None:
-    r"""Write a letter that the stream's encoding lacks as \\xf6, instead of failing."""
-    if getattr(stream, "errors", None) in FAILING and hasattr(stream, "reconfigure"):
-        stream.reconfigure(errors="backslashreplace")
+def _replace_missing_letters(*streams: Any) -> None:
+    r"""Write letters that a stream's encoding lacks as one types them (m^2), others as \\xf6: never fail."""
+    codecs.register_error("pcmc.plain", _plain)
+    for stream in streams:
+        if getattr(stream, "errors", None) in FAILING and hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="pcmc.plain")
+
+
+def _plain(error: UnicodeError) -> tuple[str, int]:
+    """The letters that cannot be encoded, in ASCII, and where to go on."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    letters = error.object[error.start : error.end].translate(PLAIN)
+    return letters.encode("ascii", "backslashreplace").decode(), error.end
 
 
 def _interrupted() -> int:

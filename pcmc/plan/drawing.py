@@ -70,8 +70,8 @@ class Drawing:
 
     @property
     def flat(self) -> bool:
-        """Whether the outline and all holes are on Π."""
-        return all(curve.pieces[0].points.shape[1] == 2 for curve in (self.outline, *self.holes.values()))
+        """Whether the outline is on Π; holes may be above it."""
+        return self.outline.pieces[0].points.shape[1] == 2
 
 
 def read_drawing(path: Path, units: str = "", gap: float | None = None) -> Drawing:
@@ -151,7 +151,9 @@ class _Sorted:
             )
             text += "; draw the edge of the roof on a layer 'outline'"
         else:
-            text = f"has no curve on a layer 'outline'; {left_out(counts)}"
+            strange = {name: count for name, count in counts.items() if layer_of(name) is None}
+            why = left_out(strange) if strange else f"all are on {listed(list(map(repr, counts)))}"
+            text = f"has no curve on a layer 'outline'; {why}"
         return PlanError(text, what="outline", found=counts, expected=understood())
 
     def drawing(self, factor: float) -> Drawing:

@@ -132,7 +132,10 @@ def _chosen(surface: Surface, planes: Sequence[Plane | str] | None) -> list[tupl
     """The mirror planes to unfold at, each with its vertices."""
     mirrors = [(plane, mask) for plane, mask in surface.on_planes if plane.mirror]
     if not mirrors:
-        text = "the surface has no mirror plane; give it one: on_planes={Plane(…, mirror=True): vertices}"
+        text = (
+            "the surface has no mirror plane, so it is whole already;"
+            " a part of a roof has one: on_planes={Plane(…, mirror=True): vertices}"
+        )
         raise SurfaceError(text, what="on_planes")
     if planes is None:
         return mirrors

@@ -44,7 +44,7 @@ class Patch:
         if not isinstance(self.wall, bool | np.bool_):
             validate.refuse("wall", self.wall, "True or False", self.name, error=SurfaceError)
         object.__setattr__(self, "wall", bool(self.wall))
-        tension = self._number("tension", least=0.0, hint="0 makes a wall that does not pull")
+        tension = self._number("tension", least=0.0, hint="only a wall may have 0")
         pressure, weight = self._number("pressure"), self._number("weight")
         if tension == 0.0 and pressure != 0.0:
             hint = f"a patch under pressure {pressure:g} must pull; a wall (pressure=0) may have tension 0"
