@@ -235,7 +235,11 @@ def test_walls_alone_have_no_panels():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         film = Surface(
-            [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("w", 1.0, 0.0)], fixed=range(3)
+            [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
+            [[0, 1, 2]],
+            [0],
+            [Patch("w", 1.0, 0.0, wall=True)],
+            fixed=range(3),
         )
     with refused(SurfaceError, what="surface", found=0):
         pcmc.panels(film, 0.1, anyway=True)

@@ -16,6 +16,7 @@ from generators import two_squares
 from pcmc import plot
 from pcmc.base.errors import FileError, MissingExtra, OptionError
 from pcmc.explore.page_data import fields as page_fields
+from pcmc.explore.session import State
 from pcmc.plot import arrows, legend, raster
 from pcmc.plot.figure import finish, new
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
@@ -258,16 +259,15 @@ def test_reactions_are_those_of_the_certificate_per_length(monkeypatch, tmp_path
     monkeypatch.setattr(
         arrows, "vectors", lambda s, field, *_, **__: drawn.append(field) or vectors(s, field)
     )
-    paint(surface, tmp_path / "a.png", "diagonal", "reactions")
-    np.testing.assert_allclose(
-        drawn[0], np.nan_to_num(page_fields(surface, found, np.zeros(3))["reactions"]), atol=1e-12
-    )
+    paint(surface, tmp_path / "a.png", ["diagonal"], "reactions")
+    shown = page_fields(State(surface, found, surface), np.zeros(3))["reactions"]
+    np.testing.assert_allclose(drawn[0], np.nan_to_num(shown), atol=1e-12)
     most = np.linalg.norm(drawn[0], axis=1).max()
     assert most == pytest.approx(found.boundaries["per_length_max"].max(), rel=1e-12)
 
 
 def test_reactions_are_arrows(tmp_path):
-    paint(two_squares(6), tmp_path / "r.png", "elevation", "reactions")
+    paint(two_squares(6), tmp_path / "r.png", ["elevation"], "reactions")
     image = np.asarray(Image.open(tmp_path / "r.png").convert("RGB"))
     assert near(image, rgb("#B2182B")).sum() > 500
 

@@ -210,10 +210,12 @@ def test_bad_materials_and_loads_are_refused(make, what):
 
 
 def test_snow_on_walls_alone_names_its_patches():
+    wall = square().retensioned(walls=["film"])
     with refused(OptionError, what="Snow.patches"):
-        model_of(square(), loads=[Snow(1.0)], anyway=True).steps  # noqa: B018
-    model = model_of(square(), loads=[Snow(1.0, patches=["film"])], anyway=True)
-    assert model.steps[1].forces.sum(axis=0) == pytest.approx([0, 0, -1.0])
+        model_of(wall, loads=[Snow(1.0)], anyway=True).steps  # noqa: B018
+    for surface, patches in ((wall, ["film"]), (square(), [])):  # a film that is no wall carries snow
+        model = model_of(surface, loads=[Snow(1.0, patches=patches)], anyway=True)
+        assert model.steps[1].forces.sum(axis=0) == pytest.approx([0, 0, -1.0])
 
 
 def test_a_surface_that_is_not_certified_is_refused_or_marked(tmp_path):

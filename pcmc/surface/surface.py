@@ -217,7 +217,7 @@ class Surface:
 
     @cached_array
     def roof(self) -> Bools:
-        """(k,) bool: the patches that are no walls; of a sail, where none has pressure, those not declared so."""
+        """(k,) bool: the patches that are no walls; where none has pressure, those not declared walls."""
         declared = np.array([p.wall for p in self.patches])
         return ~declared if self.walls.all() else ~self.walls
 
