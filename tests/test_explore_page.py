@@ -394,7 +394,7 @@ def test_colours_come_with_their_scale(page):
     for name, words in units.items():
         page.find(f"#colours input[value={name}]").click()
         page.idle()
-        assert words in page.text("#legend .name")
+        until(lambda words=words: words in page.text("#legend .name"), "the scale")
         low, high = (float(page.text(f"#legend .{end}")) for end in ("low", "high"))
         assert low < high
         assert changed(before, page.picture()) > 0.1

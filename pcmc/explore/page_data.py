@@ -29,7 +29,6 @@ from .variants import Variant, difference
 
 Arrays = dict[str, npt.NDArray[Any]]
 
-MOST_PANELS = 20_000  # triangles up to which families of panels are sorted at every answer
 ALIKE = 0.01  # of the mean edge: panels of a family differ by at most this
 
 
@@ -138,14 +137,18 @@ def fields(state: State, origin: Floats) -> Arrays:
         "error": curvature_error(drawn, "cotangent"),
         "reactions": reactions_per_length(drawn, forces),
     }
-    if drawn.m <= MOST_PANELS:
-        arrays["family"] = family_of_face(drawn)
     if len(certificate.modes) and whole is None:
         arrays["mode"] = certificate.modes[0] / (np.abs(certificate.modes[0]).max() or 1.0)
     if state.compared is not None:
         away = difference(surface, state.variants[state.compared].surface)
         arrays["difference"] = away if whole is None else away[whole.vertex]
     return arrays
+
+
+def families_drawn(state: State) -> Floats:
+    """``family_of_face`` of the surface that is drawn. It takes longer than an answer to a slider."""
+    whole = whole_of(state.surface)
+    return family_of_face(state.surface if whole is None else whole.surface)
 
 
 def family_of_face(surface: Surface) -> Floats:

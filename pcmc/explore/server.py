@@ -34,6 +34,7 @@ from .messages import pack, plain
 from .page_data import (
     aims_data,
     centre,
+    families_drawn,
     fields,
     findings,
     mesh_findings,
@@ -57,7 +58,7 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:",
 }
-OTHERS = ("check", "news", "save")  # acts that answer with no surface
+OTHERS = ("check", "families", "news", "save")  # acts that answer with no surface
 
 
 class Explorer:
@@ -257,6 +258,8 @@ class _Handler(BaseHTTPRequestHandler):
         if act == "check":
             check = session.check_mesh()
             self._send_header({"superseded": True} if check is None else {"check": mesh_findings(check)})
+        elif act == "families":
+            self._send(pack({}, {"family": families_drawn(session.state())}), "application/octet-stream")
         elif act == "news":
             watch = explorer.watch
             news = {"working": bool(watch and watch.working), "problem": watch.problem if watch else ""}

@@ -208,12 +208,29 @@ class Page {
   }
 
   colour() {
+    if (this.choice === "family" && !this.arrays.family) {
+      this.sortPanels(); // until then the colours stay
+      return;
+    }
     const field = fieldOf(this.choice, this.arrays);
     const than = this.header.variants[this.header.compared]?.name;
     showLegend(find("#legend"), this.choice, field, this.units, than);
     if (!this.viewer) return;
     this.viewer.setField(field);
     this.viewer.setArrows(this.choice === "reactions" ? arrowsOf(this.arrays, field, this.size) : null);
+  }
+
+  /** Ask for the families of panels of the surface shown; a newer surface leaves the answer behind. */
+  async sortPanels() {
+    const { header } = this;
+    try {
+      const { arrays } = await ask(`api/${this.name}/families`);
+      if (this.header !== header) return;
+      this.arrays.family = arrays.family;
+      this.colour();
+    } catch (error) {
+      this.notify(error.message);
+    }
   }
 
   /** Check the surface shown on finer meshes; a newer surface leaves the answer behind. */
@@ -261,8 +278,7 @@ class Page {
   // -- controls ------------------------------------------------------------------------------------
 
   addChoices() {
-    const possible = Object.keys(COLOURS).filter(
-      (name) => !["difference", "family"].includes(name) || this.arrays[name]);
+    const possible = Object.keys(COLOURS).filter((name) => name !== "difference" || this.arrays.difference);
     const known = [...document.querySelectorAll("#colours input")];
     if (known.map((radio) => radio.value).join() === possible.join()) {
       for (const radio of known) radio.checked = radio.value === this.choice;
