@@ -19,7 +19,7 @@ import pandas as pd
 from generators import bezier_hall, spherical_cap, two_caps
 from pcmc import Material, Snow, StructuralModel, Surface, certify, project, solve
 from pcmc.base.arrays import Floats
-from pcmc.certificate.balance import boundary_table
+from pcmc.certificate.curve_tables import boundary_table
 from pcmc.structure import StepResults
 from pcmc.surface.geometry import face_areas
 

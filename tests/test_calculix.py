@@ -13,7 +13,8 @@ from test_lines import squares
 
 import pcmc
 from pcmc import Material, SelfWeight, Snow, StructuralModel, Surface, Wind
-from pcmc.certificate.balance import load, reactions
+from pcmc.certificate.balance import load
+from pcmc.certificate.reactions import reactions
 from pcmc.surface.geometry import face_areas
 from studies import calculix, structure
 from studies.calculix import CalculixError

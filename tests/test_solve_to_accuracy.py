@@ -16,7 +16,7 @@ from pcmc.accuracy.adaptive import AccuracyStatus, size_field
 from pcmc.accuracy.estimator import _FineMesh, _held_vertices, _slope, error_shares
 from pcmc.accuracy.goals import goals_in
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
-from pcmc.certificate.balance import held_lengths, reactions
+from pcmc.certificate.reactions import held_lengths, reactions
 from pcmc.energy.functional import energy, volume
 from pcmc.meshing.curve_projection import onto_held_curves
 from pcmc.meshing.quality import edge_lengths, minimum_angle

@@ -25,7 +25,7 @@ from math import sqrt
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..certificate.balance import held_lengths, reactions
+from ..certificate.reactions import held_lengths, reactions
 from ..contact.pinching import standing_part
 from ..design.targets import Target, measure
 from ..energy.functional import energy_and_gradient

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..certificate import Certificate
-from ..certificate.balance import boundary_table, held_curves
+from ..certificate.curve_tables import boundary_table, held_curves
 from ..surface import Surface
 
 ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 
-from ..base.arrays import Bools, Floats, Ints
-from ..contact.pinching import standing_part
-from ..energy import kernels
-from ..energy.functional import add_cables_and_weights, apply_supports
+from ..base.arrays import Bools, Floats
 from ..surface import Surface
-from ..surface.geometry import area_vectors, edge_vectors, segment_lengths, vertex_sums
-from ..surface.supports import common_point, symmetric_part
+from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
+from ..surface.supports import common_point
 from ..surface.topology import Curve
 from ..surface.wall_tensions import balanced_wall
 from .proof import UnbalancedJunction, Unheld
@@ -177,7 +173,7 @@ def _carries_cable(surface: Surface, curve: Curve) -> bool:
         return False
     numbers = surface.topology.edge_numbers
     on_cable = numbers(surface.cable_edges.ends)
-    return bool(np.isin(numbers(segments(surface, curve)[0]), on_cable).any())
+    return bool(np.isin(numbers(curve.pairs), on_cable).any())
 
 
 def unheld(surface: Surface, stable: bool) -> Unheld | None:
@@ -228,181 +224,3 @@ def pressures_left_over(surface: Surface) -> str:
         f" cancel: {abs(surface.uncancelled[edges[0]]):.3g} is left over and acts from there to the point of"
         " Π, so the shape depends on that point; give a wall the pressure of one room less that of the other"
     )
-
-
-def conormal_sum(surface: Surface) -> Floats:
-    """(e,3) Σ α n over the triangles at each edge, n the outward co-normal, force/length.
-
-    With weights, α + w z stands for α. Zero along a junction of smooth surfaces at rest (7) without a
-    cable; of triangles it is zero only in the limit.
-    """
-    topo = surface.topology
-    X, F = surface.vertices, surface.faces
-    total, tension = np.zeros((len(topo.edges), 3)), edge_tensions(surface)
-    for corner in range(3):
-        a, b, apex = X[F[:, corner - 2]], X[F[:, corner - 1]], X[F[:, corner]]
-        along = b - a
-        length = np.linalg.norm(along, axis=1)
-        along /= np.where(length > 0.0, length, 1.0)[:, None]
-        out = a - apex
-        out -= np.einsum("ij,ij->i", out, along)[:, None] * along
-        length = np.linalg.norm(out, axis=1)
-        pull = tension[:, corner] / np.where(length > 0.0, length, 1.0)
-        np.add.at(total, topo.edge_of_face[:, corner], pull[:, None] * out)
-    return total
-
-
-def held_lengths(surface: Surface) -> Floats:
-    """(n,) half the length of the boundary edges at each vertex that are held at both ends, length.
-
-    In a mirror plane nothing is held.
-    """
-    ends = surface.topology.edges[surface.topology.boundary_edge & ~surface.mirror_edge]
-    ends = ends[surface.held[ends].all(axis=1)]
-    half = 0.5 * segment_lengths(surface.vertices, ends)
-    return np.asarray(np.bincount(ends.ravel(), np.repeat(half, 2), surface.n), dtype=float)
-
-
-def reactions(surface: Surface) -> Floats:
-    """(n,3) forces of the supports: the whole force where fixed, its part normal to the plane where sliding.
-
-    In a mirror plane this part is the pull of the image.
-
-    The force at a vertex is Σ α ∂A - ⅓ Σ p A_T ν_T, with a third of each triangle's pressure, and the
-    forces of cables and weights. At a boundary this is not ∇E: there the volume is that of a cone to the
-    point of Π, whose side moves with the boundary but is under no pressure.
-    """
-    X, F = surface.vertices, surface.faces
-    zero = np.zeros(len(surface.patches))
-    forces = kernels.measure(kernels.energy_mesh(surface, pressure=zero), X)[2]
-    add_cables_and_weights(surface, X, forces)
-    third = area_vectors(X[F]) / 3.0
-    forces -= vertex_sums(third * surface.pressures[surface.patch_of_face, None], F, surface.n)
-    return forces - apply_supports(surface, forces.copy())
-
-
-def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floats:
-    """(n,3) the reactions over the length of held boundary at each vertex; NaN where there is none.
-
-    Each end of a held boundary edge gets half of its length. ``forces`` (n,3) are by default the
-    reactions of the part of the surface that stands. The pull of images in mirror planes is left out.
-
-    >>> from pcmc import Patch
-    >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
-    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
-    >>> (3 * reactions_per_length(square)).round(9)[1].tolist()  # tension -1, 1; a third of p A = 2
-    [-1.5, 1.5, -1.0]
-    """
-    share = held_lengths(surface)[:, None]
-    if forces is None:
-        forces = reactions(standing_part(surface).surface)
-    forces = symmetric_part(surface.on_planes, forces.copy())
-    return np.divide(forces, share, out=np.full((surface.n, 3), np.nan), where=share > 0.0)
-
-
-def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
-    """One row per junction curve: where it is, the forces left per length, Σ α n of its triangles."""
-    topo = surface.topology
-    imbalance = np.linalg.norm(conormal_sum(surface), axis=1)
-    seams = np.flatnonzero(topo.junction_edge | topo.seam_edge)
-    number = {tuple(edge): i for i, edge in zip(seams, topo.edges[seams].tolist(), strict=True)}
-    rows = []
-    for curve in topo.junctions:
-        pairs, lengths = segments(surface, curve)
-        edges = [number[tuple(pair)] for pair in np.sort(pairs, axis=1).tolist()]
-        total, mean = float(lengths.sum()), float(lengths.mean()) or 1.0
-        rows.append(
-            {
-                "junction": " | ".join(surface.patches[i].name for i in curve.sheets),
-                "length": total,
-                **middle(surface, curve),
-                "force_left": float(np.linalg.norm(left[curve.vertices], axis=1).max()) / mean,
-                "sum_alpha_n_mean": float(imbalance[edges] @ lengths) / total if total else 0.0,
-                "sum_alpha_n_max": float(imbalance[edges].max()),
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def boundary_table(surface: Surface, forces: Floats) -> pd.DataFrame:
-    """One row per held boundary curve: where it is, its share of the reactions (n,3), most per length.
-
-    Then one per curve in a mirror plane, named after it: there the image pulls, across the plane.
-    """
-    curves = held_curves(surface)
-    carried = symmetric_part(surface.on_planes, forces.copy())
-    per_length = np.linalg.norm(np.nan_to_num(reactions_per_length(surface, forces)), axis=1)
-    rows = _boundary_rows(surface, curves, ["" for _ in curves], carried, per_length)
-    for plane, mask in surface.on_planes:
-        if plane.mirror:
-            edges = surface.mirror_edge & mask[surface.topology.edges].all(axis=1)
-            curves = _curves_by_patch(surface, edges)
-            half = 0.5 * np.repeat(segment_lengths(surface.vertices, surface.topology.edges[edges]), 2)
-            share = np.bincount(surface.topology.edges[edges].ravel(), half, surface.n)
-            pull = (forces @ np.array(plane.normal)) * mask
-            per_length = np.divide(np.abs(pull), share, out=np.zeros(surface.n), where=share > 0.0)
-            across = pull[:, None] * np.array(plane.normal)
-            rows += _boundary_rows(surface, curves, [f" in the {plane}"] * len(curves), across, per_length)
-    return pd.DataFrame(rows)
-
-
-def _curves_by_patch(surface: Surface, edges: Bools) -> list[Curve]:
-    """The curves of boundary edges (e,), each in one patch."""
-    topo = surface.topology
-    curves: list[Curve] = []
-    patch = np.empty(len(topo.edges), dtype=np.int64)
-    patch[topo.edge_of_face] = surface.patch_of_face[:, None]
-    for p in np.unique(patch[edges]):
-        curves += topo.curves_among(edges & (patch == p))
-    return curves
-
-
-def held_curves(surface: Surface) -> list[Curve]:
-    """The boundary curves with a held vertex, but for those in mirror planes."""
-    curves = surface.topology.boundary_loops
-    if surface.mirror_edge.any():
-        curves = surface.topology.curves_among(surface.topology.boundary_edge & ~surface.mirror_edge)
-    return [curve for curve in curves if surface.held[curve.vertices].any()]
-
-
-def _boundary_rows(
-    surface: Surface, curves: Sequence[Curve], places: Sequence[str], forces: Floats, per_length: Floats
-) -> list[dict[str, object]]:
-    """The rows of curves; they share the force of a corner equally, so that they add up to the total."""
-    count = np.zeros(surface.n)
-    for curve in curves:
-        count[curve.vertices] += 1.0
-    parts = forces / np.maximum(count, 1.0)[:, None]
-    rows = []
-    for curve, place in zip(curves, places, strict=True):
-        total = parts[curve.vertices].sum(axis=0).tolist()
-        rows.append(
-            {
-                "boundary": " | ".join(surface.patches[i].name for i in curve.sheets) + place,
-                "length": float(segments(surface, curve)[1].sum()),
-                **middle(surface, curve),
-                **dict(zip(("reaction_x", "reaction_y", "reaction_z"), total, strict=True)),
-                "per_length_max": float(per_length[curve.vertices].max()),
-            }
-        )
-    return rows
-
-
-def segments(surface: Surface, curve: Curve) -> tuple[Ints, Floats]:
-    order = np.append(curve.vertices, curve.vertices[:1]) if curve.closed else curve.vertices
-    pairs = np.stack([order[:-1], order[1:]], axis=1)
-    return pairs, segment_lengths(surface.vertices, pairs)
-
-
-def middle(surface: Surface, curve: Curve) -> dict[str, float]:
-    """The point half way along a curve, or the centre of a closed one; tells curves of one name apart."""
-    pairs, lengths = segments(surface, curve)
-    ends = surface.vertices[pairs]
-    if curve.closed:
-        place = lengths @ ends.mean(axis=1) / (lengths.sum() or 1.0)
-    else:
-        along = np.concatenate([[0.0], np.cumsum(lengths)])
-        points = surface.vertices[curve.vertices]
-        place = np.array([np.interp(0.5 * along[-1], along, column) for column in points.T])
-    place = np.where(np.abs(place) <= ROUNDING * surface.size, 0.0, place)
-    return {f"middle_{axis}": float(value) for axis, value in zip("xyz", place, strict=True)}

@@ -9,8 +9,9 @@ from ..base.arrays import Bools, Floats
 from ..energy.cables import directions
 from ..surface import Surface
 from ..surface.cable import Cable
+from ..surface.geometry import segment_lengths
 from ..surface.topology import Curve
-from .balance import conormal_sum, middle, segments
+from .curve_tables import conormal_sum, middle
 
 
 def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
@@ -24,13 +25,13 @@ def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
     mean of |Σ α n| and ``cable_pull``, that of τ |κ|, force/length; ``force_left`` per length in the motion
     space, of ``left`` (n,3).
     """
-    rows, sheets = [], np.linalg.norm(conormal_sum(surface), axis=1) if surface.cables else np.empty(0)
+    rows = []
     for cable, curve in _parts(surface):
-        pairs, lengths = segments(surface, curve)
-        total, t = float(lengths.sum()), directions(surface.vertices, pairs)[0]
+        lengths = segment_lengths(surface.vertices, curve.pairs)
+        total, t = float(lengths.sum()), directions(surface.vertices, curve.pairs)[0]
         turns = np.linalg.norm(t - np.roll(t, 1, axis=0) if curve.closed else np.diff(t, axis=0), axis=1)
         weight = 0.5 * (lengths + np.roll(lengths, 1)) if curve.closed else 0.5 * (lengths[1:] + lengths[:-1])
-        edges = surface.topology.edge_numbers(pairs)
+        sheets = np.linalg.norm(conormal_sum(surface, surface.topology.edge_numbers(curve.pairs)), axis=1)
         inner = curve.vertices if curve.closed else curve.vertices[1:-1]
         rows.append(
             {
@@ -38,7 +39,7 @@ def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
                 "tension": cable.tension,
                 "length": total,
                 **middle(surface, curve),
-                "sheet_pull": float(sheets[edges] @ lengths) / (total or 1.0),
+                "sheet_pull": float(sheets @ lengths) / (total or 1.0),
                 "cable_pull": cable.tension * float(turns.sum()) / (float(weight.sum()) or 1.0),
                 "force_left": float(np.linalg.norm(left[inner], axis=1).max(initial=0.0))
                 / (float(lengths.mean()) or 1.0),

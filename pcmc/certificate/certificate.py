@@ -30,10 +30,12 @@ from ..stability.modes import lowest, stiffness
 from ..surface import Plane, Surface, expect_surface, mirrored
 from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
-from .balance import boundary_table, junction_table, load, load_ratio, pressures_left_over, reactions
+from .balance import load, load_ratio, pressures_left_over
 from .cables import cable_end_table, cable_table
+from .curve_tables import boundary_table, junction_table
 from .leaning import lean_table, lean_texts
 from .proof import Proof
+from .reactions import reactions
 from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest

@@ -12,18 +12,18 @@ from ..surface.geometry import area_vectors
 THIN = 1e-6  # of the wall's mean triangle: smaller ones have no direction worth telling
 
 
-def lean_sines(surface: Surface) -> tuple[Floats, Floats]:
-    """(m,) ⟨ν, n⟩ of the walls' triangles with the normal n of Π, 0 for all others; (m,3) twice A ν.
+def lean_sines(surface: Surface) -> Floats:
+    """(m,) ⟨ν, n⟩ of the walls' triangles with the normal n of Π, 0 for all others.
 
     A triangle leans from the vertical by the angle arcsin |⟨ν, n⟩|.
     """
-    vectors = area_vectors(surface.vertices[surface.faces]) * 2.0
-    twice = np.linalg.norm(vectors, axis=1)
-    own = surface.walls[surface.patch_of_face]
-    own &= twice > THIN * (twice[own].mean() if own.any() else 0.0)
+    own = np.flatnonzero(surface.walls[surface.patch_of_face])
+    vectors = area_vectors(surface.vertices[surface.faces[own]])
+    areas = np.linalg.norm(vectors, axis=1)
+    thick = areas > THIN * (areas.mean() if len(own) else 0.0)
     sines = np.zeros(surface.m)
-    sines[own] = vectors[own] @ np.array(surface.plane.normal) / twice[own]
-    return sines, vectors
+    sines[own[thick]] = vectors[thick] @ np.array(surface.plane.normal) / areas[thick]
+    return sines
 
 
 def lean_table(surface: Surface) -> pd.DataFrame:
@@ -38,7 +38,7 @@ def lean_table(surface: Surface) -> pd.DataFrame:
     [['wall 1', 0.0]]
     """
     rows = []
-    sines, _ = lean_sines(surface)
+    sines = lean_sines(surface)
     for wall in np.flatnonzero(surface.walls) if not surface.walls.all() else ():
         faces = np.flatnonzero(surface.patch_of_face == wall)
         if not len(faces):  # a wall that is pinched all along

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import FileWarning, SurfaceError
-from ..certificate.balance import reactions
+from ..certificate.reactions import reactions
 from ..contact.pinching import standing_part
 from ..energy.curvature import mean_curvature
 from ..io.import_warnings import import_warnings

@@ -7,6 +7,7 @@ import numpy as np
 from ..base.errors import OptionError
 from ..certificate.leaning import lean_sines
 from ..surface import Surface
+from ..surface.geometry import area_vectors
 from .measurement import Measurement
 
 
@@ -23,11 +24,11 @@ def lean(surface: Surface, of: str | None) -> Measurement:
             raise OptionError(text, what="of", found=of)
     if not walls:
         raise OptionError("lean: the surface has no walls", what="of", found=of)
-    sines, vectors = lean_sines(surface)
-    sines = np.where(np.isin(surface.patch_of_face, walls), sines, 0.0)
+    sines = np.where(np.isin(surface.patch_of_face, walls), lean_sines(surface), 0.0)
     face = int(np.abs(sines).argmax())
-    s, length = float(sines[face]), float(np.linalg.norm(vectors[face]))
-    across = (np.array(surface.plane.normal) - s * vectors[face] / length) / length
+    s, normal = float(sines[face]), 2.0 * area_vectors(surface.vertices[surface.faces[face]])
+    length = float(np.linalg.norm(normal))
+    across = (np.array(surface.plane.normal) - s * normal / length) / length
     rate = np.degrees(np.sign(s) / np.sqrt(max(1.0 - s * s, 1e-12)))
     slope, corners = np.zeros_like(surface.vertices), surface.faces[face]
     for k, vertex in enumerate(corners):

@@ -12,8 +12,8 @@ from ..accuracy.mesh_check import MeshCheck, with_bar
 from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
 from ..base.units import Units
-from ..certificate.balance import reactions, reactions_per_length
 from ..certificate.certificate import Certificate
+from ..certificate.reactions import reactions, reactions_per_length
 from ..contact.pinching import standing_part
 from ..design import Parameter, Target
 from ..energy.curvature import curvature_error, mean_curvature

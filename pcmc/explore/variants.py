@@ -11,9 +11,8 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..certificate import Certificate
-from ..certificate.balance import reactions_per_length
-from ..design import Target
-from ..design.targets import measure
+from ..certificate.reactions import reactions_per_length
+from ..design.quantities import volumes_to_plane
 from ..panels.distance import distances
 from ..surface import Surface
 from ..surface.geometry import area_vectors, vertex_sums
@@ -43,7 +42,7 @@ def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]
     """
     height, areas = surface.plane.height(surface.vertices), certificate.patches["area"].to_numpy()
     sizes = np.linalg.norm(reactions_per_length(surface, certificate.reactions), axis=1)
-    topo, rows = surface.topology, []
+    topo, volumes, rows = surface.topology, volumes_to_plane(surface), []
 
     def add(quantity: str, of: str, kind: str, value: float | None) -> None:
         rows.append({"quantity": quantity, "of": of, "kind": kind, "value": value})
@@ -59,7 +58,7 @@ def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]
         boundary = np.unique(topo.edges[edges[topo.boundary_edge[edges] & ~surface.mirror_edge[edges]]])
         add("apex", name, "length", float(height[surface.faces[faces]].max()))
         add("area", name, "area", float(areas[k]))
-        add("volume", name, "volume", measure(surface, Target("volume", name)).value)
+        add("volume", name, "volume", float(volumes[k]))
         add("reaction", name, "tension", largest(sizes[boundary]))
     add("apex", "", "length", float(height.max()))
     add("area", "", "area", float(areas[roofs].sum()))

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..certificate.balance import reactions_per_length
+from ..certificate.reactions import reactions_per_length
 from ..surface import Surface
 from .figure import INK, SMALL, TEXT, Image, finish
 from .pictures import DOTS_FROM, EDGES_FROM, Path, ViewName, fit_frames, frame_axes, frames_of

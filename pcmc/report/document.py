@@ -19,7 +19,7 @@ from ..base.errors import FileError
 from ..base.files import atomic_write
 from ..base.units import Units, expect_length
 from ..certificate import Certificate
-from ..certificate.balance import held_lengths
+from ..certificate.reactions import held_lengths
 from ..panels import Panels, panels
 from ..panels.schedule import certified
 from ..plot import draw, families, reactions, vectors

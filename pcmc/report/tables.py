@@ -12,7 +12,7 @@ import pandas as pd
 from ..base.arrays import Bools, Ints
 from ..base.units import Units
 from ..certificate import Certificate
-from ..certificate.balance import held_lengths, reactions_per_length
+from ..certificate.reactions import held_lengths, reactions_per_length
 from ..panels import Panels
 from ..surface import Surface
 

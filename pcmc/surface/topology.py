@@ -38,6 +38,12 @@ class Curve:
     closed: bool
     sheets: tuple[int, ...]
 
+    @property
+    def pairs(self) -> Ints:
+        """(k,2) the ends of its edges, in order along the curve."""
+        order = np.append(self.vertices, self.vertices[:1]) if self.closed else self.vertices
+        return np.stack([order[:-1], order[1:]], axis=1)
+
 
 @dataclass(frozen=True, eq=False)
 class Topology:
