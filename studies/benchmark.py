@@ -24,6 +24,7 @@ from pcmc.base.arrays import Floats
 from pcmc.energy.functional import energy_and_gradient
 
 from . import benchmark_scaling as scaling
+from .benchmark_command import COMMAND
 from .benchmark_explore import EXPLORE
 from .benchmark_height import HEIGHT
 from .benchmark_solver import SOLVER
@@ -54,7 +55,7 @@ def energy_rate(quick: bool) -> list[Row]:
     return rows
 
 
-BENCHMARKS: list[Callable[[bool], list[Row]]] = [energy_rate, *SOLVER, *HEIGHT, *SWEEP, *EXPLORE]
+BENCHMARKS: list[Callable[[bool], list[Row]]] = [energy_rate, *SOLVER, *HEIGHT, *SWEEP, *EXPLORE, *COMMAND]
 
 
 def numpy_energy_and_gradient(surface: Surface) -> tuple[float, Floats]:

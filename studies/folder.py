@@ -94,7 +94,9 @@ class Folder:
 
                 data = BytesIO()
                 with Image.open(path) as image:
-                    image.convert("RGB").quantize(256).save(data, "PNG", optimize=True)
+                    # this palette covers all colours, also those of a few pixels, such as a legend's
+                    few = image.convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE, kmeans=1)
+                few.save(data, "PNG", optimize=True)
                 write_bytes(path, data.getvalue())
 
     def mesh_hashes(self) -> dict[str, str]:

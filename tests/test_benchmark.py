@@ -62,6 +62,7 @@ def test_the_quick_form_prints_and_writes(small, tmp_path, capsys):
     expected = {"Newton step, superlu", "peak memory", "initial shape to rest"}
     expected |= {"height, extrapolated", "surface and solution", "exponent of time"}
     expected |= {"grid of Fig. 16, 2 workers over 1", "slider followed"}
+    expected |= {"pcmc solve roof.toml, with its mesh check"}
     assert expected <= set(table["what"])
     numbers = pd.to_numeric(table["median"], errors="coerce")
     slope = table["what"].str.startswith("exponent")  # of so small surfaces: only noise

@@ -242,11 +242,10 @@ def test_why_cases_of_a_sweep_failed_is_said_once(folder, capsys):
 def test_letters_that_the_terminal_lacks_are_written_otherwise(folder, encoding):
     text = SMALL.replace("roof = ", '"größe, ō" = ')
     (folder / "roof.toml").write_text(text, encoding="utf-8")
-    code = "import sys; from pcmc.cli import main; sys.exit(main())"
     for command, name in (("solve", "stable: at rest"), ("certify", "gr\\xf6\\xdfe, \\u014d")):
         if encoding == "cp1252":
             name = name.replace("\\xf6\\xdf", "öß")
-        run = [sys.executable, "-c", code, command, "roof.toml", *(["-o", "ō.obj"] * (command == "solve"))]
+        run = [sys.executable, "-m", "pcmc", command, "roof.toml", *(["-o", "ō.obj"] * (command == "solve"))]
         done = subprocess.run(
             run,
             capture_output=True,
@@ -341,8 +340,7 @@ def test_a_mistake_of_our_own_is_not_hidden(folder, monkeypatch):
 
 
 def test_as_a_process(folder):
-    code = "import sys; from pcmc.cli import main; sys.exit(main())"
-    run = [sys.executable, "-c", code, "certify", "none.obj"]
+    run = [sys.executable, "-m", "pcmc", "certify", "none.obj"]
     done = subprocess.run(run, capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "pcmc: error: none.obj: cannot be read (No such file or directory)\n"

@@ -5,7 +5,6 @@ import sys
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.patches import Rectangle
 from pictures import near
 from PIL import Image
 from refusals import refused
@@ -18,7 +17,6 @@ from pcmc.base.errors import FileError, MissingExtra, OptionError
 from pcmc.explore.page_data import fields as page_fields
 from pcmc.explore.session import State
 from pcmc.plot import arrows, legend, raster
-from pcmc.plot.figure import finish, new
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
 from pcmc.project import paint
 from pcmc.surface.colours import WALLS, patch_colors, rgb
@@ -182,7 +180,7 @@ def test_pictures_are_written_as_svg_and_pdf_too(tmp_path, suffix, head):
 def test_pictures_stay_small(tmp_path):
     surface = two_squares(24)
     plot.draw(surface, tmp_path / "a.png", scalars=pcmc.mean_curvature(surface), label="H")
-    assert (tmp_path / "a.png").stat().st_size < 150_000
+    assert (tmp_path / "a.png").stat().st_size < 600_000
 
 
 def test_up_is_the_normal_of_the_plane():
@@ -369,19 +367,11 @@ def test_a_million_triangles_are_drawn(tmp_path):
     surface = two_squares(460)
     assert surface.m > 900_000
     plot.draw(surface, tmp_path / "a.png", scalars=pcmc.mean_curvature(surface), label="H")
-    assert 10_000 < (tmp_path / "a.png").stat().st_size < 150_000
+    assert 10_000 < (tmp_path / "a.png").stat().st_size < 600_000
 
 
-def test_a_large_picture_is_written_in_fewer_colours_and_keeps_the_rare_ones(tmp_path):
-    shades = np.linspace(0.2, 0.9, 150 * 300).reshape(150, 300)
-    figure = new(900.0, 600.0)
-    axes = figure.subplots()
-    noise = np.random.default_rng(1).uniform(-0.1, 0.1, (150, 300))
-    axes.imshow(np.stack([0.2 + 0.0 * shades, shades, 1.0 - shades + noise], 2).clip(0, 1))
-    axes.add_patch(Rectangle((10, 10), 3, 3, color="#EE8866"))
-    image = finish(figure, tmp_path / "p.png")
+def test_a_written_picture_has_all_its_colours(tmp_path):
+    surface = two_squares(6)
+    image = plot.draw(surface, tmp_path / "p.png", scalars=pcmc.mean_curvature(surface), width=400)
     with Image.open(tmp_path / "p.png") as picture:
-        assert picture.mode == "P"
-        found = np.asarray(picture.convert("RGB")).astype(int)
-    assert near(found, rgb("#EE8866"), 0.03).sum() > 20
-    assert np.abs(found - image.astype(int)).max() < 40
+        assert np.array_equal(np.asarray(picture), image)

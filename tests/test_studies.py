@@ -96,6 +96,25 @@ def test_large_figures_shrink_and_small_ones_stay(tmp_path):
     assert after["small"] == before["small"]
 
 
+def test_shrunken_figures_keep_rare_colours(tmp_path):
+    from PIL import Image
+
+    rows, columns = np.mgrid[0:600, 0:900]
+    rng = np.random.default_rng(1)
+    picture = np.stack([rows // 3, columns // 4, 200 + rng.integers(0, 50, rows.shape)], axis=2).astype(
+        np.uint8
+    )
+    picture[10:16, 10:16] = rare = (238, 136, 102)  # as in a legend
+    folder = Folder(tmp_path)
+    Image.fromarray(picture).save(folder.figure("a"))
+    folder.shrink_figures()
+    with Image.open(folder.figure("a")) as small:
+        assert small.mode == "P"
+        found = np.asarray(small.convert("RGB")).astype(int)
+    assert np.abs(found[10:16, 10:16] - rare).max() < 20
+    assert np.abs(found - picture).max() < 40
+
+
 def test_missing_file_says_which_study_writes_it(tmp_path):
     with pytest.raises(FileError, match=r"python -m studies run example9"):
         Folder(tmp_path / "example9").read_table("records")

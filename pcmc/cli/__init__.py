@@ -5,6 +5,7 @@ This file imports nothing heavy, so that ``main`` handles Ctrl-C before numpy an
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -32,6 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     own_process = arguments is None and default
     if own_process:
         signal.signal(signal.SIGINT, _exit)  # a library that is half imported may lose an exception
+        gc.disable()  # until all is imported; what lives to the end is not worth searching
     from .running import run
 
     try:
@@ -43,6 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     finally:
         if own_process:
             signal.signal(signal.SIGINT, _exit)  # until Python has ended
+            gc.freeze()  # and it ends without a last search
 
 
 def _stopped() -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import gc
 import os
 import sys
 import warnings
@@ -92,6 +93,9 @@ def _command() -> tuple[Callable[..., Any], ModuleType]:
 
     from .app import app
 
+    if not gc.isenabled():  # ``main`` pauses it
+        gc.freeze()
+        gc.enable()
     return typer.main.get_command(app), typer
 
 

@@ -16,7 +16,6 @@ from ..base.files import atomic_write, suffix_of
 DPI = 200.0
 TEXT, SMALL = 7.0, 6.0  # points
 INK = "#202020"
-LARGE = 149_000  # bytes
 EFFORT = 6  # of compression; 9 takes six times as long for 2 % fewer bytes
 SUFFIXES = (".png", ".svg", ".pdf")
 # Okabe and Ito's scheme, in an order whose first few differ most.
@@ -103,8 +102,8 @@ def check_suffix(path: str | os.PathLike[str]) -> None:
 def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
     """The figure as an (h,w,3) image, written as a PNG, SVG or PDF if there is a path.
 
-    The file has no date and no program's name: the same figure gives the same bytes. A PNG above 149 kB has
-    256 colours only. In SVG and PDF, text and curves are lines, and surfaces are pictures in them.
+    The file has no date and no program's name: the same figure gives the same bytes. In SVG and PDF, text
+    and curves are lines, and surfaces are pictures in them.
     """
     figure.canvas.draw()
     image = np.ascontiguousarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
@@ -123,17 +122,10 @@ def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
 
 
 def _png(image: Image) -> bytes:
-    """The image as a file, in fewer colours if it is large."""
     from PIL import Image as Pillow
 
-    picture = Pillow.fromarray(image)
     stream = io.BytesIO()
-    picture.save(stream, format="PNG", compress_level=EFFORT)
-    if stream.tell() > LARGE:
-        stream = io.BytesIO()
-        # the palette covers all colours, also those of a few pixels, such as a legend's
-        small = picture.quantize(256, method=Pillow.Quantize.MAXCOVERAGE, kmeans=1)
-        small.save(stream, format="PNG", optimize=True)
+    Pillow.fromarray(image).save(stream, format="PNG", compress_level=EFFORT)
     return stream.getvalue()
 
 

@@ -26,13 +26,15 @@ def paint(scene: Scene, low: Floats, scale: float, size: tuple[int, int], render
 
     ``scale`` is pixels per unit of length, ``size`` (w, h) in pixels.
     """
+    from PIL import Image as Pillow
+
     validate.choice("renderer", renderer, RENDERERS)
     many = len(scene.corners) > MANY
     painter = _with_matplotlib
     if renderer == "pyvista" or (renderer == "auto" and many and opengl()):
         painter = _with_pyvista
-    blocks = painter(scene, low, scale, size).reshape(size[1], SAMPLES, size[0], SAMPLES, 3).astype(float)
-    return np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
+    fine = Pillow.fromarray(np.ascontiguousarray(painter(scene, low, scale, size)))
+    return np.asarray(fine.reduce(SAMPLES))
 
 
 @cache
