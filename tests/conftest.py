@@ -4,6 +4,7 @@ import os
 import signal
 
 import pytest
+from small_project import SMALL
 
 from generators import spherical_cap
 from pcmc import solve
@@ -22,3 +23,19 @@ def pytest_sessionstart():
 def small_cap():
     """A stable cap of few triangles, at rest under tension 0.6."""
     return solve(spherical_cap(0.25)).surface
+
+
+@pytest.fixture
+def small(tmp_path):
+    """The file of a small project, alone in its folder."""
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The folder that a test works in, with a small project, roof.toml."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "roof.toml").write_text(SMALL, encoding="utf-8")
+    return tmp_path
