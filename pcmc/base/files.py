@@ -107,6 +107,23 @@ def atomic_writes(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path
 
 
 @contextmanager
+def writing(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Name the file, as a FileError, if the system refuses to write it in the block.
+
+    >>> with writing("roof.obj"):
+    ...     raise OSError(28, "No space left on device")
+    Traceback (most recent call last):
+    ...
+    pcmc.base.errors.FileError: roof.obj: cannot be written (No space left on device)
+    """
+    try:
+        yield
+    except OSError as error:
+        text = f"{os.fspath(path)}: cannot be written ({error.strerror or error})"
+        raise FileError(text, what=os.fspath(path)) from None
+
+
+@contextmanager
 def folder(path: Path) -> Iterator[None]:
     """Make a folder and those above it if they are missing; remove them if the block raises."""
     missing = [p for p in (path, *path.parents) if not p.exists()]

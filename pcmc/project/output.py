@@ -16,7 +16,7 @@ from .. import io
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknown
-from ..base.files import atomic_writes, check_name
+from ..base.files import atomic_writes, check_name, writing
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
@@ -56,11 +56,8 @@ def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
         for (path, write), temporary in zip(works, temporaries, strict=True):
             report(f"writing {path.name}")
             try:
-                with defer_interrupts(), _final_name_in_warnings(temporary, path):
+                with writing(temporary), defer_interrupts(), _final_name_in_warnings(temporary, path):
                     write(temporary)
-            except OSError as error:
-                text = f"{path}: cannot be written ({error.strerror or error})"
-                raise FileError(text, what=str(path)) from None
             except PcmcError as error:
                 text = str(error).replace(f"{temporary}: ", "")
                 raise FileError(f"{path}: {text}", what=str(path)) from None
