@@ -15,7 +15,7 @@ from .alpha_grid import TENSIONS
 from .corner_cases import BOTTOMS, CASES, DRAWN
 from .corner_ladder import CATEGORIES, SUPPORTS, ends, law
 from .elevations import with_triangles
-from .figure_panels import category_panels
+from .figure_panels import category_panels, graded_mesh
 from .folder import Folder
 
 COLORS = dict(
@@ -45,25 +45,20 @@ def figure(folder: Folder) -> None:
                     mine.edge_length / initial.size,
                     mine.eigenvalue * unit,
                 )
-    lines(
-        {name: curve for name, curve in curves.items() if "held" not in name},
-        folder.figure("loss"),
-        x="edge length at the end / size",
-        y="lowest eigenvalue, α/size²",
-        xscale="log",
-        markers=True,
-        levels={"saddle below": 0.0},
-        title="Bottoms slide: the hold of the ends fades",
-    )
-    lines(
-        {name: curve for name, curve in curves.items() if "held" in name},
-        folder.figure("held"),
-        x="edge length at the end / size",
-        y="lowest eigenvalue, α/size²",
-        xscale="log",
-        markers=True,
-        title="Bottoms are held: the lowest eigenvalue has a limit",
-    )
+    for name, levels, title in (
+        ("loss", {"saddle below": 0.0}, "Bottoms slide: the hold of the ends fades"),
+        ("held", None, "Bottoms are held: the lowest eigenvalue has a limit"),
+    ):
+        lines(
+            {key: curve for key, curve in curves.items() if ("held" in key) == (name == "held")},
+            folder.figure(name),
+            x="edge length at the end / size",
+            y="lowest eigenvalue, α/size²",
+            xscale="log",
+            markers=True,
+            levels=levels,
+            title=title,
+        )
     _draw_fits(folder, ladder)
     _draw_grid(folder)
     _draw_mesh(folder)
@@ -128,21 +123,11 @@ def _draw_grid(folder: Folder) -> None:
 
 def _draw_mesh(folder: Folder) -> None:
     """A graded mesh, whole and near one end, eight times and sixty-four times as large."""
-    from pcmc.plot import panel
-
     surface = folder.read_mesh(DRAWN)["at rest"]
     place = surface.vertices[ends(surface)[0]]
     parts = [_near(surface, place, surface.size / share) for share in (1, 8, 64)]
-    panel(
-        parts,
-        folder.figure("graded"),
-        views="plan",
-        one_scale=False,
-        edges=True,
-        supports=False,
-        columns=3,
-        titles=("Fig. 4, held bottoms", "an end, 8 times as large", "64 times as large"),
-    )
+    titles = ("Fig. 4, held bottoms", "an end, 8 times as large", "64 times as large")
+    graded_mesh(parts, folder.figure("graded"), titles)
 
 
 def _near(surface: Surface, place: Floats, reach: float) -> Surface:

@@ -14,6 +14,16 @@ from .errors import FileError
 from .interrupts import defer_interrupts
 
 
+def system_error(path: str | os.PathLike[str], act: str, error: OSError) -> FileError:
+    """The error for a file that the system does not let be read, written or opened.
+
+    >>> system_error("roof.obj", "read", FileNotFoundError(2, "No such file or directory"))
+    FileError('roof.obj: cannot be read (No such file or directory)')
+    """
+    name = os.fspath(path)
+    return FileError(f"{name}: cannot be {act} ({error.strerror or error})", what=name)
+
+
 def check_regular(path: Path) -> None:
     """Refuse a folder, a pipe and a device before they are opened: reading them may never end.
 
@@ -33,7 +43,7 @@ def check_regular(path: Path) -> None:
     except FileNotFoundError:
         return
     except OSError as error:
-        raise FileError(f"{path}: cannot be opened ({error.strerror or error})", what=str(path)) from None
+        raise system_error(path, "opened", error) from None
     if stat.S_ISREG(mode):
         return
     kind = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
@@ -119,8 +129,7 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        text = f"{os.fspath(path)}: cannot be written ({error.strerror or error})"
-        raise FileError(text, what=os.fspath(path)) from None
+        raise system_error(path, "written", error) from None
 
 
 @contextmanager

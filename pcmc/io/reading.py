@@ -12,7 +12,7 @@ from typing import Any
 import numpy.typing as npt
 
 from ..base.errors import FileError, FileWarning, MissingExtra, PcmcError, SurfaceError
-from ..base.files import check_regular
+from ..base.files import check_regular, system_error
 from ..base.units import MICROMETRES, Units
 from ..base.validate import choice
 from ..surface import Plane, Surface
@@ -113,7 +113,7 @@ def load(path: str | os.PathLike[str]) -> MeshData:
             return data
         return restore_walls(merged(data))
     except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
+        raise system_error(path, "read", error) from None
     except UnicodeDecodeError as error:
         text = f"{path}: byte {error.start} is not text; is it a {path.suffix} file?"
         raise FileError(text, what=str(path), where=error.start) from None

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import FileError, PcmcError, unknown
-from ..base.files import check_regular
+from ..base.files import check_regular, system_error
 from ..surface import Surface
 from . import FORMATS, READ_ONLY, meshlab
 from .libraries import unreadable
@@ -145,7 +145,7 @@ def _loaded(path: Path) -> MeshData:
         path.open("rb").close()
         return _read(path, known[suffix].module)
     except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
+        raise system_error(path, "read", error) from None
     except UnicodeDecodeError as error:
         raise FileError(
             f"{path}: byte {error.start} is not text", what=str(path), where=error.start
