@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from typing import Any
 
+from pcmc import explore
 from pcmc.explore.roof import Roof, read_roof
 
 HALL_TOML = """# the hall
@@ -28,3 +33,14 @@ def designed_hall(folder: Path) -> Roof:
     """The roof of the project, which is written to the folder as hall.toml."""
     (folder / "hall.toml").write_text(HALL_TOML)
     return read_roof(folder / "hall.toml", use_cache=False)
+
+
+@contextmanager
+def followed(path: Path) -> Iterator[Any]:
+    """The page of a project's file, served, which follows the file."""
+    read = partial(read_roof, path, use_cache=False)
+    running = explore.start_roof(read(), watch=read)
+    try:
+        yield running
+    finally:
+        running.close()

@@ -7,11 +7,11 @@ import time
 import numpy as np
 import pytest
 from browsing import Explored, changed, needs_browser, until
+from explore_cases import followed
 
 import pcmc
 from generators import four_fans, spherical_cap
 from pcmc import explore
-from pcmc.explore.roof import read_roof
 from pcmc.explore.session import Session
 
 CAP = spherical_cap(edge_length=0.25)
@@ -176,12 +176,7 @@ vary = ["west", "east", {patch = "east", kind = "pressure", low = 0.5, high = 2.
 def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(driver, tmp_path):
     path = tmp_path / "hall.toml"
     path.write_text(PROJECT)
-
-    def read():
-        return read_roof(path, use_cache=False)
-
-    running = explore.start_roof(read(), watch=read)
-    try:
+    with followed(path) as running:
         page = Explored(driver, running.url)
         assert page.text("#targets .message").startswith("met")
         assert "kN/m" in page.text("#by-patch")
@@ -240,8 +235,6 @@ def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(
         assert "edge_length" in page.text("#watch") or "outline" in page.text("#watch")
         assert "west 1.2 " in page.text("#by-patch")
         assert page.complaints() == []
-    finally:
-        running.close()
 
 
 def test_wrong_targets_are_named_on_the_page(page):

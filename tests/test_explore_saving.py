@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from asking import Client
 from browsing import until
-from explore_cases import HALL_TOML, designed_hall
+from explore_cases import HALL_TOML, designed_hall, followed
 from refusals import refused
 
 from generators import spherical_cap
@@ -137,12 +137,7 @@ def test_on_the_network_nothing_is_saved(roof, folder):
 def test_the_page_follows_the_file_and_survives_a_broken_save(tmp_path):
     path = tmp_path / "hall.toml"
     path.write_text(HALL_TOML)
-
-    def read():
-        return read_roof(path, use_cache=False)
-
-    running = explore.start_roof(read(), watch=read)
-    try:
+    with followed(path) as running:
         client = Client(running)
         name = client.ask("/api/open")[0]["session"]
 
@@ -170,8 +165,6 @@ def test_the_page_follows_the_file_and_survives_a_broken_save(tmp_path):
         assert saved["saved"] == "hall.toml"
         path.unlink()
         until(lambda: "cannot be read" in news()["problem"], "the missing file")
-    finally:
-        running.close()
 
 
 def test_a_drawing_that_a_project_refers_to_is_followed(tmp_path):
@@ -187,12 +180,7 @@ def test_a_drawing_that_a_project_refers_to_is_followed(tmp_path):
     draw(8)
     path = tmp_path / "roof.toml"
     path.write_text('[plan]\ndrawing = "hall.dxf"\nedge_length = 1.0\n')
-
-    def read():
-        return read_roof(path, use_cache=False)
-
-    running = explore.start_roof(read(), watch=read)
-    try:
+    with followed(path) as running:
         draw(11)
         until(lambda: running.version == 1, "the new drawing")
         assert np.ptp(running.start.surface.vertices[:, 0]) == pytest.approx(11.0)
@@ -200,5 +188,3 @@ def test_a_drawing_that_a_project_refers_to_is_followed(tmp_path):
         plan = tomllib.loads(saving.project_with(running.roof, surface)[0])["plan"]
         assert plan["drawing"] == "hall.dxf"
         assert [area["tension"] for area in plan["patches"].values()] == [9.0]
-    finally:
-        running.close()
