@@ -76,7 +76,8 @@ class Page {
   startViewer() {
     try {
       this.viewer = new Viewer(find("#canvas"), (spacing) => {
-        find("#scale").textContent = spacing ? `grid ${digits(spacing)}` : "";
+        const unit = this.units?.given ? ` ${this.units.length}` : "";
+        find("#scale").textContent = spacing ? `grid ${digits(spacing)}${unit}` : "";
       });
     } catch (error) {
       find("#canvas").hidden = true;

@@ -99,6 +99,7 @@ export class Targets {
     const targets = this.rows.map(({ target, fixed, quantity, of, limit, number }) => ({
       quantity: fixed ? target.quantity : quantity.value,
       of: fixed ? target.of : of.value.slice(1) || null,
+      name: target.name ?? "",
       [limit.value]: number.valueAsNumber,
     }));
     this.say("Searching for the tensions…");
