@@ -130,6 +130,6 @@ ACTS: dict[str, Callable[[dict[str, Any]], tuple[Any, ...]]] = {
     "forget": lambda asked: (place(asked),),
     "recall": lambda asked: (place(asked),),
     "compare": lambda asked: (None if asked.get("number") is None else place(asked),),
-    **dict.fromkeys(("stabilise", "undo", "redo", "reset", "stop", "state"), _nothing),
+    **dict.fromkeys(("stabilise", "remesh", "undo", "redo", "reset", "stop", "state"), _nothing),
 }
 """The arguments that each act of a session takes from a request."""

@@ -117,7 +117,10 @@ class Explorer:
 
     def open(self) -> tuple[str, Session]:
         """A new session and its name in addresses."""
-        name, session = secrets.token_urlsafe(12), Session(self.start, self._turn)
+        name, session = (
+            secrets.token_urlsafe(12),
+            Session(self.start, self._turn, self.roof.path if self.roof.is_project else None),
+        )
         with self._lock:
             self.sessions[name] = session
             while len(self.sessions) > MOST_SESSIONS:
@@ -336,6 +339,7 @@ class _Handler(BaseHTTPRequestHandler):
                 "undo": state.undo,
                 "redo": state.redo,
                 "message": state.message,
+                "way": state.note,
                 "variants": [variant_data(variant) for variant in state.variants],
                 "compared": state.compared,
             }

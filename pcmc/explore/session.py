@@ -12,23 +12,30 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from itertools import count
+from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from .. import existence
 from ..accuracy import MeshCheck, check_mesh
 from ..base.errors import OptionError
 from ..certificate import Certificate, certify
 from ..design import Parameter, Target, meet
+from ..meshing.remeshing import remesh
 from ..solvers import solve
 from ..solvers.result import Progress
 from ..surface import Patch, Surface
-from .following import AT_REST, Values, attempt, reach, until, values_of, wanted
+from ..surface.geometry import edge_vectors
+from .following import AT_REST, Reached, Values, attempt, reach, until, values_of, wanted
+from .own_way import own_start, solved_own_way
 from .variants import MOST_VARIANTS, Variant
 
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
 SETTLE: dict[str, Any] = {"iterations": 40, "tolerance": 1e-11}  # when it is let go
 FOLLOW_SECONDS = 1.0  # time limit of following, and as much again for each 50 000 triangles
-SETTLE_SECONDS = 6.0  # time limit of settling
+SETTLE_SECONDS = 6.0  # time limit of settling, and of solving from the start shape
+FIRST_ATTEMPTS = 4  # of settling, before the project's own walls are tried
 MOST_STEPS = 200  # to undo
 MOST_BYTES = 64_000_000  # of vertices in these steps
 
@@ -47,6 +54,7 @@ class State:
     undo, redo : how many steps there are either way.
     superseded : whether newer values have arrived meanwhile, so that the page ignores this state.
     message : how the search for targets ended; empty after other acts.
+    note : how the values were reached where following did not lead there; else empty.
     variants : those kept; ``compared`` is the number of the one compared with, or None.
     """
 
@@ -58,6 +66,7 @@ class State:
     redo: int = 0
     superseded: bool = False
     message: str = ""
+    note: str = ""
     variants: tuple[Variant, ...] = ()
     compared: int | None = None
 
@@ -85,17 +94,22 @@ def solved_start(surface: Surface) -> State:
 class Session:
     """A surface that follows its values; every method is safe to call from any thread.
 
-    A newer call ends the work on an older one. Each call holds ``turn`` while it works.
+    A newer call ends the work on an older one. Each call holds ``turn`` while it works. ``project`` is the
+    file that the surface is designed by: where following leads nowhere, its own way is tried.
     """
 
-    def __init__(self, start: State, turn: AbstractContextManager[Any] | None = None) -> None:
+    def __init__(
+        self, start: State, turn: AbstractContextManager[Any] | None = None, project: Path | None = None
+    ) -> None:
         self._lock, self._turn = threading.Lock(), turn or nullcontext()
+        self._project = project
+        self._walls: dict[str, float] = {}  # tensions that the project gave them on the way
         self._requests = 0
         self.surface, self._certificate = start.surface, start.certificate
         self._wanted, self._failure = start.wanted, start.failure
         self._start = self.surface
         self._steps, self._place = [self.surface], 0
-        self._message = ""
+        self._message = self._note = ""
         self._compared: int | None = None
         self.variants: list[Variant] = []
         self.aims: Aims | None = None
@@ -130,7 +144,9 @@ class Session:
 
         def act(stop: Callable[[], bool]) -> None:
             asked, end = self._with_values(values), time.monotonic() + SETTLE_SECONDS
-            way = reach(self.surface, asked, until(stop, end), **SETTLE)
+            way = reach(self.surface, asked, until(stop, end), attempts=FIRST_ATTEMPTS, **SETTLE)
+            if way.failed is not None and not stop():
+                way = self._reach_otherwise(way, asked, stop, end)
             if stop():
                 return
             if way.certificate is not None:
@@ -154,6 +170,30 @@ class Session:
                 self._add_step()
             else:
                 self._failure = certificate
+
+        return self._run(act)
+
+    def remesh(self) -> State:
+        """New triangles of the mean size for the surface shown, and from there to the values asked for."""
+
+        def act(stop: Callable[[], bool]) -> None:
+            asked, end = values_of(self._wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
+            roof = self.surface.faces[self.surface.roof[self.surface.patch_of_face]]
+            edges = np.linalg.norm(edge_vectors(self.surface.vertices[roof]), axis=2)
+            result = attempt(remesh(self.surface, float(edges.mean())), until(stop, end), **SETTLE)
+            if stop():
+                return
+            if result.certificate.verdict not in AT_REST:
+                self._failure = result.certificate
+                return
+            self._go_on_with(result.surface)
+            self._wanted = wanted(self.surface, asked)
+            if values_of(self.surface) != asked:
+                way = reach(self.surface, self._wanted, until(stop, end), **SETTLE)
+                if way.certificate is not None:
+                    self._show(way.surface)
+                self._failure = way.failed
+                self._add_step()
 
         return self._run(act)
 
@@ -286,7 +326,7 @@ class Session:
 
         with self._lock, self._turn:
             before = self._wanted
-            self._message = ""
+            self._message = self._note = ""
             if not late():
                 act(late)
             if late():
@@ -297,6 +337,46 @@ class Session:
         """The surface shown, with the values asked for."""
         self._wanted = wanted(self.surface, values)
         return self._wanted
+
+    def _reach_otherwise(self, way: Reached, asked: Surface, stop: Callable[[], bool], end: float) -> Reached:
+        """Where the first attempts failed: with the project's walls; in small steps; from its start shape."""
+        start = self._own_start(asked)
+        if start is not None:
+            walls = {p.name: p.tension for p in start.patches if p.wall}
+            balanced = asked.retensioned(walls)
+            if balanced.patches != asked.patches:
+                there = reach(self.surface, balanced, until(stop, end), attempts=FIRST_ATTEMPTS, **SETTLE)
+                if there.certificate is not None and there.failed is None:
+                    self._wanted, self._walls = there.surface, walls
+                    changed = ", ".join(
+                        f"{n} {t:g}"
+                        for n, t in walls.items()
+                        if asked.patches[asked.patch_index(n)].tension != t
+                    )
+                    self._note = f"walls balanced beside the new tensions: {changed}"
+                    return there
+        rest = reach(way.surface, asked, until(stop, end), **SETTLE)
+        if rest.failed is None or start is None or stop() or self._project is None:
+            return Reached(rest.surface, rest.certificate or way.certificate, rest.failed)
+        self.progress = "from the start shape"
+        try:
+            result = solved_own_way(self._project, start, until(stop, time.monotonic() + SETTLE_SECONDS))
+        finally:
+            self.progress = ""
+        if result is None:
+            return Reached(rest.surface, rest.certificate or way.certificate, rest.failed)
+        self._wanted, self._walls = result.surface, {p.name: p.tension for p in start.patches if p.wall}
+        self._note = "solved from the start shape of the project; the last surface led to none"
+        return Reached(result.surface, result.certificate, None)
+
+    def _own_start(self, asked: Surface) -> Surface | None:
+        """The start shape of the project for these values; walls that the page has moved keep theirs."""
+        if self._project is None:
+            return None
+        before = {p.name: p.tension for p in self._start.patches if p.wall}
+        own = (before, self._walls)
+        moved = [p.name for p in asked.patches if p.wall and p.tension not in [w.get(p.name) for w in own]]
+        return own_start(self._project, asked, moved)
 
     def _show(self, surface: Surface) -> None:
         self.surface, self._certificate = surface, certify(surface)
@@ -345,6 +425,7 @@ class Session:
             after,
             superseded,
             self._message,
+            self._note,
             tuple(self.variants),
             self._compared,
         )

@@ -28,7 +28,7 @@ export function showVerdict(root, header) {
   root.querySelector(".sign").textContent = SIGNS[verdict.name] || "?";
   root.querySelector(".word").textContent = verdict.word;
   root.querySelector(".sentence").textContent = capital(sentence);
-  root.querySelector(".detail").textContent = [verdict.detail, atRest ? "" : drawn(header)]
+  root.querySelector(".detail").textContent = [verdict.detail, atRest ? header.way : drawn(header)]
     .filter(Boolean).map((part) => `${capital(part)}.`).join(" ");
 }
 
