@@ -19,11 +19,12 @@ from ..base.units import NO_UNITS, Units
 from ..contact.pinching import standing_part
 from ..contact.pull import excess_pull
 from ..energy.curvature import METHODS, curvature_error, mean_curvature, target_curvature
-from ..energy.functional import energy_and_gradient, patch_areas, volume
+from ..energy.functional import energy_and_gradient, patch_areas
 from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
 from ..energy.motion_space import VertexClasses, force_scale, motion_space
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..energy.rooms import prescribed_volumes, room_pressures, room_volumes
+from ..energy.volume_below import volume_below
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest, stiffness
@@ -52,7 +53,7 @@ class Certificate:
         vertices beyond what their wall can take, relative. Of several loose parts, that of the worst. The
         relative differences of prescribed volumes are added to it (as squares).
     scale : norm of the single triangles' tension forces, force.
-    energy, volume : E (force·length) and the volume under the roof (length³).
+    energy, volume : E (force·length) and the volume between the roof and Π (``volumes_below``, length³).
     index : Morse index; None where the surface is not at rest. Rigid motions are not counted, nor motions
         that change a prescribed volume.
     leaning : a row per wall: its largest angle from the vertical of Π, degrees, and the place.
@@ -205,7 +206,7 @@ def certify(
     standing, classes, X = part.surface, part.classes, part.surface.vertices
     unheld = excess_pull(standing, part.walls, part.resting)
     value, forces = energy_and_gradient(standing, X, supports=False)
-    enclosed, areas = volume(surface), patch_areas(surface)
+    below, areas = volume_below(surface), patch_areas(surface)
     scale = force_scale(standing, classes, X)
     space = motion_space(standing, classes, X)
     rigid = rigid_modes(space, rigid_motions(standing), X)
@@ -255,7 +256,7 @@ def certify(
         residual=residual,
         scale=scale,
         energy=value,
-        volume=enclosed,
+        volume=below,
         index=index,
         eigenvalues=eigenvalues,
         modes=fields,
