@@ -19,6 +19,8 @@ from .pieces import Piece
 
 CORNER = math.radians(10.0)  # a joint that turns by more is a corner
 EDGE_TURN = math.radians(45.0)  # largest turn of a bend along one edge
+BESIDE = 1e-3  # in parameter: how far beside a joint the curve is compared with the joint
+PLATEAU = 1e-9  # of the length: changes of a coordinate up to this are none
 DENSE = 64  # points per curved piece, for lengths and crossings
 
 
@@ -68,6 +70,24 @@ class Curve:
         joints = np.arange(0 if self.closed else 1, len(self.pieces))
         cosines = [self.pieces[j - 1].direction(1) @ self.pieces[j].direction(0) for j in joints]
         return joints[np.arccos(np.clip(np.array(cosines, dtype=float), -1.0, 1.0)) > CORNER].astype(float)
+
+    @cached_property
+    def extremes(self) -> Floats:
+        """(e,) ascending parameters, no open ends, at which a curved piece is farthest along x or y.
+
+        >>> circle([0, 0], 2.0).extremes.tolist()
+        [0.0, 0.25, 0.5, 0.75]
+        """
+        inside = [number + piece.extremes() for number, piece in enumerate(self.pieces)]
+        curved = np.array([piece.sweep != 0.0 or len(piece.points) > 2 for piece in self.pieces])
+        joints = np.arange(0 if self.closed else 1, len(self.pieces))
+        joints = joints[curved[joints - 1] | curved[joints]].astype(float)
+        sides = np.stack([(joints - BESIDE) % len(self.pieces), joints, joints + BESIDE])
+        before, here, after = (self.at(t)[:, :2] for t in sides)
+        size = PLATEAU * self.length
+        steps = (here - before) * (here - after)
+        farthest = (steps > 0.0) & (np.minimum(np.abs(here - before), np.abs(here - after)) > size)
+        return np.sort(np.concatenate([*inside, joints[farthest.any(axis=1)]]))
 
     def parameter(self, length: Floats) -> Floats:
         """(n,) parameters at lengths (n,) along the curve."""
