@@ -19,8 +19,9 @@ from .pieces import Piece
 
 CORNER = math.radians(10.0)  # a joint that turns by more is a corner
 EDGE_TURN = math.radians(45.0)  # largest turn of a bend along one edge
-BESIDE = 1e-3  # in parameter: how far beside a joint the curve is compared with the joint
-PLATEAU = 1e-9  # of the length: changes of a coordinate up to this are none
+LEVEL = 1e-12  # product of slopes beside a joint, up to which a coordinate may turn there
+BESIDE = 0.25  # in parameter: how far beside such a joint its coordinate is compared
+PLATEAU = 1e-12  # of the length: changes of a coordinate up to this are none
 DENSE = 64  # points per curved piece, for lengths and crossings
 
 
@@ -81,13 +82,16 @@ class Curve:
         inside = [number + piece.extremes() for number, piece in enumerate(self.pieces)]
         curved = np.array([piece.sweep != 0.0 or len(piece.points) > 2 for piece in self.pieces])
         joints = np.arange(0 if self.closed else 1, len(self.pieces))
-        joints = joints[curved[joints - 1] | curved[joints]].astype(float)
+        joints = joints[curved[joints - 1] | curved[joints]]
+        ends, starts = (
+            np.reshape([self.pieces[j].direction(end)[:2] for j in js], (-1, 2))
+            for js, end in ((joints - 1, 1), (joints, 0))
+        )
         sides = np.stack([(joints - BESIDE) % len(self.pieces), joints, joints + BESIDE])
         before, here, after = (self.at(t)[:, :2] for t in sides)
-        size = PLATEAU * self.length
-        steps = (here - before) * (here - after)
-        farthest = (steps > 0.0) & (np.minimum(np.abs(here - before), np.abs(here - after)) > size)
-        return np.sort(np.concatenate([*inside, joints[farthest.any(axis=1)]]))
+        low = np.minimum(np.sign(here - before) * (here - after), np.sign(here - after) * (here - before))
+        farthest = (ends * starts < LEVEL) & (low > PLATEAU * self.length)
+        return np.sort(np.concatenate([*inside, joints[farthest.any(axis=1)].astype(float)]))
 
     def parameter(self, length: Floats) -> Floats:
         """(n,) parameters at lengths (n,) along the curve."""

@@ -72,7 +72,11 @@ class Piece:
 
     def _turns(self, axis: int) -> Floats:
         """(e,) parameters at which a coordinate of the Bézier curve changes its direction."""
+        steps = np.diff(self.points[:, axis])
+        if (steps >= 0.0).all() or (steps <= 0.0).all():  # then the curve goes one way, too
+            return np.empty(0)
         control = self._homogeneous[:, [axis, -1]]
+        control = control / control[:, 1].max()
 
         def rate(t: Floats) -> Floats:
             (n, d), (dn, dd) = _casteljau(control, t).T, _casteljau(np.diff(control, axis=0), t).T
