@@ -9,9 +9,11 @@ from pcmc.meshing.remeshing import remesh
 from pcmc.plan import Hole, Plan, arc, bezier, circle, ellipse, join, polyline
 from pcmc.surface import Plane
 
-NAVE = join(
-    polyline([[0, 10], [0, 0], [25, 0]]), arc([25, 0], [30, 5], [25, 10]), polyline([[25, 10], [0, 10]])
-)
+APSE = arc([25, 0], [30, 5], [25, 10])
+NAVE = join(polyline([[0, 10], [0, 0], [25, 0]]), APSE, polyline([[25, 10], [0, 10]]))
+HALF_DEGREES = np.radians(np.arange(0.0, 360.0, 0.5))
+AROUND = np.column_stack([1.0 + 3.0 * np.cos(HALF_DEGREES), 2.0 + 3.0 * np.sin(HALF_DEGREES)])
+WAVE = 0.5 - math.sqrt(1.0 / 12.0)
 
 
 def rim(surface):
@@ -85,11 +87,7 @@ def test_an_ellipse_is_as_wide_as_drawn(degrees):
     [
         (bezier([[0, 0], [0, 4], [8, 4], [8, 0]]), 3.0, [0.5]),
         (bezier([[0, 0], [4, 6], [8, 0]], weights=[1e-7, 2e-7, 1e-7]), 4.0, [0.5]),
-        (
-            bezier([[8, 0], [6, -3], [2, 3], [0, 0]]),
-            math.sqrt(0.75),
-            [0.5 - math.sqrt(1 / 12), 0.5 + math.sqrt(1 / 12)],
-        ),
+        (bezier([[8, 0], [6, -3], [2, 3], [0, 0]]), math.sqrt(0.75), [WAVE, 1.0 - WAVE]),
     ],
     ids=["cubic", "rational", "wave"],
 )
@@ -130,7 +128,7 @@ def test_holes_and_dividers_are_as_wide_as_drawn():
 
 
 def test_no_short_edges_arise_beside_other_stops():
-    """A divider meets the apse a fifth of an edge beside its end: the mesh keeps the divider's point."""
+    """A divider meets the apse a fifth of an edge beside its crown: the mesh keeps the divider's point."""
     height = 5.2
     place = [25 + math.sqrt(25 - (height - 5) ** 2), height]
     surface = Plan(NAVE, [[[0, 5], place]], tension=20.0, edge_length=1.0).surface()

@@ -16,7 +16,6 @@ from ..surface.topology import components
 from .curves import Curve
 from .lines import SNAP, Kind, Line, check_holes, check_line, crossing, inside, lines_at, overlap, point_text
 
-NEAR = 0.5  # of the edge length: an extreme nearer to another stop than this becomes no vertex
 Places = list[tuple[int, float]]  # numbers of lines, and the parameter on each, of one vertex
 
 
@@ -52,7 +51,7 @@ class Arrangement:
 
 
 def arrange(lines: Sequence[Line], edge_length: float, spots: Floats, stops: Floats) -> Arrangement:
-    """Cut the lines at corners, at extremes and where they meet, and divide them into edges.
+    """Cut the lines at corners and where they meet, and divide them into edges.
 
     Parameters
     ----------
@@ -82,8 +81,7 @@ def arrange(lines: Sequence[Line], edge_length: float, spots: Floats, stops: Flo
         if not places and not contains(xy):
             problem = f"the support or point at {point_text(xy)} is outside the plan or in a hole"
             raise PlanError(problem, what="supports", where=tuple(xy.tolist()))
-    meetings += [lines_at(lines, xy, snap) for xy in stops]
-    meetings += [*_extremes(lines, [*meetings, *passing], NEAR * edge_length), *passing]
+    meetings += [*(lines_at(lines, xy, snap) for xy in stops), *passing]
     nodes = _nodes(lines, meetings, snap)
     chains, points = _chains(lines, nodes, edge_length)
     chains = _inside_plan(lines, chains, points[:, :2], edge_length)
@@ -138,26 +136,6 @@ def _ends(lines: Sequence[Line], snap: float) -> Iterator[Places]:
                 )
                 raise one.error(problem, tuple(xy.tolist()), gap)
             yield [(number, t), *passing]
-
-
-def _extremes(lines: Sequence[Line], meetings: Sequence[Places], near: float) -> Iterator[Places]:
-    """The points at which a curve is farthest along x or y, unless they are near to another stop."""
-    taken: list[list[float]] = [[] for _ in lines]
-    for places in meetings:
-        for number, t in places:
-            taken[number].append(t)
-    for number, line in enumerate(lines):
-        curve = line.curve
-        stops = np.interp(taken[number], curve.dense, curve.lengths).tolist()
-        for t, reach in zip(
-            curve.extremes, np.interp(curve.extremes, curve.dense, curve.lengths), strict=True
-        ):
-            away = np.abs(np.array(stops) - reach)
-            if curve.closed:
-                away = np.minimum(away, curve.length - away)
-            if (away >= near).all():
-                stops.append(reach)
-                yield [(number, t)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,8 +200,9 @@ def _chains(lines: Sequence[Line], nodes: _Nodes, edge_length: float) -> tuple[l
         known = [1.0, 1.0, np.nan if divides else 1.0]
         stops = nodes.along(number, curve)
         if not stops:  # a closed line that meets nothing
-            new.append(curve.at(0.0) * known)
-            stops, n = [(0.0, n), (float(len(curve.pieces)), n)], n + 1
+            start = float(curve.extremes[0]) if len(curve.extremes) else 0.0
+            new.append(curve.at(start) * known)
+            stops, n = [(start, n), (start + len(curve.pieces), n)], n + 1
         for (low, first), (high, last) in pairwise(stops):
             inner = curve.between(low, high, edge_length)
             ends = (min(first, last), max(first, last))
