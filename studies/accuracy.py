@@ -27,6 +27,7 @@ from pcmc.meshing.refinement import refine
 from pcmc.plan import Area, Divider, Hole, Plan, circle
 
 from .elevations import with_triangles
+from .figure_panels import graded_mesh
 from .folder import Folder
 from .orders import Order, slope
 from .study import Study
@@ -209,7 +210,7 @@ def _triangles_at(rows: pd.DataFrame, bar: str, level: float) -> float:
 
 def figure(folder: Folder) -> None:
     """The bars against triangles, and the mesh at the re-entrant corner."""
-    from pcmc.plot import lines, panel
+    from pcmc.plot import lines
 
     bars = folder.read_table("bars")
     for family in FAMILIES:
@@ -232,20 +233,8 @@ def figure(folder: Folder) -> None:
             )
     surface = folder.read_mesh("graded")["at rest"]
     parts = [_near(surface, surface.size / share) for share in (1, 8, 64)]
-    panel(
-        parts,
-        folder.figure("graded"),
-        views="plan",
-        one_scale=False,
-        edges=True,
-        supports=False,
-        columns=3,
-        titles=(
-            "made for the reaction of a wall",
-            "re-entrant corner, 8 times as large",
-            "64 times as large",
-        ),
-    )
+    titles = ("made for the reaction of a wall", "re-entrant corner, 8 times as large", "64 times as large")
+    graded_mesh(parts, folder.figure("graded"), titles)
 
 
 def _near(surface: Surface, reach: float) -> Surface:

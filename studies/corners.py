@@ -10,23 +10,21 @@ ends slide along it, too: with this natural condition nothing is left for the me
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from generators import bezier_hall, four_fans, joined_caps, three_patches, two_caps, two_squares
+from generators import two_caps
 from pcmc import Surface
-from pcmc.base.arrays import Floats
 from pcmc.solvers import solve
 from pcmc.sweep import Sweep
 
-from .alpha_grid import AXES, EDGE_LENGTH, TENSIONS
+from .alpha_grid import AXES, EDGE_LENGTH
 from .cases import run_sweep
+from .corner_cases import BOTTOMS, CASES, DRAWN, ROUND, Case
+from .corner_figures import figure
 from .corner_ladder import (
-    CATEGORIES,
     LOST,
     NONE,
     PERSISTS,
@@ -38,15 +36,11 @@ from .corner_ladder import (
     ends,
     free_ends,
     label,
-    law,
     loss,
     opening,
     rise,
 )
-from .elevations import with_triangles
-from .figure_panels import category_panels
 from .folder import Folder
-from .refinement import FAMILIES
 from .study import Study
 
 LEVELS = {"sliding": 10, "held": 8, "natural": 10}  # of refinement at the ends
@@ -54,50 +48,7 @@ GRID_LEVELS = {"sliding": 8, "held": 5}
 REACH = 0.15  # of the size: what the first refinement reaches around an end
 GRID_REACH = 1.5
 SAMPLE = [[1.5, 6.0, 6.0], [4.0, 4.0, 3.0]]  # of the grid, where its equilibria are not at hand
-COLORS = dict(
-    zip(CATEGORIES, ("#08519C", "#CC79A7", "#F4A582", "#D6604D", "#FFF2AE", "#E6E6E6"), strict=True)
-)
-NO_CASE = "no equilibrium in the grid"
-NAMES = {"sliding": "ends fixed", "held": "held", "natural": "ends slide too"}
-BOTTOMS = ("sliding", "held")  # of the walls
-DRAWN = "fig4"
 SHIFTS = (0.0, 0.025, 0.05, 0.1, 0.2)  # of the ends, in half widths
-
-
-@dataclass(frozen=True)
-class Case:
-    """An example whose junctions end on the outline.
-
-    Attributes
-    ----------
-    build : its initial shape.
-    project : puts new boundary vertices on a curved outline.
-    """
-
-    name: str
-    title: str
-    build: Callable[[], Surface]
-    project: Callable[[Floats], Floats] | None = None
-
-
-def _on_rim(radius: float) -> Callable[[Floats], Floats]:
-    def project(points: Floats) -> Floats:
-        return points * [1.0, 1.0, 0.0] * radius / np.linalg.norm(points[:, :2], axis=1)[:, None]
-
-    return project
-
-
-ROUND = {family.name: family.rounded for family in FAMILIES}
-CASES = (
-    Case("example1-0.5", "Example 1, wall 0.5", lambda: two_squares(8, alpha_aux=0.5)),
-    Case("example1-1", "Example 1, wall 1", lambda: two_squares(8, alpha_aux=1.0)),
-    Case("example1-2", "Example 1, wall 2", lambda: two_squares(8)),
-    Case("example2", "Example 2", lambda: two_caps(0.6), ROUND["example2_near"]),
-    Case("joined", "two spheres in balance", lambda: joined_caps(0.6), ROUND["joined_caps"]),
-    Case("example3", "Example 3", lambda: four_fans(7), _on_rim(20.0)),
-    Case("example4", "Example 4", bezier_hall),
-    Case("fig4", "Fig. 4", lambda: three_patches(7), _on_rim(10.0)),
-)
 
 
 def data(folder: Folder, short: bool) -> None:
@@ -266,133 +217,6 @@ def table(folder: Folder) -> dict[str, float]:
 def _short(name: str) -> str:
     short = {PERSISTS: "limit", SADDLE: "saddle", TURNS: "turns", LOST: "lost", SINKS: "sinks", NONE: "none"}
     return short[name]
-
-
-def figure(folder: Folder) -> None:
-    """The loss of hold with its fits, the crest's rise beside the theory, the grid, a graded mesh."""
-    from pcmc.plot import lines
-
-    ladder = folder.read_table("ladder")
-    sizes = {case.name: case.build() for case in CASES if (ladder.case == case.name).any()}
-    curves = {}
-    for case in CASES:
-        for bottom in SUPPORTS:
-            mine = ladder[(ladder.case == case.name) & (ladder.bottom == bottom)]
-            mine = mine[mine.status == "converged"]
-            if bottom == "natural" and len(mine):  # on coarse meshes the polygon of the outline adds modes
-                mine = mine[mine["index"] == mine["index"].iloc[-1]]
-            if len(mine) > 1:
-                initial = sizes[case.name]
-                unit = initial.size**2 / initial.tensions.max()
-                curves[f"{case.title}, {NAMES[bottom]}"] = (
-                    mine.edge_length / initial.size,
-                    mine.eigenvalue * unit,
-                )
-    lines(
-        {name: curve for name, curve in curves.items() if "held" not in name},
-        folder.figure("loss"),
-        x="edge length at the end / size",
-        y="lowest eigenvalue, α/size²",
-        xscale="log",
-        markers=True,
-        levels={"saddle below": 0.0},
-        title="Bottoms slide: the hold of the ends fades",
-    )
-    lines(
-        {name: curve for name, curve in curves.items() if "held" in name},
-        folder.figure("held"),
-        x="edge length at the end / size",
-        y="lowest eigenvalue, α/size²",
-        xscale="log",
-        markers=True,
-        title="Bottoms are held: the lowest eigenvalue has a limit",
-    )
-    _draw_fits(folder, ladder)
-    _draw_grid(folder)
-    _draw_mesh(folder)
-
-
-def _draw_fits(folder: Folder, ladder: pd.DataFrame) -> None:
-    """The eigenvalues of sliding bottoms as long as nothing rests, in units of the first; and the law."""
-    from pcmc.plot import lines
-
-    labels = folder.read_table("labels")
-    free = ladder[(ladder.bottom == "sliding") & (ladder.pinched == 0) & (ladder.status == "converged")]
-    curves: dict[str, Any] = {}
-    fitted: dict[str, Any] = {}
-    for case in CASES:
-        mine = free[free.case == case.name]
-        fits = labels[(labels.case == case.name) & (labels.bottom == "sliding")]
-        if not len(fits) or not math.isfinite(fits.limit.iloc[0]):
-            continue
-        found, unit = fits.iloc[0], abs(mine.eigenvalue.iloc[0])
-        first, last = -np.log(mine.edge_length.to_numpy()[[2, 1 + int(found.fitted)]])
-        depth = np.linspace(first, last, 50)
-        values = law(depth, found.limit, found.loss, found["shift"], found["last"])
-        title = f"{case.title}: {found.limit:.2g} ± {found.limit_margin:.1g}"
-        curves[title] = (mine.edge_length, mine.eigenvalue / unit)
-        fitted[title] = (np.exp(-depth), values / unit)
-    lines(
-        curves,
-        folder.figure("fits"),
-        x="edge length at the end",
-        y="lowest eigenvalue, first mesh: ±1",
-        xscale="log",
-        markers=True,
-        fits=fitted,
-        title="The logarithmic loss of hold: fitted limits with 95 % intervals",
-    )
-
-
-def _draw_grid(folder: Folder) -> None:
-    grid = folder.read_table("grid")
-    marks = folder.read_table("grid").assign(found=True)
-    for bottom in BOTTOMS:
-        mine = marks[marks.bottom == bottom]
-        tables = {}
-        for wall in sorted(grid.alpha_wall.unique()):
-            square = np.full((len(TENSIONS), len(TENSIONS)), NO_CASE, dtype=object)
-            for row in mine[mine.alpha_wall == wall].itertuples():
-                square[TENSIONS.index(row.alpha_small), TENSIONS.index(row.alpha_large)] = row.label
-            tables[f"α of the wall = {wall:g}"] = square
-        shown = {name: color for name, color in COLORS.items() if (mine.label == name).any()}
-        category_panels(
-            TENSIONS,
-            TENSIONS,
-            tables,
-            shown | {NO_CASE: "#F7F7F7"},
-            folder.figure(f"grid-{bottom}"),
-            marks={},
-            xlabel="α of the larger patch",
-            ylabel="α of the smaller patch",
-            columns=5,
-        )
-
-
-def _draw_mesh(folder: Folder) -> None:
-    """A graded mesh, whole and near one end, eight times and sixty-four times as large."""
-    from pcmc.plot import panel
-
-    surface = folder.read_mesh(DRAWN)["at rest"]
-    place = surface.vertices[ends(surface)[0]]
-    parts = [_near(surface, place, surface.size / share) for share in (1, 8, 64)]
-    panel(
-        parts,
-        folder.figure("graded"),
-        views="plan",
-        one_scale=False,
-        edges=True,
-        supports=False,
-        columns=3,
-        titles=("Fig. 4, held bottoms", "an end, 8 times as large", "64 times as large"),
-    )
-
-
-def _near(surface: Surface, place: Floats, reach: float) -> Surface:
-    """The roofs' triangles within a distance of a place."""
-    roof = ~surface.walls[surface.patch_of_face]
-    near = roof & (np.linalg.norm(surface.vertices[surface.faces] - place, axis=2).max(axis=1) <= reach)
-    return with_triangles(surface, near)
 
 
 STUDY = Study(

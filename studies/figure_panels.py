@@ -1,4 +1,4 @@
-"""Figures of many small panels: curves side by side, and squares of categories."""
+"""Figures of many small panels: curves side by side, squares of categories, a mesh and its parts."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from pcmc import Surface
 
 Curves = Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]]
 MARK: dict[str, Any] = {"color": "#222222", "markersize": 2.6, "markeredgewidth": 0.7}
@@ -134,4 +136,20 @@ def _legend(
         handlelength=3.0 if lines else 1.2,
         handleheight=0.8,
         borderaxespad=0.4,
+    )
+
+
+def graded_mesh(parts: Sequence[Surface], path: Path, titles: Sequence[str]) -> None:
+    """A mesh seen from above, as a whole and in smaller and smaller parts, each as large as the others."""
+    from pcmc.plot import panel
+
+    panel(
+        parts,
+        path,
+        views="plan",
+        one_scale=False,
+        edges=True,
+        supports=False,
+        columns=3,
+        titles=titles,
     )

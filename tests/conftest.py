@@ -4,9 +4,11 @@ import os
 import signal
 
 import pytest
+from browsing import SOFTWARE_GL, Explored, browser
+from small_project import SMALL
 
-from generators import spherical_cap
-from pcmc import solve
+from generators import bezier_hall, spherical_cap
+from pcmc import explore, solve
 
 
 def pytest_sessionstart():
@@ -22,3 +24,43 @@ def pytest_sessionstart():
 def small_cap():
     """A stable cap of few triangles, at rest under tension 0.6."""
     return solve(spherical_cap(0.25)).surface
+
+
+@pytest.fixture
+def small(tmp_path):
+    """The file of a small project, alone in its folder."""
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The folder that a test works in, with a small project, roof.toml."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "roof.toml").write_text(SMALL, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def explorer():
+    """The page of a hall, served."""
+    running = explore.start(bezier_hall(edge_length=10.0), title="the hall")
+    yield running
+    running.close()
+
+
+@pytest.fixture(scope="module")
+def driver(tmp_path_factory):
+    """A browser without a window, whose downloads are in ``downloads``."""
+    folder = tmp_path_factory.mktemp("browser")
+    running = browser(folder, *SOFTWARE_GL)
+    running.downloads = folder / "downloads"
+    yield running
+    running.quit()
+
+
+@pytest.fixture
+def page(driver, explorer):
+    """The page of the hall in the browser, with a session of its own."""
+    return Explored(driver, f"{explorer.url}?session={explorer.open()[0]}")

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
-import ezdxf
-from ezdxf import units
+import pytest
+
+ezdxf = pytest.importorskip("ezdxf")
+units = pytest.importorskip("ezdxf.units")
+pytest.importorskip("tomlkit")  # it writes the projects of drawings
+
+BOX = [(0, 0), (10, 0), (10, 6), (0, 6)]
 
 
 def new(unit: int = units.M):
@@ -18,6 +24,20 @@ def new(unit: int = units.M):
 
 def on(layer: str) -> dict[str, str]:
     return {"layer": layer}
+
+
+def drawing(folder: Path, *calls: Any, outline: bool = True, unit: int = units.M) -> Path:
+    """A drawing with a box as outline, and calls of the modelspace: name, layer, arguments."""
+    document, space = new(unit)
+    if outline:
+        space.add_lwpolyline(BOX, close=True, dxfattribs=on("outline"))
+    for name, layer, *arguments in calls:
+        entity = getattr(space, f"add_{name}")(*arguments, dxfattribs=on(layer))
+        if name == "text":
+            entity.set_placement((5, 3))
+    file = folder / "hall.dxf"
+    document.saveas(file)
+    return file
 
 
 def nave(path: Path, scale: float = 1.0, unit: int = units.M, gap: float = 0.0) -> Path:

@@ -6,19 +6,12 @@ import io
 import sys
 
 import pytest
+from small_project import SMALL
 
 from pcmc import cli
-from tests.test_project import SMALL
 
 REMESH = ["remesh", "roof.toml", "-o", "x.obj", "--edge-length"]
 SWEEP = ["sweep", "roof.toml", "roof.tension=2,3"]
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "roof.toml").write_text(SMALL, encoding="utf-8")
-    return tmp_path
 
 
 @pytest.mark.parametrize(

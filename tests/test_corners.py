@@ -9,6 +9,7 @@ from generators import four_fans, three_patches, two_caps, two_squares
 from pcmc.solvers import solve
 from studies import corner_ladder as ladder
 from studies import corners
+from studies.corner_cases import CASES
 from studies.corner_ladder import LOST, PERSISTS, SADDLE, SINKS, TURNS
 
 
@@ -116,7 +117,7 @@ def test_ends_slide_along_a_round_outline():
 
 def test_ends_on_a_round_outline_are_held_by_the_mesh_too():
     """Fig. 4: sliding ends make the same saddle; fixed ones lose all hold once the junctions rest there."""
-    initial, project = three_patches(7), next(case.project for case in corners.CASES if case.name == "fig4")
+    initial, project = three_patches(7), next(case.project for case in CASES if case.name == "fig4")
     fixed, natural = (
         ladder.climb(initial, 9, corners.REACH * initial.size, bottom, project)[0]
         for bottom in ("sliding", "natural")

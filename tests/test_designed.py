@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_project import SMALL
 
 import pcmc
 from pcmc import cli
@@ -15,7 +16,6 @@ from pcmc.base.units import Units
 from pcmc.cli.reports import UNIT_OF
 from pcmc.design.quantities import QUANTITIES
 from pcmc.project import build, cached_files, clear_cache, designed, load, run, running
-from tests.test_project import SMALL
 
 GOAL = """
 [targets]

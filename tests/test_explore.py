@@ -9,10 +9,11 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from asking import Client
 from refusals import refused
 
 import pcmc
-from generators import bezier_hall, spherical_cap
+from generators import spherical_cap
 from pcmc import explore
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate import Verdict
@@ -20,14 +21,6 @@ from pcmc.explore import server
 from pcmc.explore.messages import pack, unpack
 
 CAP = spherical_cap(edge_length=0.25)
-HALL = bezier_hall(edge_length=10.0)
-
-
-@pytest.fixture(scope="module")
-def explorer():
-    running = explore.start(HALL, title="the hall")
-    yield running
-    running.close()
 
 
 def test_messages_come_back_as_they_went():
@@ -37,26 +30,6 @@ def test_messages_come_back_as_they_went():
     np.testing.assert_array_equal(back["x"], [1.0, np.nan])
     np.testing.assert_array_equal(back["i"], [0, 1, 2])
     assert back["none"].size == 0
-
-
-class Client:
-    """Plain HTTP to a running explorer."""
-
-    def __init__(self, explorer):
-        self.explorer = explorer
-
-    def raw(self, method, path, body=None, **headers):
-        line = http.client.HTTPConnection("127.0.0.1", self.explorer.port, timeout=60)
-        line.request(method, path, body, headers)
-        answer = line.getresponse()
-        body = answer.read()
-        line.close()
-        return answer, body
-
-    def ask(self, path, values=None, status=200):
-        answer, body = self.raw("POST", path, json.dumps(values or {}))
-        assert answer.status == status, body
-        return unpack(body) if status == 200 else json.loads(body)["error"]
 
 
 @pytest.fixture
@@ -266,7 +239,7 @@ def test_requests_without_a_length_or_too_long_are_refused(client):
 def test_an_address_that_is_taken_or_is_none_is_an_error_in_one_line(explorer):
     for host, port in (("127.0.0.1", explorer.port), ("256.0.0.1", 0), ("127.0.0.1", 70000)):
         with refused(OptionError, found=(host, port)) as caught:
-            explore.start(HALL, host=host, port=port)
+            explore.start(CAP, host=host, port=port)
         assert "\n" not in str(caught.value)
 
 

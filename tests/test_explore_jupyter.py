@@ -12,7 +12,7 @@ from pathlib import Path
 
 import nbformat
 import pytest
-from browsing import BROWSER, DRIVER, SOFTWARE_GL, Explored, browser, until
+from browsing import SOFTWARE_GL, Explored, browser, needs_browser, until
 
 TOKEN = "local"
 HOME = Path(__file__).resolve().parent.parent
@@ -68,7 +68,7 @@ def lab(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not (BROWSER and DRIVER), reason="chromium or chromedriver is not installed")
+@needs_browser
 def test_the_page_is_a_cells_output_and_its_surface_is_in_the_next(lab, tmp_path):
     from selenium.common.exceptions import WebDriverException
     from selenium.webdriver import ActionChains

@@ -6,45 +6,21 @@ import time
 
 import numpy as np
 import pytest
-from browsing import BROWSER, DRIVER, SOFTWARE_GL, Explored, browser, changed, until
+from browsing import Explored, changed, needs_browser, until
+from explore_cases import followed
 
 import pcmc
-from generators import bezier_hall, four_fans, spherical_cap
+from generators import four_fans, spherical_cap
 from pcmc import explore
-from pcmc.base.units import Units
-from pcmc.explore.roof import read_roof
 from pcmc.explore.session import Session
 
 CAP = spherical_cap(edge_length=0.25)
-HALL = bezier_hall(edge_length=10.0)
-
-pytestmark = pytest.mark.skipif(not (BROWSER and DRIVER), reason="chromium or chromedriver is not installed")
-
-
-@pytest.fixture(scope="module")
-def explorer():
-    running = explore.start(HALL, title="the hall")
-    yield running
-    running.close()
-
-
-@pytest.fixture(scope="module")
-def driver(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("browser")
-    running = browser(folder, *SOFTWARE_GL)
-    running.downloads = folder / "downloads"
-    yield running
-    running.quit()
+pytestmark = needs_browser
 
 
 def newest(explorer):
     """The session of the page that was opened or used last."""
     return explorer.sessions[next(reversed(explorer.sessions))]
-
-
-@pytest.fixture
-def page(driver, explorer):
-    return Explored(driver, f"{explorer.url}?session={explorer.open()[0]}")
 
 
 def test_the_page_loads_draws_and_complains_of_nothing(page):
@@ -200,12 +176,7 @@ vary = ["west", "east", {patch = "east", kind = "pressure", low = 0.5, high = 2.
 def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(driver, tmp_path):
     path = tmp_path / "hall.toml"
     path.write_text(PROJECT)
-
-    def read():
-        return read_roof(path, use_cache=False)
-
-    running = explore.start_roof(read(), watch=read)
-    try:
+    with followed(path) as running:
         page = Explored(driver, running.url)
         assert page.text("#targets .message").startswith("met")
         assert "kN/m" in page.text("#by-patch")
@@ -264,8 +235,6 @@ def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(
         assert "edge_length" in page.text("#watch") or "outline" in page.text("#watch")
         assert "west 1.2 " in page.text("#by-patch")
         assert page.complaints() == []
-    finally:
-        running.close()
 
 
 def test_wrong_targets_are_named_on_the_page(page):
@@ -307,32 +276,6 @@ def test_sliders_agree_with_their_numbers(page, explorer):
     page.complaints()
 
 
-def test_terms_are_explained_where_they_stand_by_keys_too(page):
-    from selenium.webdriver.common.keys import Keys
-
-    for name, words in (
-        ("Morse index", "saddle"),
-        ("Load over capacity", "no equilibrium exists"),
-        ("Error by Meyer's measure", "Voronoi"),
-    ):
-        (summary,) = [
-            s for s in page.driver.find_elements("css selector", "#findings summary") if s.text == name
-        ]
-        assert words not in page.text("#findings")
-        summary.send_keys(Keys.ENTER)
-        assert words in page.text("#findings")
-        page.driver.find_element("css selector", "#findings details[open] summary").click()
-
-
-def test_the_walls_are_a_layer(page):
-    page.find("#canvas").send_keys("\ue015" * 12)  # down: the roof from below
-    page.idle()
-    before = page.picture()
-    page.find("#shows input[value=walls]").click()
-    page.idle()
-    assert changed(before, page.picture()) > 0.01
-
-
 def test_slow_work_is_said(page, monkeypatch):
     real = Session.settle
 
@@ -363,155 +306,6 @@ def test_two_pages_are_two_sessions(driver, explorer):
     driver.refresh()
     one.idle()
     assert one.text("#findings") == changed_words  # the same tab finds its session again
-
-
-def test_units_stand_behind_the_numbers_where_they_are_given(driver):
-    running = explore.start(CAP, units=Units("ft", "kip"))
-    try:
-        page = Explored(driver, running.url)
-        rows = page.text("#findings")
-        assert " ft\n" in rows
-        assert " ft²\n" in rows
-        assert " ft³\n" in rows
-        assert " kip·ft\n" in rows
-        for name, words in (("curvature", "1/ft"), ("reactions", "kip/ft")):
-            page.find(f"#colours input[value={name}]").click()
-            page.idle()
-            assert words in page.text("#legend .name")
-        titles = [
-            label.get_attribute("title") for label in driver.find_elements("css selector", "#patches label")
-        ]
-        assert titles == ["kip/ft", "kip/ft²"]
-        assert not page.complaints()
-    finally:
-        running.close()
-
-
-def test_colours_come_with_their_scale(page):
-    before = page.picture()
-    assert not page.find("#legend").is_displayed()
-    units = {"curvature": "1/length", "error": "%", "reactions": "force/length", "family": "1 %"}
-    for name, words in units.items():
-        page.find(f"#colours input[value={name}]").click()
-        page.idle()
-        until(lambda words=words: words in page.text("#legend .name"), "the scale")
-        low, high = (float(page.text(f"#legend .{end}")) for end in ("low", "high"))
-        assert low < high
-        assert changed(before, page.picture()) > 0.1
-    page.find("#colours input[value=patches]").click()
-    page.idle()
-    assert changed(before, page.picture()) == 0.0
-    for name in ("mesh", "supports", "smooth", "grid"):
-        page.find(f"#shows input[value={name}]").click()
-        page.idle()
-        assert changed(before, page.picture(), by=0.01) > 0.005, name
-        page.find(f"#shows input[value={name}]").click()
-        page.idle()
-    assert page.complaints() == []
-
-
-def test_the_view_turns_by_keys_mouse_and_fingers(page):
-    from selenium.webdriver import ActionChains
-    from selenium.webdriver.common.keys import Keys
-
-    canvas, before = page.find("#canvas"), page.picture()
-
-    def home():
-        page.find("[data-view=diagonal]").click()
-        page.idle()
-        assert changed(before, page.picture()) == 0.0
-
-    for keys in (Keys.ARROW_LEFT, Keys.ARROW_UP, "+"):
-        canvas.send_keys(keys)
-        page.idle()
-        assert changed(before, page.picture()) > 0.01
-        home()
-    ActionChains(page.driver).drag_and_drop_by_offset(canvas, 60, 20).perform()
-    page.idle()
-    turned = page.picture()
-    assert changed(before, turned) > 0.01
-    home()
-    box = canvas.rect
-    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    touch(page.driver, [middle], [(middle[0] + 60, middle[1] + 20)])
-    page.idle()
-    assert changed(turned, page.picture()) < 0.02
-    home()
-    apart = [(middle[0] - d, middle[1]) for d in (-40, 40)]
-    touch(page.driver, apart, [(middle[0] - d, middle[1]) for d in (-90, 90)])
-    page.idle()
-    assert changed(before, page.picture()) > 0.05  # a pinch comes nearer
-    home()
-    for name in ("elevation", "plan"):
-        page.find(f"[data-view={name}]").click()
-        page.idle()
-        assert changed(before, page.picture()) > 0.05
-    assert page.complaints() == []
-
-
-def touch(driver, start, end):
-    """Put fingers down, move them and lift them."""
-
-    def points(part):
-        return [
-            {"x": a[0] + part * (b[0] - a[0]), "y": a[1] + part * (b[1] - a[1]), "id": k}
-            for k, (a, b) in enumerate(zip(start, end, strict=True))
-        ]
-
-    steps = [("touchStart", points(0.0)), *(("touchMove", points(k / 5)) for k in range(1, 6))]
-    for kind, where in (*steps, ("touchEnd", [])):
-        driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": where})
-
-
-def test_every_control_has_a_name_and_the_keyboard_reaches_it(page):
-    nameless = page.driver.execute_script("""
-        return [...document.querySelectorAll("button, input, summary, canvas")].filter((e) => !(
-          e.getAttribute("aria-label") || e.textContent.trim() || [...(e.labels || [])].some(
-            (l) => l.textContent.trim()))).map((e) => e.outerHTML)""")
-    assert nameless == []
-    unreachable = page.driver.execute_script(
-        "return [...document.querySelectorAll('button, input, summary, canvas')]"
-        ".filter((e) => e.tabIndex < 0).length"
-    )
-    assert unreachable == 0
-    doubled = page.driver.execute_script(
-        "const ids = [...document.querySelectorAll('[id]')].map((e) => e.id);"
-        "return ids.filter((id, i) => ids.indexOf(id) !== i)"
-    )
-    assert doubled == []
-
-
-def test_on_a_small_screen_the_verdict_stays_in_view(page):
-    page.driver.execute_cdp_cmd(
-        "Emulation.setDeviceMetricsOverride",
-        {"width": 360, "height": 700, "deviceScaleFactor": 1, "mobile": True},
-    )
-    try:
-        page.idle()
-        page.driver.execute_script("window.scrollTo(0, document.body.scrollHeight)")
-        page.idle()
-        scrolled, wide, top, bottom = page.driver.execute_script("""
-            const box = document.querySelector("#verdict").getBoundingClientRect();
-            return [scrollY, document.documentElement.scrollWidth, box.top, box.bottom]""")
-        assert scrolled > 200
-        assert wide <= 360
-        assert top >= 0
-        assert bottom <= 700
-    finally:
-        page.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-
-
-def test_without_webgl_the_page_says_so_in_one_line_and_works(explorer, tmp_path):
-    running = browser(tmp_path, "--disable-3d-apis")
-    try:
-        page = Explored(running, explorer.url)
-        assert "WebGL 2 is missing" in page.text("#no-graphics")
-        words = page.text("#findings")
-        page.enter("Tension α of left wall", 14)
-        assert page.verdict == "stable"
-        assert page.text("#findings") != words
-    finally:
-        running.quit()
 
 
 def test_when_the_program_has_ended_the_page_says_so(driver):

@@ -1,48 +1,25 @@
-"""Explore on projects: designed roofs, targets, variants, saving with comments, following the file."""
+"""Explore on projects: designed roofs, targets, and variants."""
 
 from __future__ import annotations
 
-import os
-import sys
 import threading
-import tomllib
 
 import numpy as np
 import pytest
+from asking import Client
 from browsing import until
-from refusals import refused
-from test_explore import Client
+from explore_cases import designed_hall
 
 import pcmc
 from generators import spherical_cap
 from pcmc import explore
-from pcmc.base.errors import FileError, OptionError
 from pcmc.base.units import Units
-from pcmc.certificate import Verdict
 from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
-from pcmc.explore import saving
-from pcmc.explore.page_data import outline
 from pcmc.explore.roof import Roof, read_roof
 from pcmc.explore.session import Session, solved_start
 from pcmc.explore.variants import difference, measures
 
-TEXT = """# the hall
-units = "m"
-force = "kN"
-[plan]
-edge_length = 1.0  # coarse
-outline = [[0, 0], [12, 0], [12, 6], [0, 6]]
-[[plan.dividers]]
-curve = [[6, 0], [6, 6]]
-wall = 2.0  # the valley
-[plan.patches]
-west = {tension = 5.0}  # left
-east = {tension = 5.0, pressure = 1}
-[targets]  # two heights
-meet = [{quantity = "apex", of = "west", value = 1.2}, {quantity = "apex", of = "east", value = 1.0}]
-vary = ["west", "east"]
-"""
 CAP = spherical_cap(edge_length=0.25)
 
 
@@ -53,8 +30,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def roof(folder):
-    (folder / "hall.toml").write_text(TEXT)
-    return read_roof(folder / "hall.toml", use_cache=False)
+    return designed_hall(folder)
 
 
 @pytest.fixture
@@ -253,227 +229,6 @@ def test_a_wall_nearby_does_not_hide_a_difference(roof):
     on_roof = np.unique(roof.surface.faces[~roof.surface.walls[roof.surface.patch_of_face]])
     away = difference(higher, roof.surface)[on_roof]
     assert away.min() > -0.02 * away.max()  # lower tensions: higher everywhere
-
-
-def test_saving_keeps_comments_and_the_shape_found_by_sliders(roof, session, folder):
-    state = session.settle({"tensions": {"west": 4.0, "wall 1": 2.5}, "pressures": {"east": 1.1}})
-    assert state.failure is None
-    path, note = saving.save(roof, state.surface, "found", False)
-    assert path == folder / "found.toml"
-    assert "without [targets]" in note
-    assert "apex of west" in note
-    text = path.read_text()
-    for line in ("# the hall", "# coarse", "wall = 2.5  # the valley", "west = {tension = 4.0}  # left"):
-        assert line in text
-    assert tomllib.loads(text)["plan"]["patches"]["east"]["pressure"] == 1.1
-    again = read_roof(path, use_cache=False).surface
-    moved = np.abs(difference(state.surface, roof.surface)).max()
-    assert np.abs(difference(again, state.surface)).max() < 0.05 * moved  # other triangles, the same shape
-    path.unlink()
-
-
-def test_saving_what_the_page_met_writes_its_targets(roof, session):
-    targets = Target("apex", "west", at_least=1.4), Target("height", [9, 3], 1.0)
-    vary = Parameter("west", low=1.0, high=9.0), Parameter("east")
-    state = session.meet(targets, vary)
-    assert state.message.startswith("met")
-    path, note = saving.save(roof, state.surface, "met.toml", False, session.aims)
-    assert note == "with its targets: apex of west, height at (9, 3)"
-    again = read_roof(path, use_cache=False)
-    assert again.targets == targets
-    assert again.vary == vary
-    assert again.note.startswith("met")
-    path.unlink()
-
-
-def test_an_unchanged_surface_is_saved_with_the_targets_of_the_file(roof, folder):
-    text, note = saving.project_with(roof, roof.surface)
-    assert note == ""
-    assert tomllib.loads(text)["targets"] == tomllib.loads(TEXT)["targets"]
-
-
-def test_the_same_file_is_replaced_only_if_it_is_as_it_was_read(folder, roof):
-    with refused(FileError, what="name", found="hall.toml"):
-        saving.save(roof, roof.surface, "hall.toml", False)
-    path = folder / "hall.toml"
-    path.write_text(TEXT + "# someone else\n")
-    try:
-        with pytest.raises(FileError, match="was changed since"):
-            saving.save(roof, roof.surface, "hall.toml", True)
-        assert path.read_text().endswith("# someone else\n")
-    finally:
-        path.write_text(TEXT)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="needs links")
-def test_no_link_leads_a_save_out_of_the_folder(roof, folder, tmp_path):
-    os.symlink(tmp_path / "elsewhere.toml", folder / "link.toml")
-    try:
-        with pytest.raises(FileError, match="without folder"):
-            saving.save(roof, roof.surface, "link.toml", True)
-        assert not list(tmp_path.iterdir())
-    finally:
-        (folder / "link.toml").unlink()
-
-
-def test_walls_are_found_by_name_number_and_as_bare_curves(tmp_path):
-    path = tmp_path / "three.toml"
-    path.write_text(
-        "[plan]\nedge_length = 1.5\noutline = [[0, 0], [12, 0], [12, 4], [0, 4]]\n"
-        'dividers = [[[4, 0], [4, 4]], {name = "valley", curve = [[8, 0], [8, 4]]}]\n'
-        "[plan.patches]\na = {tension = 5.0}\nb = {tension = 5.0}\nc = {tension = 5.0}\n"
-    )
-    roof = read_roof(path, start_shape=True)
-    surface = roof.surface.retensioned({"wall 1": 0.5, "valley": 0.25})
-    dividers = tomllib.loads(saving.project_with(roof, surface)[0])["plan"]["dividers"]
-    assert [d["wall"] for d in dividers] == [0.5, 0.25]
-    assert dividers[0]["curve"] == [[4, 0], [4, 4]]
-
-
-def test_surfaces_without_a_project_are_not_saved(tmp_path):
-    with pytest.raises(FileError, match="use Export"):
-        saving.save(Roof(CAP), CAP, "cap", False)
-
-
-def test_on_the_network_nothing_is_saved(roof, folder):
-    running = explore.start_roof(roof, host="0.0.0.0")
-    try:
-        client = Client(running)
-        header, _ = client.ask("/api/open")
-        assert header["project"] is False
-        assert "only a page of this machine" in client.ask(
-            f"/api/{header['session']}/save", {"name": "x"}, status=403
-        )
-        assert not (folder / "x.toml").exists()
-    finally:
-        running.close()
-
-
-def test_the_page_follows_the_file_and_survives_a_broken_save(tmp_path):
-    path = tmp_path / "hall.toml"
-    path.write_text(TEXT)
-
-    def read():
-        return read_roof(path, use_cache=False)
-
-    running = explore.start_roof(read(), watch=read)
-    try:
-        client = Client(running)
-        name = client.ask("/api/open")[0]["session"]
-
-        def news():
-            return client.ask(f"/api/{name}/news")[0]
-
-        assert news() == {"version": 0, "working": False, "problem": "", "progress": ""}
-        path.write_text(TEXT.replace("edge_length", "edge_lenght"))
-        until(lambda: "did you mean 'edge_length'" in news()["problem"], "the problem")
-        assert str(tmp_path) not in news()["problem"]
-        assert news()["version"] == 0
-        kept, _ = client.ask(f"/api/{name}/state")
-        path.write_text(
-            TEXT.replace("value = 1.2", "value = 1.5").replace("[6, 0], [6, 6]", "[7, 0], [7, 6]")
-        )
-        until(lambda: news()["version"] == 1, "the new roof")
-        assert news()["problem"] == ""
-        renewed, _ = client.ask("/api/open", {"session": name})
-        rows = {(r["quantity"], r["of"]): r["value"] for r in renewed["measures"]}
-        assert rows["apex", "west"] == pytest.approx(1.5, rel=1e-6)
-        assert renewed["mesh"] != kept["mesh"]
-        assert renewed["undo"] == 1
-        assert client.ask(f"/api/{name}/undo")[0]["mesh"] != renewed["mesh"]
-        saved, _ = client.ask(f"/api/{name}/save", {"name": "hall.toml", "replace": True})
-        assert saved["saved"] == "hall.toml"
-        path.unlink()
-        until(lambda: "cannot be read" in news()["problem"], "the missing file")
-    finally:
-        running.close()
-
-
-def test_a_drawing_that_a_project_refers_to_is_followed(tmp_path):
-    ezdxf = pytest.importorskip("ezdxf")
-
-    def draw(width):
-        drawing = ezdxf.new()
-        corners = [(0, 0), (width, 0), (width, 5), (0, 5)]
-        drawing.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": "outline"})
-        drawing.units = 6
-        drawing.saveas(tmp_path / "hall.dxf")
-
-    draw(8)
-    path = tmp_path / "roof.toml"
-    path.write_text('[plan]\ndrawing = "hall.dxf"\nedge_length = 1.0\n')
-
-    def read():
-        return read_roof(path, use_cache=False)
-
-    running = explore.start_roof(read(), watch=read)
-    try:
-        draw(11)
-        until(lambda: running.version == 1, "the new drawing")
-        assert np.ptp(running.start.surface.vertices[:, 0]) == pytest.approx(11.0)
-        surface = running.start.surface.retensioned({running.start.surface.patches[0].name: 9.0})
-        plan = tomllib.loads(saving.project_with(running.roof, surface)[0])["plan"]
-        assert plan["drawing"] == "hall.dxf"
-        assert [area["tension"] for area in plan["patches"].values()] == [9.0]
-    finally:
-        running.close()
-
-
-def test_cables_weights_and_rooms_have_values_that_move_the_surface():
-    square = pcmc.Surface(
-        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.2], [0.5, -0.1, 0]],
-        [[0, 5, 4], [5, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
-        [0] * 5,
-        [pcmc.Patch("roof", 1.0, 0.5, weight=0.1)],
-        fixed=[0, 1, 2, 3],
-        cables=[pcmc.Cable("edge", 3.0, [[0, 5], [5, 1]]), pcmc.Cable("inner", 0.0, [[0, 4]])],
-    )
-    about, arrays = outline(square.retensioned(cables={"inner": 0.1}))
-    assert [group["kinds"] for group in about["controls"]] == [
-        ["tensions", "pressures", "weights"],
-        ["cables"],
-        ["cables"],
-    ]
-    drawn = {tuple(sorted(pair)) for pair in arrays["curves"].tolist()}
-    assert {(0, 5), (1, 5), (0, 4)} < drawn
-    session = Session(solved_start(square))
-    state = session.settle({"cables": {"edge": 6.0}, "weights": {"roof": 0.2}})
-    assert state.failure is None
-    assert state.surface.cables[0].tension == 6.0
-    assert state.surface.patches[0].weight == 0.2
-    assert state.certificate.verdict is Verdict.STABLE
-    depth = [s.vertices[5, 1] for s in (session.undo().surface, state.surface)]
-    assert depth[0] > depth[1] > 0.0  # a stronger cable is straighter
-    with refused(OptionError, what="cable", found="egde"):
-        session.follow({"cables": {"egde": 1.0}})
-
-
-def test_a_piece_between_mirror_planes_is_drawn_whole():
-    planes = [pcmc.Plane(normal=n, mirror=True) for n in ((1, 0, 0), (0, 1, 0))]
-    grid = np.linspace(0.0, 1.0, 5)
-    X = np.array([[x, y, 0.0] for y in grid for x in grid])
-    corner = np.array([5 * j + i for j in range(4) for i in range(4)])[:, None]
-    F = np.concatenate([corner + np.array([0, 1, 6]), corner + np.array([0, 6, 5])])
-    supports = {plane: np.flatnonzero(X[:, k] == 0.0) for k, plane in enumerate(planes)}
-    fixed = np.flatnonzero((X[:, :2] == 1.0).any(axis=1))
-    piece = pcmc.Surface(X, F, [0] * len(F), [pcmc.Patch("roof", 2.0)], fixed=fixed, on_planes=supports)
-    running = explore.start(piece)
-    try:
-        client = Client(running)
-        header, arrays = client.ask("/api/open")
-        assert header["whole"]
-        assert header["triangles"] == 4 * piece.m
-        corners = arrays["vertices"].reshape(-1, 3) + running.origin
-        assert corners.min(axis=0) == pytest.approx([-1.0, -1.0, 0.0])
-        client.ask(f"/api/{header['session']}/keep", {"name": "a"})
-        client.ask(f"/api/{header['session']}/compare", {"number": 0})
-        header, arrays = client.ask(f"/api/{header['session']}/settle", {"tensions": {"roof": 3.0}})
-        assert len(arrays["difference"]) == len(corners)
-        assert arrays["difference"].min() < -0.01
-        held = np.isfinite(arrays["reactions"].reshape(-1, 3)[:, 0])
-        assert held.sum() == 32
-    finally:
-        running.close()
 
 
 def test_names_of_downloads_are_those_of_files():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import http.client
 import json
 import socket
 import time
@@ -10,6 +9,7 @@ from contextlib import ExitStack
 from http.server import BaseHTTPRequestHandler
 
 import pytest
+from asking import asked
 
 from generators import spherical_cap
 from pcmc import explore
@@ -30,16 +30,6 @@ def explorer():
 @pytest.fixture(scope="module")
 def session(explorer):
     return unpack(asked(explorer, "POST", "/api/open", "{}")[1])[0]["session"]
-
-
-def asked(explorer, method, path, body=None, **headers):
-    """Status and body of an answer."""
-    line = http.client.HTTPConnection("127.0.0.1", explorer.port, timeout=60)
-    line.request(method, path, body, headers)
-    answer = line.getresponse()
-    content = answer.read()
-    line.close()
-    return answer.status, content
 
 
 def sent(explorer, data):
@@ -66,9 +56,9 @@ def sent(explorer, data):
     ],
 )
 def test_wrong_values_are_answered_in_one_line(explorer, session, path, body, line):
-    status, content = asked(explorer, "POST", f"/api/{path.replace('NAME', session)}", body)
+    answer, content = asked(explorer, "POST", f"/api/{path.replace('NAME', session)}", body)
     error = json.loads(content)["error"]
-    assert status == 400
+    assert answer.status == 400
     assert line in error
     assert "\n" not in error
     assert len(error) < 300
@@ -168,7 +158,7 @@ def test_a_long_computation_is_not_cut_off(explorer, monkeypatch):
         return real(self)
 
     monkeypatch.setattr(server.Explorer, "open", slow)
-    assert asked(explorer, "POST", "/api/open", "{}")[0] == 200
+    assert asked(explorer, "POST", "/api/open", "{}")[0].status == 200
 
 
 def test_an_error_that_nobody_foresaw_is_answered_too(explorer, monkeypatch):
@@ -176,6 +166,6 @@ def test_an_error_that_nobody_foresaw_is_answered_too(explorer, monkeypatch):
         raise KeyError("two\nlines")
 
     monkeypatch.setattr(server.Explorer, "open", broken)
-    status, content = asked(explorer, "POST", "/api/open", "{}")
-    assert status == 500
+    answer, content = asked(explorer, "POST", "/api/open", "{}")
+    assert answer.status == 500
     assert "\n" not in json.loads(content)["error"]

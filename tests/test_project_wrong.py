@@ -6,11 +6,11 @@ import os
 
 import pytest
 from refusals import refused
+from small_project import SMALL
 
 from pcmc import cli
 from pcmc.base.errors import FileError, PlanError
 from pcmc.project import load, run
-from tests.test_project import SMALL
 
 
 def project(folder, text):

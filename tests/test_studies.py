@@ -1,4 +1,4 @@
-"""The studies: whole files, rules of comparison, studies that fail, and the command line."""
+"""The studies: whole files, studies that fail, and the command line."""
 
 from __future__ import annotations
 
@@ -17,38 +17,17 @@ import pytest
 from refusals import refused
 from rich.console import Console
 
-from generators import four_fans, spherical_cap, two_caps, two_squares
-from generators.calibration import PRINTED
-from pcmc import curvature_error, solve
+from generators import two_squares
 from pcmc.base.errors import FileError, OptionError
-from pcmc.energy.functional import energy_and_gradient
-from studies import example1
 from studies.__main__ import main
-from studies.benchmark import numpy_energy_and_gradient
-from studies.flow import NOISE, Case, errors, start_of, turn
 from studies.folder import Folder, mesh_hash
-from studies.mesh_search import GROUPS, groups, holders
-from studies.paper import (
-    CONDITIONAL,
-    NOT,
-    REPRODUCED,
-    Claim,
-    Figure,
-    compare,
-    judge,
-    label,
-    paper,
-    printed,
-    read_measured,
-)
-from studies.readme import with_block
+from studies.paper import read_measured
 from studies.registry import STUDIES, chosen
 from studies.runner import run_all
 from studies.study import Study, perform
 from studies.worker import main as work
 
 HOME = Path(__file__).resolve().parent.parent
-RESULTS = HOME / "results"
 
 
 # ------------------------------------------------------------------------------------ folder
@@ -118,133 +97,6 @@ def test_shrunken_figures_keep_rare_colours(tmp_path):
 def test_missing_file_says_which_study_writes_it(tmp_path):
     with pytest.raises(FileError, match=r"python -m studies run example9"):
         Folder(tmp_path / "example9").read_table("records")
-
-
-# ------------------------------------------------------------------------------ comparison
-
-
-@pytest.mark.parametrize(
-    ("relation", "ours", "verdict"),
-    [
-        ("=", 2.04, "reproduced"),
-        ("=", 2.3, "near"),
-        ("=", 3.0, "differs"),
-        ("<", 1.99, "reproduced"),
-        ("<", 2.0, "near"),
-        ("<", 9.0, "differs"),
-        (">", 2.01, "reproduced"),
-        (">", 0.1, "differs"),
-        ("=", math.nan, "not measured"),
-    ],
-)
-def test_verdict_of_a_printed_number(relation, ours, verdict):
-    claim = Claim("a", "Sec. 1", "s.a", 2.0, relation, tolerance=0.05, near=0.2)
-    assert judge(claim, {"s.a": ours}).verdict == verdict
-
-
-def test_claim_between_two_of_our_numbers():
-    claim = Claim("smaller", "Sec. 1", "s.fine", "s.coarse", "<")
-    assert judge(claim, {"s.fine": 1.0, "s.coarse": 2.0}).verdict == "reproduced"
-    assert judge(claim, {"s.fine": 2.0, "s.coarse": 1.0}).verdict == "differs"
-    assert judge(claim, {"s.fine": 2.0}).verdict == "not measured"
-
-
-def test_label_of_a_figure_follows_from_the_papers_claims():
-    first = Claim("Ex. 1: first", "Sec. 1", "s.a", 1.0, tolerance=0.1, near=0.5, figures=("1",))
-    second = Claim(
-        "Ex. 1: second",
-        "Sec. 1",
-        "s.b",
-        2.0,
-        "<",
-        figures=("1",),
-        instead="s.c",
-        fails="b is {ours}, printed {paper}; otherwise {instead}",
-    )
-    third = Claim("Ex. 1: third", "Sec. 1", "s.c", 2.0, "<", figures=("1",), own=True)
-    side = Claim("Ex. 1: side", "Sec. 1", "s.d", 4.0, figures=("1",), given=True)
-    failed = "b is 3, printed 2; otherwise "
-
-    def labelled(a=1.0, b=1.0, c=1.0, d=4.0, unknown=""):
-        measured = {"s.a": a, "s.b": b, "s.c": c, "s.d": d}
-        findings = [judge(claim, measured) for claim in (first, second, third, side)]
-        return label(Figure("1", "a shape", "s", unknown), findings)
-
-    assert labelled() == (REPRODUCED, "2 of 2", "")
-    assert labelled(c=9.0) == (REPRODUCED, "2 of 2", "")  # ours, and no claim of the paper's
-    assert labelled(unknown="its scale") == (CONDITIONAL, "2 of 2", "its scale")
-    assert labelled(b=3.0) == (CONDITIONAL, "1 of 2", failed + "1")
-    assert labelled(b=3.0, c=9.0) == (NOT, "1 of 2", failed + "nan")
-    near = "first: ours 1.4, printed 1 (+40.0%)"
-    assert labelled(a=1.4) == (CONDITIONAL, "1 of 2, 1 near", near)
-    assert labelled(a=1.4, b=3.0)[2] == f"{near}; {failed}1"
-    assert labelled(a=9.0) == (NOT, "1 of 2", "first: ours 9, printed 1 (+800.0%)")
-    assert labelled(d=5.0) == (NOT, "2 of 2", "side: ours 5, printed 4 (+25.0%)")
-    assert label(Figure("1", "a shape", "s"), [])[0] == NOT
-    assert label(Figure("1", "", "s", "all"), [judge(side, {"s.d": 4.0})])[1] == "inputs only"
-
-
-def test_reasons_say_what_is_measured():
-    bound = judge(Claim("Ex. 1: flat", "", "s.a", 0.5, "<", bound=True), {"s.a": 0.7})
-    assert bound.reason() == "flat: ours 0.7, to hold it must be < 0.5"
-    printed = judge(Claim("Ex. 1: rest", "", "s.a", 0.5, "<"), {"s.a": 0.7})
-    assert printed.reason() == "rest: ours 0.7, printed < 0.5"
-
-
-def test_no_claim_says_the_same_as_another_or_leans_on_the_one_before():
-    claims, _ = paper()
-    says = [claim.says.partition(": ")[2] for claim in claims]
-    leaning = ("and ", "so ", "the same ")
-    assert not [s for s in says if s.startswith(leaning) or " there" in s]
-    assert len({claim.says for claim in claims}) == len(claims)
-
-
-def test_every_figure_of_the_examples_rests_on_claims_of_a_study_that_exists():
-    claims, figures = paper()
-    assert [f.number for f in figures] == [str(k) for k in range(6, 26)]
-    for figure in figures:
-        assert figure.study in STUDIES
-        assert any(figure.number in claim.figures for claim in claims), figure
-    for claim in claims:
-        for key in (claim.ours, claim.paper):
-            assert not isinstance(key, str) or key.split(".")[0] in STUDIES
-
-
-def test_numbers_printed_for_initial_shapes_are_the_same_wherever_they_stand():
-    assert {name: printed(f"{name}.initial_gradient_squared") for name in PRINTED} == PRINTED
-    with refused(FileError, found="example1.turn_2"):
-        printed("example1.turn_2")
-
-
-def test_paper_file_with_a_wrong_relation_or_key_is_refused(tmp_path):
-    entry = '[[figure]]\nnumber="1"\nshows="x"\nstudy="s"\n[[claim]]\nsays="a"\nwhere="b"\nours="s.c"\n'
-    bad = tmp_path / "bad.toml"
-    for line, where, found in (
-        ('paper=1\nrelation="~"', "relation", "~"),
-        ('paper=1\nfigures=["7"]', "figures", "7"),
-        ("paper=1\nnearly=3", "a", None),
-        ('paper=1\ninstead="s.d"', "instead", "s.d"),
-        ('paper=1\nfails="{theirs}"', "fails", "{theirs}"),
-    ):
-        bad.write_text(entry + line)
-        paper.cache_clear()
-        with refused(FileError, what=str(bad), where=where, found=found):
-            paper(bad)
-
-
-def test_comparison_in_results_is_what_the_measured_numbers_give(tmp_path):
-    comparison, figures = compare(read_measured(RESULTS))
-    for name, table in (("comparison", comparison), ("figures", figures)):
-        Folder(tmp_path).write_table(name, table)
-        new, kept = ((f / f"{name}.csv").read_text() for f in (tmp_path, RESULTS))
-        assert new == kept, "run: python -m studies reproduce"
-    assert not (comparison.verdict == "not measured").any()
-
-
-def test_results_are_small():
-    files = [path for path in RESULTS.rglob("*") if path.is_file()]
-    assert sum(path.stat().st_size for path in files) < 30e6
-    assert max(path.stat().st_size for path in files if path.suffix == ".png") <= 150_000
 
 
 # ------------------------------------------------------------------------------------ steps
@@ -389,79 +241,3 @@ def test_command_runs_from_anywhere_and_ends_with_the_comparison(tmp_path):
     assert (tmp_path / "r" / "example3" / "fig19.png").stat().st_size > 1000
     left = [p.name for p in (tmp_path / "r").rglob("*") if p.name.startswith(".")]
     assert left == []
-
-
-# ------------------------------------------------------------------- what the studies measure
-
-
-@pytest.mark.parametrize("surface", [two_squares(5), two_caps(1.2)], ids=["squares", "caps"])
-def test_numpy_yardstick_agrees_with_the_compiled_loop(surface):
-    mine, theirs = numpy_energy_and_gradient(surface), energy_and_gradient(surface)
-    assert mine[0] == pytest.approx(theirs[0], rel=1e-13)
-    assert np.allclose(mine[1], theirs[1], atol=1e-13 * np.abs(theirs[1]).max())
-
-
-def test_turn_between_two_flat_sheets_is_their_angle():
-    surface = two_squares(4, height=1.0)
-    X = surface.vertices.copy()
-    X[:, 2] *= 0.0
-    roof = np.unique(surface.faces[surface.patch_faces([0, 1])])
-    X[roof, 2] = 1.0 + np.abs(X[roof, 0]) * math.tan(math.radians(20.0))
-    middle = int(np.argmin(np.linalg.norm(X - [0.0, 0.0, 1.0], axis=1)))
-    assert turn(surface.moved(X), middle, ("left", "right")) == pytest.approx(40.0)
-    X[roof, 2] = 1.0 - np.abs(X[roof, 0]) * math.tan(math.radians(20.0))
-    assert turn(surface.moved(X), middle, ("left", "right")) == pytest.approx(-40.0)
-
-
-def test_a_wall_stands_until_it_first_comes_down_however_it_bounces():
-    heights = {run: [1.0, 0.5, 0.04, 0.3, 0.2] for run in example1.STANDING}
-    *_, other = heights
-    heights[other] = [1.0, 0.9, 0.8, 0.7, 0.6]
-    tables = [
-        pd.DataFrame({"run": run, "iteration": range(5), "height": column}) for run, column in heights.items()
-    ]
-    assert example1._standing_numbers(pd.concat(tables, ignore_index=True)) == {
-        "stands_until": 1,
-        "stands_until_without_momentum": 1,
-        "least_height_3_parallel": 0.6,
-    }
-
-
-def test_a_flow_starts_from_the_same_bits_whatever_the_last_digits_of_a_linear_solver():
-    surface = four_fans(5)
-    noise = 1e-12 * np.random.default_rng(1).standard_normal((surface.n, 3))
-    cases = [
-        Case("a", lambda X=X: surface.moved(X), {}) for X in (surface.vertices, surface.vertices + noise)
-    ]
-    one, other = (start_of(case).vertices for case in cases)
-    assert not np.array_equal(surface.vertices, surface.vertices + noise)
-    assert np.array_equal(one, other)
-    np.testing.assert_allclose(one, surface.vertices, rtol=0.0, atol=1e-6)
-
-
-def test_errors_below_rounding_are_written_as_a_bound_and_others_as_they_are():
-    exact = errors(solve(spherical_cap(0.3), tolerance=1e-13).surface)
-    assert exact["largest_error_variational"] == exact["mean_error_variational"] == NOISE
-    assert exact["largest_error_cotangent"] > 1e-4
-    flat = spherical_cap(0.3)
-    assert errors(flat)["largest_error_variational"] == np.nanmax(
-        np.abs(curvature_error(flat, "variational"))
-    )
-
-
-def test_every_vertex_that_can_move_is_in_one_group_and_the_shares_add_to_one():
-    surface = two_caps(1.2)
-    masks = groups(surface)
-    assert tuple(masks) == GROUPS
-    assert np.array_equal(sum(m.astype(int) for m in masks.values()), (~surface.fixed).astype(int))
-    shares = holders(surface)
-    assert sum(shares[f"share {g}"] for g in GROUPS) == pytest.approx(1.0)
-
-
-def test_template_keeps_what_is_around_the_markers():
-    text = "before\n<!-- comparison: begin -->old<!-- comparison: end -->\nafter"
-    wanted = "before\n<!-- comparison: begin -->\n\nNEW\n\n<!-- comparison: end -->\nafter"
-    assert with_block(text, "comparison", ["NEW"]) == wanted
-    assert with_block(wanted, "comparison", ["NEW"]) == wanted
-    with refused(FileError, what="README.md"):
-        with_block("no markers", "comparison", ["NEW"])

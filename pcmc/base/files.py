@@ -14,6 +14,16 @@ from .errors import FileError
 from .interrupts import defer_interrupts
 
 
+def system_error(path: str | os.PathLike[str], act: str, error: OSError) -> FileError:
+    """The error for a file that the system does not let be read, written or opened.
+
+    >>> system_error("roof.obj", "read", FileNotFoundError(2, "No such file or directory"))
+    FileError('roof.obj: cannot be read (No such file or directory)')
+    """
+    name = os.fspath(path)
+    return FileError(f"{name}: cannot be {act} ({error.strerror or error})", what=name)
+
+
 def check_regular(path: Path) -> None:
     """Refuse a folder, a pipe and a device before they are opened: reading them may never end.
 
@@ -33,7 +43,7 @@ def check_regular(path: Path) -> None:
     except FileNotFoundError:
         return
     except OSError as error:
-        raise FileError(f"{path}: cannot be opened ({error.strerror or error})", what=str(path)) from None
+        raise system_error(path, "opened", error) from None
     if stat.S_ISREG(mode):
         return
     kind = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
@@ -104,6 +114,22 @@ def atomic_writes(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path
     finally:
         for path in (*written, *backups):
             path.unlink(missing_ok=True)
+
+
+@contextmanager
+def writing(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Name the file, as a FileError, if the system refuses to write it in the block.
+
+    >>> with writing("roof.obj"):
+    ...     raise OSError(28, "No space left on device")
+    Traceback (most recent call last):
+    ...
+    pcmc.base.errors.FileError: roof.obj: cannot be written (No space left on device)
+    """
+    try:
+        yield
+    except OSError as error:
+        raise system_error(path, "written", error) from None
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Refuse a surface that is not certified, where something is to be built after it."""
+"""Refuse or mark a surface that is not certified, where something is to be built after it."""
 
 from __future__ import annotations
 
@@ -14,6 +14,12 @@ def certified(surface: Surface, anyway: bool) -> Certificate:
     certificate = certify(surface)
     require_certified(certificate, anyway)
     return certificate
+
+
+def warning_mark(certificate: Certificate) -> str:
+    """What each page about a surface that is not certified is marked with; empty for one that is."""
+    verdict = certificate.verdict.value.split(":")[0]
+    return "" if certificate.certified else f"NOT CERTIFIED: {verdict}"
 
 
 def require_certified(certificate: Certificate, anyway: bool) -> None:

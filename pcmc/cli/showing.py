@@ -19,6 +19,7 @@ from .arguments import (
     Cables,
     Cache,
     Colour,
+    Given,
     Input,
     Loads,
     Pressures,
@@ -64,10 +65,8 @@ def convert(
     """
     projects.check_names([output])
     projects.check_outputs([output])
-    with working() as say:
-        loads = Loads(tension, pressure, weight, cable, volume)
-        shown = arguments.given(file, say, loads, start=start, cache=cache)
-    if shown.outcome is not None and not _is_good(file, shown.outcome):
+    shown = _shown(file, Loads(tension, pressure, weight, cable, volume), start, cache)
+    if shown is None:
         return NOT_CERTIFIED
     data: dict[str, Any] = {"units": shown.units, "colour": colour}
     if whole:
@@ -88,12 +87,17 @@ def convert(
     return OK
 
 
-def _is_good(file: Path, outcome: projects.Outcome) -> bool:
-    """Print how the design of a project ended; whether its roof may be shown as the designed one."""
-    report(outcome)
-    if not outcome.good:
-        print(f"nothing written (pcmc explore {file} shows this roof, --start the start shape)")
-    return outcome.good
+def _shown(file: Path, loads: Loads, start: bool, cache: bool) -> Given | None:
+    """What is to be written or drawn. Print how the design of a project ended; None if it is not good."""
+    with working() as say:
+        shown = arguments.given(file, say, loads, start=start, cache=cache)
+    if shown.outcome is None:
+        return shown
+    report(shown.outcome)
+    if shown.outcome.good:
+        return shown
+    print(f"nothing written (pcmc explore {file} shows this roof, --start the start shape)")
+    return None
 
 
 def plot(
@@ -122,10 +126,8 @@ def plot(
     seen = arguments.view_of(view)
     projects.check_picture([seen], colour)
     projects.check_outputs([picture])
-    with working() as say:
-        loads = Loads(tension, pressure, weight, cable, volume)
-        shown = arguments.given(file, say, loads, start=start, cache=cache)
-    if shown.outcome is not None and not _is_good(file, shown.outcome):
+    shown = _shown(file, Loads(tension, pressure, weight, cable, volume), start, cache)
+    if shown is None:
         return NOT_CERTIFIED
     surface = mirrored(shown.surface) if whole else shown.surface
     painting = partial(projects.paint, surface, views=[seen], colour=colour, units=shown.units)

@@ -3,10 +3,6 @@
 The misfit is φ = ‖r‖, r the relative distances of the quantities from the values wanted; every point
 tried is a solve that starts from the last solution. Sheets are nearly linear in 1/α, so 1/α is the
 unknown for a patch under pressure.
-
-At a fold solutions end: the quantity still changes but the parameter does not, λ_fold - λ ~ (q_fold - q)².
-The slopes at two points show the fold before it is reached: they give the right length of the step, and
-the reachable limit.
 """
 
 from __future__ import annotations
@@ -31,11 +27,10 @@ from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 from .outcome import Design, DesignStatus, NoStart
 from .sensitivity import sensitivities
+from .steps import Iterate, StepPlan, Trial
 from .targets import KINDS, Parameter, Target, as_parameters, as_targets, measure
 
 LEAST_CHANGE = 1e-3  # part of an unknown that a step must change to be worth a solve near failing ones
-FOLD_GAP = 1e-3  # relative distance of the misfit from its value at a fold where the search ends
-FOLD_SHARE = 0.97  # of the parameters' way to a fold is tried next
 TRIES = 6  # points tried along a step, each nearer, before it is given up
 LEAST_GAIN = 1e-6  # part of φ below which a further step is not worth a solve
 DAMPING = 1e-6  # of the largest singular value: ``_metric`` chooses among steps of equal misfit
@@ -108,24 +103,6 @@ def meet(
     validate.positive("tolerance", tolerance)
     validate.integer("solves", solves, least=1)
     return Search(surface, aims, parameters, tolerance, solves, callback, options).run()
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """A surface at rest: unknowns x, quantities, relative misfits r and φ = ‖r‖."""
-
-    x: Floats
-    result: Result
-    quantities: Floats
-    r: Floats
-    phi: float
-
-
-@dataclass(frozen=True, eq=False)
-class Iterate(Trial):
-    """A trial with its derivatives J = ∂r/∂x."""
-
-    jacobian: Floats
 
 
 @dataclass(eq=False)
@@ -349,47 +326,6 @@ class Search:
         )
         reason = self.failure if status is DesignStatus.AT_FOLD else ""
         return Design(status, here.result, targets, parameters, self.solves, pd.DataFrame(self.rows), reason)
-
-
-@dataclass(frozen=True, eq=False)
-class StepPlan:
-    """A Gauss-Newton step, and how the misfit bends along it.
-
-    Along the step let g = dt/dφ be linear in φ, from the slopes here and at the iterate before, and
-    ρ = φ (g_before/g - 1) / (φ_before - φ). Then the misfit vanishes after 1 - ρ/2 of the way that the
-    slope alone predicts. If ρ > 1, a fold comes first, after 1/(2ρ) of that way, where the misfit has
-    fallen by φ/ρ.
-
-    Attributes
-    ----------
-    step : the Gauss-Newton step, t = 1.
-    first : t to try first.
-    to_limit : φ/ρ over the slope; quantities linear in t have their values at the fold there.
-    at_fold : whether the fold is so near that it is not worth a further solve.
-    """
-
-    step: Floats
-    first: float = 1.0
-    to_limit: float = 0.0
-    at_fold: bool = False
-
-    @classmethod
-    def of(cls, before: Iterate | None, here: Iterate, step: Floats) -> StepPlan:
-        """The plan for a step from here; ``before`` is the last iterate."""
-        if before is None or not before.phi > here.phi:
-            return cls(step)
-        run = here.x - before.x
-        cosine = run @ step / (np.linalg.norm(run) * np.linalg.norm(step))
-        slope, slope_before = (-float(p.r @ p.jacobian @ step) / p.phi for p in (here, before))
-        if cosine < 0.9 or slope <= 0.0 or slope_before <= 0.0:
-            return cls(step)
-        full = here.phi / slope
-        bend = here.phi * (slope / slope_before - 1.0) / (before.phi - here.phi)
-        if bend <= 1.0:
-            return cls(step, min(1.0, full * (1.0 - 0.5 * bend)) if bend > 0.0 else 1.0)
-        gap = here.phi / bend
-        first = min(1.0, FOLD_SHARE * 0.5 * full / bend)
-        return cls(step, first, gap / slope, gap < FOLD_GAP)
 
 
 def _unsolved(surface: Surface) -> Result:

@@ -14,11 +14,11 @@ import pandas as pd
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import FileError, OptionError
-from ..base.files import atomic_writes, suffix_of
+from ..base.errors import OptionError
+from ..base.files import atomic_writes, suffix_of, writing
 from ..base.units import expect_length, length_factor
 from ..certificate import Certificate
-from ..certificate.required import certified
+from ..certificate.required import certified, warning_mark
 from ..panels import Panels, panels
 from ..surface import Surface, expect_surface
 from . import dxf, pdf, views
@@ -87,11 +87,8 @@ class DrawingSet:
         works = self.files(*paths)
         with atomic_writes([path for path, _ in works]) as temporaries:
             for (path, write), temporary in zip(works, temporaries, strict=True):
-                try:
+                with writing(path):
                     write(temporary)
-                except OSError as error:
-                    text = f"{path}: cannot be written ({error.strerror or error})"
-                    raise FileError(text, what=str(path)) from None
         return [path for path, _ in works]
 
 
@@ -178,8 +175,7 @@ def drawing_set(
         sheets += table_sheets("Families of panels", *_family_rows(schedule, DECIMALS[units]), sheet)
     if schedule is not None and panel_sheets:
         sheets += panels_at_true_size(schedule, sheet, millimetres)
-    mark = "" if certificate.certified else f"NOT CERTIFIED: {certificate.verdict.value.split(':')[0]}"
-    add_frames(sheets, name, units, mark)
+    add_frames(sheets, name, units, warning_mark(certificate))
     cut = [one for _, group in levels for one in group] + [one for _, group in profiles for one in group]
     return DrawingSet(surface, units, certificate, curves, cut, points, schedule, sheets)
 

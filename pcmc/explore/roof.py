@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import project as projects
-from ..base.errors import FileError
+from ..base.files import system_error
 from ..base.units import NO_UNITS, Units
 from ..design import Parameter, Target
 from ..io import read_bare
@@ -125,4 +125,4 @@ def text_of(path: Path) -> str:
     try:
         return path.read_bytes().decode("utf-8-sig")
     except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
+        raise system_error(path, "read", error) from None

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import FileError, PcmcError, unknown
-from ..base.files import check_regular
+from ..base.files import check_regular, system_error
 from ..surface import Surface
 from . import FORMATS, READ_ONLY, meshlab
 from .libraries import unreadable
@@ -95,8 +95,7 @@ def repair(
     try:
         return _repaired(data, weld, holes, edge_length)
     except PcmcError as error:
-        text = f"{path}: {error}"
-        raise type(error)(text, what=error.what, where=error.where, found=error.found) from None
+        raise error.in_file(path) from None
 
 
 def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float | None) -> Repaired:
@@ -145,13 +144,13 @@ def _loaded(path: Path) -> MeshData:
         path.open("rb").close()
         return _read(path, known[suffix].module)
     except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
+        raise system_error(path, "read", error) from None
     except UnicodeDecodeError as error:
         raise FileError(
             f"{path}: byte {error.start} is not text", what=str(path), where=error.start
         ) from None
     except FileError as error:
-        raise FileError(f"{path}: {error}", what=str(path), where=error.where, found=error.found) from None
+        raise error.in_file(path, what=str(path)) from None
 
 
 def _read(path: Path, module: str) -> MeshData:

@@ -14,13 +14,13 @@ import numpy.typing as npt
 
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError
-from ..base.files import atomic_write, check_name
+from ..base.files import atomic_write, check_name, writing
 from ..base.units import Units, length_factor
 from ..base.validate import choice
 from ..contact.pinching import standing_part
 from ..surface import Surface, expect_surface
 from .flat_walls import encode_walls
-from .formats import FORMATS, Format, format_of, in_file
+from .formats import FORMATS, Format, format_of
 from .scaling import as_units, scaled_surface
 
 
@@ -99,13 +99,11 @@ def write(
             lost.append(f"{surface.m - shown.m} triangles of walls without height")
     content: dict[str, Any] = {"scalars": scalars, "colour": colour, "certificate": _values(certificate)}
     content |= {"walls": walls, "units": units}
-    try:
-        with atomic_write(path) as temporary:
+    with writing(path), atomic_write(path) as temporary:
+        try:
             note = form.functions.write(temporary, shown, **content)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written ({error.strerror or error})", what=str(path)) from None
-    except PcmcError as error:
-        raise in_file(path, error, FileError) from None
+        except PcmcError as error:
+            raise error.in_file(path, FileError, str(path)) from None
     if lost:
         text = f"{path}: a {path.suffix} file cannot carry {', '.join([*lost, *form.loses])}; left out"
         warnings.warn(text, LostWarning, stacklevel=2)

@@ -1,7 +1,8 @@
 """A Surface with walls, from the lines of a plan or from a mesh with labelled faces.
 
 ``plan`` holds Plan, ``curves`` its curves, ``parts`` dividers, holes, patches and cables; ``build`` makes the
-Surface from ``lines`` and their ``arrangement``, ``edges``, ``planar`` meshes, ``heights`` and ``walls``.
+Surface from the ``draft`` (``lines``, their ``arrangement``, ``edges``, the ``planar`` mesh), its ``areas``,
+``heights`` and ``walls``.
 ``drawing`` reads CAD files (``strokes``, joined to ``paths``), ``proposal`` chooses what they do not say.
 May import ``io`` and the rooms below it.
 """

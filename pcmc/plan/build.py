@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import count
 from typing import NamedTuple
 
@@ -18,45 +17,19 @@ from ..meshing.angles import improve_angles
 from ..surface import Cable, Patch, Plane, Room, Surface
 from ..surface.geometry import segment_lengths
 from ..surface.wall_tensions import balanced_wall
-from .arrangement import Arrangement, arrange, hole_points
+from .areas import patches_of
 from .corners import most_in_corners
-from .curves import Curve
-from .edges import (
-    NONE,
-    STATES,
-    Boundary,
-    boundary,
-    check_lines,
-    check_pressures,
-    edge_cables,
-    mirror_planes,
-    raised_heights,
-    strip_mask,
-)
+from .draft import Draft, drafted
+from .edges import NONE, STATES, check_pressures, edge_cables, mirror_planes, raised_heights, strip_mask
 from .heights import dome, harmonic_heights
 from .lines import SNAP, Kind, Line
-from .parts import BALANCED, Area, PlanData
-from .pieces import to_local, to_space
-from .planar import SIDES, PlanarMesh, locate, signed_areas, triangulate
+from .parts import BALANCED, PlanData
+from .pieces import to_space
+from .planar import SIDES, PlanarMesh, signed_areas
 from .walls import UpperEdge, WallMesh, build_walls
 
-MAX_TRIANGLES = 5_000_000
-MAX_EDGES = 200_000  # along a line
-MAX_RISE = 10.0  # of the initial surface, over the size of the plan
 SHARE = 0.6  # of p R, R of the smallest part beside a wall: more would pull a flat roof down
 GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan
-
-
-@dataclass(frozen=True, eq=False)
-class _Draft:
-    """A plan with its lines, and its plane mesh, whose first points are those of the lines."""
-
-    plan: PlanData
-    lines: Sequence[Line]
-    supports_on_edge: Sequence[Curve]
-    drawn: Arrangement
-    mesh: PlanarMesh
-    edges: Boundary
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +47,7 @@ class _Roof:
 
 def build_surface(plan: PlanData) -> Surface:
     """The mesh of the plan at its initial height, with its walls and supports."""
-    _check_size(plan)
-    draft = _drafted(plan)
+    draft = drafted(plan)
     mesh = draft.mesh
     fixed, sliding = _supports(draft)
     if not (fixed | sliding).any():
@@ -86,7 +58,7 @@ def build_surface(plan: PlanData) -> Surface:
     given = np.full(len(mesh.points), np.nan)
     given[: len(draft.drawn.heights)] = raised_heights(plan, draft.edges, draft.drawn, fixed | sliding)
     base = harmonic_heights(mesh.points, mesh.triangles, given)
-    patches, patch_of_face = _patches(plan, mesh)
+    patches, patch_of_face = patches_of(plan, mesh)
     cables = _cables(draft, fixed | sliding)
     check_pressures(draft.edges, mesh.triangles, patch_of_face, patches)
     height = base + _rise(draft, patches, fixed | sliding)
@@ -125,7 +97,7 @@ def _check_rooms(surface: Surface) -> None:
         raise PlanError(problem, what="rooms", where=error.where, found=error.found) from None
 
 
-def _rise(draft: _Draft, patches: Sequence[Patch], held: Bools) -> Floats:
+def _rise(draft: Draft, patches: Sequence[Patch], held: Bools) -> Floats:
     """(n,) what the initial surface rises above the one that the boundary spans."""
     plan, mesh = draft.plan, draft.mesh
     walled = any(divider.wall is not None for divider in plan.dividers)
@@ -134,79 +106,7 @@ def _rise(draft: _Draft, patches: Sequence[Patch], held: Bools) -> Floats:
     return dome(mesh.points, mesh.triangles, held, plan.rise)
 
 
-def _drafted(plan: PlanData) -> _Draft:
-    lines, on_edge = _lines(plan)
-    check_lines(plan, lines)
-    spots = np.array([to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)])
-    cut = [*on_edge, *(c.local(plan.plane) for c in (*(part.curve for part in plan.cables), *plan.mirrors))]
-    stops = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in cut)])
-    named = np.array([[*point, np.nan] for point in plan.points.values()]).reshape(-1, 3)
-    drawn = arrange(lines, plan.edge_length, np.concatenate([spots.reshape(-1, 3), named]), stops)
-    drawn = replace(drawn, spots=drawn.spots[: len(spots)])  # the named points are vertices, but not held
-    edges = np.concatenate([chain.edges for chain in drawn.chains])
-    try:
-        mesh = triangulate(drawn.points, edges, plan.edge_length, hole_points(drawn, lines))
-    except SurfaceError as error:
-        problem = f"lines of the plan are too close to each other for edges of length {plan.edge_length:g}"
-        raise PlanError(f"{problem}: {error}", what="edge_length", found=plan.edge_length) from None
-    return _Draft(plan, lines, on_edge, drawn, mesh, boundary(plan, lines, drawn))
-
-
-def _check_size(plan: PlanData) -> None:
-    """Refuse lengths that are probably mistakes, before they fill the memory."""
-
-    def error(key: str, value: float, problem: str) -> PlanError:
-        return PlanError(f"{key}={value:g} {problem}", what=key, found=value)
-
-    x, y = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2].T
-    area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
-    count = area / math.sqrt(0.1875) / plan.edge_length / plan.edge_length  # its square may be 0 or infinite
-    size = float(np.hypot(np.ptp(x), np.ptp(y)))
-    if count > MAX_TRIANGLES:
-        problem = f"would make about {count:.2g} triangles; at most {MAX_TRIANGLES} are allowed"
-        raise error("edge_length", plan.edge_length, problem)
-    if plan.edge_length > size:
-        problem = f"is longer than the plan, {size:.4g} from corner to corner; use a smaller one"
-        raise error("edge_length", plan.edge_length, problem)
-    if plan.rise is not None and plan.rise > MAX_RISE * size:
-        problem = f"is more than {MAX_RISE:g} times the plan's size, {size:.4g}; use a smaller one"
-        raise error("rise", plan.rise, problem)
-    lines = {"the outline": plan.outline} | {hole.name: hole.curve for hole in plan.holes}
-    lines |= {f"divider {divider.name!r}": divider.curve for divider in plan.dividers}
-    lines |= {f"support {k}": s for k, s in enumerate(plan.supports, 1) if isinstance(s, Curve)}
-    for name, curve in lines.items():
-        if curve.length > MAX_EDGES * plan.edge_length:
-            problem = (
-                f"{name} is {curve.length:.3g} long, more than {MAX_EDGES} edges of {plan.edge_length:g}"
-            )
-            raise PlanError(f"{problem}; draw it as long as the plan", what=name, found=curve.length)
-    for hole in plan.holes:
-        xy = hole.curve.local(plan.plane).at(hole.curve.dense)[:, :2]
-        extent = float(np.ptp(xy, axis=0).max())
-        if extent <= SNAP * plan.edge_length:
-            problem = f"is only {extent:g} wide, too little for edges of length {plan.edge_length:g}"
-            problem += "; leave it out, or use a smaller edge_length"
-            raise PlanError(f"{hole.name} {problem}", what=hole.name, found=extent)
-
-
-def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:
-    """The lines to draw, in the coordinates of Π, and the supports that lie on the boundary."""
-    lines = [Line("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
-    lines += [Line(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
-    boundary = list(lines)
-    lines += [Line(f"divider {d.name!r}", Kind.DIVIDER, d.curve.local(plan.plane)) for d in plan.dividers]
-    on_edge, snap = [], SNAP * plan.edge_length
-    for number, support in enumerate(plan.supports, start=1):
-        if isinstance(support, Curve):
-            local = support.local(plan.plane)
-            if all(any(b.nearest(xy)[1] <= snap for b in boundary) for xy in local.at(local.dense)[:, :2]):
-                on_edge.append(local)
-            else:
-                lines.append(Line(f"support {number}", Kind.SUPPORT, local))
-    return lines, on_edge
-
-
-def _supports(draft: _Draft) -> tuple[Bools, Bools]:
+def _supports(draft: Draft) -> tuple[Bools, Bools]:
     """(n,) fixed and sliding vertices."""
     plan, drawn, edges = draft.plan, draft.drawn, draft.edges
     fixed, sliding = np.zeros((2, len(draft.mesh.points)), dtype=bool)
@@ -223,7 +123,7 @@ def _supports(draft: _Draft) -> tuple[Bools, Bools]:
     return fixed, sliding & ~fixed
 
 
-def _warn_of_free_edges(draft: _Draft, held: Bools) -> None:
+def _warn_of_free_edges(draft: Draft, held: Bools) -> None:
     """Warn of free edges: the tension of the patch has nothing to pull against there."""
     edges = draft.edges
     for number, line in enumerate(draft.lines):
@@ -239,7 +139,7 @@ def _warn_of_free_edges(draft: _Draft, held: Bools) -> None:
             warnings.warn(text, PlanWarning, stacklevel=4)
 
 
-def _cables(draft: _Draft, held: Bools) -> list[Cable]:
+def _cables(draft: Draft, held: Bools) -> list[Cable]:
     """The cables of the edges, and those along dividers."""
     numbers = count(1)
     cables = edge_cables(draft.edges, held, numbers)
@@ -254,66 +154,7 @@ def _cables(draft: _Draft, held: Bools) -> list[Cable]:
     return cables
 
 
-def _patches(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
-    """The plan's patches and the patch of each triangle."""
-    count = int(mesh.region.max()) + 1
-    area = signed_areas(mesh.points, mesh.triangles)
-    weight = np.bincount(mesh.region, area, count)
-    middle = mesh.points[mesh.triangles].mean(axis=1)
-    centroid = np.stack([np.bincount(mesh.region, area * m, count) / weight for m in middle.T], axis=1)
-    areas = plan.patches
-    if not areas:
-        assert plan.tension is not None
-        values = {"tension": plan.tension, "pressure": plan.pressure, "weight": plan.weight}
-        areas = tuple(Area(f"patch {k + 1}", **values) for k in range(count))
-    located = [a for a in areas if a.at is not None]
-    if not located:
-        if len(areas) != count:
-            problem = (
-                f"the dividers cut the plan into {count} parts, but there are {len(areas)} patches"
-                f" ({', '.join(a.name for a in areas)}); give one for each part, or place them with at="
-            )
-            raise PlanError(problem, what="patches", found=len(areas), expected=count)
-        owner: Ints = np.argsort(np.lexsort(centroid.round(6).T[::-1]))
-    elif len(located) < len(areas):
-        missing = next(a.name for a in areas if a.at is None)
-        problem = f"patch {missing!r} has no at=; give it to all patches or to none"
-        raise PlanError(problem, what="at", where=missing)
-    else:
-        owner = _located(areas, mesh, count, centroid)
-    snow = [plan.snow if a.snow is None else a.snow for a in areas]
-    patches = [
-        Patch(a.name, a.tension, a.pressure - s, weight=a.weight) for a, s in zip(areas, snow, strict=True)
-    ]
-    return patches, owner[mesh.region]
-
-
-def _located(areas: Sequence[Area], mesh: PlanarMesh, count: int, centroid: Floats) -> Ints:
-    """(count,) the area that each part of the plan belongs to."""
-    owner = np.full(count, -1)
-    for number, one in enumerate(areas):
-        points = np.atleast_2d(np.array(one.at, dtype=float))
-        for point, triangle in zip(points, locate(mesh, points), strict=True):
-            if triangle < 0:
-                problem = f"patch {one.name!r}: its point {point.tolist()} is not inside the plan"
-                raise PlanError(problem, what="at", where=one.name, found=point.tolist())
-            part = mesh.region[triangle]
-            if owner[part] not in (-1, number):
-                problem = (
-                    f"patches {areas[owner[part]].name!r} and {one.name!r} are in the same part of the"
-                    f" plan (around {centroid[part].round(3).tolist()}); draw a divider between them"
-                )
-                raise PlanError(problem, what="at", where=one.name)
-            owner[part] = number
-    bare = np.flatnonzero(owner < 0)
-    if len(bare):
-        place = centroid[bare[0]].round(3).tolist()
-        problem = f"the part of the plan around {place} has no patch ({len(bare)} such parts)"
-        raise PlanError(f"{problem}; add one with at= inside it", what="patches", where=place)
-    return owner
-
-
-def _upright_planes(draft: _Draft, walls: WallMesh, sides: Sequence[_Sides]) -> list[tuple[Plane, Bools]]:
+def _upright_planes(draft: Draft, walls: WallMesh, sides: Sequence[_Sides]) -> list[tuple[Plane, Bools]]:
     """The vertical plane of each upright divider, and the (n,) mask of its wall and junction."""
     planes = []
     divider_of_wall = np.array([side.divider for side in sides], dtype=np.int64)
@@ -342,7 +183,7 @@ def _room_of_face(plan: PlanData, patches: Sequence[Patch], patch_of_face: Ints)
     return np.array(number, dtype=np.int64)[patch_of_face]
 
 
-def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], list[_Sides]]:
+def _walls(draft: Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], list[_Sides]]:
     """The walls and their patches: one for each divider and each pair of pressures and rooms along it.
 
     A wall takes the pressure on the left of its divider less that on the right.
@@ -376,7 +217,7 @@ def _walls(draft: _Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], list[_Sid
     return walls, patches, [sides._replace(divider=number) for number, sides in kinds]
 
 
-def _balanced(draft: _Draft, roof: _Roof, number: int) -> float:
+def _balanced(draft: Draft, roof: _Roof, number: int) -> float:
     """A tension for the wall of a divider with which all of its junctions balance, if there is one."""
     line = 1 + len(draft.plan.holes) + number
     beside = [_beside(draft.mesh.triangles, *c.vertices[:2]) for c in draft.drawn.chains if c.line == line]

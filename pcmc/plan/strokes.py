@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import FileError, MissingExtra, unknown
-from ..base.files import check_regular
+from ..base.files import check_regular, system_error
 from ..io.reading_process import read_arrays
 from .curves import Curve
 from .pieces import Piece
@@ -80,9 +80,9 @@ def read_strokes(path: Path) -> Strokes:
         contents = read_arrays(f"{suffix[1:]} drawing", path)
         strokes = [stroke for entity in contents["entities"] for stroke in _strokes(entity)]
     except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
+        raise system_error(path, "read", error) from None
     except FileError as error:
-        raise FileError(f"{path}: {error}", what=str(path), where=error.where) from None
+        raise error.in_file(path, what=str(path)) from None
     return Strokes(contents["unit"] or "", strokes, contents["others"], contents["hidden"])
 
 

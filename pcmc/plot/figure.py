@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..base.errors import FileError, MissingExtra
-from ..base.files import atomic_write, suffix_of
+from ..base.errors import MissingExtra
+from ..base.files import atomic_write, suffix_of, writing
 
 DPI = 200.0
 TEXT, SMALL = 7.0, 6.0  # points
@@ -112,12 +112,8 @@ def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
     check_suffix(path)
     kind = os.path.splitext(path)[1].lower()
     content = _png(image) if kind == ".png" else _vector(figure, kind.removeprefix("."))
-    try:
-        with atomic_write(path) as temporary:
-            temporary.write_bytes(content)
-    except OSError as error:
-        text = f"{os.fspath(path)}: cannot be written ({error.strerror or error})"
-        raise FileError(text, what=os.fspath(path)) from None
+    with writing(path), atomic_write(path) as temporary:
+        temporary.write_bytes(content)
     return image
 
 

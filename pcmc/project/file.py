@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from .. import io
 from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError, unknown
-from ..base.files import check_name, check_regular
+from ..base.files import check_name, check_regular, system_error
 from ..base.units import NO_UNITS, Units
 from ..plan import Plan, plan_from
 from ..solvers import find_method
@@ -149,7 +149,7 @@ def read_data(path: Path) -> tuple[str, dict[str, Any]]:
         _check_depth(path, text)
         data = tomllib.loads(text)
     except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
+        raise system_error(path, "read", error) from None
     except UnicodeDecodeError as error:
         message = f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8"
         raise FileError(message, what=str(path), where=error.start) from None
@@ -193,8 +193,7 @@ def in_file(path: Path, kind: type[PcmcError] | None = None) -> Iterator[None]:
     try:
         yield
     except PcmcError as error:
-        fields = {name: getattr(error, name) for name in ("what", "where", "found", "expected")}
-        raise (kind or type(error))(f"{path}: {error}", **fields) from None
+        raise error.in_file(path, kind) from None
 
 
 def build(path: PathLike) -> Surface:

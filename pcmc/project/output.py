@@ -16,7 +16,7 @@ from .. import io
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknown
-from ..base.files import atomic_writes, check_name
+from ..base.files import atomic_writes, check_name, system_error, writing
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
@@ -56,11 +56,8 @@ def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
         for (path, write), temporary in zip(works, temporaries, strict=True):
             report(f"writing {path.name}")
             try:
-                with defer_interrupts(), _final_name_in_warnings(temporary, path):
+                with writing(temporary), defer_interrupts(), _final_name_in_warnings(temporary, path):
                     write(temporary)
-            except OSError as error:
-                text = f"{path}: cannot be written ({error.strerror or error})"
-                raise FileError(text, what=str(path)) from None
             except PcmcError as error:
                 text = str(error).replace(f"{temporary}: ", "")
                 raise FileError(f"{path}: {text}", what=str(path)) from None
@@ -154,7 +151,7 @@ def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
             is_folder = path.is_dir()
             there = next(f for f in (folder.absolute(), *folder.absolute().parents) if f.exists())
         except OSError as error:  # a name that is too long
-            raise FileError(f"{path}: cannot be written ({error.strerror})", what=str(path)) from None
+            raise system_error(path, "written", error) from None
         problem = None
         if is_folder:
             problem = "is a folder; give the name of a file"

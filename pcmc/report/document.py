@@ -16,12 +16,12 @@ import pandas as pd
 
 from ..base import validate
 from ..base.errors import FileError
-from ..base.files import atomic_write
+from ..base.files import atomic_write, writing
 from ..base.units import Units, expect_length
 from ..certificate import Certificate
 from ..certificate.reactions import held_lengths
+from ..certificate.required import certified, warning_mark
 from ..panels import Panels, panels
-from ..panels.schedule import certified
 from ..plot import draw, families, reactions, vectors
 from ..surface import Surface, expect_surface
 from . import pages, tables, words
@@ -68,19 +68,14 @@ class RoofReport:
         """
         path = check_name(path)
         content = self.pdf()
-        try:
-            with atomic_write(path) as temporary:
-                temporary.write_bytes(content)
-        except OSError as error:
-            text = f"{path}: cannot be written ({error.strerror or error})"
-            raise FileError(text, what=str(path)) from None
+        with writing(path), atomic_write(path) as temporary:
+            temporary.write_bytes(content)
         return path
 
     def pdf(self) -> bytes:
         """The bytes of the PDF file."""
         title = f"Report on the roof {self.name}" if self.name else "Report on a roof"
-        verdict = self.certificate.verdict.value.split(":")[0]
-        mark = "" if self.certificate.certified else f"NOT CERTIFIED: {verdict}"
+        mark = warning_mark(self.certificate)
         if not mark and self.targets is not None and not self.targets["met"].all():
             mark = "TARGETS NOT MET"
         foot = ", ".join(filter(None, (f"pcmc {version('pcmc-surfaces')}", self.date)))

@@ -11,8 +11,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError
-from ..base.files import atomic_write, check_name, suffix_of
+from ..base.files import atomic_write, check_name, suffix_of, writing
 from ..io.text import format_rows
 from ..surface.geometry import area_vectors
 from . import cables
@@ -62,11 +61,8 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> Non
     if not isinstance(model, StructuralModel):
         validate.refuse("model", type(model).__name__, "a StructuralModel")
     text = "".join(_sections(model))
-    try:
-        with atomic_write(path) as temporary:
-            temporary.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written ({error.strerror or error})", what=str(path)) from None
+    with writing(path), atomic_write(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _sections(model: StructuralModel) -> Iterator[str]:

@@ -13,7 +13,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats, Ints, cached_array
 from ..base.errors import FileError
-from ..base.files import check_regular, suffix_of
+from ..base.files import check_regular, suffix_of, system_error
 from ..surface.geometry import area_vectors
 from . import dat, frd
 from .blocks import TENSOR, Block
@@ -100,15 +100,12 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
         steps = READERS[suffix](text)
         _check(steps, model)
     except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror or error})", what=str(path)) from None
+        raise system_error(path, "read", error) from None
     except UnicodeDecodeError as error:
         message = f"{path}: byte {error.start} is not text; the file is damaged"
         raise FileError(message, what=str(path), where=error.start) from None
     except FileError as error:
-        text = f"{path}: {error}"
-        raise FileError(
-            text, what=str(path), where=error.where, found=error.found, expected=error.expected
-        ) from None
+        raise error.in_file(path, what=str(path)) from None
     return tuple(_results(model, k, blocks) for k, blocks in enumerate(steps))
 
 

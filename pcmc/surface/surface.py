@@ -15,19 +15,21 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
 from . import checks, supports
-from .cable import Cable, CableEdges, cable_edges, checked_cables
+from .cable import Cable, CableEdges, cable_edges
+from .checked import check_planes, checked_parts
 from .circle import Circle, Guide
 from .geometry import bounding_size
 from .origin import uncancelled_pressures, volume_origin
 from .patch import Patch
 from .plane import Plane
 from .renewed import renewed
-from .room import Room, checked_rooms, room_signs
+from .room import Room, room_signs
 from .summary import summary
 from .topology import Topology, topology
 
 MESH = ("vertices", "faces", "patch_of_face", "patches")
-FIELDS = (*MESH, "fixed", "on_plane", "plane", "on_line", "on_planes", "cables", "rooms", "given_supports")
+PARTS = (*MESH, "fixed", "on_plane", "plane", "on_line", "on_planes", "cables", "rooms")  # that are given
+FIELDS = (*PARTS, "given_supports")
 GROUND = Plane()
 
 
@@ -97,46 +99,7 @@ class Surface:
     given_supports: supports.Supports = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.plane, Plane):
-            validate.refuse("plane", self.plane, "a Plane", error=SurfaceError)
-        if self.plane.mirror:
-            message = "plane: Π cannot be a mirror plane; give that plane in on_planes= instead"
-            raise SurfaceError(message, what="plane")
-        X = checks.positions(self.vertices)
-        checks.large_enough(X)
-        F = checks.face_array(self.faces, len(X))
-        patches = tuple(self.patches) if isinstance(self.patches, Iterable) else ()
-        if not patches or not all(isinstance(patch, Patch) for patch in patches):
-            validate.refuse("patches", self.patches, "a sequence of Patch", error=SurfaceError)
-        patch = checks.patch_array(self.patch_of_face, len(F), patches)
-        fixed = checks.mask(self.fixed, len(X), "fixed")
-        on_line = checks.on_line(self.on_line, X)
-        on_plane = checks.mask(self.on_plane, len(X), "on_plane")
-        on_planes = supports.plane_masks(self.on_planes, len(X))
-        given = supports.Supports(fixed.copy(), on_plane, tuple(on_line))
-        if on_planes:
-            at_end = topology(F, patch, len(X)).on_boundary
-            on_planes = supports.completed(on_planes, X, at_end, fixed)
-            supports.check_mirrors(on_planes, X, F, patch, [p.name for p in patches])
-            both = [(self.plane, on_plane), *on_planes]
-            on_line, points = supports.guides_and_points(both, fixed, on_line)
-            fixed |= points
-        for _, along in on_line:
-            fixed |= along
-        object.__setattr__(self, "given_supports", given.frozen())
-        object.__setattr__(self, "on_line", tuple((line, read_only(along)) for line, along in on_line))
-        sliding = on_plane & ~fixed
-        object.__setattr__(self, "on_planes", tuple((plane, read_only(mask)) for plane, mask in on_planes))
-        arrays = {"vertices": X, "faces": F, "patch_of_face": patch, "fixed": fixed}
-        for key, value in (arrays | {"on_plane": sliding}).items():
-            object.__setattr__(self, key, read_only(value))
-        object.__setattr__(self, "patches", patches)
-        object.__setattr__(self, "cables", checked_cables(self.cables, self.topology.edges, len(X)))
-        object.__setattr__(self, "rooms", checked_rooms(self.rooms, [p.name for p in patches]))
-        height = self.plane.height(X)
-        # a vertex that slides on another plane alone may come down to Π like a free one
-        checks.mesh(X, F, patch, self.topology, self.patches, given.bound, height)
-        self._check_planes(X)
+        vars(self).update(checked_parts(**{name: getattr(self, name) for name in PARTS}))
         if not (self.held.any() or self.rooms):
             message = "no vertex is fixed or on the plane: translations are free, so only closed surfaces"
             message += " have an equilibrium; pass fixed= or on_plane= to hold it"
@@ -289,7 +252,7 @@ class Surface:
         X = checks.positions(vertices)
         if X.shape != self.vertices.shape:
             checks.refuse_shape("vertices", X, self.vertices.shape)
-        self._check_planes(X)
+        check_planes(X, self.plane, self.on_plane, self.on_planes, self.size)
         checks.on_lines(self.on_line, X)
         return self._with(vertices=read_only(X))
 
@@ -311,7 +274,7 @@ class Surface:
         >>> over.faces.tolist(), over.fixed.all()
         ([[0, 2, 1]], np.True_)
         """
-        parts = {name: getattr(self, name) for name in FIELDS if name != "given_supports"}
+        parts = {name: getattr(self, name) for name in PARTS}
         return Surface(**parts | self.given_supports._asdict() | changes)
 
     def retensioned(
@@ -405,12 +368,6 @@ class Surface:
     def patch_faces(self, patches: Sequence[int]) -> Bools:
         """(m,) mask of the triangles of the given patches."""
         return np.isin(self.patch_of_face, patches)
-
-    def _check_planes(self, X: Floats) -> None:
-        """Sliding vertices must lie on their planes."""
-        checks.on_plane(self.plane.height(X), self.on_plane, X, self.size)
-        for plane, mask in self.on_planes:
-            checks.on_plane(plane.height(X), mask, X, self.size, str(plane))
 
     def _with(self, **changes: object) -> Surface:
         """A copy that skips the checks already made; the topology travels along."""

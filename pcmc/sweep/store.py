@@ -24,7 +24,7 @@ from typing import Any
 from warnings import warn
 
 from ..base.errors import FileError, FileWarning
-from ..base.files import check_regular
+from ..base.files import check_regular, system_error
 from .case_script import WORDS, answer, version
 from .grid import Sweep
 
@@ -110,7 +110,7 @@ def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FileError(f"{path}: cannot be opened for writing ({error.strerror})", what=str(path)) from error
+        raise system_error(path, "opened for writing", error) from None
     with _connected(path, "rwc") as database:
         _lock(path, database)
         if not database.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]:
@@ -145,7 +145,7 @@ def read_store(path: str | os.PathLike[str]) -> list[Record]:
     try:
         path.open("rb").close()
     except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror})", what=str(path)) from error
+        raise system_error(path, "read", error) from None
     with _connected(path, "rw") as database:
         database.execute("BEGIN")
         declared = _declaration(path, database)
@@ -178,7 +178,7 @@ def _check_file(path: Path) -> None:
     except FileNotFoundError:
         return
     except OSError as error:
-        raise FileError(f"{path}: cannot be opened ({error.strerror})", what=str(path)) from error
+        raise system_error(path, "opened", error) from None
     if start.startswith(LINES):
         raise FileError(
             f"{path}: is a store of an older pcmc, in lines of JSON; name a new file",

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..base.errors import FileError, MissingExtra
-from ..base.files import atomic_write, suffix_of
+from ..base.errors import MissingExtra
+from ..base.files import atomic_write, suffix_of, writing
 from .store import Record
 
 TABLES = (".csv", ".parquet")
@@ -57,15 +57,11 @@ def write_table(path: str | os.PathLike[str], frame: pd.DataFrame) -> None:
     """
     path = Path(path)
     suffix = suffix_of(path, TABLES, "a table")
-    try:
-        with atomic_write(path) as temporary:
-            if suffix == ".csv":
-                frame.to_csv(temporary, lineterminator="\n")
-            else:
-                _to_parquet(temporary, frame)
-    except OSError as error:
-        text = f"{path}: cannot be written ({error.strerror or error})"
-        raise FileError(text, what=str(path)) from error
+    with writing(path), atomic_write(path) as temporary:
+        if suffix == ".csv":
+            frame.to_csv(temporary, lineterminator="\n")
+        else:
+            _to_parquet(temporary, frame)
 
 
 def _to_parquet(path: Path, frame: pd.DataFrame) -> None:

@@ -1,0 +1,77 @@
+"""The points of a search for targets, and the steps between them.
+
+At a fold solutions end: the quantity still changes but the parameter does not, λ_fold - λ ~ (q_fold - q)².
+The slopes at two points show the fold before it is reached: they give the right length of the step, and
+the reachable limit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..solvers.result import Result
+
+FOLD_GAP = 1e-3  # relative distance of the misfit from its value at a fold where the search ends
+FOLD_SHARE = 0.97  # of the parameters' way to a fold is tried next
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A surface at rest: unknowns x, quantities, relative misfits r and φ = ‖r‖."""
+
+    x: Floats
+    result: Result
+    quantities: Floats
+    r: Floats
+    phi: float
+
+
+@dataclass(frozen=True, eq=False)
+class Iterate(Trial):
+    """A trial with its derivatives J = ∂r/∂x."""
+
+    jacobian: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class StepPlan:
+    """A Gauss-Newton step, and how the misfit bends along it.
+
+    Along the step let g = dt/dφ be linear in φ, from the slopes here and at the iterate before, and
+    ρ = φ (g_before/g - 1) / (φ_before - φ). Then the misfit vanishes after 1 - ρ/2 of the way that the
+    slope alone predicts. If ρ > 1, a fold comes first, after 1/(2ρ) of that way, where the misfit has
+    fallen by φ/ρ.
+
+    Attributes
+    ----------
+    step : the Gauss-Newton step, t = 1.
+    first : t to try first.
+    to_limit : φ/ρ over the slope; quantities linear in t have their values at the fold there.
+    at_fold : whether the fold is so near that it is not worth a further solve.
+    """
+
+    step: Floats
+    first: float = 1.0
+    to_limit: float = 0.0
+    at_fold: bool = False
+
+    @classmethod
+    def of(cls, before: Iterate | None, here: Iterate, step: Floats) -> StepPlan:
+        """The plan for a step from here; ``before`` is the last iterate."""
+        if before is None or not before.phi > here.phi:
+            return cls(step)
+        run = here.x - before.x
+        cosine = run @ step / (np.linalg.norm(run) * np.linalg.norm(step))
+        slope, slope_before = (-float(p.r @ p.jacobian @ step) / p.phi for p in (here, before))
+        if cosine < 0.9 or slope <= 0.0 or slope_before <= 0.0:
+            return cls(step)
+        full = here.phi / slope
+        bend = here.phi * (slope / slope_before - 1.0) / (before.phi - here.phi)
+        if bend <= 1.0:
+            return cls(step, min(1.0, full * (1.0 - 0.5 * bend)) if bend > 0.0 else 1.0)
+        gap = here.phi / bend
+        first = min(1.0, FOLD_SHARE * 0.5 * full / bend)
+        return cls(step, first, gap / slope, gap < FOLD_GAP)

@@ -1,0 +1,123 @@
+"""A plan drawn: its lines in the coordinates of Π, cut where they meet, and its plane mesh."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.errors import PlanError, SurfaceError
+from .arrangement import Arrangement, arrange, hole_points
+from .curves import Curve
+from .edges import Boundary, boundary, check_lines
+from .lines import SNAP, Kind, Line
+from .parts import PlanData
+from .pieces import to_local
+from .planar import PlanarMesh, triangulate
+
+MAX_TRIANGLES = 5_000_000
+MAX_EDGES = 200_000  # along a line
+MAX_RISE = 10.0  # of the initial surface, over the size of the plan
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """A plan with its lines and its plane mesh.
+
+    Attributes
+    ----------
+    lines : the outline, then the holes, the dividers, and the supports that are not on the boundary.
+    supports_on_edge : the supports along the outline or a hole.
+    drawn : the lines cut where they meet.
+    mesh : of the plan, in the coordinates of Π; its first points are those of ``drawn``.
+    edges : the boundary, edge by edge.
+    """
+
+    plan: PlanData
+    lines: Sequence[Line]
+    supports_on_edge: Sequence[Curve]
+    drawn: Arrangement
+    mesh: PlanarMesh
+    edges: Boundary
+
+
+def drafted(plan: PlanData) -> Draft:
+    """Draw the lines of a plan and mesh what is between them.
+
+    Raises
+    ------
+    PlanError
+        For lengths that are probably mistakes, and lines that do not fit together.
+    """
+    _check_size(plan)
+    lines, on_edge = _lines(plan)
+    check_lines(plan, lines)
+    spots = np.array([to_local(p, plan.plane) for p in plan.supports if not isinstance(p, Curve)])
+    cut = [*on_edge, *(c.local(plan.plane) for c in (*(part.curve for part in plan.cables), *plan.mirrors))]
+    stops = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in cut)])
+    named = np.array([[*point, np.nan] for point in plan.points.values()]).reshape(-1, 3)
+    drawn = arrange(lines, plan.edge_length, np.concatenate([spots.reshape(-1, 3), named]), stops)
+    drawn = replace(drawn, spots=drawn.spots[: len(spots)])  # the named points are vertices, but not held
+    edges = np.concatenate([chain.edges for chain in drawn.chains])
+    try:
+        mesh = triangulate(drawn.points, edges, plan.edge_length, hole_points(drawn, lines))
+    except SurfaceError as error:
+        problem = f"lines of the plan are too close to each other for edges of length {plan.edge_length:g}"
+        raise PlanError(f"{problem}: {error}", what="edge_length", found=plan.edge_length) from None
+    return Draft(plan, lines, on_edge, drawn, mesh, boundary(plan, lines, drawn))
+
+
+def _check_size(plan: PlanData) -> None:
+    """Refuse lengths that are probably mistakes, before they fill the memory."""
+
+    def error(key: str, value: float, problem: str) -> PlanError:
+        return PlanError(f"{key}={value:g} {problem}", what=key, found=value)
+
+    x, y = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2].T
+    area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
+    count = area / math.sqrt(0.1875) / plan.edge_length / plan.edge_length  # its square may be 0 or infinite
+    size = float(np.hypot(np.ptp(x), np.ptp(y)))
+    if count > MAX_TRIANGLES:
+        problem = f"would make about {count:.2g} triangles; at most {MAX_TRIANGLES} are allowed"
+        raise error("edge_length", plan.edge_length, problem)
+    if plan.edge_length > size:
+        problem = f"is longer than the plan, {size:.4g} from corner to corner; use a smaller one"
+        raise error("edge_length", plan.edge_length, problem)
+    if plan.rise is not None and plan.rise > MAX_RISE * size:
+        problem = f"is more than {MAX_RISE:g} times the plan's size, {size:.4g}; use a smaller one"
+        raise error("rise", plan.rise, problem)
+    lines = {"the outline": plan.outline} | {hole.name: hole.curve for hole in plan.holes}
+    lines |= {f"divider {divider.name!r}": divider.curve for divider in plan.dividers}
+    lines |= {f"support {k}": s for k, s in enumerate(plan.supports, 1) if isinstance(s, Curve)}
+    for name, curve in lines.items():
+        if curve.length > MAX_EDGES * plan.edge_length:
+            problem = (
+                f"{name} is {curve.length:.3g} long, more than {MAX_EDGES} edges of {plan.edge_length:g}"
+            )
+            raise PlanError(f"{problem}; draw it as long as the plan", what=name, found=curve.length)
+    for hole in plan.holes:
+        xy = hole.curve.local(plan.plane).at(hole.curve.dense)[:, :2]
+        extent = float(np.ptp(xy, axis=0).max())
+        if extent <= SNAP * plan.edge_length:
+            problem = f"is only {extent:g} wide, too little for edges of length {plan.edge_length:g}"
+            problem += "; leave it out, or use a smaller edge_length"
+            raise PlanError(f"{hole.name} {problem}", what=hole.name, found=extent)
+
+
+def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:
+    """The lines to draw, in the coordinates of Π, and the supports that lie on the boundary."""
+    lines = [Line("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
+    lines += [Line(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
+    boundary = list(lines)
+    lines += [Line(f"divider {d.name!r}", Kind.DIVIDER, d.curve.local(plan.plane)) for d in plan.dividers]
+    on_edge, snap = [], SNAP * plan.edge_length
+    for number, support in enumerate(plan.supports, start=1):
+        if isinstance(support, Curve):
+            local = support.local(plan.plane)
+            if all(any(b.nearest(xy)[1] <= snap for b in boundary) for xy in local.at(local.dense)[:, :2]):
+                on_edge.append(local)
+            else:
+                lines.append(Line(f"support {number}", Kind.SUPPORT, local))
+    return lines, on_edge

@@ -1,0 +1,190 @@
+"""Explore: a surface saved as a project with its comments, and the page that follows its file."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+from asking import Client
+from browsing import until
+from explore_cases import HALL_TOML, designed_hall, followed
+from refusals import refused
+
+from generators import spherical_cap
+from pcmc import explore
+from pcmc.base.errors import FileError
+from pcmc.design import Parameter, Target
+from pcmc.explore import saving
+from pcmc.explore.roof import Roof, read_roof
+from pcmc.explore.session import Session, solved_start
+from pcmc.explore.variants import difference
+
+CAP = spherical_cap(edge_length=0.25)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("project")
+
+
+@pytest.fixture(scope="module")
+def roof(folder):
+    return designed_hall(folder)
+
+
+@pytest.fixture
+def session(roof):
+    return Session(solved_start(roof.surface))
+
+
+def test_saving_keeps_comments_and_the_shape_found_by_sliders(roof, session, folder):
+    state = session.settle({"tensions": {"west": 4.0, "wall 1": 2.5}, "pressures": {"east": 1.1}})
+    assert state.failure is None
+    path, note = saving.save(roof, state.surface, "found", False)
+    assert path == folder / "found.toml"
+    assert "without [targets]" in note
+    assert "apex of west" in note
+    text = path.read_text()
+    for line in ("# the hall", "# coarse", "wall = 2.5  # the valley", "west = {tension = 4.0}  # left"):
+        assert line in text
+    assert tomllib.loads(text)["plan"]["patches"]["east"]["pressure"] == 1.1
+    again = read_roof(path, use_cache=False).surface
+    moved = np.abs(difference(state.surface, roof.surface)).max()
+    assert np.abs(difference(again, state.surface)).max() < 0.05 * moved  # other triangles, the same shape
+    path.unlink()
+
+
+def test_saving_what_the_page_met_writes_its_targets(roof, session):
+    targets = Target("apex", "west", at_least=1.4), Target("height", [9, 3], 1.0)
+    vary = Parameter("west", low=1.0, high=9.0), Parameter("east")
+    state = session.meet(targets, vary)
+    assert state.message.startswith("met")
+    path, note = saving.save(roof, state.surface, "met.toml", False, session.aims)
+    assert note == "with its targets: apex of west, height at (9, 3)"
+    again = read_roof(path, use_cache=False)
+    assert again.targets == targets
+    assert again.vary == vary
+    assert again.note.startswith("met")
+    path.unlink()
+
+
+def test_an_unchanged_surface_is_saved_with_the_targets_of_the_file(roof, folder):
+    text, note = saving.project_with(roof, roof.surface)
+    assert note == ""
+    assert tomllib.loads(text)["targets"] == tomllib.loads(HALL_TOML)["targets"]
+
+
+def test_the_same_file_is_replaced_only_if_it_is_as_it_was_read(folder, roof):
+    with refused(FileError, what="name", found="hall.toml"):
+        saving.save(roof, roof.surface, "hall.toml", False)
+    path = folder / "hall.toml"
+    path.write_text(HALL_TOML + "# someone else\n")
+    try:
+        with pytest.raises(FileError, match="was changed since"):
+            saving.save(roof, roof.surface, "hall.toml", True)
+        assert path.read_text().endswith("# someone else\n")
+    finally:
+        path.write_text(HALL_TOML)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs links")
+def test_no_link_leads_a_save_out_of_the_folder(roof, folder, tmp_path):
+    os.symlink(tmp_path / "elsewhere.toml", folder / "link.toml")
+    try:
+        with pytest.raises(FileError, match="without folder"):
+            saving.save(roof, roof.surface, "link.toml", True)
+        assert not list(tmp_path.iterdir())
+    finally:
+        (folder / "link.toml").unlink()
+
+
+def test_walls_are_found_by_name_number_and_as_bare_curves(tmp_path):
+    path = tmp_path / "three.toml"
+    path.write_text(
+        "[plan]\nedge_length = 1.5\noutline = [[0, 0], [12, 0], [12, 4], [0, 4]]\n"
+        'dividers = [[[4, 0], [4, 4]], {name = "valley", curve = [[8, 0], [8, 4]]}]\n'
+        "[plan.patches]\na = {tension = 5.0}\nb = {tension = 5.0}\nc = {tension = 5.0}\n"
+    )
+    roof = read_roof(path, start_shape=True)
+    surface = roof.surface.retensioned({"wall 1": 0.5, "valley": 0.25})
+    dividers = tomllib.loads(saving.project_with(roof, surface)[0])["plan"]["dividers"]
+    assert [d["wall"] for d in dividers] == [0.5, 0.25]
+    assert dividers[0]["curve"] == [[4, 0], [4, 4]]
+
+
+def test_surfaces_without_a_project_are_not_saved(tmp_path):
+    with pytest.raises(FileError, match="use Export"):
+        saving.save(Roof(CAP), CAP, "cap", False)
+
+
+def test_on_the_network_nothing_is_saved(roof, folder):
+    running = explore.start_roof(roof, host="0.0.0.0")
+    try:
+        client = Client(running)
+        header, _ = client.ask("/api/open")
+        assert header["project"] is False
+        assert "only a page of this machine" in client.ask(
+            f"/api/{header['session']}/save", {"name": "x"}, status=403
+        )
+        assert not (folder / "x.toml").exists()
+    finally:
+        running.close()
+
+
+def test_the_page_follows_the_file_and_survives_a_broken_save(tmp_path):
+    path = tmp_path / "hall.toml"
+    path.write_text(HALL_TOML)
+    with followed(path) as running:
+        client = Client(running)
+        name = client.ask("/api/open")[0]["session"]
+
+        def news():
+            return client.ask(f"/api/{name}/news")[0]
+
+        assert news() == {"version": 0, "working": False, "problem": "", "progress": ""}
+        path.write_text(HALL_TOML.replace("edge_length", "edge_lenght"))
+        until(lambda: "did you mean 'edge_length'" in news()["problem"], "the problem")
+        assert str(tmp_path) not in news()["problem"]
+        assert news()["version"] == 0
+        kept, _ = client.ask(f"/api/{name}/state")
+        path.write_text(
+            HALL_TOML.replace("value = 1.2", "value = 1.5").replace("[6, 0], [6, 6]", "[7, 0], [7, 6]")
+        )
+        until(lambda: news()["version"] == 1, "the new roof")
+        assert news()["problem"] == ""
+        renewed, _ = client.ask("/api/open", {"session": name})
+        rows = {(r["quantity"], r["of"]): r["value"] for r in renewed["measures"]}
+        assert rows["apex", "west"] == pytest.approx(1.5, rel=1e-6)
+        assert renewed["mesh"] != kept["mesh"]
+        assert renewed["undo"] == 1
+        assert client.ask(f"/api/{name}/undo")[0]["mesh"] != renewed["mesh"]
+        saved, _ = client.ask(f"/api/{name}/save", {"name": "hall.toml", "replace": True})
+        assert saved["saved"] == "hall.toml"
+        path.unlink()
+        until(lambda: "cannot be read" in news()["problem"], "the missing file")
+
+
+def test_a_drawing_that_a_project_refers_to_is_followed(tmp_path):
+    ezdxf = pytest.importorskip("ezdxf")
+
+    def draw(width):
+        drawing = ezdxf.new()
+        corners = [(0, 0), (width, 0), (width, 5), (0, 5)]
+        drawing.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": "outline"})
+        drawing.units = 6
+        drawing.saveas(tmp_path / "hall.dxf")
+
+    draw(8)
+    path = tmp_path / "roof.toml"
+    path.write_text('[plan]\ndrawing = "hall.dxf"\nedge_length = 1.0\n')
+    with followed(path) as running:
+        draw(11)
+        until(lambda: running.version == 1, "the new drawing")
+        assert np.ptp(running.start.surface.vertices[:, 0]) == pytest.approx(11.0)
+        surface = running.start.surface.retensioned({running.start.surface.patches[0].name: 9.0})
+        plan = tomllib.loads(saving.project_with(running.roof, surface)[0])["plan"]
+        assert plan["drawing"] == "hall.dxf"
+        assert [area["tension"] for area in plan["patches"].values()] == [9.0]

@@ -1,0 +1,187 @@
+"""Explore in a real browser: how the page is looked at, and that every part of it can be reached."""
+
+from __future__ import annotations
+
+from browsing import Explored, browser, changed, needs_browser, until
+
+from generators import spherical_cap
+from pcmc import explore
+from pcmc.base.units import Units
+
+CAP = spherical_cap(edge_length=0.25)
+pytestmark = needs_browser
+
+
+def test_terms_are_explained_where_they_stand_by_keys_too(page):
+    from selenium.webdriver.common.keys import Keys
+
+    for name, words in (
+        ("Morse index", "saddle"),
+        ("Load over capacity", "no equilibrium exists"),
+        ("Error by Meyer's measure", "Voronoi"),
+    ):
+        (summary,) = [
+            s for s in page.driver.find_elements("css selector", "#findings summary") if s.text == name
+        ]
+        assert words not in page.text("#findings")
+        summary.send_keys(Keys.ENTER)
+        assert words in page.text("#findings")
+        page.driver.find_element("css selector", "#findings details[open] summary").click()
+
+
+def test_the_walls_are_a_layer(page):
+    page.find("#canvas").send_keys("\ue015" * 12)  # down: the roof from below
+    page.idle()
+    before = page.picture()
+    page.find("#shows input[value=walls]").click()
+    page.idle()
+    assert changed(before, page.picture()) > 0.01
+
+
+def test_units_stand_behind_the_numbers_where_they_are_given(driver):
+    running = explore.start(CAP, units=Units("ft", "kip"))
+    try:
+        page = Explored(driver, running.url)
+        rows = page.text("#findings")
+        assert " ft\n" in rows
+        assert " ft²\n" in rows
+        assert " ft³\n" in rows
+        assert " kip·ft\n" in rows
+        for name, words in (("curvature", "1/ft"), ("reactions", "kip/ft")):
+            page.find(f"#colours input[value={name}]").click()
+            page.idle()
+            assert words in page.text("#legend .name")
+        titles = [
+            label.get_attribute("title") for label in driver.find_elements("css selector", "#patches label")
+        ]
+        assert titles == ["kip/ft", "kip/ft²"]
+        assert not page.complaints()
+    finally:
+        running.close()
+
+
+def test_colours_come_with_their_scale(page):
+    before = page.picture()
+    assert not page.find("#legend").is_displayed()
+    units = {"curvature": "1/length", "error": "%", "reactions": "force/length", "family": "1 %"}
+    for name, words in units.items():
+        page.find(f"#colours input[value={name}]").click()
+        page.idle()
+        until(lambda words=words: words in page.text("#legend .name"), "the scale")
+        low, high = (float(page.text(f"#legend .{end}")) for end in ("low", "high"))
+        assert low < high
+        assert changed(before, page.picture()) > 0.1
+    page.find("#colours input[value=patches]").click()
+    page.idle()
+    assert changed(before, page.picture()) == 0.0
+    for name in ("mesh", "supports", "smooth", "grid"):
+        page.find(f"#shows input[value={name}]").click()
+        page.idle()
+        assert changed(before, page.picture(), by=0.01) > 0.005, name
+        page.find(f"#shows input[value={name}]").click()
+        page.idle()
+    assert page.complaints() == []
+
+
+def test_the_view_turns_by_keys_mouse_and_fingers(page):
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    canvas, before = page.find("#canvas"), page.picture()
+
+    def home():
+        page.find("[data-view=diagonal]").click()
+        page.idle()
+        assert changed(before, page.picture()) == 0.0
+
+    for keys in (Keys.ARROW_LEFT, Keys.ARROW_UP, "+"):
+        canvas.send_keys(keys)
+        page.idle()
+        assert changed(before, page.picture()) > 0.01
+        home()
+    ActionChains(page.driver).drag_and_drop_by_offset(canvas, 60, 20).perform()
+    page.idle()
+    turned = page.picture()
+    assert changed(before, turned) > 0.01
+    home()
+    box = canvas.rect
+    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    touch(page.driver, [middle], [(middle[0] + 60, middle[1] + 20)])
+    page.idle()
+    assert changed(turned, page.picture()) < 0.02
+    home()
+    apart = [(middle[0] - d, middle[1]) for d in (-40, 40)]
+    touch(page.driver, apart, [(middle[0] - d, middle[1]) for d in (-90, 90)])
+    page.idle()
+    assert changed(before, page.picture()) > 0.05  # a pinch comes nearer
+    home()
+    for name in ("elevation", "plan"):
+        page.find(f"[data-view={name}]").click()
+        page.idle()
+        assert changed(before, page.picture()) > 0.05
+    assert page.complaints() == []
+
+
+def touch(driver, start, end):
+    """Put fingers down, move them and lift them."""
+
+    def points(part):
+        return [
+            {"x": a[0] + part * (b[0] - a[0]), "y": a[1] + part * (b[1] - a[1]), "id": k}
+            for k, (a, b) in enumerate(zip(start, end, strict=True))
+        ]
+
+    steps = [("touchStart", points(0.0)), *(("touchMove", points(k / 5)) for k in range(1, 6))]
+    for kind, where in (*steps, ("touchEnd", [])):
+        driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": where})
+
+
+def test_every_control_has_a_name_and_the_keyboard_reaches_it(page):
+    nameless = page.driver.execute_script("""
+        return [...document.querySelectorAll("button, input, summary, canvas")].filter((e) => !(
+          e.getAttribute("aria-label") || e.textContent.trim() || [...(e.labels || [])].some(
+            (l) => l.textContent.trim()))).map((e) => e.outerHTML)""")
+    assert nameless == []
+    unreachable = page.driver.execute_script(
+        "return [...document.querySelectorAll('button, input, summary, canvas')]"
+        ".filter((e) => e.tabIndex < 0).length"
+    )
+    assert unreachable == 0
+    doubled = page.driver.execute_script(
+        "const ids = [...document.querySelectorAll('[id]')].map((e) => e.id);"
+        "return ids.filter((id, i) => ids.indexOf(id) !== i)"
+    )
+    assert doubled == []
+
+
+def test_on_a_small_screen_the_verdict_stays_in_view(page):
+    page.driver.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride",
+        {"width": 360, "height": 700, "deviceScaleFactor": 1, "mobile": True},
+    )
+    try:
+        page.idle()
+        page.driver.execute_script("window.scrollTo(0, document.body.scrollHeight)")
+        page.idle()
+        scrolled, wide, top, bottom = page.driver.execute_script("""
+            const box = document.querySelector("#verdict").getBoundingClientRect();
+            return [scrollY, document.documentElement.scrollWidth, box.top, box.bottom]""")
+        assert scrolled > 200
+        assert wide <= 360
+        assert top >= 0
+        assert bottom <= 700
+    finally:
+        page.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_without_webgl_the_page_says_so_in_one_line_and_works(explorer, tmp_path):
+    running = browser(tmp_path, "--disable-3d-apis")
+    try:
+        page = Explored(running, explorer.url)
+        assert "WebGL 2 is missing" in page.text("#no-graphics")
+        words = page.text("#findings")
+        page.enter("Tension α of left wall", 14)
+        assert page.verdict == "stable"
+        assert page.text("#findings") != words
+    finally:
+        running.quit()

@@ -1,0 +1,228 @@
+"""Project files: every key and value is checked, and an error names its line and what to type."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from refusals import refused
+from small_project import changed
+
+from pcmc.base.errors import FileError
+from pcmc.project import load, reference, sections
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "key", "near"),
+    [
+        ("[output]", "[outptu]", 10, "outptu", "output"),
+        ("edge_length", "edge_lenght", 3, "plan.edge_lenght", "edge_length"),
+        ("method =", "metod =", 8, "solve.metod", "method"),
+        ('"newton"', '"newton"\ntoleranse = 1e-9', 9, "solve.toleranse", "tolerance"),
+        ("files =", "file =", 11, "output.file", "files"),
+        ("tension =", "tension = 1, tensoin =", 5, "plan.patches.roof.tensoin", "tension"),
+        ("[solve]", "[[plan.holes]]\ncurve = []\nedg = 1\n[solve]", 9, "plan.holes.edg", "edge"),
+        ("[solve]", "[[plan.dividers]]\ncurve = []\nbotom = 1\n[solve]", 9, "plan.dividers.botom", "bottom"),
+        ("[solve]", "[plan.plane]\nnormall = [0, 0, 1]\n[solve]", 8, "plan.plane.normall", "normal"),
+        ("[output]", "[[remesh]]\nedge_length = 1\n[[remesh]]\nwen = 1\n[output]", 13, "remesh.wen", "when"),
+        ("[output]", "[targets]\nmeet = []\nvaryy = []\n[output]", 12, "targets.varyy", "vary"),
+        (
+            "[output]",
+            '[targets]\nvary = []\nmeet = [{quantity = "apex", valu = 1}]\n[output]',
+            12,
+            "targets.meet.valu",
+            "value",
+        ),
+    ],
+)
+def test_an_unknown_key_has_its_line_and_the_nearest_key(small, old, new, line, key, near):
+    with refused(FileError, what=key, where=line, found=key.rpartition(".")[2]) as caught:
+        load(changed(small, old, new))
+    text = str(caught.value)
+    assert text.startswith(f"{small}: line {line}: unknown ")
+    assert f"did you mean {near!r}?" in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "key"),
+    [
+        ("outline = [[0, 0], [4, 0], [4, 3], [0, 3]]", "", 2, "plan.outline"),
+        ("tension =", "pressure =", 5, "plan.patches.roof.tension"),
+        ("[output]", "[remesh]\ngrowth = 2\n[output]", 10, "remesh.edge_length"),
+        ("[output]", '[targets]\nmeet = [{quantity = "apex"}]\n[output]', 10, "targets.vary"),
+        ("[output]", '[targets]\nmeet = [{of = "a"}]\nvary = ["a"]\n[output]', 11, "targets.meet.quantity"),
+        ("[output]", "[targets]\nmeet = []\nvary = [{low = 1}]\n[output]", 12, "targets.vary.patch"),
+    ],
+)
+def test_a_missing_key_is_named_with_the_line_of_its_table(small, old, new, line, key):
+    with refused(FileError, what=key, where=line) as caught:
+        load(changed(small, old, new))
+    assert f"needs the key {key.rpartition('.')[2]!r}" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fields"),
+    [
+        ("[plan]", "[plan", {"where": 2}),
+        ("[plan]", "solve = 3\n[plan]", {"where": 8}),
+        ('"newton"', '"newtn"', {"what": "solve.method", "where": 8, "found": "newtn"}),
+        ('"newton"', '"newton"\niterations = -1', {}),
+        ("edge_length = 1.0", "edge_length = -1.0", {}),
+        ('["roof.pcmc", "roof.obj"]', '"roof.obj"', {"what": "output.files", "where": 11}),
+        ("files =", "picture = 3\nfiles =", {"what": "output.picture", "where": 11, "found": 3}),
+        ("files =", 'colour = "eror"\nfiles =', {"what": "output.colour", "found": "eror"}),
+        ('"roof.obj"', '"roof.obk"', {"what": "roof.obk", "found": ".obk"}),
+        ("files =", 'picture = "roof.jpg"\nfiles =', {"what": "roof.jpg"}),
+        ("[output]", "[remesh]\nedge_length = -1\n[output]", {}),
+        ("[output]", "[remesh]\nedge_length = 1\nwhen = 'beforre'\n[output]", {"what": "remesh.when"}),
+        ("[output]", "[targets]\nmeet = []\nvary = []\n[output]", {"what": "targets.meet"}),
+    ],
+)
+def test_a_bad_value_is_one_line_with_the_file(small, old, new, fields):
+    with refused(FileError, **fields) as caught:
+        load(changed(small, old, new))
+    assert str(caught.value).startswith(f"{small}: ")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "key", "kind"),
+    [
+        ("dividers = 3", "dividers", "a list of curves or tables"),
+        ("holes = {curve = 3}", "holes", "a list of curves or tables"),
+        ('supports = "x"', "supports", "a list of points and curves"),
+        ("patches = 3", "patches", "a table"),
+        ("patches = {roof = 3}", "patches.roof", "a table"),
+        ('patches = {roof = {tension = "b"}}', "patches.roof.tension", "a number"),
+        ("patches = {roof = {tension = true}}", "patches.roof.tension", "a number"),
+        (
+            'dividers = [{curve = [[2, 0], [2, 3]], wall = "a"}]',
+            "dividers.wall",
+            'a number, "balanced" or false',
+        ),
+        ("outline = 3", "outline", "a curve"),
+        ('rise = "x"', "rise", "a number"),
+        ("plane = {normal = 3}", "plane.normal", "a point [x, y, z]"),
+    ],
+)
+def test_values_of_the_wrong_kind(tmp_path, line, key, kind):
+    path = tmp_path / "p.toml"
+    rest = ["edge_length = 1.0"]
+    if not line.startswith("outline"):
+        rest.append("outline = [[0, 0], [4, 0], [4, 3], [0, 3]]")
+    if not line.startswith("patches"):
+        rest.append("patches = {roof = {tension = 2.0}}")
+    path.write_text("\n".join(["[plan]", "edge = 'fixed'", line, *rest]), encoding="utf-8")
+    with refused(FileError, what=f"plan.{key}", where=3, expected=kind) as caught:
+        load(path)
+    assert str(caught.value).startswith(f"{path}: line 3: plan.{key} must be {kind}, found ")
+    assert ("; write [[plan.holes]]" in str(caught.value)) == (key == "holes")
+
+
+@pytest.mark.parametrize(
+    ("at", "key"),
+    [('"b"', "plan.patches.roof.at"), ("3", "plan.patches.roof.at"), ("[1, nan]", "at"), ('["b", 2]', "at")],
+)
+def test_a_patch_is_at_a_point(small, at, key):
+    with refused(FileError, what=key) as caught:
+        load(changed(small, "tension = 2.0", f"tension = 2.0, at = {at}"))
+    assert "a point [x, y] or a list of points" in str(caught.value)
+
+
+def test_a_wrong_value_inside_a_curve(small):
+    changed(small, "edge_length", 'holes = [{circle = {centre = [1, 1], radius = "x"}}]\nedge_length')
+    with pytest.raises(FileError, match=r"hole 1: circle: radius: expected .*, found 'x'"):
+        load(small)
+
+
+def test_the_line_is_that_of_the_entry_with_the_wrong_value(small):
+    holes = "[[plan.holes]]\ncurve = []\nedge = 'free'\n[[plan.holes]]\ncurve = []\nedge = 'fred'\n"
+    with refused(FileError, what="plan.holes.edge", where=12, found="fred"):
+        load(changed(small, "[solve]", f"{holes}[solve]"))
+
+
+def test_the_manual_lists_every_key_that_is_read():
+    from dataclasses import fields
+
+    from pcmc.design import Parameter, Target
+    from pcmc.plan import Area, Divider, Hole, Plan
+    from pcmc.plot.scene import VIEWS
+    from pcmc.project import Remeshing
+    from pcmc.project.accuracy import AccuracyWanted
+    from pcmc.project.keys import KINDS
+    from pcmc.solvers import find_method
+    from pcmc.surface import Plane
+
+    classes = {
+        "plan": Plan,
+        "plan.patches.NAME": Area,
+        "plan.dividers": Divider,
+        "plan.holes": Hole,
+        "plan.plane": Plane,
+        "remesh": Remeshing,
+        "targets.meet": Target,
+        "targets.vary": Parameter,
+    }
+    listed = {(s.name, s.condition): s for s in sections()}
+    for name, cls in classes.items():
+        unused = {Area: {"name"}, Plane: {"name", "mirror"}}.get(cls, set())
+        names = {f.name for f in fields(cls)} - unused
+        # what Plan's lines are made from, and what stands for tensions
+        names |= {Plan: {"drawing", "gap", "apex", "span_ratio"}, Area: {"rise", "apex"}}.get(cls, set())
+        assert {key.name for key in listed[name, ""].keys} == names
+    for method in ("newton", "nesterov", "lbfgs"):
+        options = {f.name: f.default for f in fields(find_method(method).options)}
+        section = listed["solve", f'method = "{method}"']
+        extra = fields(AccuracyWanted) if method == "newton" else ()
+        options |= {f.name: None if f.name == "accuracy" else f.default for f in extra}
+        assert {key.name: key.default for key in section.keys[2:]} == options
+    manual = reference()
+    for section in sections():
+        for key in section.keys:
+            assert key.help, (section.name, key.name)
+            assert KINDS[key.kind]
+            assert f"| `{key.name}` | " in manual
+    (view,) = (key for key in listed["output", ""].keys if key.name == "view")
+    assert all(name in view.help for name in VIEWS)
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(FileError, match="cannot be read"):
+        load(tmp_path / "none.toml")
+    (tmp_path / "p.toml").write_bytes(b"ab\xff\xfe")
+    with refused(FileError, what=str(tmp_path / "p.toml"), where=2):
+        load(tmp_path / "p.toml")
+    (tmp_path / "p.toml").write_text("# nothing", encoding="utf-8")
+    with refused(FileError, what="plan", where=1):
+        load(tmp_path / "p.toml")
+    (tmp_path / "p.toml").write_text("plan = 3", encoding="utf-8")
+    with refused(FileError, what="plan", where=1, found=3, expected="a table"):
+        load(tmp_path / "p.toml")
+
+
+@pytest.mark.parametrize("text", ["[plan]\ngröße = 1", "[größe]", "[plan]\na = {süd = 1}"])
+def test_letters_beyond_a_to_z_need_quotes_and_this_is_said(small, text):
+    small.write_text(text, encoding="utf-8")
+    with pytest.raises(FileError, match=r"not TOML: .*put names with letters beyond a-z in quotes"):
+        load(small)
+    small.write_text("[plan", encoding="utf-8")
+    with pytest.raises(FileError, match=r"at end of document\)$"):
+        load(small)
+    small.write_text("# größe\nplan = ]", encoding="utf-8")
+    with pytest.raises(FileError, match=r"at line 2, column 8\)$"):
+        load(small)
+
+
+def test_a_project_is_read_with_the_mark_of_windows_editors(small):
+    small.write_bytes(b"\xef\xbb\xbf" + small.read_bytes())
+    assert load(small).method == "newton"
+
+
+@pytest.mark.parametrize(
+    ("view", "found"), [('"diagnal"', "diagnal"), ("[30]", [30]), ("[30, 'a']", [30, "a"]), ("3", 3)]
+)
+def test_a_bad_view_is_refused_before_any_work(small, view, found):
+    changed(small, "files =", f"view = {view}\nfiles =")
+    with pytest.raises(FileError, match=rf"view.* {re.escape(repr(found))}"):
+        load(small)
