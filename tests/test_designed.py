@@ -12,7 +12,7 @@ import pytest
 import pcmc
 from pcmc import cli
 from pcmc.base.units import Units
-from pcmc.cli.reports import UNIT_OF
+from pcmc.design.outcome import UNIT_OF
 from pcmc.design.quantities import QUANTITIES
 from pcmc.project import build, cached_files, clear_cache, designed, load, run, running
 from tests.test_project import SMALL

@@ -115,7 +115,7 @@ def solve_(
         run = partial(projects.check_of, project, outcome)
         check = checking.mesh_check(outcome.surface, outcome.certificate, wanted, run)
     if check is not None:
-        print(f"\n{check.brief()}")
+        print(f"\n{check.brief(outcome.units)}")
     return OK if outcome.good else NOT_CERTIFIED
 
 
@@ -169,7 +169,7 @@ def certify_(
         with working() as say:
             say("checking the mesh")
             check = check_mesh(surface, meshes)
-        print(f"\n{check}")
+        print(f"\n{check.text(shown.units)}")
     good = certificate.certified if outcome is None else outcome.good
     return OK if good else NOT_CERTIFIED
 

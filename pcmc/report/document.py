@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from ..base import validate
 from ..base.errors import FileError
 from ..base.files import atomic_write
-from ..base.units import Units, expect_length
+from ..base.units import Units, as_units, expect_length
 from ..certificate import Certificate
 from ..certificate.reactions import held_lengths
 from ..panels import Panels, panels
@@ -121,7 +120,7 @@ class RoofReport:
             story += pages.picture("Reactions of the supports on the roof", pictures["Reactions"])
         story += [pages.heading("Forces"), pages.paragraph(words.about_forces(units))]
         if self.targets is not None:
-            story += pages.table(tables.target_table(self.targets))
+            story += pages.table(tables.target_table(self.targets, self.units))
         listed = [
             tables.patch_table(surface, certificate, units),
             tables.junction_table(certificate, units),
@@ -145,7 +144,7 @@ class RoofReport:
         return [
             pages.heading("Mesh check"),
             pages.paragraph(f"{text[:1].upper()}{text[1:]}. {about}"),
-            *pages.table(tables.mesh_table(check)),
+            *pages.table(tables.mesh_table(check, self.units)),
         ]
 
     def _panel_story(self, schedule: Panels, picture: bytes) -> list[Any]:
@@ -221,9 +220,7 @@ def roof_report(
     '1:20'
     """
     expect_surface(surface)
-    units = Units(units) if isinstance(units, str) else units
-    if not isinstance(units, Units):
-        validate.refuse("units", units, "Units, or a unit of length")
+    units = as_units(units)
     expect_length(units.length, "a report")
     pages.register_fonts()
     certificate = certified(surface, anyway)
