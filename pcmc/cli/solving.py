@@ -16,7 +16,7 @@ from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
 from ..certificate.certificate import certify
 from ..io import write
-from ..meshing.remeshing import remesh
+from ..meshing.remeshing import remesh, size_note
 from . import NOT_CERTIFIED, OK, arguments, checking
 from .arguments import (
     MANY_FILES,
@@ -202,6 +202,8 @@ def remesh_(
             surface = remesh(shown.surface, **stage.options)
             writing = partial(write, surface=surface, units=shown.units)
             projects.write_all([(path, writing) for path in output], say)
+        if note := size_note(surface, edge_length):
+            print(note)
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
     project = replace(_project(file, None, output, None), remeshing=(stage,), picture=None)
