@@ -91,6 +91,10 @@ class AccurateResult:
     surfaces: tuple[Surface, ...]
     detail: str = ""
 
+    def __repr__(self) -> str:
+        """How the search ended, above the surface it reached."""
+        return f"{self.message}\n{self.surface!r}"
+
     @property
     def reached(self) -> bool:
         """Whether every quantity is as accurate as wanted."""

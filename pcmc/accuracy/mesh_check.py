@@ -101,6 +101,8 @@ class MeshCheck:
     def __str__(self) -> str:
         return self.text()
 
+    __repr__ = __str__  # what a prompt shows: the table, not arrays
+
     def _head(self) -> list[str]:
         return [part for part in (self.verdict.value, self.detail, self.advice) if part]
 

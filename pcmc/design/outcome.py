@@ -55,7 +55,7 @@ class NoStart(SurfaceError):
     """There is no equilibrium to start a search for targets from; the message says why."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Design:
     """The end of a search for targets. Every value describes exactly ``surface``.
 
@@ -82,6 +82,14 @@ class Design:
     solves: int
     history: pd.DataFrame
     reason: str = ""
+
+    def __repr__(self) -> str:
+        """How the search ended, what it reached and with what, above the surface."""
+        values = "\n".join(
+            f"  {name}: {values_text(table['value'])}"
+            for name, table in (("targets", self.targets), ("parameters", self.parameters))
+        )
+        return f"{self.message}\n{values}\n  {self.solves} solves\n{self.surface!r}"
 
     @property
     def met(self) -> bool:

@@ -7,8 +7,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..base.errors import FileError, unknown
+from ..plan.curves import CURVES
 from .keys import KINDS, REQUIRED, Section, main_sections, solve_section, target_sections
 
+OR_CURVE = ("plan.dividers", "plan.holes")  # sections in place of which a curve may stand
 LONGEST = 1023  # bits of a float's exponent
 Place = tuple[str, ...]  # the keys that lead to a table or a value
 
@@ -51,11 +53,14 @@ def _tables(data: Any, section: Section) -> Iterator[tuple[Place, Any]]:
         else:
             below = [((*p, step), table[step]) for p, table in found if step in table]
             found = [(p, t) for p, value in below for t in (value if isinstance(value, list) else [value])]
-    curved = any(key.name == "curve" for key in section.keys)
     for place, table in found:
-        # a divider or hole without the key "curve" is a curve itself
-        if "curve" in table or not curved if isinstance(table, Mapping) else section.name.endswith("NAME"):
+        if not _is_curve(section, table) if isinstance(table, Mapping) else section.name.endswith("NAME"):
             yield place, table
+
+
+def _is_curve(section: Section, table: Mapping[str, Any]) -> bool:
+    """Whether the table of a divider or hole is a curve itself."""
+    return section.name in OR_CURVE and "curve" not in table and any(name in CURVES for name in table)
 
 
 def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
@@ -72,7 +77,8 @@ def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
             raise _error(text, (*place, name), message, found=value, expected=key.choices)
     for name in table:
         if name not in known:
-            message = unknown(f"key of {title}", name, known)
+            curves = CURVES if section.name in OR_CURVE and "curve" not in table else ()
+            message = unknown(f"key of {title}", name, [*known, *curves])
             raise _error(text, (*place, name), message, found=name, expected=tuple(known))
     for name, key in known.items():
         if key.default is REQUIRED and name not in table and not any(other in table for other in key.unless):
