@@ -6,7 +6,8 @@ from motion_cases import SURFACES, seam
 
 from pcmc import hessian
 from pcmc.energy.motion_space import motion_space, vertex_classes
-from pcmc.energy.projected_hessian import assemble, hessian_pattern
+from pcmc.energy.pattern import hessian_pattern
+from pcmc.energy.projected_hessian import assemble
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 

@@ -9,7 +9,7 @@ from starts import double_bubble, sphere, two_squares
 
 from pcmc import Patch, Surface, hessian
 from pcmc.energy.motion_space import motion_space, vertex_classes
-from pcmc.energy.projected_hessian import Pattern
+from pcmc.energy.pattern import Pattern
 from pcmc.energy.rigid_motions import rigid_modes, rigid_motions
 from pcmc.stability.factorisation import factoriser
 from pcmc.stability.modes import lowest, negatives_without, stiffness

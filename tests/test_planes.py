@@ -24,7 +24,8 @@ from pcmc.energy.functional import (
 )
 from pcmc.energy.jacobian import linearise
 from pcmc.energy.motion_space import motion_space, vertex_classes
-from pcmc.energy.projected_hessian import assemble, hessian_pattern
+from pcmc.energy.pattern import hessian_pattern
+from pcmc.energy.projected_hessian import assemble
 from pcmc.meshing.local_refinement import refine_faces
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh

@@ -21,7 +21,7 @@ from ..contact.pull import excess_pull
 from ..energy.curvature import METHODS, curvature_error, mean_curvature, target_curvature
 from ..energy.functional import energy_and_gradient, patch_areas, volume
 from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
-from ..energy.motion_space import VertexClasses, force_scale, motion_space
+from ..energy.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..energy.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..meshing.quality import triangle_quality
@@ -39,6 +39,7 @@ from .reactions import reactions
 from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
+UNKNOWN: tuple[int | None, Floats, Floats] = None, np.empty(0), np.empty((0, 0, 3))  # as of ``_stability``
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,14 +222,8 @@ def certify(
     qualities = triangle_quality(X, standing.faces)
     in_wall = part.walls.pinchable[standing.patch_of_face]
     quality = float(qualities[~in_wall].min(initial=1.0))
-    index, eigenvalues, fields = None, np.empty(0), np.empty((0, 0, 3))
-    if residual <= tolerance and quality > COLLAPSED:
-        with suppress(SingularMatrix):
-            system = stiffness(standing, classes, space, rigid)
-            index = system.negative
-            if modes > 0 and space.size > 2:
-                eigenvalues, fields = lowest(system, modes)
-            del system  # the factor is most of a large surface's memory
+    at_rest = residual <= tolerance and quality > COLLAPSED
+    index, eigenvalues, fields = _stability(standing, classes, space, rigid, modes) if at_rest else UNKNOWN
 
     patches = _patch_table(surface, standing, areas, qualities)
     ratio, support_forces = load_ratio(standing), reactions(standing)
@@ -278,6 +273,19 @@ def certify(
         leaning=lean_table(standing),
         symmetric_in=tuple(str(plane) for plane, _ in surface.on_planes if plane.mirror),
     )
+
+
+def _stability(
+    surface: Surface, classes: VertexClasses, space: MotionSpace, rigid: Floats, modes: int
+) -> tuple[int | None, Floats, Floats]:
+    """The Morse index, the lowest eigenvalues and their modes; unknown where the matrix is singular."""
+    index, eigenvalues, fields = UNKNOWN
+    with suppress(SingularMatrix):
+        system = stiffness(surface, classes, space, rigid)
+        index = system.negative
+        if modes > 0 and space.size > 2:
+            eigenvalues, fields = lowest(system, modes)
+    return index, eigenvalues, fields
 
 
 def _own_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> Floats:

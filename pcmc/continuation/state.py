@@ -20,7 +20,8 @@ from ..energy.functional import (
 )
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
-from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
+from ..energy.pattern import Pattern, hessian_pattern
+from ..energy.projected_hessian import assemble
 from ..energy.rooms import (
     prescribed_volumes,
     volume_gradients_at,

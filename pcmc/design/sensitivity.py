@@ -32,7 +32,8 @@ from ..contact.pull import excess_pull
 from ..energy.functional import energy_and_gradient, gradient_by
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
-from ..energy.projected_hessian import assemble, hessian_pattern
+from ..energy.pattern import hessian_pattern
+from ..energy.projected_hessian import assemble
 from ..energy.rooms import prescribed_volumes, volume_defects, volume_gradients_at
 from ..stability.bordered import BorderedFactor
 from ..stability.factorisation import Factor, SingularMatrix, factoriser

@@ -12,11 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..base.compiled import compiled
 from ..base.errors import SurfaceError
 from ..surface import Surface
 from ..surface.cable import CableEdges
-from ..surface.geometry import dot, norm, point, scaled, sub, vector
 from ..surface.topology import Topology
 
 
@@ -94,46 +92,3 @@ def tensions_on(topo: Topology, cables: CableEdges) -> Floats:
         )
         raise SurfaceError(message, what="cables", where=(i, j))
     return np.bincount(place, cables.tension, len(topo.edges)).astype(float)
-
-
-@compiled
-def assemble_cables(
-    X: Floats,
-    ends: Ints,
-    tension: Floats,
-    basis: Floats,
-    dimension: Ints,
-    start: Ints,
-    indptr: Ints,
-    indices: Ints,
-    hessian: float,
-    stiffness: float,
-    data: Floats,
-) -> None:
-    """Add hessian · τ/ℓ (1 - t tᵀ) + stiffness · τ/ℓ of each edge to the upper triangle of BᵀHB."""
-    for e in range(len(ends)):
-        i, j = min(ends[e, 0], ends[e, 1]), max(ends[e, 0], ends[e, 1])
-        side = sub(point(X, j), point(X, i))
-        length = norm(side)
-        if length == 0.0:
-            continue
-        t, k = scaled(1.0 / length, side), tension[e] / length
-        for v in (i, j):
-            for r in range(dimension[v]):
-                at = indptr[start[v] + r] - r
-                for s in range(r, dimension[v]):
-                    b, c = vector(basis[v, r]), vector(basis[v, s])
-                    product = dot(b, c)
-                    turning = product - dot(b, t) * dot(c, t)
-                    data[at + s] += k * (hessian * turning + stiffness * product)
-        if dimension[j] == 0:
-            continue
-        for r in range(dimension[i]):
-            row = start[i] + r
-            low, high = indptr[row], indptr[row + 1]
-            at = low + np.searchsorted(indices[low:high], start[j])
-            for s in range(dimension[j]):
-                b, c = vector(basis[i, r]), vector(basis[j, s])
-                product = dot(b, c)
-                turning = product - dot(b, t) * dot(c, t)
-                data[at + s] -= k * (hessian * turning + stiffness * product)

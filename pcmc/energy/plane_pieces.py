@@ -16,11 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..base.compiled import compiled
 from ..surface import Surface
-from ..surface.geometry import cross, dot, scaled, vector
 from .flat_pieces import FlatPieces, flat_pieces
-from .motion_space import MotionSpace, VertexClasses
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -79,55 +76,7 @@ def plane_hessian(surface: Surface) -> csr_array:
     return half + half.T
 
 
-def add_plane_hessian(
-    surface: Surface,
-    classes: VertexClasses,
-    space: MotionSpace,
-    indptr: Ints,
-    offset: Ints,
-    scale: float,
-    data: Floats,
-) -> Floats:
-    """Values (k,) with scale · Bᵀ(-p ∂²V)B of the flat pieces added, at the places of a ``Pattern``."""
-    pieces = flat_pieces(surface)
-    if pieces:
-        pressed = classes.active[pieces.face] & (surface.pressures[surface.patch_of_face[pieces.face]] != 0.0)
-        number = np.cumsum(classes.active) - 1
-        face, corner = number[pieces.face[pressed]], pieces.corner[pressed]
-        weight = scale * surface.pressures[surface.patch_of_face[pieces.face[pressed]]] / 6.0
-        apex = np.ascontiguousarray(pieces.apex[pressed])
-        _add_to_pattern(classes.faces, face, corner, apex, weight, space, indptr, offset, data)
-    return data
-
-
 def _sides(surface: Surface, pieces: FlatPieces) -> tuple[Ints, Ints]:
     """The vertices a and b (h,) of the sides."""
     face, corner = pieces.face, pieces.corner
     return surface.faces[face, corner], surface.faces[face, (corner + 1) % 3]
-
-
-@compiled
-def _add_to_pattern(
-    F: Ints,
-    face: Ints,
-    corner: Ints,
-    apex: Floats,
-    weight: Floats,
-    space: MotionSpace,
-    indptr: Ints,
-    offset: Ints,
-    data: Floats,
-) -> None:
-    """Add -p ⟨b_a, [c]× b_b⟩ / 6 = -weight ⟨c, b_b × b_a⟩ at the places of the two vertices of each side."""
-    basis, dimension, start = space.basis, space.dimension, space.start
-    for e in range(len(face)):
-        f, i = face[e], corner[e]
-        v, w = F[f, i], F[f, (i + 1) % 3]
-        q = scaled(-weight[e], vector(apex[e]))
-        for r in range(dimension[v]):
-            for s in range(dimension[w]):
-                if v < w:
-                    at = indptr[start[v] + r] + dimension[v] - r + offset[f, i] + s
-                else:
-                    at = indptr[start[w] + s] + dimension[w] - s + offset[f, i] + r
-                data[at] += dot(q, cross(vector(basis[w, s]), vector(basis[v, r])))

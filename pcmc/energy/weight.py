@@ -21,7 +21,6 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..surface import Surface
 from ..surface.geometry import (
-    Vector,
     accumulate,
     add,
     area_vectors,
@@ -99,29 +98,6 @@ def compressed(surface: Surface) -> Bools:
     return np.asarray((surface.weights[surface.patch_of_face] != 0.0) & (pull <= 0.0))
 
 
-def assemble_weights(
-    surface: Surface,
-    faces: Ints,
-    patch: Ints,
-    X: Floats,
-    basis: Floats,
-    dimension: Ints,
-    start: Ints,
-    indptr: Ints,
-    offset: Ints,
-    hessian: float,
-    stiffness: float,
-    data: Floats,
-) -> None:
-    """Add hessian · Bᵀ ∂²(Σ w A z̄) B + stiffness · Bᵀ (L_(wz) ⊗ I) B to the upper triangle ``data``.
-
-    L_(wz) is the cotangent Laplacian with the weights max(w z̄, 0), which the tension w z adds to.
-    """
-    at, normal = _plane(surface)
-    law = (faces, patch, X, surface.weights, at, normal)
-    _assemble(*law, basis, dimension, start, indptr, offset, hessian, stiffness, data)
-
-
 def _plane(surface: Surface) -> tuple[Floats, Floats]:
     return np.array(surface.plane.point), np.array(surface.plane.normal)
 
@@ -174,77 +150,3 @@ def _add_products(
         accumulate(change, F[f, 0], add(cross_sum(Dhalf, sub(c, b), half, sub(Dc, Db)), down))
         accumulate(change, F[f, 1], add(cross_sum(Dhalf, sub(a, c), half, sub(Da, Dc)), down))
         accumulate(change, F[f, 2], add(cross_sum(Dhalf, sub(b, a), half, sub(Db, Da)), down))
-
-
-@compiled
-def _entry(
-    weight: float,
-    mean: float,
-    bending: float,
-    nu: Vector,
-    after: float,
-    n: Vector,
-    g_i: Vector,
-    g_j: Vector,
-    b_i: Vector,
-    b_j: Vector,
-) -> float:
-    """⟨b_i, w ∂²(A z̄)/∂i∂j b_j⟩; ``bending`` is (e_i·e_j)/(4A), ``after`` 1 if j follows i, 0 if it is i."""
-    curved = bending * dot(b_i, nu) * dot(b_j, nu) - 0.5 * after * dot(nu, cross(b_j, b_i))
-    slope = dot(b_i, g_i) * dot(n, b_j) + dot(b_i, n) * dot(g_j, b_j)
-    return weight * (mean * curved + slope / 3.0)
-
-
-@compiled
-def _assemble(
-    F: Ints,
-    patch: Ints,
-    X: Floats,
-    weight: Floats,
-    at_plane: Floats,
-    normal: Floats,
-    basis: Floats,
-    dimension: Ints,
-    start: Ints,
-    indptr: Ints,
-    offset: Ints,
-    hessian: float,
-    stiffness: float,
-    data: Floats,
-) -> None:
-    origin, n = vector(at_plane), vector(normal)
-    for f in range(len(F)):
-        wt = weight[patch[f]]
-        if wt == 0.0:
-            continue
-        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
-        edge = (sub(c, b), sub(a, c), sub(b, a))
-        twice = cross(edge[1], edge[2])
-        length = norm(twice)
-        if length == 0.0:
-            continue
-        nu = scaled(1.0 / length, twice)
-        mean = dot(sub(scaled(1.0 / 3.0, add(add(a, b), c)), origin), n)
-        half = scaled(0.5, nu)
-        g = (cross(half, edge[0]), cross(half, edge[1]), cross(half, edge[2]))
-        added = stiffness * max(wt * mean, 0.0) * 0.5 / length
-        for i in range(3):
-            j = (i + 1) % 3
-            v, w = F[f, i], F[f, j]
-            square, product = dot(edge[i], edge[i]), dot(edge[i], edge[j])
-            for r in range(dimension[v]):
-                b_r = vector(basis[v, r])
-                at = indptr[start[v] + r] - r
-                for s in range(r, dimension[v]):
-                    b_s = vector(basis[v, s])
-                    value = _entry(wt, mean, 0.5 * square / length, nu, 0.0, n, g[i], g[i], b_r, b_s)
-                    data[at + s] += hessian * value + added * square * dot(b_r, b_s)
-                for s in range(dimension[w]):
-                    b_s = vector(basis[w, s])
-                    value = _entry(wt, mean, 0.5 * product / length, nu, 1.0, n, g[i], g[j], b_r, b_s)
-                    value = hessian * value + added * product * dot(b_r, b_s)
-                    if v < w:
-                        at_w = indptr[start[v] + r] + dimension[v] - r + offset[f, i] + s
-                    else:
-                        at_w = indptr[start[w] + s] + dimension[w] - s + offset[f, i] + r
-                    data[at_w] += value

@@ -16,7 +16,8 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..energy.functional import apply_supports
 from ..energy.motion_space import MotionSpace, VertexClasses, perpendicular
-from ..energy.projected_hessian import assemble, hessian_pattern
+from ..energy.pattern import hessian_pattern
+from ..energy.projected_hessian import assemble
 from ..stability.factorisation import factoriser
 from ..surface import Surface
 from ..surface.topology import SHEET

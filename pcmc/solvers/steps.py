@@ -11,7 +11,8 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from ..base.arrays import Floats
 from ..energy.jacobian import linearise
 from ..energy.motion_space import MotionSpace
-from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
+from ..energy.pattern import Pattern, hessian_pattern
+from ..energy.projected_hessian import assemble
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..meshing.quality import edge_lengths
 from ..stability.bordered import BorderedFactor

@@ -1,6 +1,6 @@
 """Sparse symmetric factorisation with inertia, behind one small interface.
 
-A matrix is the upper triangle of a fixed pattern (``projected_hessian.Pattern``) with values. A factoriser
+A matrix is the upper triangle of a fixed pattern (``pattern.Pattern``) with values. A factoriser
 does the symbolic work once per pattern; ``factor`` then takes new values. Backends, fastest first:
 ``"pardiso"`` (MKL, extra ``fast``) and ``"superlu"`` (scipy, everywhere).
 """
@@ -29,7 +29,7 @@ from scipy.sparse.linalg import splu
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.errors import MissingExtra
-from ..energy.projected_hessian import Pattern
+from ..energy.pattern import Pattern
 
 BACKENDS = ("pardiso", "superlu")
 ZERO = 1e-13  # of the largest entry: a pivot below is zero to rounding

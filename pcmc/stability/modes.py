@@ -19,7 +19,8 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from ..base.arrays import Floats
 from ..contact.pinching import standing_part
 from ..energy.motion_space import MotionSpace, VertexClasses, motion_space
-from ..energy.projected_hessian import Pattern, assemble, hessian_pattern
+from ..energy.pattern import Pattern, hessian_pattern
+from ..energy.projected_hessian import assemble
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..energy.rooms import volume_columns
 from ..surface import Surface

@@ -1,0 +1,87 @@
+"""The sparsity pattern of matrices over motion-space unknowns, and the place of an entry in it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from ..base.arrays import Floats, Ints
+from ..base.compiled import compiled, inlined
+from .motion_space import MotionSpace, VertexClasses
+
+
+class Pattern(NamedTuple):
+    """Upper triangle (CSR) of a symmetric matrix over motion-space unknowns, and the way into it.
+
+    Attributes
+    ----------
+    indptr, indices : CSR structure of the upper triangle, diagonal first in each row.
+    offset : (m,3) int: for corner pairs (0,1), (1,2), (2,0) of each active face, where the columns
+        of the later vertex begin in the rows of the earlier one, counted after its diagonal block.
+    """
+
+    indptr: Ints
+    indices: Ints
+    offset: Ints
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return len(self.indptr) - 1
+
+    def matrix(self, data: Floats) -> csr_array:
+        """The upper triangle as a scipy array."""
+        return csr_array((data, self.indices, self.indptr), shape=(self.size, self.size))
+
+
+def hessian_pattern(classes: VertexClasses, space: MotionSpace) -> Pattern:
+    """Sparsity of Bᵀ (∂²E) B: it depends on the faces and on the dimensions of the motion space."""
+    low, high = classes.topology.edges.T.astype(np.int64)
+    first = np.searchsorted(low, np.arange(len(space.dimension) + 1))
+    width = space.dimension[high]
+    before = np.concatenate([[0], np.cumsum(width)])
+    edge_offset = before[:-1] - before[first[low]]
+    beyond = before[first[1:]] - before[first[:-1]]
+    indptr, indices = _fill_pattern(space, first, high, beyond)
+    # edge (i,j) opposite corner k: pairs (0,1), (1,2), (2,0) are opposite corners 2, 0, 1
+    offset = edge_offset[classes.topology.edge_of_face[:, [2, 0, 1]]]
+    return Pattern(indptr, indices, np.ascontiguousarray(offset.astype(np.int32)))
+
+
+@inlined
+def row_place(space: MotionSpace, pattern: Pattern, v: int, r: int) -> int:
+    """Where the values of row (v, r) would begin if they began in column (v, 0): add s for column (v, s)."""
+    return pattern.indptr[space.start[v] + r] - r
+
+
+@inlined
+def pair_place(space: MotionSpace, pattern: Pattern, v: int, r: int, w: int, s: int, offset: int) -> int:
+    """The place of the entry of (v, r) and (w, s), two corners of a triangle; ``offset`` is the pair's."""
+    if v < w:
+        return pattern.indptr[space.start[v] + r] + space.dimension[v] - r + offset + s
+    return pattern.indptr[space.start[w] + s] + space.dimension[w] - s + offset + r
+
+
+@compiled
+def _fill_pattern(space: MotionSpace, first: Ints, high: Ints, beyond: Ints) -> tuple[Ints, Ints]:
+    dimension, start = space.dimension, space.start
+    indptr = np.zeros(start[-1] + 1, dtype=np.int32)
+    for v in range(len(dimension)):
+        for r in range(dimension[v]):
+            row = start[v] + r
+            indptr[row + 1] = indptr[row] + dimension[v] - r + beyond[v]
+    indices = np.empty(indptr[-1], dtype=np.int32)
+    for v in range(len(dimension)):
+        for r in range(dimension[v]):
+            at = indptr[start[v] + r]
+            for c in range(r, dimension[v]):
+                indices[at] = start[v] + c
+                at += 1
+            for edge in range(first[v], first[v + 1]):
+                w = high[edge]
+                for c in range(dimension[w]):
+                    indices[at] = start[w] + c
+                    at += 1
+    return indptr, indices

@@ -1,0 +1,144 @@
+"""Surfaces to files."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.arrays import Floats
+from ..base.errors import FileError, FileWarning, LostWarning, PcmcError
+from ..base.files import atomic_write, check_name
+from ..base.units import Units, length_factor
+from ..base.validate import choice
+from ..contact.pinching import standing_part
+from ..surface import Surface, expect_surface
+from .flat_walls import encode_walls
+from .formats import FORMATS, Format, format_of, in_file
+from .scaling import as_units, scaled_surface
+
+
+class Solved(Protocol):
+    """The result of a solver."""
+
+    @property
+    def surface(self) -> Surface:
+        """The surface reached."""
+
+    @property
+    def certificate(self) -> object:
+        """Its certificate."""
+
+
+def write(
+    path: str | os.PathLike[str],
+    surface: Surface | Solved,
+    *,
+    scalars: Mapping[str, Floats] | None = None,
+    certificate: object | None = None,
+    colour: str = "",
+    units: Units | str | None = None,
+) -> None:
+    """Write a surface as the suffix says; the file appears whole or not at all.
+
+    A wall below a junction on Π has triangles without area. Formats with a mesh per patch (.stl, .glb,
+    .gltf, .3dm, .ifc, .usda) leave them out; all but .stl hold these walls as text, and ``read`` puts them
+    back. From .stl, and if another program changed the surface, the junction comes back sliding on Π.
+
+    Parameters
+    ----------
+    path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
+    surface : a Surface, or the result of a solver; formats that hold a certificate then get the result's.
+    scalars : (n,) or (m,) arrays by name (curvature, error, ...), for formats that hold them.
+    certificate : a Certificate, or values by name, for the formats that hold it (.pcmc, .ifc).
+    colour : the name in ``scalars`` of an (n,) array that colours the vertices, for formats that hold
+        colours (.glb, .gltf, .usda). Without it each patch has a colour.
+    units : of the surface: a unit of length such as "mm", or ``pcmc.base.units.Units`` with that of forces.
+        The file says them. .glb and .gltf are in metres, as glTF prescribes: the surface is converted
+        (scalars are not). Without a unit the numbers stay, and .3dm, .ifc and .usda files are in metres.
+
+    Warns
+    -----
+    LostWarning : once, naming what the format cannot carry.
+    FileWarning : if the coordinates are written relative to another origin (.stl).
+    """
+    path = Path(path)
+    check_name(path)
+    form = format_of(path, FORMATS)
+    surface, certificate = _unpacked(surface, certificate, form)
+    for patch in surface.patches:
+        if "\n" in patch.name or "\r" in patch.name:
+            text = f"{path}: the patch name {patch.name!r} contains a line break; rename the patch"
+            raise FileError(text, what=str(path), where="patches", found=patch.name)
+    scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
+    sizes = {"": (), "vertices": (surface.n,), "both": (surface.n, surface.m)}[form.scalars]
+    units = as_units(units)
+    lost = [name for name, scalar in scalars.items() if len(scalar) not in sizes]
+    if colour:
+        choice("colour", colour, [name for name, scalar in scalars.items() if len(scalar) == surface.n])
+        if not form.colours:
+            lost.append(f"colours of {colour!r}")
+    if certificate is not None and not form.certificate:
+        lost.append("certificate")
+    lost += form.lost(surface, units)
+    if units and form.unit:
+        surface = scaled_surface(surface, length_factor(units.length, form.unit))
+        units = Units(form.unit, units.force)
+    shown, walls = surface, None
+    if form.separate:
+        shown = standing_part(surface).surface
+        if shown.m < surface.m and form.walls:
+            walls = encode_walls(surface, shown)
+        elif shown.m < surface.m:
+            lost.append(f"{surface.m - shown.m} triangles of walls without height")
+    content: dict[str, Any] = {"scalars": scalars, "colour": colour, "certificate": _values(certificate)}
+    content |= {"walls": walls, "units": units}
+    try:
+        with atomic_write(path) as temporary:
+            note = form.functions.write(temporary, shown, **content)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written ({error.strerror or error})", what=str(path)) from None
+    except PcmcError as error:
+        raise in_file(path, error, FileError) from None
+    if lost:
+        text = f"{path}: a {path.suffix} file cannot carry {', '.join([*lost, *form.loses])}; left out"
+        warnings.warn(text, LostWarning, stacklevel=2)
+    if note:
+        warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
+
+
+def _unpacked(given: Surface | Solved, certificate: object, form: Format) -> tuple[Surface, object]:
+    """The surface, and the certificate of a solver's result if the format holds it and none is given."""
+    surface: Any = given if isinstance(given, Surface) else getattr(given, "surface", given)
+    expect_surface(surface)
+    if surface is not given and form.certificate and certificate is None:
+        certificate = getattr(given, "certificate", None)
+    return surface, certificate
+
+
+def _values(certificate: Any) -> Mapping[str, Any]:
+    """The certificate's public values by name."""
+    if certificate is None or isinstance(certificate, Mapping):
+        return certificate or {}
+    if not is_dataclass(certificate):
+        found = type(certificate).__name__
+        raise FileError(
+            f"certificate: expected a Certificate, found {found}", what="certificate", found=found
+        )
+    shown = [f.name for f in fields(certificate) if f.repr and not f.name.startswith("_")]
+    return {name: getattr(certificate, name) for name in shown}
+
+
+def _scalar(surface: Surface, name: str, value: npt.ArrayLike) -> Floats:
+    array = np.asarray(value, dtype=float)
+    if array.shape not in ((surface.n,), (surface.m,)):
+        shapes = f"({surface.n},) for vertices or ({surface.m},) for faces"
+        text = f"scalars[{name!r}]: expected shape {shapes}, found {array.shape}"
+        raise FileError(text, what="scalars", where=name, found=array.shape)
+    return array
