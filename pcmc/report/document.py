@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from ..base.errors import FileError
-from ..base.files import atomic_write
+from ..base.files import atomic_write, suffix_of
 from ..base.units import Units, as_units, expect_length
 from ..certificate import Certificate
 from ..certificate.reactions import held_lengths
@@ -65,7 +65,7 @@ class RoofReport:
         ------
         FileError : for another suffix than .pdf, or a file that cannot be written.
         """
-        path = check_name(path)
+        path = check_suffix(path)
         content = self.pdf()
         try:
             with atomic_write(path) as temporary:
@@ -231,13 +231,10 @@ def roof_report(
     )
 
 
-def check_name(path: str | os.PathLike[str]) -> Path:
+def check_suffix(path: str | os.PathLike[str]) -> Path:
     """The path of a report; refuses another suffix than .pdf."""
-    path = Path(path)
-    if path.suffix.lower() != ".pdf":
-        text = f"{path}: a report is written as .pdf; change the suffix"
-        raise FileError(text, what=str(path), found=path.suffix, expected=".pdf")
-    return path
+    suffix_of(path, (".pdf",), "a report")
+    return Path(path)
 
 
 def _png(picture: Any) -> bytes:
