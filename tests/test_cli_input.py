@@ -1,4 +1,4 @@
-"""What is typed wrong is told as it was typed, and the command speaks where a terminal can do little."""
+"""Wrong input is quoted as it was typed, and messages are readable on a poor terminal."""
 
 from __future__ import annotations
 

@@ -398,7 +398,7 @@ def test_a_format_carries_the_forces_or_says_in_one_line_what_it_leaves_out(suff
         assert [room.volume for room in back.rooms] == [8.0, 8.0]
 
 
-# ---- bad input: one line that says what and where
+# ---- bad input: one line with cause and place
 
 
 ENDS = [[0, 0], [10, 0]]

@@ -208,7 +208,7 @@ def length_factor(source: str, target: str) -> float:
 
 
 def conversion_note(source: str, target: str) -> str:
-    """The line that says that lengths were converted; empty where nothing changes.
+    """A line about the conversion of lengths; empty where nothing changes.
 
     >>> conversion_note("mm", "m")
     'lengths converted from mm to m (1 mm = 0.001 m)'

@@ -348,7 +348,7 @@ class _Handler(BaseHTTPRequestHandler):
         if suffix not in FORMATS:
             raise RequestError(unknown("format", suffix[:60], FORMATS))
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the page says which formats carry the numbers
+            warnings.simplefilter("ignore")  # the page lists the formats that carry the numbers
             path = Path(folder) / f"surface{suffix}"
             scalars = written_fields(state.surface, state.certificate)
             numbers = plain(state.certificate.numbers())

@@ -38,7 +38,7 @@ Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """The surface of a session and all that the page says about it.
+    """The surface of a session and all that the page shows about it.
 
     Attributes
     ----------
