@@ -115,7 +115,7 @@ def whole_of(surface: Surface) -> Whole | None:
 
 def unit_texts(units: Units) -> dict[str, Any]:
     """The units that the page shows; ``given`` is whether they are more than "force" and "length"."""
-    names = ("area", "volume", "curvature", "tension", "pressure", "energy")
+    names = ("area", "volume", "curvature", "tension", "pressure", "energy", "angle")
     texts = {name: getattr(units, name) for name in names}
     bare = {"length": units.length or "length", "force": units.force or "force"}
     return {"given": bool(units), **bare, **texts}
