@@ -283,19 +283,20 @@ def with_bar(value: float, bar: float, unit: str = "") -> str:
 
     >>> with_bar(2.71828, 0.0123), with_bar(1234.5, 45.0), with_bar(2.0, math.inf), with_bar(2.0, 1e-12)
     ('2.718 ± 0.012', '1234 ± 45', '2 ± unknown', '2 ± 1e-12')
-    >>> with_bar(2.71828, 0.0123, " m"), with_bar(1.7, 0.0, " m³"), with_bar(math.nan, math.inf, " m")
-    ('2.718 ± 0.012 m', '1.7 m³ (given)', 'none in sight')
+    >>> with_bar(2.71828, 0.0123, " m"), with_bar(1.7, 0.0, " m³"), with_bar(2.0, math.inf, " m")
+    ('2.718 ± 0.012 m', '1.7 m³ (given)', '2 m ± unknown')
     """
     if math.isnan(value):
         return "none in sight"
     if bar == 0.0:
         return f"{value:.8g}{unit} (given)"
+    if not math.isfinite(bar):
+        return f"{value:.4g}{unit} ± unknown"
     return _rounded(value, bar) + unit
 
 
 def _rounded(value: float, bar: float) -> str:
-    if not math.isfinite(bar):
-        return f"{value:.4g} ± unknown"
+    """Both with two digits of the bar."""
     if bar <= 1e-9 * abs(value):
         return f"{value:.8g} ± {bar:.0e}"
     digits = 1 - math.floor(math.log10(bar))
