@@ -103,7 +103,7 @@ def given_volume(surface: Surface) -> float | None:
     if not surface.rooms or np.any(closing_volumes(surface)):
         return None
     signs, roof = surface.room_signs, (~surface.walls).astype(float)
-    share = np.linalg.lstsq(signs.T, roof)[0]
+    share = np.round(np.linalg.lstsq(signs.T, roof)[0], 9)  # most are whole: no rounding in the sum
     known = np.abs(share @ signs - roof).max() <= ROUNDING
     return float(share @ prescribed_volumes(surface)) if known else None
 
