@@ -140,22 +140,23 @@ class Certificate:
 
     def text(self, units: Units = NO_UNITS) -> str:
         """The findings as a table, with the units of its numbers if they are given."""
+        lowest, sums, force = self.eigenvalues, (self.load, self.support), units.behind("force")
         rows = [
             ("verdict", self.verdict.value),
             ("", self.detail),
             ("units", units.sentence if units else ""),
             ("residual", f"{self.residual:.2e} of {self.scale:.4g}"),
-            ("energy", f"{self.energy:.10g}"),
-            ("volume", f"{self.volume:.6g}"),
+            ("energy", f"{self.energy:.10g}{units.behind('energy')}"),
+            ("volume", f"{self.volume:.6g}{units.behind('volume')}"),
             ("Morse index", "-" if self.index is None else str(self.index)),
             ("of motions", "" if not self.symmetric_in else f"symmetric in {', '.join(self.symmetric_in)}"),
-            ("lowest eigenvalue", f"{self.eigenvalues[0]:.4g}" if len(self.eigenvalues) else "-"),
+            ("lowest eigenvalue", f"{lowest[0]:.4g}{units.behind('eigenvalue')}" if len(lowest) else "-"),
             ("curvature error", f"{self.curvature_error:.2e}"),
             ("triangle quality", f"{self.quality:.3f} (sliding walls {self.walls_quality:.3f})"),
             ("pinched vertices", str(len(self.pinched))),
             ("walls lean", ", ".join(lean_texts(self.leaning))),
             ("load over capacity", f"{self.load_ratio:.3f}"),
-            ("load, reactions", f"{self.load:.6g}, {self.support:.6g} along the plane's normal"),
+            ("load, reactions", ", ".join(f"{x:.6g}{force}" for x in sums) + " along the plane's normal"),
         ]
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
         tables = self.patches, self.rooms, self.junctions, self.boundaries, self.cables, self.cable_ends

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import OptionError
+from ..base.errors import OptionError, unknown
 from ..surface import Plane
 from .pieces import Piece
 
@@ -300,19 +300,21 @@ def curve(spec: Any, closed: bool = False) -> Curve:
     return polyline(spec, closed=closed)
 
 
+CURVES = ("polyline", "bezier", "arc", "circle", "ellipse")
+"""The keys that make a table a curve."""
+
 TABLES = {"circle": ({"centre", "radius"}, set()), "ellipse": ({"centre", "axes"}, {"sweep"})}
 """Kinds of curves given by a table: the keys that it must have, and those that it may have."""
 
 
 def _from_mapping(spec: Mapping[str, Any]) -> Curve:
-    known = ("polyline", "bezier", "arc", "circle", "ellipse")
     besides = {"closed": "polyline", "weights": "bezier"}
     kinds = [key for key in spec if key not in besides]
     for key in kinds:
-        validate.choice("curve", key, known)
+        validate.choice("curve", key, CURVES)
     if len(kinds) != 1:
-        problem = f"a curve needs exactly one of {', '.join(known)}; found {list(spec)}"
-        raise OptionError(problem, what="curve", found=list(spec), expected=known)
+        problem = f"a curve needs exactly one of {', '.join(CURVES)}; found {list(spec)}"
+        raise OptionError(problem, what="curve", found=list(spec), expected=CURVES)
     (kind,) = kinds
     value = spec[kind]
     if kind == "polyline" and "weights" not in spec:
@@ -328,6 +330,9 @@ def _from_mapping(spec: Mapping[str, Any]) -> Curve:
     if kind == "arc":
         return arc(*_points(value, "arc", 3, exactly=True))
     needed, allowed = TABLES[kind]
+    for key in value if isinstance(value, Mapping) else ():
+        if key not in needed | allowed:
+            raise _error(kind, unknown("key", key, sorted(needed | allowed)), where=key)
     if not isinstance(value, Mapping) or not needed <= set(value) <= needed | allowed:
         wanted = "centre and radius" if kind == "circle" else "centre, axes and perhaps sweep"
         raise _error(kind, f"expected {wanted}, found {value!r}", found=value)

@@ -29,9 +29,10 @@ from .parts import (
     support_of,
 )
 from .pieces import to_local, to_space
+from .summary import summary
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Plan(PlanData):
     """A roof given by the lines of its plan.
 
@@ -138,6 +139,10 @@ class Plan(PlanData):
             if name in names[:place]:
                 problem = f"the name {name!r} is used twice; each patch, wall and cable needs its own"
                 raise OptionError(problem, what="name", found=name)
+
+    def __repr__(self) -> str:
+        """Size, outline, patches, dividers and holes, a line each."""
+        return summary(self)
 
     @property
     def corners(self) -> Floats:
