@@ -20,6 +20,7 @@ import numpy as np
 from .. import existence
 from ..accuracy import MeshCheck, check_mesh
 from ..base.errors import OptionError
+from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
 from ..design import Parameter, Target, meet
 from ..meshing.remeshing import remesh
@@ -44,7 +45,7 @@ Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """The surface of a session and all that the page says about it.
+    """The surface of a session and all that the page shows about it.
 
     Attributes
     ----------
@@ -99,12 +100,16 @@ class Session:
     """
 
     def __init__(
-        self, start: State, turn: AbstractContextManager[Any] | None = None, project: Path | None = None
+        self,
+        start: State,
+        turn: AbstractContextManager[Any] | None = None,
+        units: Units = NO_UNITS,
+        project: Path | None = None,
     ) -> None:
         self._lock, self._turn = threading.Lock(), turn or nullcontext()
+        self._requests, self._units = 0, units
         self._project = project
         self._walls: dict[str, float] = {}  # tensions that the project gave them on the way
-        self._requests = 0
         self.surface, self._certificate = start.surface, start.certificate
         self._wanted, self._failure = start.wanted, start.failure
         self._start = self.surface
@@ -215,7 +220,7 @@ class Session:
             if stop():
                 return
             certificate = design.certificate
-            self._message = design.message
+            self._message = design.text(self._units)
             if design.met and certificate.verdict in AT_REST:
                 self._show(design.surface)
                 self._wanted, self._failure = design.surface, None
@@ -271,11 +276,11 @@ class Session:
 
         return self._run(act)
 
-    def renew(self, start: State) -> State:
+    def renew(self, start: State, units: Units = NO_UNITS) -> State:
         """Show another start, as a new step: the file behind the page was saved."""
 
         def act(stop: Callable[[], bool]) -> None:
-            self._start, self.aims = start.surface, None
+            self._start, self._units, self.aims = start.surface, units, None
             self.surface, self._certificate = start.surface, start.certificate
             self._wanted, self._failure = start.wanted, start.failure
             self._add_step()
