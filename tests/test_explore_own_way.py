@@ -11,9 +11,11 @@ import pcmc
 from generators import spherical_cap
 from pcmc import explore
 from pcmc.explore import own_way
+from pcmc.explore.following import Reached
 from pcmc.explore.roof import read_roof
 from pcmc.explore.session import Session, solved_start
 
+CAP = spherical_cap(edge_length=0.25)
 OPEN_WALL = """[plan]
 edge_length = 1.0
 outline = [[0, 0], [12, 0], [12, 6], [0, 6]]
@@ -58,24 +60,23 @@ def test_walls_that_were_moved_stay(path):
     assert state.failure is not None
     assert "cannot balance" in state.failure.detail
     assert state.note == ""
+    state = Session(start, project=path).settle({"tensions": {"wall 1": 1.0}})
+    assert state.failure is None
+    assert tensions(state.surface)["wall 1"] == 1.0
 
 
 def test_a_roof_that_following_does_not_reach_is_solved_from_the_start_shape(path, monkeypatch):
-    from pcmc.explore import session as sessions
-
-    roof = read_roof(path, use_cache=False)
-    start = solved_start(roof.surface)
-
-    def no_way(start, asked, stop, **options):
-        return sessions.Reached(start, None, pcmc.certify(start))
-
-    monkeypatch.setattr(sessions, "reach", no_way)
+    start = solved_start(read_roof(path, use_cache=False).surface)
+    nowhere = Reached(start.surface, None, pcmc.certify(CAP.retensioned({"cap": 0.01})))
+    monkeypatch.setattr(own_way, "reach", lambda *arguments, **options: nowhere)
     path.write_text(OPEN_WALL + "[remesh]\nedge_length = 0.8\n")
     state = Session(start, project=path).settle({"tensions": {"east": 4.0}})
     assert state.failure is None
     assert "from the start shape" in state.note
     assert tensions(state.surface)["east"] == 4.0
     assert state.surface.m > 1.2 * start.surface.m
+    failed = Session(start).settle({"tensions": {"east": 4.0}})  # without the project
+    assert failed.failure is nowhere.failed
 
 
 def test_a_file_that_holds_another_plan_has_no_way(path):
@@ -89,14 +90,13 @@ def test_a_file_that_holds_another_plan_has_no_way(path):
 
 def poor_cap():
     """A cap at rest with triangles far from equilateral."""
-    cap = spherical_cap(edge_length=0.25)
-    X = cap.vertices.copy()
-    free = np.setdiff1d(np.arange(cap.n), np.flatnonzero(cap.held))
+    X = CAP.vertices.copy()
+    free = np.setdiff1d(np.arange(CAP.n), np.flatnonzero(CAP.held))
     corner = free[np.argmin(np.linalg.norm(X[free] - X[free].mean(axis=0), axis=1))]
-    ring = np.unique(cap.faces[(cap.faces == corner).any(axis=1)])
+    ring = np.unique(CAP.faces[(CAP.faces == corner).any(axis=1)])
     other = ring[ring != corner][0]
     X[corner] += 0.96 * (X[other] - X[corner])
-    return pcmc.solve(cap.moved(X), min_quality=0.0).surface
+    return pcmc.solve(CAP.moved(X), min_quality=0.0).surface
 
 
 def test_new_triangles_for_the_surface_shown():

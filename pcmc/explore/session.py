@@ -28,15 +28,14 @@ from ..solvers import solve
 from ..solvers.result import Progress
 from ..surface import Patch, Surface
 from ..surface.geometry import edge_vectors
-from .following import AT_REST, Reached, Values, attempt, reach, until, values_of, wanted
-from .own_way import own_start, solved_own_way
+from .following import AT_REST, Values, attempt, reach, until, values_of, wanted
+from .own_way import OwnWay
 from .variants import MOST_VARIANTS, Variant
 
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
 SETTLE: dict[str, Any] = {"iterations": 40, "tolerance": 1e-11}  # when it is let go
 FOLLOW_SECONDS = 1.0  # time limit of following, and as much again for each 50 000 triangles
-SETTLE_SECONDS = 6.0  # time limit of settling, and of solving from the start shape
-FIRST_ATTEMPTS = 4  # of settling, before the project's own walls are tried
+SETTLE_SECONDS = 6.0  # time limit of settling
 MOST_STEPS = 200  # to undo
 MOST_BYTES = 64_000_000  # of vertices in these steps
 
@@ -108,8 +107,7 @@ class Session:
     ) -> None:
         self._lock, self._turn = threading.Lock(), turn or nullcontext()
         self._requests, self._units = 0, units
-        self._project = project
-        self._walls: dict[str, float] = {}  # tensions that the project gave them on the way
+        self._own_way = OwnWay(project).giving(start.surface)
         self.surface, self._certificate = start.surface, start.certificate
         self._wanted, self._failure = start.wanted, start.failure
         self._start = self.surface
@@ -149,11 +147,12 @@ class Session:
 
         def act(stop: Callable[[], bool]) -> None:
             asked, end = self._with_values(values), time.monotonic() + SETTLE_SECONDS
-            way = reach(self.surface, asked, until(stop, end), attempts=FIRST_ATTEMPTS, **SETTLE)
-            if way.failed is not None and not stop():
-                way = self._reach_otherwise(way, asked, stop, end)
+            settled = self._own_way.settle(self.surface, asked, stop, end, self._report, **SETTLE)
             if stop():
                 return
+            way, self._note, self._own_way = settled.reached, settled.note, settled.own_way
+            if settled.note:
+                self._wanted = way.surface
             if way.certificate is not None:
                 self._show(way.surface)
             self._failure = way.failed
@@ -183,9 +182,8 @@ class Session:
 
         def act(stop: Callable[[], bool]) -> None:
             asked, end = values_of(self._wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
-            roof = self.surface.faces[self.surface.roof[self.surface.patch_of_face]]
-            edges = np.linalg.norm(edge_vectors(self.surface.vertices[roof]), axis=2)
-            result = attempt(remesh(self.surface, float(edges.mean())), until(stop, end), **SETTLE)
+            lengths = edge_lengths(self.surface)
+            result = attempt(remesh(self.surface, float(lengths.mean())), until(stop, end), **SETTLE)
             if stop():
                 return
             if result.certificate.verdict not in AT_REST:
@@ -281,6 +279,7 @@ class Session:
 
         def act(stop: Callable[[], bool]) -> None:
             self._start, self._units, self.aims = start.surface, units, None
+            self._own_way = self._own_way.giving(start.surface)
             self.surface, self._certificate = start.surface, start.certificate
             self._wanted, self._failure = start.wanted, start.failure
             self._add_step()
@@ -343,45 +342,9 @@ class Session:
         self._wanted = wanted(self.surface, values)
         return self._wanted
 
-    def _reach_otherwise(self, way: Reached, asked: Surface, stop: Callable[[], bool], end: float) -> Reached:
-        """Where the first attempts failed: with the project's walls; in small steps; from its start shape."""
-        start = self._own_start(asked)
-        if start is not None:
-            walls = {p.name: p.tension for p in start.patches if p.wall}
-            balanced = asked.retensioned(walls)
-            if balanced.patches != asked.patches:
-                there = reach(self.surface, balanced, until(stop, end), attempts=FIRST_ATTEMPTS, **SETTLE)
-                if there.certificate is not None and there.failed is None:
-                    self._wanted, self._walls = there.surface, walls
-                    changed = ", ".join(
-                        f"{n} {t:g}"
-                        for n, t in walls.items()
-                        if asked.patches[asked.patch_index(n)].tension != t
-                    )
-                    self._note = f"walls balanced beside the new tensions: {changed}"
-                    return there
-        rest = reach(way.surface, asked, until(stop, end), **SETTLE)
-        if rest.failed is None or start is None or stop() or self._project is None:
-            return Reached(rest.surface, rest.certificate or way.certificate, rest.failed)
-        self.progress = "from the start shape"
-        try:
-            result = solved_own_way(self._project, start, until(stop, time.monotonic() + SETTLE_SECONDS))
-        finally:
-            self.progress = ""
-        if result is None:
-            return Reached(rest.surface, rest.certificate or way.certificate, rest.failed)
-        self._wanted, self._walls = result.surface, {p.name: p.tension for p in start.patches if p.wall}
-        self._note = "solved from the start shape of the project; the last surface led to none"
-        return Reached(result.surface, result.certificate, None)
-
-    def _own_start(self, asked: Surface) -> Surface | None:
-        """The start shape of the project for these values; walls that the page has moved keep theirs."""
-        if self._project is None:
-            return None
-        before = {p.name: p.tension for p in self._start.patches if p.wall}
-        own = (before, self._walls)
-        moved = [p.name for p in asked.patches if p.wall and p.tension not in [w.get(p.name) for w in own]]
-        return own_start(self._project, asked, moved)
+    def _report(self, words: str) -> None:
+        """What the work under way does now."""
+        self.progress = words
 
     def _show(self, surface: Surface) -> None:
         self.surface, self._certificate = surface, certify(surface)
