@@ -240,6 +240,38 @@ def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(
         assert page.complaints() == []
 
 
+def test_tied_tensions_are_one_choice_and_stay_equal(driver, tmp_path):
+    path = tmp_path / "hall.toml"
+    tied = PROJECT.replace('["west", "east", {', '[["west", "east"], {')
+    path.write_text(tied)
+    with followed(path) as running:
+        page = Explored(driver, running.url)
+        driver.execute_script("document.querySelector('#targets details').open = true")
+
+        def chosen():
+            boxes = driver.find_elements("css selector", "#targets .vary input")
+            return [b.get_attribute("aria-label") for b in boxes if b.is_selected()]
+
+        def box(name):
+            return page.find(f"#targets .vary input[aria-label='{name} may change']")
+
+        pressure = "pressure of east may change"
+        assert chosen() == ["tension of west and east may change", pressure]
+        box("west").click()
+        assert chosen() == ["west may change", pressure]  # the tie is let go
+        box("tension of west and east").click()
+        assert chosen() == ["tension of west and east may change", pressure]
+        wanted = page.find("#targets input[aria-label='Value wanted']")
+        wanted.clear()
+        wanted.send_keys("1.4")
+        page.find("#targets .meet").click()
+        until(lambda: "west 1.4 " in page.text("#by-patch"), "the targets")
+        page.idle()
+        west, east = (page.number(f"Tension α of {name}").get_attribute("value") for name in ("west", "east"))
+        assert west == east
+        assert page.complaints() == []
+
+
 def test_wrong_targets_are_named_on_the_page(page):
     message = page.find("#targets .message")
     page.find("#targets .meet").click()

@@ -15,8 +15,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from .. import existence
 from ..accuracy import MeshCheck, check_mesh
 from ..base.errors import OptionError
@@ -27,7 +25,7 @@ from ..meshing.remeshing import remesh
 from ..solvers import solve
 from ..solvers.result import Progress
 from ..surface import Patch, Surface
-from ..surface.geometry import edge_vectors
+from ..surface.geometry import segment_lengths
 from .following import AT_REST, Values, attempt, reach, until, values_of, wanted
 from .own_way import OwnWay
 from .variants import MOST_VARIANTS, Variant
@@ -182,8 +180,8 @@ class Session:
 
         def act(stop: Callable[[], bool]) -> None:
             asked, end = values_of(self._wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
-            lengths = edge_lengths(self.surface)
-            result = attempt(remesh(self.surface, float(lengths.mean())), until(stop, end), **SETTLE)
+            mean = segment_lengths(self.surface.vertices, self.surface.topology.edges).mean()
+            result = attempt(remesh(self.surface, float(mean)), until(stop, end), **SETTLE)
             if stop():
                 return
             if result.certificate.verdict not in AT_REST:
