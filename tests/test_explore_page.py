@@ -205,7 +205,7 @@ def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(
         assert changed(before, page.picture()) > 0.1
         assert "Distance from Variant 1, m" in page.text("#legend .name")
         table = page.text("#variants table")
-        assert "west\nApex m 1.2 1.5 +0.3 +25 %" in table
+        assert "west\nApex m 1.2 1.5 +0.3 +25\n" in table
         assert "Pressure kN/m²" not in table.partition("east\n")[0]  # it does not differ
         assert "more numbers are the same to four digits" in table
         page.find("#variants button[aria-pressed]").click()

@@ -4,7 +4,7 @@ import { button, element, tableRow } from "./elements.js";
 import { digits } from "./panel.js";
 
 const NAMES = {
-  apex: "Apex", area: "Area", volume: "Volume", reaction: "Largest reaction",
+  apex: "Apex", area: "Area", volume: "Volume", reaction: "Reaction",
   tension: "Tension", pressure: "Pressure", weight: "Weight",
 };
 
@@ -63,11 +63,11 @@ export class Variants {
     const difference = (row) => {
       const then = before.get(key(row));
       const change = row.value - then;
-      const signed = (x) => `${x > 0 ? "+" : ""}${digits(x, 3)}`;
+      const signed = (x) => `${x > 0 ? "+" : ""}${digits(x, 2)}`;
       const head = element("span", "", NAMES[row.quantity]);
       if (units.given) head.append(element("span", "unit", ` ${units[row.kind]}`));
       return tableRow(head, [
-        digits(then), digits(row.value), signed(change), then ? `${signed((100 * change) / Math.abs(then))} %` : "",
+        digits(then), digits(row.value), signed(change), then ? signed((100 * change) / Math.abs(then)) : "",
       ]);
     };
     const parts = ["", ...new Set(changed.map((row) => row.of).filter(Boolean))]; // all, then each
