@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base.errors import PcmcError
 from ..certificate.balance import strained_junction
@@ -17,14 +18,19 @@ from ..plan import Divider, Plan
 from ..plan.parts import BALANCED
 from ..solvers.result import Status
 from ..surface import Surface
+from .accuracy import AccuracyWanted
 from .file import Project
 from .outcome import Outcome
+
+if TYPE_CHECKING:
+    from ..design import Parameter
 
 BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of it
 FARTHEST = 20.0  # times the tensions: a fold beyond has another reason, such as an end that slips
 TRIES = 3  # plans tried
 TRIANGLES = 5000  # of the meshes that these are tried on, at most about
 INFLATED = (Overload, Fold)
+Trial = Callable[[Project, Surface], Outcome]  # solves a project from a surface
 
 
 def chosen_walls(project: Project, surface: Surface) -> list[str]:
@@ -39,16 +45,20 @@ def chosen_walls(project: Project, surface: Surface) -> list[str]:
     return [f"walls balanced with their neighbours: {values} (to choose one, type wall = under its divider)"]
 
 
-def advice(project: Project, given: Surface, start: Surface, outcome: Outcome) -> list[str]:
-    """What to type so that a project, or a surface, comes to rest: a heading, and a line for each change.
+def advice(
+    project: Project, given: Surface, start: Surface, outcome: Outcome, try_project: Trial
+) -> list[str]:
+    """What to type so that a project, or a surface, comes to rest and meets its targets: a heading, and a
+    line for each change.
 
     Parameters
     ----------
     given, start : the start shape of the project, and the one that was solved, with the command's tensions.
+    try_project : solves another project, with its targets.
     """
-    if outcome.certificate.certified:
-        return []
     plan = project.plan
+    if outcome.certificate.certified and (plan is None or outcome.design is None or outcome.design.met):
+        return []
     if plan is None or start is not given:
         strained = strained_junction(start, standing_part(start).walls.pinchable)
         if strained is None or strained.remedy is None:
@@ -57,10 +67,26 @@ def advice(project: Project, given: Surface, start: Surface, outcome: Outcome) -
     name = project.path.with_suffix(".toml").name
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the project's own warnings were shown
-        better, works = _tried(project, plan, outcome)
+        better, rests = (plan, True) if outcome.certificate.certified else _tried(project, plan, outcome)
+        met, reached = False, ""
+        if rests and project.targets:
+            better, met, reached = _with_targets(project, better, outcome, try_project)
         lines = _lines(plan, better)
-    tried = "which was tried and comes to rest" if works else "as a first step"
-    return [f"type in {name}, {tried}:", *lines] if lines else []
+    if not lines:
+        return []
+    if not project.targets:
+        return [
+            f"type in {name}, {'which was tried and comes to rest' if rests else 'as a first step'}:",
+            *lines,
+        ]
+    if met:
+        return [f"type in {name}, which was tried, comes to rest and meets the targets:", *lines]
+    tried = "which was tried without the targets and comes to rest" if rests else "as a first step"
+    return [
+        f"type in {name}, {tried}:",
+        *lines,
+        *([f"with them, the targets are {reached}"] if reached else []),
+    ]
 
 
 def _tried(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, bool]:
@@ -69,10 +95,9 @@ def _tried(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, bool]:
         better = mended(plan, outcome)
         if not _lines(plan, better):
             break
-        plan, share = better, outcome.surface.m / TRIANGLES
-        trial = replace(plan, edge_length=plan.edge_length * max(1.0, math.sqrt(share)))
+        plan = better
         try:
-            result = solve(trial.surface(), project.method, **project.options)
+            result = solve(_coarse(plan, outcome).surface(), project.method, **project.options)
         except PcmcError:  # too coarse for this plan
             break
         outcome = Outcome(result, ())
@@ -81,6 +106,46 @@ def _tried(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, bool]:
         if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
             raise KeyboardInterrupt
     return plan, False
+
+
+def _coarse(plan: Plan, outcome: Outcome) -> Plan:
+    """The plan with a mesh that is not fine."""
+    return replace(plan, edge_length=plan.edge_length * max(1.0, math.sqrt(outcome.surface.m / TRIANGLES)))
+
+
+def _with_targets(
+    project: Project, plan: Plan, outcome: Outcome, try_project: Trial
+) -> tuple[Plan, bool, str]:
+    """The first plan that meets the targets, and whether one does; else the plan, and what it reaches."""
+    plain = replace(project, remeshing=(), wanted=AccuracyWanted())
+    looser, reached = _loosened(plan, project.vary), ""
+    for candidate in (plan, looser):
+        if candidate is project.plan or candidate is None:  # tried already, or nothing to loosen
+            continue
+        try:
+            trial = try_project(replace(plain, plan=candidate), _coarse(candidate, outcome).surface())
+        except PcmcError:  # such as a target that the coarse mesh cannot measure
+            continue
+        if trial.good:
+            return candidate, True, ""
+        if trial.design is not None:
+            reached = reached or trial.design.message
+    return plan, False, reached
+
+
+def _loosened(plan: Plan, vary: Sequence[Parameter]) -> Plan | None:
+    """The plan with all walls balanced, and the tensions that vary at the mean of the others; or None.
+
+    A wall that was chosen for far tensions holds those that vary near them.
+    """
+    names = {name for parameter in vary if parameter.kind == "tension" for name in parameter.names}
+    others = [area.tension for area in plan.patches if area.name not in names]
+    if not others or len(others) == len(plan.patches):
+        return None
+    mean = float(f"{sum(others) / len(others):.3g}")
+    areas = [replace(area, tension=mean) if area.name in names else area for area in plan.patches]
+    walls = {divider.name for divider in plan.dividers if divider.wall is not None} - names
+    return replace(_with_dividers(plan, walls, wall=BALANCED), patches=areas)
 
 
 def mended(plan: Plan, outcome: Outcome) -> Plan:

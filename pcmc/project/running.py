@@ -225,16 +225,19 @@ def solve_from_start(
     if outcome.good:
         return replace(outcome, notes=notes)
     report("looking for advice")
-    return replace(outcome, notes=notes, advice=advice(project, given, start, outcome))
+    return replace(outcome, notes=notes, advice=advice(project, given, start, outcome, solve_project))
 
 
 def _check_balance(surface: Surface) -> None:
-    """Warn before a long computation if the tensions alone show that a junction cannot balance."""
+    """Warn before a long computation if the tensions alone show that a junction cannot balance.
+
+    The advice after it names a remedy that was tried.
+    """
     pinchable = standing_part(surface).walls.pinchable
     imbalance = unbalanced(surface, pinchable)
     if imbalance:
         unless = ", unless the junction rests on the plane" if pinchable.any() else ""
-        warnings.warn(f"{imbalance}{unless}; solving anyway", BalanceWarning, stacklevel=4)
+        warnings.warn(f"{imbalance.imbalance}{unless}; solving anyway", BalanceWarning, stacklevel=4)
 
 
 def solve_project(project: Project, surface: Surface, progress: OnStep | None = None) -> Outcome:
