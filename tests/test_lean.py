@@ -1,5 +1,7 @@
 """Walls that lean: how much, as a target, and the derivative."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from refusals import refused
@@ -8,6 +10,9 @@ from pcmc import Parameter, Target, certify, cli, meet, solve
 from pcmc.base.errors import OptionError
 from pcmc.design import sensitivities
 from pcmc.design.targets import measure
+from pcmc.meshing.local_refinement import refine_near
+from pcmc.meshing.refinement import refine
+from pcmc.meshing.remeshing import remesh
 from pcmc.plan import Divider, Plan
 
 HALL = [[0, 0], [12, 0], [12, 6], [0, 6]]
@@ -74,3 +79,23 @@ def test_the_command_says_which_walls_lean(tmp_path, capsys, upright):
     )
     assert cli.main(["solve", str(path), "--no-mesh-check"]) == 0
     assert ("walls lean from the vertical: 'wall 1'" in capsys.readouterr().out) is (upright == "false")
+
+
+@pytest.mark.parametrize(
+    "finer",
+    [refine, partial(remesh, edge_length=0.7), lambda surface: refine_near(surface, [6, 3, 0.5], 2, 1.5)],
+    ids=["refined", "remeshed", "refined near"],
+)
+@pytest.mark.parametrize("turned", [0.0, 2.0])
+def test_an_upright_wall_stays_upright_on_finer_meshes(finer, turned):
+    """All of the wall, and the junction, stay in the plane; so do they once solved."""
+    divider = Divider([[6 - turned, 0], [6 + turned, 6]], 3.0, upright=True)
+    patches = {"west": {"tension": 6.0, "at": [1, 3]}, "east": {"tension": 4.0, "at": [11, 3]}}
+    surface = solve(Plan(HALL, [divider], patches=patches, edge_length=1.0).surface()).surface
+    for fine in (finer(surface), solve(finer(surface)).surface):
+        assert fine.m > surface.m
+        (plane, mask), wall = fine.on_planes[0], fine.patch_index("wall 1")
+        own = np.unique(fine.faces[fine.patch_of_face == wall])
+        assert mask[own].all()
+        assert np.abs(plane.height(fine.vertices[own])).max() < 1e-12 * fine.size
+    assert certify(fine).leaning["lean"].max() < 1e-4

@@ -30,7 +30,8 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     - boundary edge, one end sliding and the other sliding, or fixed and on Π: sliding;
     - junction or seam edge, both ends fixed, not leading from boundary to boundary: fixed;
     - edge inside a sheet, both ends fixed and off the boundary (a held line in a patch): fixed;
-    - boundary edge in a plane of ``on_planes``: sliding there; the same for a curve in a mirror plane;
+    - boundary edge in a plane of ``on_planes``: sliding there; the same for a curve in a mirror plane, and
+      for each edge of a triangle that lies in the plane;
     - every other edge, such as one across a sheet between two fixed boundary vertices: free.
 
     A new vertex is the middle of its edge, except beside a junction that rests on Π: there the rows of
@@ -112,7 +113,8 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
 def carry_planes(surface: Surface, cut: Bools) -> tuple[tuple[Plane, Bools], ...]:
     """The planes besides Π with their vertices, those on the edges ``cut`` (e,) last.
 
-    A new vertex is on a plane if its edge is part of the boundary there, or of a curve in a mirror plane.
+    A new vertex is on a plane if its edge is part of the boundary there, of a curve in a mirror plane, or
+    of a triangle that lies in the plane, as those of an upright wall do.
     """
     pairs = zip(surface.on_planes, edges_on_planes(surface), strict=True)
     return tuple((plane, np.concatenate([mask, along[cut]])) for (plane, mask), along in pairs)
@@ -121,10 +123,12 @@ def carry_planes(surface: Surface, cut: Bools) -> tuple[tuple[Plane, Bools], ...
 def edges_on_planes(surface: Surface) -> list[Bools]:
     """For each of ``on_planes`` the (e,) edges whose new vertices slide on it."""
     topo = surface.topology
-    return [
-        mask[topo.edges].all(axis=1) & (topo.curve_edge if plane.mirror else topo.boundary_edge)
-        for plane, mask in surface.on_planes
-    ]
+    masks = []
+    for plane, mask in surface.on_planes:
+        along = mask[topo.edges].all(axis=1) & (topo.curve_edge if plane.mirror else topo.boundary_edge)
+        along[topo.edge_of_face[mask[surface.faces].all(axis=1)]] = True
+        masks.append(along)
+    return masks
 
 
 def projected(project: Projection, points: Floats) -> Floats:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from ..base import validate
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import MissingExtra, SurfaceError
 from ..contact.pinching import lift, standing_part
 from ..surface import Surface
@@ -239,6 +239,7 @@ def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]
     X = np.concatenate([mesh.X for mesh in meshes])[used]
     fixed, sliding, *on_planes = np.concatenate([mesh.support for mesh in meshes])[used].T
     lines = carry_lines(surface, X, fixed)
+    _onto_planes(surface, X, F, patch_of_face, used >= len(old.X), on_planes)
     planes = tuple((plane, mask) for (plane, _), mask in zip(surface.on_planes, on_planes, strict=True))
     ends = np.searchsorted(used, old.curves)
     cables = tuple(replace(c, edges=ends[old.cable == index]) for index, c in enumerate(surface.cables))
@@ -252,6 +253,21 @@ def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]
         on_planes=planes,
         cables=cables,
     )
+
+
+def _onto_planes(
+    surface: Surface, X: Floats, F: Ints, patch: Ints, new: Bools, masks: Sequence[Bools]
+) -> None:
+    """Put new vertices of patches that lie in a plane, such as upright walls, on it: X and masks change."""
+    count = len(surface.patches)
+    for (plane, before), mask in zip(surface.on_planes, masks, strict=True):
+        off = ~before[surface.faces].all(axis=1)
+        lies = (np.bincount(surface.patch_of_face, off, count) == 0) & np.isin(np.arange(count), patch)
+        inside = np.zeros(len(X), dtype=bool)
+        inside[F[lies[patch]]] = True
+        inside &= new
+        X[inside] -= plane.height(X[inside])[:, None] * np.array(plane.normal)
+        mask |= inside
 
 
 def _patch_angles(mesh: CurveMesh, count: int) -> Floats:
