@@ -14,7 +14,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PlanError
-from ..base.units import conversion_note, length_factor
+from ..base.units import conversion_note, length_factor, size_note
 from .curves import Curve
 from .layers import Layer, layer_of, left_out, listed, understood
 from .paths import JoinedPath, join_strokes
@@ -165,6 +165,9 @@ class _Sorted:
         dividers = self._dividers([outline, *holes.values()])
         heights, labels = self._heights(), self._labels()
         self._note_rest()
+        width = float(np.ptp(outline.at(outline.dense), axis=0)[:2].max())
+        if note := size_note(width, self.units, self.content.unit):
+            self.notes.append(note)
         if factor != 1.0:
             self.notes.insert(0, conversion_note(self.content.unit, self.units))
         return Drawing(

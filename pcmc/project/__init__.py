@@ -42,7 +42,7 @@ from .file import Project, build, load, raised, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
 from .outcome import Outcome
 from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
-from .planning import project_text, proposal_text
+from .planning import drawing_reference, project_text, proposal_text
 from .remeshing import Remeshing
 from .running import (
     MOST_CHECKED,
@@ -88,6 +88,7 @@ __all__ = [
     "paint",
     "project_text",
     "raised",
+    "drawing_reference",
     "proposal_text",
     "reference",
     "run",

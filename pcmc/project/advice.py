@@ -33,16 +33,20 @@ INFLATED = (Overload, Fold)
 Trial = Callable[[Project, Surface], Outcome]  # solves a project from a surface
 
 
-def chosen_walls(project: Project, surface: Surface) -> list[str]:
-    """The tensions of the walls that the project leaves open, in a line."""
-    if project.plan is None or project.drawing is not None:
-        return []
+def chosen_values(project: Project, surface: Surface) -> list[str]:
+    """The tensions and walls that the project leaves open, a line each for the drawing's and the plan's."""
+    if project.plan is None or project.path.suffix.lower() != ".toml":
+        return []  # a drawing alone is proposed as a whole
+    drawn = [project.chosen.text] if project.chosen.text else []
     left_open = [divider for divider in project.plan.dividers if divider.wall == BALANCED]
     chosen = [p for p in surface.patches if any(_is_wall_of(divider, p.name) for divider in left_open)]
     if not chosen:
-        return []
+        return drawn
     values = ", ".join(f"{patch.name!r} {patch.tension:g}" for patch in chosen)
-    return [f"walls balanced with their neighbours: {values} (to choose one, type wall = under its divider)"]
+    return [
+        *drawn,
+        f"walls balanced with their neighbours: {values} (to choose one, type wall = under its divider)",
+    ]
 
 
 def advice(

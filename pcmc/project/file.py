@@ -12,18 +12,20 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .. import io
 from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError, unknown
 from ..base.files import check_name, check_regular, system_error
-from ..base.units import NO_UNITS, Units
+from ..base.units import NO_UNITS, Units, size_note
 from ..plan import Plan, plan_from
 from ..solvers import find_method
 from ..surface import Surface
 from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys
 from .documents import Documents, documents_of
-from .drawn import is_drawing, with_drawing
+from .drawn import Chosen, is_drawing, with_drawing
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
 from .rises import Rise, take_rises, with_rises
@@ -64,6 +66,7 @@ class Project:
     views, colour : of the picture, side by side; ``colour`` is one of ``COLOURS``.
     whole : whether the output is the whole roof that a surface with mirror planes is a part of.
     drawing : that the plan refers to, or that ``path`` is; None if there is none.
+    chosen : values for the drawing that neither it nor the file gives.
     """
 
     path: Path
@@ -87,6 +90,7 @@ class Project:
     colour: str = "patches"
     whole: bool = False
     drawing: Drawing | None = None
+    chosen: Chosen = field(default_factory=Chosen)
 
     @property
     def outputs(self) -> list[Path]:
@@ -121,13 +125,18 @@ def load(path: PathLike) -> Project:
     Warns
     -----
     FileWarning
-        For what was changed and left out of a drawing.
+        For what was changed and left out of a drawing, and a plan whose size is unlikely in its unit.
     """
     path = Path(path)
     project = project_of(path, read_data(path)[1])
     if project.drawing is not None and project.drawing.notes:
         text = f"{project.drawing.path}: {'; '.join(project.drawing.notes)}"
         warnings.warn(text, FileWarning, stacklevel=2)
+    elif project.drawing is None and project.plan is not None:
+        corners = project.plan.outline.at(project.plan.outline.dense)
+        width = float(np.ptp(corners, axis=0).max())
+        if note := size_note(width, project.units.length):
+            warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
     return project
 
 
@@ -227,7 +236,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     """The project with the given data. Errors as in ``load``."""
     with in_file(path, FileError):
         data, rises = take_rises(data)
-    data, drawing = with_drawing(path, data)
+    data, drawing, chosen = with_drawing(path, data)
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
     method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
     files, picture = output.get("files", []), output.get("picture")
@@ -269,6 +278,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             colour=colour,
             whole=output.get("whole", False),
             drawing=drawing,
+            chosen=chosen,
         )
 
 

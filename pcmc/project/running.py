@@ -25,11 +25,22 @@ from ..meshing.remeshing import remesh
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface, mirrored
 from . import cache
-from .advice import advice, chosen_walls
+from .advice import advice, chosen_values
 from .documents import document_works
 from .file import Project, in_file, load, start_of
 from .outcome import Outcome, Whole
-from .output import OnStep, PathLike, Works, check_names, check_outputs, fields, ignore, paint, write_all
+from .output import (
+    OnStep,
+    PathLike,
+    Works,
+    check_names,
+    check_outputs,
+    fields,
+    ignore,
+    metres_note,
+    paint,
+    write_all,
+)
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
@@ -221,7 +232,9 @@ def solve_from_start(
         raise OptionError(f"{text}, or give the plan mirrors", what="whole")
     _check_balance(start)
     outcome = replace(solve_project(project, start, report), units=units)
-    notes = (*chosen_walls(project, start), *outcome.notes)
+    notes = (*chosen_values(project, start), *outcome.notes)
+    if project.drawing is not None:
+        notes += tuple(metres_note(project.files, units.length))
     if outcome.good:
         return replace(outcome, notes=notes)
     report("looking for advice")
