@@ -308,8 +308,11 @@ class _Sorted:
                     raise PlanError(text, what=where, where=_plain(foot))
                 tops.append(top)
         if tops:
-            text = "a roof held at a point has a peak there as small as the triangles; draw a mast's top as a"
-            self.notes.append(f"layer 'mast': {text} ring, and no mesh changes the roof")
+            text = "a roof held at a point has a peak there as thin as the triangles, which comes to rest on"
+            text += (
+                " some meshes and not on others; draw a mast's top as a ring, and the roof is the same on all"
+            )
+            self.notes.append(f"layer 'mast': {text}")
         return tops
 
     def _heights(self) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import PcmcError
@@ -20,7 +20,9 @@ from ..solvers.result import Status
 from ..surface import Surface
 from .accuracy import AccuracyWanted
 from .file import Project
+from .masts import SHARES, point_masts, ring_lines, with_rings
 from .outcome import Outcome
+from .sails import as_sail, sail_lines
 
 if TYPE_CHECKING:
     from ..design import Parameter
@@ -68,33 +70,89 @@ def advice(
         if strained is None or strained.remedy is None:
             return []
         return ["add to the command:", f"--tension {strained.remedy[0]!r}={strained.remedy[1]:g}"]
-    name = project.path.with_suffix(".toml").name
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the project's own warnings were shown
-        better, rests = (plan, True) if outcome.certificate.certified else _tried(project, plan, outcome)
+        if outcome.certificate.certified:
+            base, reshaping, better, rests = plan, Reshaping(), plan, True
+        else:
+            base, reshaping, outcome = _reshaped(project, plan, outcome)
+            better, rests = _tried(project, base, outcome)
+        if reshaping.sail and project.rises:
+            project = replace(project, targets=project.targets[: -len(project.rises)])
         met, reached = False, ""
         if rests and project.targets:
             better, met, reached = _with_targets(project, better, outcome, try_project)
-        lines = _lines(plan, better)
-    if not lines:
+        lines = _lines(base, better)
+    if not (lines or reshaping.lines):
         return []
-    if not project.targets:
-        return [
-            f"type in {name}, {'which was tried and comes to rest' if rests else 'as a first step'}:",
-            *lines,
-        ]
+    tried = "which was tried and comes to rest" if rests else "as a first step"
     if met:
-        return [f"type in {name}, which was tried, comes to rest and meets the targets:", *lines]
-    tried = "which was tried without the targets and comes to rest" if rests else "as a first step"
+        tried = "which was tried, comes to rest and meets the targets"
+    elif rests and project.targets:
+        tried = "which was tried without the targets and comes to rest"
+    ending = [f"with them, the targets are {reached}"] if reached else []
     return [
-        f"type in {name}, {tried}:",
+        f"{reshaping.cause}{_where(project, reshaping, lines)}, {tried}:",
+        *reshaping.lines,
         *lines,
-        *([f"with them, the targets are {reached}"] if reached else []),
+        *ending,
     ]
+
+
+@dataclass(frozen=True)
+class Reshaping:
+    """Changes of what holds a roof: a sail instead of free edges, rings instead of points."""
+
+    sail: Sequence[str] = ()
+    rings: Sequence[str] = ()
+
+    @property
+    def lines(self) -> list[str]:
+        """What to type or draw."""
+        return [*self.sail, *self.rings]
+
+    @property
+    def cause(self) -> str:
+        """Why, before a heading; empty without changes."""
+        causes = ["edges that nothing holds"] if self.sail else []
+        causes += ["a roof held at a single point"] if self.rings else []
+        return f"the cause is {' and '.join(causes)}; " if causes else ""
+
+
+def _where(project: Project, reshaping: Reshaping, lines: Sequence[str]) -> str:
+    """Where to make the changes: in the project, or in its drawing."""
+    if project.drawing is None or not reshaping.rings:
+        return f"type in {project.path.with_suffix('.toml').name}"
+    typed = lines or reshaping.sail
+    drawn = f"draw in {project.drawing.path.name}"
+    return f"{drawn} and type in {project.path.with_suffix('.toml').name}" if typed else drawn
+
+
+def _reshaped(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, Reshaping, Outcome]:
+    """The plan as a sail, if edges are free, with rings instead of single points, and its outcome.
+
+    The rings are the smallest with which the roof comes to rest; the plan itself where nothing does.
+    """
+    sail, masts = as_sail(plan, project.rises), point_masts(plan)
+    base = plan if sail is None else sail
+    shares = SHARES if masts else () if sail is None else (0.0,)
+    for share in shares:
+        changed = with_rings(base, masts, share) if masts else base
+        try:
+            result = solve(_coarse(changed, outcome).surface(), project.method, **project.options)
+        except PcmcError:  # such as a patch whose point is in the ring
+            continue
+        if result.certificate.certified:
+            typed = [] if sail is None else sail_lines(plan, sail, project.rises)
+            rings = ring_lines(masts, share, drawn=project.drawing is not None)
+            return changed, Reshaping(typed, rings), Outcome(result, ())
+    return plan, Reshaping(), outcome
 
 
 def _tried(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, bool]:
     """The plan mended until it comes to rest, on a mesh that is not fine; and whether it does."""
+    if outcome.certificate.certified:
+        return plan, True
     for _ in range(TRIES):
         better = mended(plan, outcome)
         if not _lines(plan, better):

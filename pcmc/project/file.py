@@ -26,6 +26,7 @@ from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys
 from .documents import Documents, documents_of
 from .drawn import Chosen, is_drawing, with_drawing
+from .masts import mast_note
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
 from .rises import Rise, take_rises, with_rises
@@ -66,6 +67,7 @@ class Project:
     views, colour : of the picture, side by side; ``colour`` is one of ``COLOURS``.
     whole : whether the output is the whole roof that a surface with mirror planes is a part of.
     drawing : that the plan refers to, or that ``path`` is; None if there is none.
+    rises : heights that the plan has instead of tensions; each is one of the targets.
     chosen : values for the drawing that neither it nor the file gives.
     """
 
@@ -90,6 +92,7 @@ class Project:
     colour: str = "patches"
     whole: bool = False
     drawing: Drawing | None = None
+    rises: Sequence[Rise] = ()
     chosen: Chosen = field(default_factory=Chosen)
 
     @property
@@ -125,7 +128,8 @@ def load(path: PathLike) -> Project:
     Warns
     -----
     FileWarning
-        For what was changed and left out of a drawing, and a plan whose size is unlikely in its unit.
+        For what was changed and left out of a drawing, for a plan whose size is unlikely in its unit,
+        and for a roof held at single points inside.
     """
     path = Path(path)
     project = project_of(path, read_data(path)[1])
@@ -135,7 +139,7 @@ def load(path: PathLike) -> Project:
     elif project.drawing is None and project.plan is not None:
         corners = project.plan.outline.at(project.plan.outline.dense)
         width = float(np.ptp(corners, axis=0).max())
-        if note := size_note(width, project.units.length):
+        for note in filter(None, (size_note(width, project.units.length), mast_note(project.plan))):
             warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
     return project
 
@@ -278,6 +282,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             colour=colour,
             whole=output.get("whole", False),
             drawing=drawing,
+            rises=rises,
             chosen=chosen,
         )
 
@@ -298,7 +303,7 @@ def raised(project: Project, wanted: Mapping[str, float | None]) -> Project:
         text = f"{flag}: {project.path.name} has targets already; change them there"
         raise OptionError(text, what=flag)
     plan, targets, vary = with_rises(project.plan, rises)
-    return replace(project, plan=plan, targets=targets, vary=vary)
+    return replace(project, plan=plan, targets=targets, vary=vary, rises=rises)
 
 
 def _views(output: Mapping[str, Any]) -> list[Any]:
