@@ -50,6 +50,12 @@ class Meridian:
         rate = (self.r * self.tangent[:, 1] - self.z * self.tangent[:, 0]) * self.r
         return float(2.0 * np.pi / 3.0 * simpson(rate, dx=self.length / (len(self.r) - 1)))
 
+    @property
+    def volume_below(self) -> float:
+        """∫ z ⟨ν, n⟩ dA = -2π ∫ z r' r ds between the surface and z = 0, length³."""
+        rate = -self.z * self.tangent[:, 0] * self.r
+        return float(2.0 * np.pi * simpson(rate, dx=self.length / (len(self.r) - 1)))
+
     def distance(self, points: Floats) -> Floats:
         """(k,) distance of points (k,3) from the surface, length."""
         flat = np.column_stack([np.hypot(points[:, 0], points[:, 1]), points[:, 2]])

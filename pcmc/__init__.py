@@ -136,6 +136,8 @@ if not TYPE_CHECKING:
             _html = _shell.display_formatter.formatters["text/html"]
             _html.for_type_by_name("pcmc.surface.surface", "Surface", _cell_html)
             _html.for_type_by_name("pcmc.solvers.result", "Result", _cell_html)
+            _html.for_type_by_name("pcmc.design.outcome", "Design", _cell_html)
+            _html.for_type_by_name("pcmc.accuracy.adaptive", "AccurateResult", _cell_html)
 
     def __dir__() -> list[str]:
         return sorted({*globals(), *__all__})

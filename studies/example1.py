@@ -127,7 +127,7 @@ def _standing_numbers(standing: pd.DataFrame) -> dict[str, float]:
 
 
 def _given(start: Surface, records: pd.DataFrame) -> dict[str, float]:
-    """What the paper tells of the initial shape and of its runs, taken from ours."""
+    """What the paper states of the initial shape and of its runs, measured on ours."""
     roof = start.patch_faces([0])
     X = start.vertices[np.unique(start.faces[roof])]
     across = np.unique(X[:, 0].round(9))

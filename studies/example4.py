@@ -54,7 +54,7 @@ def table(folder: Folder) -> dict[str, float]:
 
 
 def _given(start: Surface) -> dict[str, float]:
-    """What the paper tells of the initial shape, taken from ours."""
+    """What the paper states of the initial shape, measured on ours."""
     width, depth, height = np.ptp(start.vertices, axis=0)
     tension = {patch.name: patch.tension for patch in start.patches}
     return {

@@ -223,8 +223,8 @@ def figure(folder: Folder) -> None:
 def _draw_rays(folder: Folder) -> None:
     """The ends of the rays in the plane of the tensions, joined in the order of their directions.
 
-    Between two folds the line is whole: there the branch turns back. Next to an end that says something
-    of the mesh only, or that was not reached, it is dashed.
+    Between two folds the line is whole: there the branch turns back. Next to an end that belongs
+    to the mesh only, or that was not reached, it is dashed.
     """
     from pcmc.plot.figure import CURVES, INK, SMALL, TEXT, finish, new, style
 

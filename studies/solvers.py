@@ -9,7 +9,7 @@ takes about a minute. Times are processor times of one thread.
 Example 1 has a wall of α 1: with the paper's 2 it is a saddle on fine meshes. The geometric solver has two
 targets. "stationary" comes to the nearest equilibrium, a minimum or a saddle, as the flow would from a
 symmetric start. "minimum", its default, leaves saddles: from Example 3's it goes down until triangles
-collapse, and the verdict says which and why.
+collapse, and the verdict names the cause.
 """
 
 from __future__ import annotations

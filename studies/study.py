@@ -25,7 +25,7 @@ class Study:
 
     Attributes
     ----------
-    name, about : its name on the command line, and one line that says what it answers.
+    name, about : its name on the command line, and the question that it answers, in one line.
     data : ``data(folder, short)`` solves and writes records and meshes; ``short`` asks for the
         least work that still passes through every line.
     table : ``table(folder)`` reads records, writes tables, and returns the numbers that are

@@ -44,6 +44,15 @@ def solved(folder, capsys):
     return folder
 
 
+def test_without_a_command_the_help_is_printed(capsys):
+    assert cli.main(["--help"]) == 0
+    help_page = capsys.readouterr()
+    assert cli.main([]) == 2
+    assert capsys.readouterr() == help_page
+    assert "pcmc solve roof.toml" in help_page.out
+    assert not help_page.err
+
+
 def test_help_shows_every_command(capsys):
     assert cli.main(["--help"]) == 0
     out = capsys.readouterr().out
@@ -164,7 +173,6 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "Missing command"),
         (["slove"], "No such command"),
         (["solve"], "Missing argument"),
         (["solve", "none.obj"], "none.obj: cannot be read"),

@@ -1,8 +1,9 @@
-"""What is typed wrong is told as it was typed, and the command speaks where a terminal can do little."""
+"""Wrong input is quoted as it was typed, and messages are readable on a poor terminal."""
 
 from __future__ import annotations
 
 import io
+import re
 import sys
 
 import pytest
@@ -32,6 +33,20 @@ def test_a_number_that_is_none_is_shown_with_its_option(folder, capsys, argument
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
     assert message in err
+
+
+def test_an_edge_length_that_cannot_be_is_explained_in_one_line(folder, capsys):
+    assert cli.main([*REMESH, "1e-9"]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert re.search(r"edge_length = 1e-09 would make about .* triangles, .*; use [\d.]+ or more", err)
+    for more in (["--no-solve"], []):
+        assert cli.main([*REMESH, "50", *more]) == 0
+        assert "the edge length 50 is not reached; the longest edge is " in capsys.readouterr().out
+    project = SMALL.split("[output]")[0]
+    (folder / "twice.toml").write_text(project + "[remesh]\nedge_length = 50\n", encoding="utf-8")
+    assert cli.main(["solve", "twice.toml", "--no-mesh-check"]) == 0
+    assert "the edge length 50 is not reached" in capsys.readouterr().out
 
 
 def test_the_help_named_is_that_of_the_command(folder, capsys):

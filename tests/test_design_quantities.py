@@ -15,7 +15,6 @@ from pcmc.base.errors import SurfaceError
 from pcmc.certificate.certificate import TOLERANCE
 from pcmc.design.quantities import QUANTITIES
 from pcmc.design.targets import measure
-from pcmc.energy.functional import apply_supports
 
 
 @pytest.fixture
@@ -125,20 +124,6 @@ def test_volumes_over_the_plane_are_the_same_wherever_it_is_drawn(make, shift):
     assert pcmc.energy(far) == pytest.approx(pcmc.energy(near), rel=1e-7)
     free = near.free
     np.testing.assert_allclose(found.by_position[free], whole.by_position[free], atol=1e-8)
-
-
-def test_a_patchs_volume_is_seen_from_the_point_of_the_plane_however_far():
-    """V_i = ⅓ Σ ⟨x - p, A ν⟩ over its triangles."""
-    far = drawn_at(two_caps(1.2), np.array([1e3, -2e3, 0.0]))
-    target, name = Target("volume", "large"), "large"
-    X = far.vertices[far.faces[far.patch_of_face == far.patch_index(name)]]
-    vector = 0.5 * np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0])
-    found = measure(far, target)
-    assert found.value == pytest.approx(np.einsum("fd,fd", X.mean(axis=1), vector) / 3.0, rel=1e-10)
-    direction = apply_supports(far, np.random.default_rng(2).standard_normal(far.vertices.shape))
-    ahead, behind = (measure(far.moved(far.vertices + t * direction), target).value for t in (1e-4, -1e-4))
-    slope = float((found.by_position * direction).sum())
-    assert slope == pytest.approx((ahead - behind) / 2e-4, rel=1e-6)
 
 
 def test_points_are_in_the_coordinates_of_a_tilted_plane():

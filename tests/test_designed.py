@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import signal
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from small_project import SMALL
 
 import pcmc
-from pcmc import cli
+from pcmc import cli, explore
 from pcmc.base.units import Units
-from pcmc.cli.reports import UNIT_OF
+from pcmc.design.outcome import UNIT_OF
 from pcmc.design.quantities import QUANTITIES
+from pcmc.explore.page_data import unit_texts
 from pcmc.project import build, cached_files, clear_cache, designed, load, run, running
 
 GOAL = """
@@ -190,7 +193,11 @@ def test_targets_are_shown_in_their_units(folder, capsys):
 
 
 def test_every_quantity_of_a_target_has_a_unit():
-    for quantity in {*QUANTITIES, "tension", "pressure"} - {"lean"}:  # an angle, in degrees
+    page = Path(explore.__file__).with_name("page") / "targets.js"
+    kinds = dict(re.findall(r"(\w+): \"(\w+)\"", page.read_text(encoding="utf-8").partition("};")[0]))
+    assert kinds == {quantity: UNIT_OF.get(quantity, quantity) for quantity in QUANTITIES}
+    assert set(kinds.values()) <= set(unit_texts(Units("m", "kN")))
+    for quantity in {*QUANTITIES, "tension", "pressure"}:
         assert getattr(Units("m", "kN"), UNIT_OF.get(quantity, quantity))
 
 

@@ -1,4 +1,4 @@
-"""Explore in a real browser: what is drawn, what is said, and what every control does."""
+"""Explore in a real browser: the picture, the messages, and what every control does."""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from browsing import Explored, browser, changed, needs_browser, until
 
 from generators import spherical_cap
@@ -55,6 +57,10 @@ def test_units_stand_behind_the_numbers_where_they_are_given(driver):
             label.get_attribute("title") for label in driver.find_elements("css selector", "#patches label")
         ]
         assert titles == ["kip/ft", "kip/ft²"]
+        page.find("#check").click()
+        rows = until(lambda: page.text("#check-result tbody"), "the mesh check")
+        assert re.search(r"Height of cap\s+[\d.]+ ± [\d.]+ ft\s+[\d.]+ ± [\d.]+ ft\n", rows)
+        assert " kip/ft³" in rows
         assert not page.complaints()
     finally:
         running.close()

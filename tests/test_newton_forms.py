@@ -234,7 +234,7 @@ def test_rigid_motions_are_neutral_and_not_counted():
 
 @pytest.mark.parametrize("make", [sphere, double_bubble])
 def test_a_bubble_sought_as_a_minimum_vanishes_and_says_so(make):
-    """It is a saddle: smaller or larger, E falls. Nothing else exists, and the verdict says so."""
+    """It is a saddle: smaller or larger, E falls. Nothing else exists, as the verdict states."""
     result = solve(make(0.8))
     assert not result.converged
     assert np.isfinite(result.surface.vertices).all()

@@ -48,7 +48,7 @@ def rebuilt(surface, X=None, plane=None, patches=None, order=None, rank=None):
 
 
 def answer(surface):
-    """Numbers that do not depend on where, how large or in what order the surface is told."""
+    """Numbers that do not depend on the place, the size and the numbering of the surface."""
     result = solve(surface, target="stationary")
     assert result.converged
     found = result.certificate

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from force_cases import HALL, MASTS, SAIL, SQUARE, cables
+from volume_cases import cap_height
 
 import pcmc
 from pcmc import Verdict
@@ -108,6 +109,17 @@ def test_weight_and_snow_are_those_of_the_patches():
     snowy = Plan(HALL, tension=3.0, snow=0.25, edge_length=1.5).surface()
     bare = Plan(HALL, tension=3.0, edge_length=1.5).surface()
     assert snowy.pressures.tolist() == bare.with_snow(0.25).pressures.tolist()
+
+
+def test_a_patch_with_a_negative_volume_hangs_below_the_plane():
+    """The cap of height h over the unit disc has the pressure 4 α h / (1 + h²)."""
+    plan = {"outline": {"circle": {"centre": [0, 0], "radius": 1.0}}, "edge_length": 0.2}
+    for volume in (1.0, -1.0):
+        result = pcmc.solve(Plan(**plan, patches={"cap": {"tension": 2.0, "volume": volume}}).surface())
+        assert result.certify().certified
+        heights, h = result.surface.vertices[:, 2], np.sign(volume) * cap_height(1.0)
+        assert heights[np.abs(heights).argmax()] == pytest.approx(h, rel=0.03)
+        assert result.surface.pressures[0] == pytest.approx(8.0 * h / (1.0 + h * h), rel=0.03)
 
 
 def test_rooms_of_prescribed_volume_close_at_their_walls():

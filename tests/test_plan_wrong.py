@@ -9,13 +9,17 @@ from refusals import refused
 
 from pcmc.base.errors import MissingExtra, OptionError, PlanError, SurfaceError
 from pcmc.plan import Area, Plan, plan_from
-from pcmc.plan.curves import arc, circle, curve, join, polyline
+from pcmc.plan.curves import circle, curve, polyline
 from tests.test_plan import BOX, vertices_of
 
 COURT = {"curve": circle([17, 5], 2)}
 WALL = [[10, 0], [10, 12]]
-WEST, EAST = 3.85 * np.array([[-np.cos(0.4), -np.sin(0.4)], [np.cos(0.4), np.sin(0.4)]])
-TURNED = join(arc(WEST, [0, 3.85], EAST), arc(EAST, [0, -3.85], WEST))  # octagons would cross
+BETWEEN = 3.85 * np.array([np.cos(np.pi / 8), np.sin(np.pi / 8)])  # two vertices of the outline, an octagon
+COARSE = {
+    "outline": circle([0, 0], 4),
+    "holes": [polyline([[0, 0], [1, 0], BETWEEN], closed=True)],
+    "edge_length": 3.5,
+}
 
 
 def tension(changes):
@@ -29,7 +33,6 @@ SLOPED = {
     "outline": [[0, 0, 1], [20, 0, 2], [20, 12, 1], [0, 12, 1]],
     "dividers": [{"curve": WALL, "bottom": "sloped"}, [[0, 6], [10, 6]]],
 }
-COARSE = {"outline": circle([0, 0], 4), "holes": [TURNED], "edge_length": 3.5}
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Roofs along curved platforms, remeshed: what comes to rest does, and what collapses is told why."""
+"""Roofs along curved platforms, remeshed: those that exist come to rest, and a collapse has its reason."""
 
 import numpy as np
 import pytest

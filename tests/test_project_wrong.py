@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 
 import pytest
 from refusals import refused
@@ -54,6 +55,89 @@ def test_a_number_out_of_range_is_named_with_its_line(tmp_path):
     line = 1 + path.read_text(encoding="utf-8").split("\n").index("[solve]")
     with refused(FileError, what="solve.iterations", where=line + 1):
         load(path)
+
+
+WHOLE = """
+units = "m"
+[plan]
+edge_length = 1.0
+outline = [[0, 0], [8, 0], [8, 6], [0, 6]]
+plane = {point = [0, 0, 0]}
+[plan.patches.west]
+tension = 2.0
+[plan.patches.east]
+tension = 2.5
+[[plan.dividers]]
+curve = [[4, 0], [4, 6]]
+bottom = "held"
+[[plan.holes]]
+curve = {circle = {centre = [6, 3], radius = 0.5}}
+[[plan.cables]]
+curve = [[0, 0], [4, 0]]
+name = "rim"
+tension = 3.0
+[plan.rooms.both]
+volume = 20.0
+patches = ["west", "east"]
+[solve]
+mesh_check = false
+[[remesh]]
+growth = 1.3
+edge_length = 0.5
+[targets]
+meet = [{quantity = "apex", of = "west", value = 1.0}]
+vary = [{patch = "west", low = 1.0}]
+[structure]
+young = 1e6
+thickness = 0.01
+[output]
+files = ["a.obj"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("key", "typed"),
+    [
+        ("units", "unit"),
+        ("edge_length = 1.0", "edge_lenght = 1.0"),
+        ("point", "pont"),
+        ("tension = 2.5", "tensoin = 2.5"),
+        ("bottom", "botom"),
+        ("curve = [[4", "curv = [[4"),
+        ("curve = {circle", "cirve = {circle"),
+        ("circle", "cirlce"),
+        ("centre", "center"),
+        ("radius", "radios"),
+        ("curve = [[0", "curves = [[0"),
+        ("name", "nam"),
+        ("volume", "volum"),
+        ("patches =", "patchs ="),
+        ("mesh_check", "meshcheck"),
+        ("growth", "grow"),
+        ("meet", "met"),
+        ("quantity", "quantiy"),
+        ("value", "valeu"),
+        ("patch =", "path ="),
+        ("low", "lo"),
+        ("thickness", "thicknes"),
+        ("files", "file"),
+        ("plan.rooms", "plan.room"),
+        ("targets", "target"),
+    ],
+)
+def test_a_misspelt_key_names_the_nearest_right_one(tmp_path, key, typed):
+    path = project(tmp_path, WHOLE)
+    load(path)
+    assert WHOLE.count(key) >= 1
+    project(tmp_path, WHOLE.replace(key, typed, 1))
+    right, wrong = (re.split(r"[ .]", text.removeprefix("plan."))[0] for text in (key, typed))
+    with pytest.raises(FileError, match=rf"unknown .*{wrong}'; did you mean '{right}'\?"):
+        load(path)
+
+
+def test_a_hole_may_be_a_curve_itself(tmp_path):
+    curve = "[plan]\nholes = [{circle = {centre = [2, 1.5], radius = 0.4}}]"
+    assert len(load(project(tmp_path, SMALL.replace("[plan]", curve))).plan.holes) == 1
 
 
 @pytest.mark.parametrize("edge", ["1e-300", "1e-9", "1e300"])

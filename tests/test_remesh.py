@@ -14,7 +14,7 @@ from pcmc.energy.functional import patch_areas
 from pcmc.meshing.curve_cutting import CurveMesh, cut_curves
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.meshing.refinement import refine
-from pcmc.meshing.remeshing import _patch_angles, _remesh_with_mmg, remesh
+from pcmc.meshing.remeshing import _patch_angles, _remesh_with_mmg, remesh, size_note
 from pcmc.plan import Plan
 
 
@@ -203,7 +203,6 @@ def test_cutting_curves_keeps_flat_areas_and_orientation(length):
     [
         ("edge_length", 0.0, "a finite number > 0"),
         ("edge_length", -np.inf, "a finite number > 0"),
-        ("edge_length", 1e-5, "at most 20000000 triangles"),
         ("near_curves", -1.0, "a finite number > 0"),
         ("chord", np.inf, "a finite number > 0"),
         ("growth", 1.0, "a finite number > 1"),
@@ -212,6 +211,33 @@ def test_cutting_curves_keeps_flat_areas_and_orientation(length):
 def test_wrong_arguments_are_refused(name, value, expected):
     with refused(OptionError, what=name, found=value, expected=expected):
         remesh(generators.two_squares(2), **{"edge_length": 1.0, name: value})
+
+
+@pytest.mark.parametrize(("name", "value"), [("edge_length", 1e-9), ("near_curves", 1e-9), ("chord", 1e-9)])
+def test_lengths_that_no_mesh_has_are_refused_at_once_with_the_least_one(name, value):
+    cap = generators.spherical_cap(0.25)
+    with pytest.raises(OptionError) as refusal:
+        remesh(cap, **{"edge_length": 0.3, name: value})
+    error = refusal.value
+    assert (error.what, error.found) == (name, value)
+    assert value < error.expected < 0.3
+    assert f"use {error.expected:g} or more" in str(error)
+
+
+def test_the_least_chord_is_met():
+    cap = generators.spherical_cap(0.25)
+    with pytest.raises(OptionError) as refusal:
+        remesh(cap, 0.5, chord=1e-9)
+    assert remesh(cap, 0.5, chord=refusal.value.expected).m > 2 * remesh(cap, 0.5).m
+
+
+def test_an_edge_length_that_curves_do_not_allow_is_noted():
+    cap = generators.spherical_cap(0.25)
+    coarse = remesh(cap, 50.0)
+    longest = float(edge_lengths(coarse).max())
+    text = f"the edge length 50 is not reached; the longest edge is {longest:.3g}"
+    assert size_note(coarse, 50.0).startswith(text)
+    assert not size_note(coarse, 0.99 * longest)
 
 
 def test_without_mmgpy_the_extra_is_named(monkeypatch):

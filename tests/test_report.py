@@ -184,7 +184,7 @@ def test_the_command_reports_on_the_designed_roof(tmp_path, monkeypatch, capsys)
     (tmp_path / "roof.toml").write_text(GOAL % 0.6)
     assert cli.main(["report", "roof.toml", "-o", "roof.pdf", "--no-mesh-check"]) == 0
     text = "\n".join(words_of("roof.pdf"))
-    assert re.search(r"apex of roof +0\.6000 +0\.6000 +yes", text)
+    assert re.search(r"apex of roof +0\.6000 +0\.6000 +m +yes", text)
     assert "1 May" in text
     assert re.search(r"F1 +\d+", text)
     assert "Mesh check" not in text

@@ -25,6 +25,7 @@ from .. import existence
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, SurfaceError
+from ..base.units import NO_UNITS, Units
 from ..meshing.curve_projection import onto_held_curves
 from ..meshing.refinement import Projection
 from ..meshing.remeshing import remesh
@@ -36,6 +37,7 @@ from ..surface.geometry import face_areas
 from .estimator import Goal, error_shares, evenness
 from .goals import Accuracy, accuracies, check_places, goals_in
 from .mesh_check import BOUNDARIES, MeshCheck, check_mesh, vertex_numbers, with_bar
+from .quantities import UNIT_OF
 
 TRIANGLES = 50_000  # of the mesh returned, by default at most
 ROUNDS = 12
@@ -89,6 +91,10 @@ class AccurateResult:
     surfaces: tuple[Surface, ...]
     detail: str = ""
 
+    def __repr__(self) -> str:
+        """How the search ended, above the surface it reached."""
+        return f"{self.message}\n{self.surface!r}"
+
     @property
     def reached(self) -> bool:
         """Whether every quantity is as accurate as wanted."""
@@ -101,14 +107,19 @@ class AccurateResult:
 
     @property
     def message(self) -> str:
+        """``text`` without units."""
+        return self.text()
+
+    def text(self, units: Units = NO_UNITS) -> str:
         """A sentence, and each quantity with its bar on this mesh and in the limit."""
-        head = "; ".join(filter(None, (self.status.value, self.detail)))
-        parts = [
-            f"{_name(row)} {with_bar(row['value'], row['error'])} on this mesh,"
-            f" {with_bar(row['limit'], row['limit_error'])} in the limit, wanted ± {row['accuracy']:g}"
-            for row in self.values.to_dict("records")
-        ]
-        return "; ".join([f"{head} ({self.surface.m} triangles)", *parts])
+        parts = ["; ".join(filter(None, (self.status.value, self.detail))) + f" ({self.surface.m} triangles)"]
+        for row in self.values.to_dict("records"):
+            unit = units.behind(UNIT_OF.get(row["quantity"], row["quantity"]))
+            on_mesh = with_bar(row["value"], row["error"], unit)
+            limit = with_bar(row["limit"], row["limit_error"], unit)
+            wanted = f"wanted ± {row['accuracy']:g}{unit}"
+            parts.append(f"{_name(row)} {on_mesh} on this mesh, {limit} in the limit, {wanted}")
+        return "; ".join(parts)
 
 
 def solve_to_accuracy(

@@ -15,6 +15,7 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Ints
 from ..base.errors import FreeSurfaceWarning, OptionError, SurfaceError
+from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
 from ..meshing.held_curves import curve_doubt, held_corners, smooth_midpoints
 from ..meshing.refinement import Projection, refine
@@ -23,7 +24,7 @@ from ..solvers.result import Callback, Result, Status
 from ..surface import Surface
 from .extrapolation import extrapolate
 from .persistence import MeshVerdict, compared, lost, shape_order
-from .quantities import Key, Reading, readings
+from .quantities import UNIT_OF, Key, Reading, readings
 
 MOST = 4_000_000  # triangles of the finest mesh, by default
 STEPS = 60  # of the solver on each finer mesh: it starts near
@@ -44,6 +45,7 @@ class MeshCheck:
         - ``quantity``, ``of``: its name; the patch or boundary it belongs to, empty for the whole;
         - ``value``: on this mesh; ``error``: its bar, how far the limit may be from it;
         - ``limit``: the value as edges go to zero; ``limit_error``: its bar;
+          both bars are 0 where the value is given: the volume, where rooms prescribe it;
         - ``order``: observed p of error ∝ h^p, h the edge length.
 
         Without a limit in sight ``limit`` is NaN and the bars are infinite. ``order`` is NaN for what is
@@ -87,13 +89,19 @@ class MeshCheck:
                 found[f"{row['quantity']}_{column}".replace(" ", "_")] = float(row[column])
         return found
 
-    def brief(self) -> str:
-        """The verdict, its reason, and the bars of the heights and of what belongs to the whole surface."""
-        main = self.table[(self.table.of == "") | (self.table.quantity == "height")]
-        return "\n".join([*self._head(), _text_table(main)])
+    def brief(self, units: Units = NO_UNITS) -> str:
+        """The verdict, its reason, and the bars of heights, of rooms and of the whole surface."""
+        main = self.table[(self.table.of == "") | self.table.quantity.isin(["height", "pressure"])]
+        return "\n".join([*self._head(), _text_table(main, units)])
+
+    def text(self, units: Units = NO_UNITS) -> str:
+        """The verdict, its reason and the table, with the units of its numbers if they are given."""
+        return "\n".join([*self._head(), "", _text_table(self.table, units)])
 
     def __str__(self) -> str:
-        return "\n".join([*self._head(), "", _text_table(self.table)])
+        return self.text()
+
+    __repr__ = __str__  # what a prompt shows: the table, not arrays
 
     def _head(self) -> list[str]:
         return [part for part in (self.verdict.value, self.detail, self.advice) if part]
@@ -252,31 +260,44 @@ def _of(one: dict[Key, Reading], key: Key, name: str) -> float:
     return float(getattr(one[key], name)) if key in one else math.nan
 
 
-def _text_table(table: pd.DataFrame) -> str:
+def _text_table(table: pd.DataFrame, units: Units) -> str:
     """Lines with as many digits as the bars let stand."""
+    kinds = [UNIT_OF.get(quantity, quantity) for quantity in table.quantity]
     lines = pd.DataFrame(
         {
             "quantity": table.quantity,
             "of": table.of,
             "on this mesh": [with_bar(*pair) for pair in zip(table.value, table.error, strict=True)],
             "limit": [with_bar(*pair) for pair in zip(table.limit, table.limit_error, strict=True)],
+            "unit": [units.behind(kind).strip() for kind in kinds],
             "order": ["-" if math.isnan(p) else f"{p:.1f}" for p in table.order],
         }
     )
+    if not units:
+        del lines["unit"]
     return lines.to_string(index=False)
 
 
-def with_bar(value: float, bar: float) -> str:
-    """A value and its bar, with two digits of the bar.
+def with_bar(value: float, bar: float, unit: str = "") -> str:
+    """A value and its bar, with two digits of the bar, and what follows them; without a bar it is given.
 
     >>> with_bar(2.71828, 0.0123), with_bar(1234.5, 45.0), with_bar(2.0, math.inf), with_bar(2.0, 1e-12)
     ('2.718 ± 0.012', '1234 ± 45', '2 ± unknown', '2 ± 1e-12')
+    >>> with_bar(2.71828, 0.0123, " m"), with_bar(1.7, 0.0, " m³"), with_bar(2.0, math.inf, " m")
+    ('2.718 ± 0.012 m', '1.7 m³ (given)', '2 m ± unknown')
     """
     if math.isnan(value):
         return "none in sight"
+    if bar == 0.0:
+        return f"{value:.8g}{unit} (given)"
     if not math.isfinite(bar):
-        return f"{value:.4g} ± unknown"
-    if bar <= 1e-9 * abs(value) or bar == 0.0:
+        return f"{value:.4g}{unit} ± unknown"
+    return _rounded(value, bar) + unit
+
+
+def _rounded(value: float, bar: float) -> str:
+    """Both with two digits of the bar."""
+    if bar <= 1e-9 * abs(value):
         return f"{value:.8g} ± {bar:.0e}"
     digits = 1 - math.floor(math.log10(bar))
     if -6 <= digits <= 9:

@@ -10,7 +10,12 @@ import numpy as np
 from ..base.arrays import Floats
 from ..certificate import Certificate
 from ..certificate.curve_tables import boundary_table, held_curves
+from ..energy.rooms import closing_volumes, prescribed_volumes, room_pressures
 from ..surface import Surface
+
+UNIT_OF = {"height": "length", "reaction": "force", "thrust": "force", "reaction per length": "tension"}
+UNIT_OF |= {"lowest eigenvalue": "eigenvalue"}
+"""The unit of quantities, as a name of ``Units``; others are named as their units."""
 
 ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open
 RESIDUALS = 10.0  # that a quantity may change with the forces left, relative
@@ -31,7 +36,8 @@ class Reading:
     quantity, of : its name, and the patch or boundary it belongs to; empty for the whole.
     value : as read from the mesh.
     estimate : of the same limit, but smoother from mesh to mesh; the same as ``value`` for most.
-    rounding : differences up to this size are none.
+    rounding : differences up to this size are none; 0 for a value that is given, such as the volume of
+        rooms whose volumes are prescribed.
     """
 
     quantity: str
@@ -61,7 +67,12 @@ def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[
             found["height", patch.name, (), b""] = reading
     for patch, area in zip(surface.patches, areas.tolist(), strict=True):
         add("area", patch.name, area, size**2)
-    add("volume", "", certificate.volume, size**3)
+    if (given := given_volume(surface)) is None:
+        add("volume", "", certificate.volume, size**3)
+    else:
+        add("volume", "", given, 0.0)
+    for room, pressure in zip(surface.rooms, room_pressures(surface).tolist(), strict=True):
+        add("pressure", room.name, pressure, tension / size)
     add("energy", "", certificate.energy, tension * float(areas.sum()))
     add("reaction", "", certificate.support, tension * size)
     for curve, name, pull, most in _boundaries(surface, certificate, vertices):
@@ -75,6 +86,26 @@ def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[
         key = "lowest eigenvalue"
         found[key, "", (), b""] = Reading(key, "", lowest, lowest, rounding)
     return found
+
+
+def given_volume(surface: Surface) -> float | None:
+    """The volume under the roof, where the prescribed volumes of rooms fix it; else None.
+
+    >>> from pcmc import Patch, Room
+    >>> X, F, sides = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[1, 2, 3]], [Patch("side", 2.0)]
+    >>> given_volume(Surface(X[1:], [[0, 1, 2]], [0], sides, fixed=range(3))) is None
+    True
+    >>> room = Room("all", {"lid": 1}, 3.0)
+    >>> lid = Surface(X[:3], [[0, 1, 2]], [0], [Patch("lid", 2.0)], fixed=range(3), rooms=[room])
+    >>> round(given_volume(lid), 12)
+    3.0
+    """
+    if not surface.rooms or np.any(closing_volumes(surface)):
+        return None
+    signs, roof = surface.room_signs, (~surface.walls).astype(float)
+    share = np.round(np.linalg.lstsq(signs.T, roof)[0], 9)  # most are whole: no rounding in the sum
+    known = np.abs(share @ signs - roof).max() <= ROUNDING
+    return float(share @ prescribed_volumes(surface)) if known else None
 
 
 def _boundaries(

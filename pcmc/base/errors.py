@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -33,6 +34,24 @@ class PcmcError(ValueError):
     ) -> None:
         super().__init__(message)
         self.what, self.where, self.found, self.expected = what, where, found, expected
+
+    def in_file(
+        self, path: str | os.PathLike[str], kind: type[PcmcError] | None = None, what: str | None = None
+    ) -> PcmcError:
+        """The same error with the name of a file in front of its message.
+
+        Parameters
+        ----------
+        kind : of the new error, if another.
+        what : its ``what``, if another.
+
+        >>> PcmcError("line 3: no number", what="x", where=3).in_file("roof.obj", FileError)
+        FileError('roof.obj: line 3: no number')
+        """
+        text, what = f"{os.fspath(path)}: {self}", self.what if what is None else what
+        return (kind or type(self))(
+            text, what=what, where=self.where, found=self.found, expected=self.expected
+        )
 
 
 class SurfaceError(PcmcError):

@@ -117,6 +117,21 @@ class Units:
         return f"{self.tension}²"
 
     @property
+    def eigenvalue(self) -> str:
+        """The unit of eigenvalues, force per displacement and area: "kN/m³"."""
+        return f"{self.tension}³"
+
+    def behind(self, kind: str) -> str:
+        """What follows a number: a space and the unit of its kind; nothing if no unit is given.
+
+        ``kind`` is length, force, or a property of Units such as volume.
+
+        >>> Units("m", "kN").behind("volume"), Units("m").behind("force"), Units().behind("volume")
+        (' m³', ' force', '')
+        """
+        return f" {getattr(self, kind) or kind}" if self else ""
+
+    @property
     def sentence(self) -> str:
         """All units in one line, for the head of a table.
 
@@ -170,6 +185,23 @@ def size_note(size: float, unit: str, drawn: str = "") -> str:
     return f'{note}; are its numbers in {likely[0]}? Then type units = "{likely[0]}"'
 
 
+def as_units(units: object) -> Units:
+    """Units as given, or by their unit of length alone.
+
+    Raises
+    ------
+    OptionError : for an unknown unit, and for anything else.
+
+    >>> as_units("mm").volume
+    'mm³'
+    """
+    if isinstance(units, str):
+        return Units(units)
+    if not isinstance(units, Units):
+        validate.refuse("units", units, 'a unit of length such as "m", or Units("m", "kN")')
+    return units
+
+
 def expect_length(unit: object, purpose: str) -> str:
     """The unit of lengths that a purpose such as "a drawing" cannot do without.
 
@@ -210,7 +242,7 @@ def length_factor(source: str, target: str) -> float:
 
 
 def conversion_note(source: str, target: str) -> str:
-    """The line that says that lengths were converted; empty where nothing changes.
+    """A line about the conversion of lengths; empty where nothing changes.
 
     >>> conversion_note("mm", "m")
     'lengths converted from mm to m (1 mm = 0.001 m)'

@@ -54,7 +54,7 @@ def load_ratio(surface: Surface) -> float:
 
 
 def load_is_given(surface: Surface) -> bool:
-    """Whether a ``load_ratio`` above 1 says something about every shape of the surface, not about this one.
+    """Whether a ``load_ratio`` above 1 rules out every shape of the surface, not this one alone.
 
     The load depends on the shape where patches weigh something, where the surface has free edges, as between
     cables, and where rooms prescribe volumes instead of pressures.

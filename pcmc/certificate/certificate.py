@@ -19,11 +19,12 @@ from ..base.units import NO_UNITS, Units
 from ..contact.pinching import standing_part
 from ..contact.pull import excess_pull
 from ..energy.curvature import METHODS, curvature_error, mean_curvature, target_curvature
-from ..energy.functional import energy_and_gradient, patch_areas, volume
+from ..energy.functional import energy_and_gradient, patch_areas
 from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
 from ..energy.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..energy.rooms import prescribed_volumes, room_pressures, room_volumes
+from ..energy.volume_below import volume_below
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest, stiffness
@@ -53,7 +54,7 @@ class Certificate:
         vertices beyond what their wall can take, relative. Of several loose parts, that of the worst. The
         relative differences of prescribed volumes are added to it (as squares).
     scale : norm of the single triangles' tension forces, force.
-    energy, volume : E (force·length) and the volume under the roof (length³).
+    energy, volume : E (force·length) and the volume between the roof and Π (``volumes_below``, length³).
     index : Morse index; None where the surface is not at rest. Rigid motions are not counted, nor motions
         that change a prescribed volume.
     leaning : a row per wall: its largest angle from the vertical of Π, degrees, and the place.
@@ -139,22 +140,23 @@ class Certificate:
 
     def text(self, units: Units = NO_UNITS) -> str:
         """The findings as a table, with the units of its numbers if they are given."""
+        lowest, sums, force = self.eigenvalues, (self.load, self.support), units.behind("force")
         rows = [
             ("verdict", self.verdict.value),
             ("", self.detail),
             ("units", units.sentence if units else ""),
             ("residual", f"{self.residual:.2e} of {self.scale:.4g}"),
-            ("energy", f"{self.energy:.10g}"),
-            ("volume", f"{self.volume:.6g}"),
+            ("energy", f"{self.energy:.10g}{units.behind('energy')}"),
+            ("volume", f"{self.volume:.6g}{units.behind('volume')}"),
             ("Morse index", "-" if self.index is None else str(self.index)),
             ("of motions", "" if not self.symmetric_in else f"symmetric in {', '.join(self.symmetric_in)}"),
-            ("lowest eigenvalue", f"{self.eigenvalues[0]:.4g}" if len(self.eigenvalues) else "-"),
+            ("lowest eigenvalue", f"{lowest[0]:.4g}{units.behind('eigenvalue')}" if len(lowest) else "-"),
             ("curvature error", f"{self.curvature_error:.2e}"),
             ("triangle quality", f"{self.quality:.3f} (sliding walls {self.walls_quality:.3f})"),
             ("pinched vertices", str(len(self.pinched))),
             ("walls lean", ", ".join(lean_texts(self.leaning))),
             ("load over capacity", f"{self.load_ratio:.3f}"),
-            ("load, reactions", f"{self.load:.6g}, {self.support:.6g} along the plane's normal"),
+            ("load, reactions", ", ".join(f"{x:.6g}{force}" for x in sums) + " along the plane's normal"),
         ]
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
         tables = self.patches, self.rooms, self.junctions, self.boundaries, self.cables, self.cable_ends
@@ -206,7 +208,7 @@ def certify(
     standing, classes, X = part.surface, part.classes, part.surface.vertices
     unheld = excess_pull(standing, part.walls, part.resting)
     value, forces = energy_and_gradient(standing, X, supports=False)
-    enclosed, areas = volume(surface), patch_areas(surface)
+    below, areas = volume_below(surface), patch_areas(surface)
     scale = force_scale(standing, classes, X)
     space = motion_space(standing, classes, X)
     rigid = rigid_modes(space, rigid_motions(standing), X)
@@ -250,7 +252,7 @@ def certify(
         residual=residual,
         scale=scale,
         energy=value,
-        volume=enclosed,
+        volume=below,
         index=index,
         eigenvalues=eigenvalues,
         modes=fields,

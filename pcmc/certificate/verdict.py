@@ -35,7 +35,7 @@ class Verdict(Enum):
     NOT_CONVERGED = "not converged: the forces do not balance yet; solve further"
     NO_EQUILIBRIUM = "no equilibrium: tension and pressure cannot balance, as the detail proves"
     RAN_AWAY = "ran away from this start: another start may come to rest; nothing proves that none does"
-    UNDECIDED = "undecided: rounding hides whether it is at rest, or stable; the detail says why"
+    UNDECIDED = "undecided: rounding hides whether it is at rest, or stable; the detail has the reason"
     WALL_DOWN = "wall down: a junction comes down on the held bottom of its wall, where it cannot rest"
     DEGENERATE = "degenerate mesh: triangles have collapsed; remesh, or start from another shape"
 

@@ -24,7 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int : the exit code. 0: the result is certified, or a command that certifies nothing has succeeded;
-        1: the result is not certified; 2: bad input; 130: stopped by Ctrl-C.
+        1: the result is not certified; 2: bad input, or no command at all, which prints the help;
+        130: stopped by Ctrl-C.
 
     >>> main(["certify", "roof.obk"])
     2

@@ -27,6 +27,8 @@ app = typer.Typer(
     Exit codes: 0 the result is certified (or the command has done its work and certifies nothing), 1 the
     result is not certified, 2 bad input, 130 stopped by Ctrl-C.
     """,
+    epilog="To begin: pcmc solve roof.toml, or pcmc solve hall.dxf --rise 2 -o hall.3dm."
+    " pcmc COMMAND --help explains a command.",
 )
 
 

@@ -137,7 +137,7 @@ class Given:
 def to_build(file: Path, say: OnStep, *, anyway: bool, cache: bool, whole: bool) -> Given:
     """As ``given``, for what is built: a roof that misses its targets is refused, unless ``anyway``.
 
-    With ``whole``, or where its project says so, the roof is unfolded at its mirror planes.
+    With ``whole``, or where its project asks for it, the roof is unfolded at its mirror planes.
     """
     shown = given(file, say, cache=cache)
     refuse_missed(file, shown, anyway)

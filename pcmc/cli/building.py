@@ -15,12 +15,12 @@ from ..base import validate
 from ..base.errors import FileError
 from ..base.units import Units
 from ..drawings import drawing_set
-from ..drawings.drawing_set import check_name
+from ..drawings.drawing_set import check_suffix as check_drawing
 from ..io import FORMATS, write
 from ..panels import Panels, fewer_families, panels
 from ..panels.schedule import MIRROR_IMAGES
 from ..report import roof_report
-from ..report.document import check_name as check_report
+from ..report.document import check_suffix as check_report
 from . import NOT_CERTIFIED, OK, arguments, checking
 from .arguments import MANY_FILES, Cache, Input, ViewName, Whole, number, option
 from .checking import CHECKED
@@ -128,7 +128,7 @@ def draw_(
       pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
     """
     for path in output:
-        check_name(path)
+        check_drawing(path)
     projects.check_outputs(output)
     heights = None if height is None else [number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]

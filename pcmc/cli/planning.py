@@ -10,7 +10,7 @@ import typer
 
 from .. import project as projects
 from ..base.errors import FileError, FileWarning
-from ..base.files import atomic_write
+from ..base.files import atomic_write, suffix_of
 from ..base.units import LENGTHS
 from . import OK
 from .arguments import TOML, number, option
@@ -36,9 +36,7 @@ def plan(
       pcmc plan hall.dxf -o hall.toml
       pcmc plan hall.3dm -o hall.toml --refer --units m
     """
-    if output.suffix.lower() != TOML:
-        text = f"{output}: a project is written as {TOML}; change the suffix"
-        raise FileError(text, what=str(output), found=output.suffix, expected=TOML)
+    suffix_of(output, (TOML,), "a project")
     if output.exists():
         text = f"{output}: is there already; delete it, or name another file"
         raise FileError(text, what=str(output))

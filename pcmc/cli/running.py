@@ -54,9 +54,11 @@ def run(arguments: list[str]) -> int:
 def _run(arguments: list[str]) -> int:
     try:
         command, exits = _command()
-        code = command(args=arguments, prog_name="pcmc", standalone_mode=False)
+        code = command(args=arguments or ["--help"], prog_name="pcmc", standalone_mode=False)
         if sys.stdout is not None:  # None if the shell closed it
             sys.stdout.flush()
+        if not arguments:  # the help, with the exit code of typer where a command is missing
+            return BAD_INPUT
         return _interrupted() if code == INTERRUPTED else int(code or OK)
     except KeyboardInterrupt:
         return _interrupted()

@@ -16,7 +16,7 @@ from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
 from ..certificate.certificate import certify
 from ..io import write
-from ..meshing.remeshing import remesh
+from ..meshing.remeshing import remesh, size_note
 from . import NOT_CERTIFIED, OK, arguments, checking
 from .arguments import (
     MANY_FILES,
@@ -115,7 +115,7 @@ def solve_(
         run = partial(projects.check_of, project, outcome)
         check = checking.mesh_check(outcome.surface, outcome.certificate, wanted, run)
     if check is not None:
-        print(f"\n{check.brief()}")
+        print(f"\n{check.brief(outcome.units)}")
     return OK if outcome.good else NOT_CERTIFIED
 
 
@@ -169,7 +169,7 @@ def certify_(
         with working() as say:
             say("checking the mesh")
             check = check_mesh(surface, meshes)
-        print(f"\n{check}")
+        print(f"\n{check.text(shown.units)}")
     good = certificate.certified if outcome is None else outcome.good
     return OK if good else NOT_CERTIFIED
 
@@ -202,6 +202,8 @@ def remesh_(
             surface = remesh(shown.surface, **stage.options)
             writing = partial(write, surface=surface, units=shown.units)
             projects.write_all([(path, writing) for path in output], say)
+        if note := size_note(surface, edge_length):
+            print(note)
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
     project = replace(_project(file, None, output, None), remeshing=(stage,), picture=None)

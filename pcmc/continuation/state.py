@@ -221,7 +221,7 @@ class State:
 
     @cached_property
     def volume(self) -> float:
-        """Volume under the patches that had a pressure at the start, length³."""
+        """Σ V_i of the energy over the patches that had a pressure at the start, length³."""
         return float(patch_volumes(self.mesh.surface.moved(self.X)) @ self.mesh.loaded)
 
     @cached_property

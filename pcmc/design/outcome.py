@@ -9,6 +9,7 @@ from enum import Enum
 import pandas as pd
 
 from ..base.errors import SurfaceError
+from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..solvers.result import Result
 from ..surface import Surface
@@ -25,11 +26,36 @@ class DesignStatus(Enum):
     STOPPED = "not met: stopped on request; the returned surface is the best so far"
 
 
+UNIT_OF = dict.fromkeys(("apex", "height", "sag"), "length")
+UNIT_OF |= {"reaction": "tension", "weight": "pressure", "lean": "angle"}
+"""The unit of quantities and parameters, as a name of ``Units``; others are named as their units."""
+
+
+def unit_of(label: str) -> str:
+    """The unit of a target or parameter, by its label, whose first word is the quantity.
+
+    >>> unit_of("apex of roof"), unit_of("tension of roof"), unit_of("tension of cable 1")
+    ('length', 'tension', 'force')
+    """
+    quantity = "force" if label.startswith("tension of cable ") else label.partition(" ")[0]
+    return UNIT_OF.get(quantity, quantity)
+
+
+def values_text(values: pd.Series, units: Units = NO_UNITS) -> str:
+    """Targets or parameters in words, such as "apex of roof 1.2 m".
+
+    >>> values_text(pd.Series({"apex of roof": 1.2, "tension of roof": 3.0}), Units("m", "kN"))
+    'apex of roof 1.2 m, tension of roof 3 kN/m'
+    """
+    labelled = {str(label): value for label, value in values.items()}
+    return ", ".join(f"{label} {x:.6g}{units.behind(unit_of(label))}" for label, x in labelled.items())
+
+
 class NoStart(SurfaceError):
     """There is no equilibrium to start a search for targets from; the message says why."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Design:
     """The end of a search for targets. Every value describes exactly ``surface``.
 
@@ -57,6 +83,14 @@ class Design:
     history: pd.DataFrame
     reason: str = ""
 
+    def __repr__(self) -> str:
+        """How the search ended, what it reached and with what, above the surface."""
+        values = "\n".join(
+            f"  {name}: {values_text(table['value'])}"
+            for name, table in (("targets", self.targets), ("parameters", self.parameters))
+        )
+        return f"{self.message}\n{values}\n  {self.solves} solves\n{self.surface!r}"
+
     @property
     def met(self) -> bool:
         """Whether every target is met."""
@@ -74,15 +108,19 @@ class Design:
 
     @property
     def message(self) -> str:
+        """``text`` without units."""
+        return self.text()
+
+    def text(self, units: Units = NO_UNITS) -> str:
         """A sentence, with the nearest reachable value of each target that is not met."""
         text = self.status.value
         missed = self.targets[~self.targets["met"]]
         for label, row in missed.iterrows():
             known = not math.isnan(row["limit"])
             reached = f"nearest reachable {row['limit']:.6g}" if known else f"so far {row['value']:.6g}"
-            text += f"; {label}: wanted {row['wanted']:.6g}, {reached}"
+            unit = units.behind(unit_of(str(label)))
+            text += f"; {label}: wanted {row['wanted']:.6g}{unit}, {reached}{unit}"
         if len(missed):
-            values = (f"{name} {value:.6g}" for name, value in self.parameters["value"].items())
-            text += f" ({', '.join(values)})"
+            text += f" ({values_text(self.parameters['value'], units)})"
             text += f"; a step further, {self.reason}" if self.reason else ""
         return text

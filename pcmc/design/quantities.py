@@ -18,7 +18,8 @@ from ..base.errors import OptionError
 from ..certificate.reactions import held_lengths, reactions
 from ..energy import kernels
 from ..energy.cables import add_cable_products
-from ..energy.functional import gradient_by, patch_volumes, weighted
+from ..energy.functional import gradient_by, weighted
+from ..energy.volume_below import volume_below_gradient, volumes_below
 from ..energy.weight import add_weight_products
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d, vertex_sums
@@ -82,24 +83,9 @@ def _area(surface: Surface, of: str | None) -> Measurement:
 
 
 def _volume(surface: Surface, of: str | None) -> Measurement:
-    """V_i as in ``volumes_to_plane``, of one patch or of all under pressure, length³."""
+    """V_i as in ``volumes_below``, of one patch or of all under pressure, length³."""
     one = _chosen_patches(surface, of)
-    slope = weighted(surface, 0.0, -one)[2]
-    X, F = surface.vertices, surface.faces[_faces_of(surface, of)]
-    away = surface.origin - np.array(surface.plane.point)
-    for c in range(3):
-        np.add.at(slope, F[:, c], np.cross(X[F[:, c - 2]] - X[F[:, c - 1]], away) / 6.0)
-    return Measurement(float(one @ volumes_to_plane(surface)), slope)
-
-
-def volumes_to_plane(surface: Surface) -> Floats:
-    """(k,) V_i of each patch seen from the point p of Π, however far, length³.
-
-    V_i = V_o + ⅓ ⟨o - p, Σ A_T ν_T⟩, with V_o the volume seen from the surface's origin o.
-    """
-    away = surface.origin - np.array(surface.plane.point)
-    across = area_vectors(surface.vertices[surface.faces]) @ away / 3.0
-    return patch_volumes(surface) + np.bincount(surface.patch_of_face, across, len(surface.patches))
+    return Measurement(float(one @ volumes_below(surface)), volume_below_gradient(surface, one))
 
 
 def _curvature(surface: Surface, of: str) -> Measurement:

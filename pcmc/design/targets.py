@@ -27,7 +27,7 @@ class Target:
     Parameters
     ----------
     quantity : ``"apex"``, greatest height over Π of a patch; ``"height"`` over a point of Π;
-        ``"volume"`` (V_i of a patch, seen from the point of Π) and ``"area"``; ``"curvature"``,
+        ``"volume"`` between a patch and Π (``volumes_below``), and ``"area"``; ``"curvature"``,
         p / (2α), a patch's mean curvature at rest; ``"reaction"``, the greatest force per length
         on the held boundary of a patch; ``"lean"`` of a wall, its largest angle from the vertical, degrees;
         ``"pressure"`` of a room of prescribed volume; ``"sag"`` of a

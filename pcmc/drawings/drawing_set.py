@@ -60,7 +60,7 @@ class DrawingSet:
         works: list[tuple[Path, Callable[[Path], None]]] = []
         document: Any = None
         for path in map(Path, paths):
-            suffix = check_name(path)
+            suffix = check_suffix(path)
             if document is None:
                 model = dxf.Model(self.surface, self.curves, self.sections, self.points)
                 document = dxf.document(model, self.units, self.sheets)
@@ -180,7 +180,7 @@ def drawing_set(
     return DrawingSet(surface, units, certificate, curves, cut, points, schedule, sheets)
 
 
-def check_name(path: Path) -> str:
+def check_suffix(path: Path) -> str:
     """The suffix of a drawing's file; another is refused."""
     return suffix_of(path, SUFFIXES, "a drawing")
 

@@ -209,5 +209,5 @@ def patch_volumes(surface: Surface) -> Floats:
 
 
 def volume(surface: Surface) -> float:
-    """The volume under the roof: Σ V_i over the patches that are no walls, length³."""
+    """Σ V_i of the energy over the patches that are no walls, length³; under a roof see ``volume_below``."""
     return float(patch_volumes(surface)[~surface.walls].sum())

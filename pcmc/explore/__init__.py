@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ..base.units import NO_UNITS, Units
+from ..base.units import NO_UNITS, Units, as_units
 from ..surface import Surface
 
 if TYPE_CHECKING:
@@ -21,7 +21,12 @@ __all__ = ["open_and_wait", "serve", "show", "start", "start_roof"]
 
 
 def serve(
-    surface: Surface, host: str = "127.0.0.1", port: int = 0, open_browser: bool = True, title: str = ""
+    surface: Surface,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    open_browser: bool = True,
+    title: str = "",
+    units: Units | str = NO_UNITS,
 ) -> None:
     """Explore a surface in the browser; returns when Ctrl-C is pressed.
 
@@ -36,12 +41,13 @@ def serve(
     port : 0 for any that is free.
     open_browser : open the page at once.
     title : at the top of the page, such as the name of a file.
+    units : of the surface's numbers, such as ``Units("m", "kN")``; a text is the unit of length.
 
     Raises
     ------
-    OptionError : if the server cannot listen on the address.
+    OptionError : for unknown units, and if the server cannot listen on the address.
     """
-    open_and_wait(start(surface, host, port, title), open_browser)
+    open_and_wait(start(surface, host, port, title, units), open_browser)
 
 
 def open_and_wait(explorer: Explorer, open_browser: bool = True) -> None:
@@ -60,12 +66,12 @@ def open_and_wait(explorer: Explorer, open_browser: bool = True) -> None:
 
 
 def start(
-    surface: Surface, host: str = "127.0.0.1", port: int = 0, title: str = "", units: Units = NO_UNITS
+    surface: Surface, host: str = "127.0.0.1", port: int = 0, title: str = "", units: Units | str = NO_UNITS
 ) -> Explorer:
     """Start the server in the background; the Explorer returned has ``.url`` and ``.close()``."""
     from .roof import Roof
 
-    return start_roof(Roof(surface, title, units), host, port)
+    return start_roof(Roof(surface, title, as_units(units)), host, port)
 
 
 def start_roof(
@@ -84,7 +90,7 @@ def start_roof(
     return Explorer(roof, host, port, watch)
 
 
-def show(surface: Surface, height: int = 680, title: str = "") -> View:
+def show(surface: Surface, height: int = 680, title: str = "", units: Units | str = NO_UNITS) -> View:
     """The page as the output of a cell in JupyterLab.
 
     The View returned has ``.surface``, the surface with the tensions and pressures now chosen, for the
@@ -95,7 +101,13 @@ def show(surface: Surface, height: int = 680, title: str = "") -> View:
     surface : the surface to start from; it is not changed.
     height : of the page in pixels.
     title : at the top of the page.
+    units : of the surface's numbers, as for ``serve``.
+
+    Raises
+    ------
+    OptionError : for unknown units.
     """
+    from .roof import Roof
     from .server import View
 
-    return View(surface, height, title)
+    return View(Roof(surface, title, as_units(units)), height)

@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..accuracy.mesh_check import MeshCheck, with_bar
+from ..accuracy.quantities import UNIT_OF
 from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
-from ..base.units import Units
+from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..certificate.reactions import reactions, reactions_per_length
 from ..contact.pinching import standing_part
@@ -114,7 +115,7 @@ def whole_of(surface: Surface) -> Whole | None:
 
 def unit_texts(units: Units) -> dict[str, Any]:
     """The units that the page shows; ``given`` is whether they are more than "force" and "length"."""
-    names = ("area", "volume", "curvature", "tension", "pressure", "energy")
+    names = ("area", "volume", "curvature", "tension", "pressure", "energy", "angle")
     texts = {name: getattr(units, name) for name in names}
     bare = {"length": units.length or "length", "force": units.force or "force"}
     return {"given": bool(units), **bare, **texts}
@@ -189,18 +190,20 @@ def findings(surface: Surface, certificate: Certificate) -> dict[str, Any]:
     }
 
 
-def mesh_findings(check: MeshCheck) -> dict[str, Any]:
+def mesh_findings(check: MeshCheck, units: Units = NO_UNITS) -> dict[str, Any]:
     """The verdict of the mesh check, and its table in words."""
     word, _, sentence = check.verdict.value.partition(": ")
-    rows = [
-        {
-            "name": " of ".join(filter(None, (row["quantity"], row["of"]))),
-            "value": with_bar(row["value"], row["error"]),
-            "limit": with_bar(row["limit"], row["limit_error"]),
-            "order": float(row["order"]),
-        }
-        for row in check.table.to_dict(orient="records")
-    ]
+    rows = []
+    for row in check.table.to_dict(orient="records"):
+        unit = units.behind(UNIT_OF.get(row["quantity"], row["quantity"]))
+        rows.append(
+            {
+                "name": " of ".join(filter(None, (row["quantity"], row["of"]))),
+                "value": with_bar(row["value"], row["error"], unit),
+                "limit": with_bar(row["limit"], row["limit_error"], unit),
+                "order": float(row["order"]),
+            }
+        )
     detail = "; ".join(filter(None, (check.detail, check.advice)))
     return {
         "name": check.verdict.name.lower(),

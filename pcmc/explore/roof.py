@@ -101,7 +101,7 @@ def read_roof(
     if report is not None:
         report(outcome)
     certificate, design = outcome.certificate, outcome.design
-    note = "" if design is None else design.message
+    note = "" if design is None else design.text(outcome.units)
     if not certificate.certified:
         note = "; ".join(filter(None, (note, certificate.verdict.value, certificate.detail)))
     at_rest = certificate.index is not None

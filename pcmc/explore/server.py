@@ -98,7 +98,7 @@ class Explorer:
             self.roof, self.origin, self.start = roof, centre(roof.surface), start
             sessions = list(self.sessions.values())
         for session in sessions:
-            session.renew(start)
+            session.renew(start, roof.units)
         self.version += 1
 
     def save(self, session: Session, name: str, replace: bool) -> dict[str, Any]:
@@ -117,7 +117,7 @@ class Explorer:
 
     def open(self) -> tuple[str, Session]:
         """A new session and its name in addresses."""
-        name, session = secrets.token_urlsafe(12), Session(self.start, self._turn)
+        name, session = secrets.token_urlsafe(12), Session(self.start, self._turn, self.roof.units)
         with self._lock:
             self.sessions[name] = session
             while len(self.sessions) > MOST_SESSIONS:
@@ -150,8 +150,8 @@ class Explorer:
 class View:
     """The page in a notebook; ``surface`` is the one it shows now."""
 
-    def __init__(self, surface: Surface, height: int, title: str) -> None:
-        self.explorer = Explorer(Roof(surface, title), "127.0.0.1", 0)
+    def __init__(self, roof: Roof, height: int) -> None:
+        self.explorer = Explorer(roof, "127.0.0.1", 0)
         self._name, self._session = self.explorer.open()
         self.height = int(height)
 
@@ -257,7 +257,8 @@ class _Handler(BaseHTTPRequestHandler):
         session, act = explorer.session(steps[1]), steps[2]
         if act == "check":
             check = session.check_mesh()
-            self._send_header({"superseded": True} if check is None else {"check": mesh_findings(check)})
+            found = None if check is None else mesh_findings(check, explorer.roof.units)
+            self._send_header({"superseded": True} if found is None else {"check": found})
         elif act == "families":
             self._send(pack({}, {"family": families_drawn(session.state())}), "application/octet-stream")
         elif act == "news":
@@ -347,7 +348,7 @@ class _Handler(BaseHTTPRequestHandler):
         if suffix not in FORMATS:
             raise RequestError(unknown("format", suffix[:60], FORMATS))
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the page says which formats carry the numbers
+            warnings.simplefilter("ignore")  # the page lists the formats that carry the numbers
             path = Path(folder) / f"surface{suffix}"
             scalars = written_fields(state.surface, state.certificate)
             numbers = plain(state.certificate.numbers())

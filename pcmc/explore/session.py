@@ -17,6 +17,7 @@ from typing import Any
 from .. import existence
 from ..accuracy import MeshCheck, check_mesh
 from ..base.errors import OptionError
+from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
 from ..design import Parameter, Target, meet
 from ..solvers import solve
@@ -37,7 +38,7 @@ Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """The surface of a session and all that the page says about it.
+    """The surface of a session and all that the page shows about it.
 
     Attributes
     ----------
@@ -88,9 +89,11 @@ class Session:
     A newer call ends the work on an older one. Each call holds ``turn`` while it works.
     """
 
-    def __init__(self, start: State, turn: AbstractContextManager[Any] | None = None) -> None:
+    def __init__(
+        self, start: State, turn: AbstractContextManager[Any] | None = None, units: Units = NO_UNITS
+    ) -> None:
         self._lock, self._turn = threading.Lock(), turn or nullcontext()
-        self._requests = 0
+        self._requests, self._units = 0, units
         self.surface, self._certificate = start.surface, start.certificate
         self._wanted, self._failure = start.wanted, start.failure
         self._start = self.surface
@@ -175,7 +178,7 @@ class Session:
             if stop():
                 return
             certificate = design.certificate
-            self._message = design.message
+            self._message = design.text(self._units)
             if design.met and certificate.verdict in AT_REST:
                 self._show(design.surface)
                 self._wanted, self._failure = design.surface, None
@@ -231,11 +234,11 @@ class Session:
 
         return self._run(act)
 
-    def renew(self, start: State) -> State:
+    def renew(self, start: State, units: Units = NO_UNITS) -> State:
         """Show another start, as a new step: the file behind the page was saved."""
 
         def act(stop: Callable[[], bool]) -> None:
-            self._start, self.aims = start.surface, None
+            self._start, self._units, self.aims = start.surface, units, None
             self.surface, self._certificate = start.surface, start.certificate
             self._wanted, self._failure = start.wanted, start.failure
             self._add_step()

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Floats, Ints
 from ..certificate import Certificate
 from ..certificate.reactions import reactions_per_length
-from ..design.quantities import volumes_to_plane
+from ..energy.volume_below import volumes_below
 from ..panels.distance import distances
 from ..surface import Surface
 from ..surface.geometry import area_vectors, vertex_sums
@@ -42,7 +42,7 @@ def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]
     """
     height, areas = surface.plane.height(surface.vertices), certificate.patches["area"].to_numpy()
     sizes = np.linalg.norm(reactions_per_length(surface, certificate.reactions), axis=1)
-    topo, volumes, rows = surface.topology, volumes_to_plane(surface), []
+    topo, volumes, rows = surface.topology, volumes_below(surface), []
 
     def add(quantity: str, of: str, kind: str, value: float | None) -> None:
         rows.append({"quantity": quantity, "of": of, "kind": kind, "value": value})

@@ -2,7 +2,7 @@
 
 A patch's tension is its faces' ``tension``; the patches of one pressure p ≠ 0 are one body with
 ``pressure p``; fixed vertices are ``fixed``, sliding ones lie on ``constraint 1``, the plane Π, and on
-``constraint 2`` and so on, the other planes; a comment names these, and says which are mirrors. Cables and
+``constraint 2`` and so on, the other planes; a comment names these, and marks mirrors. Cables and
 weights are in ``evolver_forces``.
 Evolver measures volumes from the origin (``symmetric_content``: det/6 per face, Eq. 10b), so the
 coordinates are relative to the point of Π, or with other planes to ``Surface.origin``, and a comment says

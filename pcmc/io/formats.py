@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import FileError, PcmcError, unknown
+from ..base.errors import FileError, unknown
 from ..base.units import Units
 from ..surface import Surface
 
@@ -114,10 +113,3 @@ def format_of(path: Path, known: Mapping[str, Format]) -> Format:
         text = f"{path}: {readable}{unknown('suffix', suffix, known)}"
         raise FileError(text, what=str(path), found=suffix, expected=list(known))
     return known[suffix]
-
-
-def in_file(path: str | os.PathLike[str], error: PcmcError, kind: type[PcmcError]) -> PcmcError:
-    """The error with the file's name in front, as one of this kind."""
-    what = os.fspath(path) if kind is FileError else error.what
-    text = f"{os.fspath(path)}: {error}"
-    return kind(text, what=what, where=error.where, found=error.found, expected=error.expected)

@@ -17,7 +17,7 @@ from ..base.units import MICROMETRES, Units
 from ..base.validate import choice
 from ..surface import Plane, Surface
 from .flat_walls import restore_walls
-from .formats import FORMATS, READ_ONLY, format_of, in_file
+from .formats import FORMATS, READ_ONLY, format_of
 from .import_warnings import import_warnings
 from .libraries import unreadable
 from .mesh_data import MeshData, checked, merged, to_surface, without_unused
@@ -82,7 +82,7 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
     try:
         surface = to_surface(data, *given)
     except PcmcError as error:
-        raised = in_file(path, error, type(error))
+        raised = error.in_file(path)
         if isinstance(error, SurfaceError):
             raised.args = (f"{raised}; or try: pcmc repair {os.fspath(path)} -o clean.obj",)
         raise raised from None
@@ -118,8 +118,8 @@ def load(path: str | os.PathLike[str]) -> MeshData:
         text = f"{path}: byte {error.start} is not text; is it a {path.suffix} file?"
         raise FileError(text, what=str(path), where=error.start) from None
     except PcmcError as error:
-        raise in_file(path, error, FileError) from None
+        raise error.in_file(path, FileError, str(path)) from None
     except MissingExtra:
         raise
     except Exception as error:  # the net under the readers: a file may be wrong in a way that none checks
-        raise in_file(path, unreadable(path.suffix, error), FileError) from error
+        raise unreadable(path.suffix, error).in_file(path, FileError, str(path)) from error

@@ -95,8 +95,7 @@ def repair(
     try:
         return _repaired(data, weld, holes, edge_length)
     except PcmcError as error:
-        text = f"{path}: {error}"
-        raise type(error)(text, what=error.what, where=error.where, found=error.found) from None
+        raise error.in_file(path) from None
 
 
 def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float | None) -> Repaired:
@@ -151,7 +150,7 @@ def _loaded(path: Path) -> MeshData:
             f"{path}: byte {error.start} is not text", what=str(path), where=error.start
         ) from None
     except FileError as error:
-        raise FileError(f"{path}: {error}", what=str(path), where=error.where, found=error.found) from None
+        raise error.in_file(path, what=str(path)) from None
 
 
 def _read(path: Path, module: str) -> MeshData:

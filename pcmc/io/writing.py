@@ -20,7 +20,7 @@ from ..base.validate import choice
 from ..contact.pinching import standing_part
 from ..surface import Surface, expect_surface
 from .flat_walls import encode_walls
-from .formats import FORMATS, Format, format_of, in_file
+from .formats import FORMATS, Format, format_of
 from .scaling import as_units, scaled_surface
 
 
@@ -103,7 +103,7 @@ def write(
         try:
             note = form.functions.write(temporary, shown, **content)
         except PcmcError as error:
-            raise in_file(path, error, FileError) from None
+            raise error.in_file(path, FileError, str(path)) from None
     if lost:
         text = f"{path}: a {path.suffix} file cannot carry {', '.join([*lost, *form.loses])}; left out"
         warnings.warn(text, LostWarning, stacklevel=2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -12,12 +13,14 @@ from scipy.spatial import cKDTree
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
-from ..base.errors import MissingExtra, SurfaceError
+from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..contact.pinching import lift, standing_part
+from ..energy.curvature import mean_curvature
 from ..surface import Surface
 from ..surface.geometry import angles, face_areas, segment_lengths
 from .angles import improve_angles
 from .curve_cutting import CurveMesh, cut_curves
+from .quality import edge_lengths
 from .refinement import (
     Projection,
     carry_lines,
@@ -31,6 +34,8 @@ from .sizes import (
 )
 
 CHORD = 0.1  # of the edge length
+SHORTEST = 0.3  # of the edge length: no edge of MMG gets shorter
+BEYOND = 2.0  # times the chord wanted: where these edges are farther off, MMG gives up or never ends
 MOST = 20_000_000  # triangles; more mean a mistake in the edge length
 PASSES = 3  # of MMG at most, each on the result of the one before; a patch takes its best
 GOOD_ANGLE = 25.0  # degrees; no further pass is made when all angles reach it
@@ -77,8 +82,9 @@ def remesh(
     MissingExtra
         Without the library mmgpy.
     OptionError
-        For lengths that are not positive, or that would make more than 20 million triangles; if
-        ``project`` returns another shape.
+        For lengths that are not positive, or that would make more than 20 million triangles; for a
+        ``chord`` that edges of 0.3 ``edge_length``, the shortest, do not come near; if ``project`` returns
+        another shape.
     SurfaceError
         When MMG gives up, or does not keep a curve.
 
@@ -93,9 +99,13 @@ def remesh(
     one: Any = edge_length if np.ndim(edge_length) == 0 else 1.0
     check_lengths(one, near_curves, growth, chord)
     size = _wanted_sizes(surface, edge_length, growth)
+    along_curves = size if near_curves is None else np.minimum(size, near_curves)
+    _refuse_too_many(surface, size, "edge_length")
+    _refuse_too_many(surface, along_curves, "near_curves")  # curves are cut with the mesh around them
+    if chord is not None:
+        _refuse_flat_chord(surface, chord, float(size.min()))
     part = standing_part(surface)
     surface = lift(surface, part.walls, part.resting, RAISED)
-    along_curves = size if near_curves is None else np.minimum(size, near_curves)
     old, wanted = cut_curves(surface, size, along_curves, project)
     chord = CHORD * float(wanted.size.max()) if chord is None else chord
     candidates, mesh = [], old
@@ -107,6 +117,15 @@ def remesh(
         if angles(mesh.X[mesh.F]).min() >= GOOD_ANGLE:
             break
     return _assembled(surface, old, candidates)
+
+
+def size_note(surface: Surface, edge_length: float) -> str:
+    """A line about a remeshed surface whose edges cannot be so long; empty if its longest edge is."""
+    longest = float(edge_lengths(surface).max())
+    if longest >= edge_length:
+        return ""
+    reached = f"the edge length {edge_length:g} is not reached; the longest edge is {longest:.3g}"
+    return f"{reached}, as junctions and boundaries keep their vertices"
 
 
 def check_lengths(
@@ -132,12 +151,44 @@ def _wanted_sizes(surface: Surface, edge_length: npt.ArrayLike, growth: float) -
     else:
         size = check_sizes(edge_length, surface.n)
         size = limit_growth(surface.vertices, surface.topology.edges, size, growth)
-    count = triangles_for(face_areas(surface.vertices[surface.faces]), size[surface.faces].mean(axis=1))
-    if count > MOST:
-        hint = f"it makes about {count:.2g}; choose a larger one"
-        found = float(size.min())
-        validate.refuse("edge_length", found, f"at most {MOST} triangles", hint=hint)
     return size
+
+
+def _refuse_too_many(surface: Surface, size: Floats, name: str) -> None:
+    """Refuse edge lengths (n,) that would make more triangles than ``MOST``, with the least possible one."""
+    count = triangles_for(face_areas(surface.vertices[surface.faces]), size[surface.faces].mean(axis=1))
+    if count <= MOST:
+        return
+    found = float(size.min())
+    least = _rounded_up(found * math.sqrt(count / MOST))
+    message = f"remesh: {name} = {found:g} would make about {count:.2g} triangles, more than {MOST}"
+    raise OptionError(f"{message}; use {least:g} or more", what=name, found=found, expected=least)
+
+
+def _refuse_flat_chord(surface: Surface, chord: float, size: float) -> None:
+    """Refuse a chord that the shortest edges exceed by far: MMG would take long, and give up.
+
+    An equilateral triangle of edge e is up to H e² / 6 away from a sphere of mean curvature H.
+    """
+    curvature = np.abs(mean_curvature(surface, "cotangent"))
+    known = curvature[np.isfinite(curvature)]
+    curved = float(known.mean()) if len(known) else 0.0
+    reached = curved * (SHORTEST * size) ** 2 / 6.0
+    if reached <= BEYOND * chord:
+        return
+    least = _rounded_up(reached / BEYOND)
+    message = f"remesh: chord = {chord:g} is out of reach of an edge length of {size:g}"
+    message += f"; use {least:g} or more, or a smaller edge length"
+    raise OptionError(message, what="chord", found=chord, expected=least)
+
+
+def _rounded_up(value: float) -> float:
+    """The next larger number with two digits.
+
+    >>> _rounded_up(0.00123), _rounded_up(4.0)
+    (0.0013, 4.0)
+    """
+    return float(f"{value:.1e}") if float(f"{value:.1e}") >= value else float(f"{1.05 * value:.1e}")
 
 
 def _sizes(mesh: CurveMesh, wanted: SizeField, growth: float) -> Floats:
@@ -172,7 +223,7 @@ def _remesh_with_mmg(mesh: CurveMesh, size: Floats, growth: float, chord: float)
     tool.set_required_vertices(fixed.astype(np.int32))
     tool.set_required_triangles(_corners_to_keep(mesh, size).astype(np.int32))
     tool["metric"] = size[:, None]
-    least, most = 0.3 * float(size.min()), 1.3 * float(size.max())
+    least, most = SHORTEST * float(size.min()), 1.3 * float(size.max())
     try:
         tool.remesh(hmin=least, hmax=most, hausd=chord, hgrad=growth, angle=0, verbose=-1)
     except RuntimeError as error:

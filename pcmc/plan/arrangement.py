@@ -200,8 +200,9 @@ def _chains(lines: Sequence[Line], nodes: _Nodes, edge_length: float) -> tuple[l
         known = [1.0, 1.0, np.nan if divides else 1.0]
         stops = nodes.along(number, curve)
         if not stops:  # a closed line that meets nothing
-            new.append(curve.at(0.0) * known)
-            stops, n = [(0.0, n), (float(len(curve.pieces)), n)], n + 1
+            start = float(curve.extremes[0]) if len(curve.extremes) else 0.0
+            new.append(curve.at(start) * known)
+            stops, n = [(start, n), (start + len(curve.pieces), n)], n + 1
         for (low, first), (high, last) in pairwise(stops):
             inner = curve.between(low, high, edge_length)
             ends = (min(first, last), max(first, last))

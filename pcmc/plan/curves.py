@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,16 @@ import numpy.typing as npt
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import OptionError
+from ..base.errors import OptionError, unknown
 from ..surface import Plane
 from .pieces import Piece
 
 CORNER = math.radians(10.0)  # a joint that turns by more is a corner
+NEAR = 0.5  # of the edge length: an extreme nearer to another stop than this becomes no vertex
 EDGE_TURN = math.radians(45.0)  # largest turn of a bend along one edge
+LEVEL = 1e-12  # product of slopes beside a joint, up to which a coordinate may turn there
+BESIDE = 0.25  # in parameter: how far beside such a joint its coordinate is compared
+PLATEAU = 1e-12  # of the length: changes of a coordinate up to this are none
 DENSE = 64  # points per curved piece, for lengths and crossings
 
 
@@ -69,23 +74,60 @@ class Curve:
         cosines = [self.pieces[j - 1].direction(1) @ self.pieces[j].direction(0) for j in joints]
         return joints[np.arccos(np.clip(np.array(cosines, dtype=float), -1.0, 1.0)) > CORNER].astype(float)
 
+    @cached_property
+    def extremes(self) -> Floats:
+        """(e,) ascending parameters, no open ends, at which a curved piece is farthest along x or y.
+
+        >>> circle([0, 0], 2.0).extremes.tolist()
+        [0.0, 0.25, 0.5, 0.75]
+        """
+        inside = [number + piece.extremes() for number, piece in enumerate(self.pieces)]
+        curved = np.array([piece.sweep != 0.0 or len(piece.points) > 2 for piece in self.pieces])
+        joints = np.arange(0 if self.closed else 1, len(self.pieces))
+        joints = joints[curved[joints - 1] | curved[joints]]
+        ends, starts = (
+            np.reshape([self.pieces[j].direction(end)[:2] for j in js], (-1, 2))
+            for js, end in ((joints - 1, 1), (joints, 0))
+        )
+        sides = np.stack([(joints - BESIDE) % len(self.pieces), joints, joints + BESIDE])
+        before, here, after = (self.at(t)[:, :2] for t in sides)
+        low = np.minimum(np.sign(here - before) * (here - after), np.sign(here - after) * (here - before))
+        farthest = (ends * starts < LEVEL) & (low > PLATEAU * self.length)
+        return np.sort(np.concatenate([*inside, joints[farthest.any(axis=1)].astype(float)]))
+
     def parameter(self, length: Floats) -> Floats:
         """(n,) parameters at lengths (n,) along the curve."""
         return np.interp(length, self.lengths, self.dense)
 
     def between(self, start: float, end: float, edge_length: float) -> Floats:
-        """(k,) parameters strictly between two others, at equal lengths near ``edge_length``.
+        """(k,) parameters strictly between two others, at about equal lengths near ``edge_length``.
 
-        Bends get at least an edge per 45°. On a closed curve ``end`` may exceed the last parameter.
+        The extremes are among them, but not those nearer than half an edge to an end or to one before;
+        between these the lengths are equal. Bends get at least an edge per 45°. On a closed curve ``end``
+        may exceed the last parameter.
+
+        >>> arc([1, 0], [0, 1], [-1, 0]).between(0.0, 1.0, 0.65).round(12).tolist()  # not 5 equal edges
+        [0.25, 0.5, 0.75]
         """
         last, total = float(len(self.pieces)), self.length
-        low = float(np.interp(start, self.dense, self.lengths))
-        high = float(np.interp(end % last if end > last else end, self.dense, self.lengths))
-        high += total if end > last else 0.0
-        bend = self._turning(low, high)
-        count = max(1, round((high - low) / edge_length), math.ceil(bend / EDGE_TURN - 1e-9))
-        inner = low + (high - low) * np.arange(1, count) / count
-        return self.parameter(inner % total if end > last else inner)
+        low, high = self._lengths_at(np.array([start, end]))
+        extremes = np.concatenate([self.extremes, self.extremes + last])
+        stops = [low]
+        for length in self._lengths_at(extremes[extremes < end]).tolist():
+            if min(length - stops[-1], high - length) >= NEAR * edge_length:
+                stops.append(length)
+        inner = []
+        for first, second in pairwise([*stops, high]):
+            bend = self._turning(first, second)
+            count = max(1, round((second - first) / edge_length), math.ceil(bend / EDGE_TURN - 1e-9))
+            inner.append(first + (second - first) * np.arange(count) / count)
+        lengths = np.concatenate(inner)[1:]
+        return self.parameter(np.where(lengths > total, lengths - total, lengths))
+
+    def _lengths_at(self, t: Floats) -> Floats:
+        """(n,) the length along the curve up to parameters t, which may go around a closed curve twice."""
+        around = t > len(self.pieces)
+        return np.interp(t - around * len(self.pieces), self.dense, self.lengths) + around * self.length
 
     def _turning(self, low: float, high: float) -> float:
         """The angle through which the smooth pieces turn between two lengths along the curve."""
@@ -258,19 +300,21 @@ def curve(spec: Any, closed: bool = False) -> Curve:
     return polyline(spec, closed=closed)
 
 
+CURVES = ("polyline", "bezier", "arc", "circle", "ellipse")
+"""The keys that make a table a curve."""
+
 TABLES = {"circle": ({"centre", "radius"}, set()), "ellipse": ({"centre", "axes"}, {"sweep"})}
 """Kinds of curves given by a table: the keys that it must have, and those that it may have."""
 
 
 def _from_mapping(spec: Mapping[str, Any]) -> Curve:
-    known = ("polyline", "bezier", "arc", "circle", "ellipse")
     besides = {"closed": "polyline", "weights": "bezier"}
     kinds = [key for key in spec if key not in besides]
     for key in kinds:
-        validate.choice("curve", key, known)
+        validate.choice("curve", key, CURVES)
     if len(kinds) != 1:
-        problem = f"a curve needs exactly one of {', '.join(known)}; found {list(spec)}"
-        raise OptionError(problem, what="curve", found=list(spec), expected=known)
+        problem = f"a curve needs exactly one of {', '.join(CURVES)}; found {list(spec)}"
+        raise OptionError(problem, what="curve", found=list(spec), expected=CURVES)
     (kind,) = kinds
     value = spec[kind]
     if kind == "polyline" and "weights" not in spec:
@@ -286,6 +330,9 @@ def _from_mapping(spec: Mapping[str, Any]) -> Curve:
     if kind == "arc":
         return arc(*_points(value, "arc", 3, exactly=True))
     needed, allowed = TABLES[kind]
+    for key in value if isinstance(value, Mapping) else ():
+        if key not in needed | allowed:
+            raise _error(kind, unknown("key", key, sorted(needed | allowed)), where=key)
     if not isinstance(value, Mapping) or not needed <= set(value) <= needed | allowed:
         wanted = "centre and radius" if kind == "circle" else "centre, axes and perhaps sweep"
         raise _error(kind, f"expected {wanted}, found {value!r}", found=value)

@@ -96,8 +96,7 @@ def read_drawing(path: Path, units: str = "", gap: float | None = None) -> Drawi
     try:
         return _Sorted(path, content, strokes, units or content.unit, gap).drawing(factor)
     except PlanError as error:
-        text = f"{path}: {error}"
-        raise PlanError(text, what=error.what, where=error.where, found=error.found) from None
+        raise error.in_file(path) from None
 
 
 def _scaled(stroke: Stroke, factor: float) -> Stroke:

@@ -96,7 +96,7 @@ class RoomData:
     Attributes
     ----------
     patches : names of the patches over it.
-    volume : between them, their walls and Π, length³.
+    volume : between them, their walls and Π, length³; negative for patches that hang below Π.
     """
 
     patches: tuple[str, ...]
@@ -116,7 +116,7 @@ class Area:
     snow : force per area of the plan; None for that of the plan. It is a change of pressure: a load s on the
         plan area has the potential s V, so the patch takes the pressure p - s.
     volume : of the room under the patch, between its walls, length³, instead of a pressure, which is then a
-        result.
+        result. A patch with a negative volume hangs below Π.
     at : a point [x, y] inside the patch, or a point in each of its parts. If no patch has one, the
         patches are given to the parts from left to right (by centroid).
     """

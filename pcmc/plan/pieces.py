@@ -10,6 +10,9 @@ import numpy as np
 from ..base.arrays import Floats
 from ..surface import Plane
 
+SAME = 1e-9  # of a curve's size or parameter: differences up to this are none
+SAMPLES, BISECTIONS = 66, 60  # of a coordinate of a Bézier curve, and to find where it turns between two
+
 
 @dataclass(frozen=True, eq=False)
 class Piece:
@@ -34,15 +37,62 @@ class Piece:
             centre, u, v = self.points
             angle = (self.sweep * t)[:, None]
             return centre + np.cos(angle) * u + np.sin(angle) * v
-        control = self.points
-        if self.weights is not None:  # homogeneous coordinates
-            control = np.column_stack([control * self.weights[:, None], self.weights])
-        level = np.broadcast_to(control, (len(t), *control.shape))
-        s = t[:, None, None]
-        while level.shape[1] > 1:  # de Casteljau
-            level = (1.0 - s) * level[:, :-1] + s * level[:, 1:]
-        last = level[:, 0]
-        return last if self.weights is None else last[:, :-1] / last[:, -1:]
+        if self.weights is None:
+            return _casteljau(self.points, t)
+        last = _casteljau(self._homogeneous, t)
+        return last[:, :-1] / last[:, -1:]
+
+    @property
+    def _homogeneous(self) -> Floats:
+        """(k,d+1) control points times their weights, and the weights."""
+        weights = np.ones(len(self.points)) if self.weights is None else self.weights
+        return np.column_stack([self.points * weights[:, None], weights])
+
+    def extremes(self) -> Floats:
+        """(e,) ascending parameters inside 0..1 at which x or y is largest or smallest.
+
+        On an arc c + u cos φ + v sin φ these are the angles with tan φ = v / u, in each coordinate. On a
+        (rational) Bézier curve N / D they are the roots of N' D - N D', found by bisection.
+
+        >>> Piece(np.array([[5.0, 0], [2, 0], [0, 2]]), math.pi).extremes().tolist()
+        [0.5]
+        >>> Piece(np.array([[0.0, 0], [1, 3], [2, 0]])).extremes().tolist()
+        [0.5]
+        """
+        if self.sweep:
+            _, u, v = self.points[:, :2]
+            used = np.hypot(u, v) > SAME * np.abs(self.points[1:]).max()
+            angles = np.arctan2(v, u)[used][:, None] + math.pi * np.arange(-3, 4)
+            t = np.unique(angles / self.sweep)
+        elif len(self.points) > 2:
+            t = np.unique(np.concatenate([self._turns(k) for k in range(2)]))
+        else:
+            return np.empty(0)
+        return t[(t > SAME) & (t < 1.0 - SAME)]
+
+    def _turns(self, axis: int) -> Floats:
+        """(e,) parameters at which a coordinate of the Bézier curve changes its direction."""
+        steps = np.diff(self.points[:, axis])
+        if (steps >= 0.0).all() or (steps <= 0.0).all():  # then the curve goes one way, too
+            return np.empty(0)
+        control = self._homogeneous[:, [axis, -1]]
+        control = control / control[:, 1].max()
+
+        def rate(t: Floats) -> Floats:
+            (n, d), (dn, dd) = _casteljau(control, t).T, _casteljau(np.diff(control, axis=0), t).T
+            return np.asarray(dn * d - n * dd)
+
+        t = np.linspace(0.0, 1.0, SAMPLES)
+        slope = rate(t)
+        moving = np.flatnonzero(np.abs(slope) > SAME * np.ptp(self.points, axis=0).max())
+        turned = np.flatnonzero(np.diff(np.sign(slope[moving])))
+        low, high = t[moving[turned]], t[moving[turned + 1]]
+        sign = np.sign(slope[moving[turned]])
+        for _ in range(BISECTIONS if len(low) else 0):
+            middle = 0.5 * (low + high)
+            before = rate(middle) * sign > 0.0
+            low, high = np.where(before, middle, low), np.where(before, high, middle)
+        return 0.5 * (low + high)
 
     def direction(self, end: int) -> Floats:
         """(d,) unit tangent at the start (0) or at the end (1)."""
@@ -69,6 +119,15 @@ class Piece:
         if self.sweep and self.points.shape[1] == 3:  # the last two rows are vectors, not points
             local[1:] = (self.points @ plane.axes.T)[1:]
         return Piece(local, self.sweep, self.weights)
+
+
+def _casteljau(control: Floats, t: Floats) -> Floats:
+    """(n,d) the polynomial with Bernstein coefficients (k,d) at t (n,)."""
+    level = np.broadcast_to(control, (len(t), *control.shape))
+    s = t[:, None, None]
+    while level.shape[1] > 1:
+        level = (1.0 - s) * level[:, :-1] + s * level[:, 1:]
+    return level[:, 0]
 
 
 def to_local(points: Floats, plane: Plane) -> Floats:

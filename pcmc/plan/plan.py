@@ -29,9 +29,10 @@ from .parts import (
     support_of,
 )
 from .pieces import to_local, to_space
+from .summary import summary
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Plan(PlanData):
     """A roof given by the lines of its plan.
 
@@ -44,7 +45,8 @@ class Plan(PlanData):
     holes : openings: Holes, or curves (with fixed edges).
     patches : an Area for each part into which the dividers cut the plan, or a mapping from names to
         their attributes; without patches ``tension`` holds for every part.
-    edge_length : of the triangles, length.
+    edge_length : of the triangles, length. Along lines edges are about as long, equal between corners,
+        meetings, and the points at which a curve is farthest along x or y, which are vertices.
     edge : the support of the outline: "fixed"; "sliding" on Π, where the roof is at rest if it meets Π
         at a right angle; "cable": free between ``supports``, with a cable along it; or "free", where the
         tension has nothing to pull against.
@@ -137,6 +139,10 @@ class Plan(PlanData):
             if name in names[:place]:
                 problem = f"the name {name!r} is used twice; each patch, wall and cable needs its own"
                 raise OptionError(problem, what="name", found=name)
+
+    def __repr__(self) -> str:
+        """Size, outline, patches, dividers and holes, a line each."""
+        return summary(self)
 
     @property
     def corners(self) -> Floats:

@@ -82,7 +82,7 @@ def read_strokes(path: Path) -> Strokes:
     except OSError as error:
         raise system_error(path, "read", error) from None
     except FileError as error:
-        raise FileError(f"{path}: {error}", what=str(path), where=error.where) from None
+        raise error.in_file(path, what=str(path)) from None
     return Strokes(contents["unit"] or "", strokes, contents["others"], contents["hidden"])
 
 

@@ -5,15 +5,20 @@ from __future__ import annotations
 import html
 from base64 import b64encode
 from io import BytesIO
+from typing import TYPE_CHECKING
 
 from ..base.errors import MissingExtra
 from ..solvers.result import Result
 from ..surface import Surface
 
+if TYPE_CHECKING:
+    from ..accuracy.adaptive import AccurateResult
+    from ..design import Design
+
 WIDTH = 700  # pixels
 
 
-def cell_html(value: Surface | Result) -> str:
+def cell_html(value: Surface | Result | Design | AccurateResult) -> str:
     """A picture of a surface, or of the one in a result, above its ``repr``; without ``plot`` the text alone.
 
     >>> from pcmc import Patch

@@ -191,7 +191,7 @@ def _with_targets(
         if trial.good:
             return candidate, True, ""
         if trial.design is not None:
-            reached = reached or trial.design.message
+            reached = reached or trial.design.text(project.units)
     return plan, False, reached
 
 

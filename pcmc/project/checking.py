@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..base.errors import FileError, unknown
+from ..plan.curves import CURVES
 from .keys import KINDS, REQUIRED, Section, main_sections, solve_section, target_sections
 
+OR_CURVE = ("plan.dividers", "plan.holes")  # sections in place of which a curve may stand
 LONGEST = 1023  # bits of a float's exponent
 Place = tuple[str, ...]  # the keys that lead to a table or a value
 
@@ -24,7 +27,11 @@ def check_keys(text: str, data: Mapping[str, Any]) -> None:
     _check_table(text, root, (), data)
     method = data.get("solve", {}).get("method", "newton")
     targets = target_sections() if "targets" in data else ()
+    drawn = isinstance(data.get("plan"), Mapping) and "drawing" in data["plan"]
     for section in (*below, solve_section(str(method)), *targets):
+        if drawn and section.name in OR_CURVE:  # the drawing may have the curve of that name
+            keys = (replace(key, default=None) if key.name == "curve" else key for key in section.keys)
+            section = replace(section, keys=tuple(keys))
         for place, table in _tables(data, section):
             _check_table(text, section, place, table)
 
@@ -51,11 +58,14 @@ def _tables(data: Any, section: Section) -> Iterator[tuple[Place, Any]]:
         else:
             below = [((*p, step), table[step]) for p, table in found if step in table]
             found = [(p, t) for p, value in below for t in (value if isinstance(value, list) else [value])]
-    curved = any(key.name == "curve" for key in section.keys)
     for place, table in found:
-        # a divider or hole without the key "curve" is a curve itself
-        if "curve" in table or not curved if isinstance(table, Mapping) else section.name.endswith("NAME"):
+        if not _is_curve(section, table) if isinstance(table, Mapping) else section.name.endswith("NAME"):
             yield place, table
+
+
+def _is_curve(section: Section, table: Mapping[str, Any]) -> bool:
+    """Whether the table of a divider or hole is a curve itself."""
+    return section.name in OR_CURVE and "curve" not in table and any(name in CURVES for name in table)
 
 
 def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
@@ -72,7 +82,8 @@ def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
             raise _error(text, (*place, name), message, found=value, expected=key.choices)
     for name in table:
         if name not in known:
-            message = unknown(f"key of {title}", name, known)
+            curves = CURVES if section.name in OR_CURVE and "curve" not in table else ()
+            message = unknown(f"key of {title}", name, [*known, *curves])
             raise _error(text, (*place, name), message, found=name, expected=tuple(known))
     for name, key in known.items():
         if key.default is REQUIRED and name not in table and not any(other in table for other in key.unless):

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from ..base import validate
-from ..base.errors import FileError, OptionError
+from ..base.errors import OptionError
+from ..base.files import suffix_of
 from ..base.units import Units, expect_length
-from ..drawings.drawing_set import check_name as check_drawing
+from ..drawings.drawing_set import check_suffix as check_drawing
 from ..drawings.drawing_set import drawing_set
 from ..drawings.sheet import FORMATS
 from ..panels import Panels, panels
-from ..report.document import check_name as check_report
+from ..report.document import check_suffix as check_report
 from ..report.document import roof_report
 from ..structure import write_structure
 from .outcome import Outcome
@@ -161,16 +162,12 @@ def document_works(
 
 def check_schedule(path: Path) -> None:
     """Refuse the name of a schedule that does not end with .csv."""
-    if path.suffix.lower() != CSV:
-        text = f"{path}: a schedule of panels is written as {CSV}; change the suffix"
-        raise FileError(text, what=str(path), found=path.suffix, expected=CSV)
+    suffix_of(path, (CSV,), "a schedule of panels")
 
 
 def check_model(path: Path) -> None:
     """Refuse the name of a structural model that does not end with .inp."""
-    if path.suffix.lower() != INP:
-        text = f"{path}: a structural model is written as {INP}; change the suffix"
-        raise FileError(text, what=str(path), found=path.suffix, expected=INP)
+    suffix_of(path, (INP,), "a structural model")
 
 
 def schedule_paths(path: Path) -> list[Path]:

@@ -140,7 +140,7 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
     try:
         lines = proposed(drawing, plan)
     except OptionError as error:
-        raise FileError(f"{path}: {error}", what=error.what, where=error.where) from None
+        raise error.in_file(path, FileError) from None
     full = {**data, "plan": lines}
     if drawing.units:
         full["units"] = drawing.units

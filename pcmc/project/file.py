@@ -206,8 +206,7 @@ def in_file(path: Path, kind: type[PcmcError] | None = None) -> Iterator[None]:
     try:
         yield
     except PcmcError as error:
-        fields = {name: getattr(error, name) for name in ("what", "where", "found", "expected")}
-        raise (kind or type(error))(f"{path}: {error}", **fields) from None
+        raise error.in_file(path, kind) from None
 
 
 def build(path: PathLike) -> Surface:

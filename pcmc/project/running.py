@@ -21,7 +21,7 @@ from ..certificate.balance import unbalanced
 from ..certificate.certificate import certify
 from ..contact.pinching import standing_part
 from ..existence import solve
-from ..meshing.remeshing import remesh
+from ..meshing.remeshing import remesh, size_note
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface, mirrored
 from . import cache
@@ -259,25 +259,26 @@ def solve_project(project: Project, surface: Surface, progress: OnStep | None = 
     A surface that is not certified, or misses a target, is not remeshed. The accuracy comes last; targets
     are met once more on its mesh.
     """
-    report = progress or ignore
+    report, notes = progress or ignore, list[str]()
     with in_file(project.path):
         for stage in project.remeshing:
             if stage.when == "before":
                 report("remeshing")
                 surface = remesh(surface, **stage.options)
+                notes.append(size_note(surface, stage.edge_length))
         after = [stage for stage in project.remeshing if stage.when == "after"]
         if project.wanted.accuracy and not after and not project.targets:
             return _solve_to_accuracy(project, surface, report)
         outcome = _solve_or_meet(project, surface, report)
+        outcome = replace(outcome, notes=(*filter(None, notes), *outcome.notes))
         for stage in after:
             if outcome.good:
                 report("remeshing")
-                before = outcome
-                outcome = _again(project, remesh(outcome.surface, **stage.options), report)
-                outcome = replace(
-                    outcome,
-                    notes=(*before.notes, *outcome.notes, *_met_before(project.targets, before, outcome)),
-                )
+                before, surface = outcome, remesh(outcome.surface, **stage.options)
+                note = size_note(surface, stage.edge_length)
+                outcome = _again(project, surface, report)
+                notes = [*before.notes, note, *outcome.notes, *_met_before(project.targets, before, outcome)]
+                outcome = replace(outcome, notes=tuple(filter(None, notes)))
         if project.wanted.accuracy and outcome.good:
             accurate = _solve_to_accuracy(project, outcome.surface, report)
             if not (project.targets and accurate.good):

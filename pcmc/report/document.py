@@ -14,10 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from ..base import validate
-from ..base.errors import FileError
-from ..base.files import atomic_write, writing
-from ..base.units import Units, expect_length
+from ..base.files import atomic_write, suffix_of, writing
+from ..base.units import Units, as_units, expect_length
 from ..certificate import Certificate
 from ..certificate.reactions import held_lengths
 from ..certificate.required import certified, warning_mark
@@ -66,7 +64,7 @@ class RoofReport:
         ------
         FileError : for another suffix than .pdf, or a file that cannot be written.
         """
-        path = check_name(path)
+        path = check_suffix(path)
         content = self.pdf()
         with writing(path), atomic_write(path) as temporary:
             temporary.write_bytes(content)
@@ -116,7 +114,7 @@ class RoofReport:
             story += pages.picture("Reactions of the supports on the roof", pictures["Reactions"])
         story += [pages.heading("Forces"), pages.paragraph(words.about_forces(units))]
         if self.targets is not None:
-            story += pages.table(tables.target_table(self.targets))
+            story += pages.table(tables.target_table(self.targets, self.units))
         listed = [
             tables.patch_table(surface, certificate, units),
             tables.junction_table(certificate, units),
@@ -140,7 +138,7 @@ class RoofReport:
         return [
             pages.heading("Mesh check"),
             pages.paragraph(f"{text[:1].upper()}{text[1:]}. {about}"),
-            *pages.table(tables.mesh_table(check)),
+            *pages.table(tables.mesh_table(check, self.units)),
         ]
 
     def _panel_story(self, schedule: Panels, picture: bytes) -> list[Any]:
@@ -216,9 +214,7 @@ def roof_report(
     '1:20'
     """
     expect_surface(surface)
-    units = Units(units) if isinstance(units, str) else units
-    if not isinstance(units, Units):
-        validate.refuse("units", units, "Units, or a unit of length")
+    units = as_units(units)
     expect_length(units.length, "a report")
     pages.register_fonts()
     certificate = certified(surface, anyway)
@@ -229,13 +225,10 @@ def roof_report(
     )
 
 
-def check_name(path: str | os.PathLike[str]) -> Path:
+def check_suffix(path: str | os.PathLike[str]) -> Path:
     """The path of a report; refuses another suffix than .pdf."""
-    path = Path(path)
-    if path.suffix.lower() != ".pdf":
-        text = f"{path}: a report is written as .pdf; change the suffix"
-        raise FileError(text, what=str(path), found=path.suffix, expected=".pdf")
-    return path
+    suffix_of(path, (".pdf",), "a report")
+    return Path(path)
 
 
 def _png(picture: Any) -> bytes:

@@ -13,6 +13,7 @@ from ..base.arrays import Bools, Ints
 from ..base.units import Units
 from ..certificate import Certificate
 from ..certificate.reactions import held_lengths, reactions_per_length
+from ..design.outcome import unit_of
 from ..panels import Panels
 from ..surface import Surface
 
@@ -181,26 +182,31 @@ def room_table(certificate: Certificate, units: Units) -> Table | None:
     return _table("Rooms of prescribed volume", ["room"], [[name] for name in table["room"]], columns)
 
 
-def target_table(targets: pd.DataFrame) -> Table:
+def target_table(targets: pd.DataFrame, units: Units) -> Table:
     """What was wanted, and what is reached."""
     words = [[str(name)] for name in targets.index]
     columns = {
         "wanted": [one(x) for x in targets["wanted"].tolist()],
         "reached": [one(x) for x in targets["value"].tolist()],
+        "unit": [units.behind(unit_of(str(name))).strip() for name in targets.index],
         "met": ["yes" if met else "no" for met in targets["met"]],
     }
     return _table("Targets", ["quantity"], words, columns)
 
 
-def mesh_table(check: MeshCheck) -> Table:
+def mesh_table(check: MeshCheck, units: Units) -> Table:
     """Each quantity with its error bar, and its limit on finer and finer meshes."""
+    from ..accuracy.quantities import UNIT_OF  # takes long to import
+
     table = check.table
     words = [[quantity, of] for quantity, of in zip(table["quantity"], table["of"], strict=True)]
+    kinds = [UNIT_OF.get(quantity, quantity) for quantity in table["quantity"]]
     columns = {
         "on this mesh": [one(x) for x in table["value"].tolist()],
         "error bar": [_bar(x) for x in table["error"].tolist()],
         "limit": [one(x) for x in table["limit"].tolist()],
         "its error bar": [_bar(x) for x in table["limit_error"].tolist()],
+        "unit": [units.behind(kind).strip() for kind in kinds],
     }
     return _table("", ["quantity", "of"], words, columns)
 
@@ -234,5 +240,7 @@ def small(value: float) -> str:
 
 
 def _bar(value: float) -> str:
-    """An error bar, to two digits; nothing for one without bound."""
+    """An error bar, to two digits; nothing for one without bound, and "given" where the value is given."""
+    if value == 0.0:
+        return "given"
     return f"± {column([value], 2)[0]}" if math.isfinite(value) else "–"

@@ -105,10 +105,7 @@ def read_results(path: str | os.PathLike[str], model: StructuralModel) -> tuple[
         message = f"{path}: byte {error.start} is not text; the file is damaged"
         raise FileError(message, what=str(path), where=error.start) from None
     except FileError as error:
-        text = f"{path}: {error}"
-        raise FileError(
-            text, what=str(path), where=error.where, found=error.found, expected=error.expected
-        ) from None
+        raise error.in_file(path, what=str(path)) from None
     return tuple(_results(model, k, blocks) for k, blocks in enumerate(steps))
 
 

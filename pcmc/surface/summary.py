@@ -33,14 +33,18 @@ def summary(surface: Any) -> str:
     return "\n".join(
         [
             f"Surface of {surface.m} triangles and {surface.n} vertices, {surface.size:.4g} across",
-            *(f"  {name}: {_listed(texts)}" for name, texts in parts.items() if texts),
+            *(f"  {name}: {listed(texts)}" for name, texts in parts.items() if texts),
             f"  supports: {fixed} vertices fixed, {sliding} sliding",
             f"  heights over the plane: {height.min():.4g} to {height.max():.4g}",
         ]
     )
 
 
-def _listed(texts: Sequence[str]) -> str:
-    """The first few, and how many more there are."""
+def listed(texts: Sequence[str]) -> str:
+    """The first few, and how many more there are.
+
+    >>> listed("abcdefgh")
+    'a, b, c, d, e, f, and 2 more'
+    """
     more = f", and {len(texts) - NAMED} more" if len(texts) > NAMED else ""
     return ", ".join(texts[:NAMED]) + more

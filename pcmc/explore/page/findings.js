@@ -51,7 +51,7 @@ export function showFindings(body, findings, units) {
   const rows = [
     ["Rise above the plane", measured(findings.height, "length"), `The largest height above the plane Π, ${units.length}.`],
     ["Area under pressure", measured(findings.area, "area"), `Of all patches except walls, ${units.area}.`],
-    ["Volume", measured(findings.volume, "volume"), `Under the patches with pressure, ${units.volume}.`],
+    ["Volume", measured(findings.volume, "volume"), `Between the patches with pressure and the plane Π, ${units.volume}.`],
     ["Energy", measured(findings.energy, "energy", 6), `Σ α A − Σ p V, ${units.energy}. A surface at rest has no nearby shape of other first-order energy; a stable one has the least.`],
     ["Morse index", findings.index ?? "–", "How many independent changes of shape lower the energy. 0: stable, every small push is resisted. 1 or more: a saddle, which a small push moves away from."],
     ["Load over capacity", percentOf(findings.load_ratio), "The pressure's total push, as a part of the most that the tensions along the supports can carry, when all of them pull straight down. Above 100 % no equilibrium exists: raise tensions or lower pressures."],
@@ -82,7 +82,7 @@ export function showPatches(table, measures, units) {
   head.append(element("td"), ...columns.map(([, name, kind]) => {
     const th = element("th", "", name);
     th.scope = "col";
-    if (kind === "volume") th.title = "The patch's share as targets count it: the cone from the patch to the point of Π; all shares add up to the volume";
+    if (kind === "volume") th.title = "Between the patch and the plane Π, straight below it; the volumes of all patches add up to the volume of the roof";
     if (units.given) th.append(element("span", "unit", units[kind]));
     return th;
   }));

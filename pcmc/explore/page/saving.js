@@ -2,8 +2,8 @@
 
 import { ask } from "./server.js";
 
-/** `session()` names the session; `told(text)` shows how it ended. */
-export function addSaving(opener, dialog, header, session, told) {
+/** `session()` names the session; `notify(text)` shows how it ended. */
+export function addSaving(opener, dialog, header, session, notify) {
   opener.hidden = !header.project;
   const [name, replace, message] = ["input[type=text]", "input[type=checkbox]", ".message"]
     .map((selector) => dialog.querySelector(selector));
@@ -28,7 +28,7 @@ export function addSaving(opener, dialog, header, session, told) {
     try {
       const { header: answer } = await ask(`api/${session()}/save`, { name: name.value, replace: replace.checked });
       dialog.close();
-      told(`Saved as ${answer.saved}${answer.note ? `, ${answer.note}` : ""}.`);
+      notify(`Saved as ${answer.saved}${answer.note ? `, ${answer.note}` : ""}.`);
     } catch (error) {
       message.textContent = error.message;
     }

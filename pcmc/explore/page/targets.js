@@ -3,7 +3,10 @@
 import { button, element, input, select } from "./elements.js";
 import { digits } from "./panel.js";
 
-const UNITS = { apex: "length", area: "area", volume: "volume", reaction: "tension", height: "length" };
+const UNITS = {
+  apex: "length", area: "area", volume: "volume", reaction: "tension", height: "length", curvature: "curvature",
+  pressure: "pressure", lean: "angle", sag: "length", length: "length", force: "force",
+};
 const LIMITS = [["value", "="], ["at_most", "at most"], ["at_least", "at least"]];
 
 export class Targets {
