@@ -259,6 +259,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
         misfit = None
         if "targets" in data:
             given = _search(data["targets"], plan)
+            _check_sought_once(rises, given["vary"], plan)
             targets, vary = [*given["targets"], *targets], [*given["vary"], *vary]
             misfit = given["misfit"]
         return Project(
@@ -284,6 +285,27 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             rises=rises,
             chosen=chosen,
         )
+
+
+def _check_sought_once(rises: Sequence[Rise], vary: Sequence[Parameter], plan: Plan) -> None:
+    """Refuse a tension that both a rise and [targets] find."""
+    for rise in rises:
+        areas = [area.name for area in plan.patches] or ["patch 1"]
+        own = areas if rise.patch is None else [rise.patch]
+        both = [n for parameter in vary if parameter.kind == "tension" for n in parameter.names if n in own]
+        if not both:
+            continue
+        names = [name for parameter in vary for name in parameter.names if name not in own]
+        change = f"type vary = [{', '.join(map(_quoted, names))}]" if names else "remove vary and its targets"
+        where = "[plan]" if rise.patch is None else f"patch {rise.patch!r}"
+        text = f"targets.vary: the tension of {both[0]!r} is found for the {rise.kind} of {where}, too;"
+        text += f" {change}, or give {where} tension = instead of {rise.kind} ="
+        raise OptionError(text, what="targets.vary", where=both[0], found=both[0])
+
+
+def _quoted(name: str) -> str:
+    """A name as TOML writes it."""
+    return '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def raised(project: Project, wanted: Mapping[str, float | None]) -> Project:
