@@ -23,7 +23,7 @@ from ..plan import Plan, plan_from
 from ..solvers import find_method
 from ..surface import Surface
 from .accuracy import AccuracyWanted, take_accuracy
-from .checking import check_keys
+from .checking import check_keys, line_with
 from .documents import Documents, documents_of
 from .drawn import Chosen, is_drawing, with_drawing
 from .masts import mast_note
@@ -202,11 +202,12 @@ def _toml_error(text: str, message: str) -> tuple[int | None, str]:
 
 @contextmanager
 def in_file(path: Path, kind: type[PcmcError] | None = None) -> Iterator[None]:
-    """Put the file at the start of the message of an error, and raise it as ``kind`` if that is given."""
+    """Put the file, and the line of what was found, in front of an error's message; raise it as ``kind``."""
     try:
         yield
     except PcmcError as error:
-        raise error.in_file(path, kind) from None
+        line = 0 if str(error).startswith("line ") else line_with(path, error.found)
+        raise error.in_file(f"{path}: line {line}" if line else path, kind) from None
 
 
 def build(path: PathLike) -> Surface:

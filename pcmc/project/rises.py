@@ -29,8 +29,8 @@ class Rise:
     Attributes
     ----------
     patch : its name; None for all together, which get one tension.
-    kind : "rise", height of the highest point over a level outline; "apex", over Π; "span_ratio", the smaller
-        span of the plan over its rise.
+    kind : "rise", height of the highest point over a level outline; "apex", over Π; "span_ratio", the span
+        of the plan, which is the diameter of the largest circle in it, over its rise.
     value : > 0.
     """
 
