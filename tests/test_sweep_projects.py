@@ -81,7 +81,7 @@ def test_a_case_is_what_the_project_with_these_numbers_gives(roof):
 
 def test_targets_and_remeshing_are_the_projects(roof):
     aim = '[targets]\nmeet = [{quantity = "apex", of = "west", value = 0.3}]\nvary = ["west"]\n'
-    roof.write_text(TEXT + aim + "[remesh]\nedge_length = 1.0\n", encoding="utf-8")
+    roof.write_text(TEXT + aim + "[remesh]\nedge_length = 0.9\n", encoding="utf-8")
     case = solve_project("roof.toml", digest(roof), **{"east.tension": 3.1})
     assert case["targets_met"] is True
     assert case["triangles"] > 1.5 * varied(roof, {})[1].m
