@@ -131,3 +131,15 @@ def test_the_note_on_a_free_edge_has_all_keys():
         square, edge="cable", cable=cable, supports=square[:3], tension=1.0, pressure=0.0, edge_length=1
     )
     assert sail.surface().cables
+
+
+def test_an_apex_below_a_raised_ring_is_explained(tmp_path):
+    path = tmp_path / "dome.toml"
+    path.write_text(
+        f'units = "m"\n{SQUARE}tension = 6.0\n'
+        '[[plan.holes]]\nname = "lantern"\ncurve = {circle = {centre = [10, 6, 3], radius = 1.5}}\n'
+        "[targets]\nmeet = [{quantity = 'apex', value = 2.0}]\nvary = ['patch 1']\n"
+    )
+    outcome = project.run_project(project.load(path), use_cache=False)
+    assert not outcome.good
+    assert "hole 'lantern' is held at 3 m, so the apex cannot be 2 m" in outcome.notes

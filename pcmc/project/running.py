@@ -26,6 +26,7 @@ from ..solvers.result import Progress, Result, Status
 from ..surface import Surface, mirrored
 from . import cache
 from .advice import advice, chosen_values
+from .aims import aims_below_supports
 from .documents import document_works
 from .file import Project, in_file, load, start_of
 from .outcome import Outcome, Whole
@@ -237,6 +238,7 @@ def solve_from_start(
         notes += tuple(metres_note(project.files, units.length))
     if outcome.good:
         return replace(outcome, notes=notes)
+    notes += tuple(aims_below_supports(project.plan, start, project.targets, units))
     report("looking for advice")
     return replace(outcome, notes=notes, advice=advice(project, given, start, outcome, solve_project))
 

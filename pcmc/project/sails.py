@@ -33,8 +33,8 @@ def as_sail(plan: Plan, rises: Sequence[Rise] = ()) -> Plan | None:
     ]
     cable = usual_cable(plan)
     holes = [replace(h, edge="cable", cable=cable) if h.edge == "free" else h for h in plan.holes]
-    edge = {"edge": "cable", "cable": cable} if plan.edge == "free" else {}
-    return replace(plan, pressure=0.0, patches=areas, holes=holes, **edge)
+    edge, around = ("cable", cable) if plan.edge == "free" else (plan.edge, plan.cable)
+    return replace(plan, pressure=0.0, patches=areas, holes=holes, edge=edge, cable=around)
 
 
 def sail_lines(plan: Plan, sail: Plan, rises: Sequence[Rise]) -> list[str]:

@@ -98,7 +98,8 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
 
 def _check_not_sought(path: Path, values: Iterable[str]) -> None:
     """Refuse values that the search for targets replaces by those that it finds."""
-    project, sought = _project(path, {}), {}
+    project = _project(path, {})
+    sought: dict[str, str] = {}
     for parameter in project.vary:
         for one in parameter.names:
             bare = one.removeprefix(CABLE) if parameter.kind == "cable" else one
