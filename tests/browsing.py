@@ -57,6 +57,8 @@ class Explored:
         """Open the address; without one, the page is there already."""
         self.driver = driver
         if url:
+            driver.get("about:blank")  # the page before may go on asking a server that has ended
+            self.complaints()
             driver.get(url)
         self.idle()
 

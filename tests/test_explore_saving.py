@@ -45,9 +45,10 @@ def test_saving_keeps_comments_and_the_shape_found_by_sliders(roof, session, fol
     assert state.failure is None
     path, note = saving.save(roof, state.surface, "found", False)
     assert path == folder / "found.toml"
-    assert "without [targets]" in note
+    assert "[targets] as comments" in note
     assert "apex of west" in note
     text = path.read_text()
+    assert '\n# meet = [{quantity = "apex", of = "west", value = 1.2}' in text
     for line in ("# the hall", "# coarse", "wall = 2.5  # the valley", "west = {tension = 4.0}  # left"):
         assert line in text
     assert tomllib.loads(text)["plan"]["patches"]["east"]["pressure"] == 1.1
@@ -69,6 +70,23 @@ def test_saving_what_the_page_met_writes_its_targets(roof, session):
     assert again.vary == vary
     assert again.note.startswith("met")
     path.unlink()
+
+
+def test_a_named_point_keeps_its_name(tmp_path):
+    path = tmp_path / "hall.toml"
+    named = HALL_TOML.replace('quantity = "apex", of = "west"', 'quantity = "height", of = "crown"')
+    path.write_text(named.replace("outline", "points = {crown = [3.0, 3.0]}\noutline"))
+    roof = read_roof(path, use_cache=False)
+    assert roof.targets[0].label == "height at crown"
+    state = Session(solved_start(roof.surface)).settle({"tensions": {"west": 4.0}})
+    text, note = saving.project_with(roof, state.surface)
+    assert "(height at crown, apex of east)" in note
+    met = Session(solved_start(roof.surface))
+    targets = Target("height", (3, 3), 1.3, name="crown"), roof.targets[1]
+    assert met.meet(targets, roof.vary).message.startswith("met")
+    text, note = saving.project_with(roof, met.surface, met.aims)
+    assert note == "with its targets: height at crown, apex of east"
+    assert tomllib.loads(text)["targets"]["meet"][0] == {"quantity": "height", "of": "crown", "value": 1.3}
 
 
 def test_an_unchanged_surface_is_saved_with_the_targets_of_the_file(roof, folder):

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import re
+from contextlib import contextmanager
+from itertools import pairwise
 
+import numpy as np
 from browsing import Explored, browser, changed, needs_browser, until
+from explore_cases import HALL_TOML, followed
 
-from generators import spherical_cap
+from generators import spherical_cap, two_squares
 from pcmc import explore
 from pcmc.base.units import Units
+from pcmc.explore.page_data import family_of_face
 
 CAP = spherical_cap(edge_length=0.25)
 pytestmark = needs_browser
@@ -69,7 +74,7 @@ def test_units_stand_behind_the_numbers_where_they_are_given(driver):
 def test_colours_come_with_their_scale(page):
     before = page.picture()
     assert not page.find("#legend").is_displayed()
-    units = {"curvature": "1/length", "error": "%", "reactions": "force/length", "family": "1 %"}
+    units = {"curvature": "1/length", "error": "%", "reactions": "force/length"}
     for name, words in units.items():
         page.find(f"#colours input[value={name}]").click()
         page.idle()
@@ -87,6 +92,40 @@ def test_colours_come_with_their_scale(page):
         page.find(f"#shows input[value={name}]").click()
         page.idle()
     assert page.complaints() == []
+
+
+def test_many_families_of_panels_are_coloured_by_how_many_are_alike(page, explorer):
+    family = family_of_face(explorer.start.surface)
+    sizes = np.bincount(family[np.isfinite(family)].astype(int))[1:]
+    assert len(sizes) > 8
+    before = page.picture()
+    page.find("#colours input[value=family]").click()
+    until(lambda: "congruent" in page.text("#legend .name"), "the scale")
+    page.idle()
+    words = page.text("#legend")
+    assert (
+        f"{len(sizes)} families of congruent panels, {sizes.sum()} panels in all, {sizes.max()} in" in words
+    )
+    assert f"one of a kind: {(sizes == 1).sum()} panels" in words
+    assert f"2 to 4 alike: {sizes[(sizes > 1) & (sizes < 5)].sum()} panels" in words
+    assert not page.find("#legend .ends").is_displayed()
+    assert changed(before, page.picture()) > 0.1
+
+
+def test_few_families_of_panels_have_a_colour_each(driver):
+    running = explore.start(two_squares(2))
+    try:
+        page = Explored(driver, running.url)
+        family = family_of_face(running.start.surface)
+        count = int(np.nanmax(family))
+        assert 1 < count <= 8
+        page.find("#colours input[value=family]").click()
+        until(lambda: page.find("#legend").is_displayed(), "the scale")
+        words = page.text("#legend ul").splitlines()
+        assert words == [f"family {k}: {int((family == k).sum())} panels" for k in range(1, count + 1)]
+        assert not page.complaints()
+    finally:
+        running.close()
 
 
 def test_the_view_turns_by_keys_mouse_and_fingers(page):
@@ -158,6 +197,60 @@ def test_every_control_has_a_name_and_the_keyboard_reaches_it(page):
         "return ids.filter((id, i) => ids.indexOf(id) !== i)"
     )
     assert doubled == []
+
+
+@contextmanager
+def small_screen(page, width=400, height=800):
+    size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+    page.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        page.idle()
+        yield
+    finally:
+        page.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_a_wide_page_never_scrolls_its_header_away(page):
+    page.find("#variants button[type=submit]").click()
+    page.idle()
+    page.enter("Tension α of left wall", 12)
+    page.find("#variants button[aria-pressed]").click()
+    page.idle()
+    with small_screen(page):
+        page.driver.execute_script("window.scrollTo(0, document.body.scrollHeight)")
+        assert page.driver.execute_script("return scrollY") > 200
+    page.idle()
+    scrolled, tall, window = page.driver.execute_script("""
+        for (const one of document.querySelectorAll("caption, aside section")) one.scrollIntoView();
+        window.scrollTo(0, 1e6);
+        return [scrollY, document.documentElement.scrollHeight, innerHeight]""")
+    assert (scrolled, tall) == (0, window)
+    top = page.driver.execute_script("return document.querySelector('header').getBoundingClientRect().top")
+    assert top == 0
+
+
+def test_on_a_small_screen_half_is_left_for_the_values_and_nothing_lies_over_the_roof(driver, tmp_path):
+    path = tmp_path / "hall.toml"
+    path.write_text(HALL_TOML)
+    with followed(path) as running:
+        page = Explored(driver, running.url)
+        with small_screen(page):
+            page.find("#colours input[value=curvature]").click()
+            page.driver.execute_script("window.scrollTo(0, document.body.scrollHeight)")
+            page.idle()
+            parts = ("#watch", "#verdict", "#canvas", "#legend", "#views")
+            boxes = page.driver.execute_script(
+                """return arguments[0].map((name) => {
+                const box = document.querySelector(name).getBoundingClientRect();
+                return [box.top, box.bottom]; })""",
+                parts,
+            )
+            assert boxes[0][0] >= 0.0
+            for (_, bottom), (top, _) in pairwise(boxes):
+                assert top >= bottom - 0.5
+            assert boxes[-1][1] <= 400
+            canvas = boxes[2]
+            assert canvas[1] - canvas[0] > 120
 
 
 def test_on_a_small_screen_the_verdict_stays_in_view(page):

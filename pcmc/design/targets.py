@@ -38,11 +38,14 @@ class Target:
         ``"curvature"``, ``"pressure"`` and the quantities of cables.
     value, at_most, at_least : a value, or a limit on one side or both. A target to be met has at least one of
         them; ``pcmc.sensitivities`` needs none.
+    name : of the point of a height, such as ``"crown"``: shown instead of its coordinates.
 
     Examples
     --------
     >>> Target("apex", "north", 2.5).label
     'apex of north'
+    >>> Target("height", (9, 9), 3.9).label, Target("height", (9, 9), 3.9, name="crown").label
+    ('height at (9, 9)', 'height at crown')
     >>> Target("apx", "north")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
@@ -54,6 +57,7 @@ class Target:
     value: float | None = None
     at_most: float | None = None
     at_least: float | None = None
+    name: str = ""
 
     def __post_init__(self) -> None:
         validate.choice("quantity", self.quantity, tuple(QUANTITIES))
@@ -77,7 +81,7 @@ class Target:
     def label(self) -> str:
         """The quantity in words."""
         if self.quantity == "height":
-            return f"height at ({self.of[0]:g}, {self.of[1]:g})"
+            return f"height at {self.name or f'({self.of[0]:g}, {self.of[1]:g})'}"
         return self.quantity if self.of is None else f"{self.quantity} of {self.of}"
 
     @property

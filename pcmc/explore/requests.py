@@ -11,7 +11,7 @@ from .following import KINDS
 
 LONGEST_NAME = 1000  # characters
 MOST_AIMS = 100  # targets, and parameters, of one request
-TARGET_KEYS = ("quantity", "of", "value", "at_most", "at_least")
+TARGET_KEYS = ("quantity", "of", "value", "at_most", "at_least", "name")
 PARAMETER_KEYS = ("patch", "kind", "low", "high")
 
 
@@ -66,7 +66,7 @@ def _aim(key: str, name: str, value: Any, known: tuple[str, ...]) -> Any:
         return None
     if name == "patch" and isinstance(value, list):  # tied: they change together
         return tuple(_name(f"{key}: {name}", one) for one in value)
-    if name in ("quantity", "patch", "kind") or (name == "of" and isinstance(value, str)):
+    if name in ("quantity", "patch", "kind", "name") or (name == "of" and isinstance(value, str)):
         return _name(f"{key}: {name}", value)
     if name == "of":
         if not isinstance(value, list) or len(value) != 2:
@@ -130,6 +130,6 @@ ACTS: dict[str, Callable[[dict[str, Any]], tuple[Any, ...]]] = {
     "forget": lambda asked: (place(asked),),
     "recall": lambda asked: (place(asked),),
     "compare": lambda asked: (None if asked.get("number") is None else place(asked),),
-    **dict.fromkeys(("stabilise", "undo", "redo", "reset", "stop", "state"), _nothing),
+    **dict.fromkeys(("stabilise", "remesh", "undo", "redo", "reset", "stop", "state"), _nothing),
 }
 """The arguments that each act of a session takes from a request."""

@@ -166,10 +166,14 @@ def _set_targets(
     surface: Surface,
     aims: tuple[tuple[Target, ...], tuple[Parameter, ...]] | None,
 ) -> str:
-    """Keep the targets that the surface meets: those of the page, else those of the file; drop others."""
+    """Keep the targets that the surface meets: those of the page, else those of the file.
+
+    Others become comments: with them, solving the project would lead away from the surface saved.
+    """
     if aims is not None and _meets(surface, aims[0]):
         table = tomlkit.table()
-        table["meet"] = _array(tomlkit, [{k: getattr(t, k) for k in FIELDS} for t in aims[0]])
+        points = document["plan"].get("points", {})
+        table["meet"] = _array(tomlkit, [_target(t, points) for t in aims[0]])
         table["vary"] = _array(tomlkit, [_plain(p) for p in aims[1]])
         document["targets"] = table
         return f"with its targets: {', '.join(t.label for t in aims[0])}"
@@ -177,8 +181,12 @@ def _set_targets(
         return ""
     labels = ", ".join(t.label for t in roof.targets if not _meets(surface, (t,)))
     if "targets" in document:
+        kept = tomlkit.dumps({"targets": document["targets"]}).strip()
         del document["targets"]
-        return f"without [targets], as the surface saved does not meet them ({labels})"
+        document.add(tomlkit.nl())
+        for line in ("not met by the tensions saved here:", *kept.splitlines()):
+            document.add(tomlkit.comment(line))
+        return f"its [targets] as comments, as the surface saved does not meet them ({labels})"
     text = f"the drawing asks for {labels}, and the surface shown does not meet it; change the drawing"
     raise OptionError(text, what="targets")
 
@@ -189,6 +197,12 @@ def _meets(surface: Surface, targets: tuple[Target, ...]) -> bool:
         abs(value - t.nearest(value)) <= HELD * t.scale(surface)
         for t, value in zip(targets, values, strict=True)
     )
+
+
+def _target(target: Target, points: Mapping[str, Any]) -> dict[str, Any]:
+    """A target as in a project: a point that the plan names by its name."""
+    entry = {key: getattr(target, key) for key in FIELDS}
+    return entry | {"of": target.name} if target.name in points else entry
 
 
 def _plain(parameter: Parameter) -> Any:

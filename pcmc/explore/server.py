@@ -117,7 +117,8 @@ class Explorer:
 
     def open(self) -> tuple[str, Session]:
         """A new session and its name in addresses."""
-        name, session = secrets.token_urlsafe(12), Session(self.start, self._turn, self.roof.units)
+        project = self.roof.path if self.roof.is_project else None
+        name, session = secrets.token_urlsafe(12), Session(self.start, self._turn, self.roof.units, project)
         with self._lock:
             self.sessions[name] = session
             while len(self.sessions) > MOST_SESSIONS:
@@ -337,6 +338,7 @@ class _Handler(BaseHTTPRequestHandler):
                 "undo": state.undo,
                 "redo": state.redo,
                 "message": state.message,
+                "way": state.note,
                 "variants": [variant_data(variant) for variant in state.variants],
                 "compared": state.compared,
             }

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from itertools import count
+from pathlib import Path
 from typing import Any
 
 from .. import existence
@@ -20,10 +21,13 @@ from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
 from ..design import Parameter, Target, meet
+from ..meshing.remeshing import remesh
 from ..solvers import solve
 from ..solvers.result import Progress
 from ..surface import Patch, Surface
+from ..surface.geometry import segment_lengths
 from .following import AT_REST, Values, attempt, reach, until, values_of, wanted
+from .own_way import OwnWay
 from .variants import MOST_VARIANTS, Variant
 
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
@@ -48,6 +52,7 @@ class State:
     undo, redo : how many steps there are either way.
     superseded : whether newer values have arrived meanwhile, so that the page ignores this state.
     message : how the search for targets ended; empty after other acts.
+    note : how the values were reached where following did not lead there; else empty.
     variants : those kept; ``compared`` is the number of the one compared with, or None.
     """
 
@@ -59,6 +64,7 @@ class State:
     redo: int = 0
     superseded: bool = False
     message: str = ""
+    note: str = ""
     variants: tuple[Variant, ...] = ()
     compared: int | None = None
 
@@ -86,19 +92,25 @@ def solved_start(surface: Surface) -> State:
 class Session:
     """A surface that follows its values; every method is safe to call from any thread.
 
-    A newer call ends the work on an older one. Each call holds ``turn`` while it works.
+    A newer call ends the work on an older one. Each call holds ``turn`` while it works. ``project`` is the
+    file that the surface is designed by: where following leads nowhere, its own way is tried.
     """
 
     def __init__(
-        self, start: State, turn: AbstractContextManager[Any] | None = None, units: Units = NO_UNITS
+        self,
+        start: State,
+        turn: AbstractContextManager[Any] | None = None,
+        units: Units = NO_UNITS,
+        project: Path | None = None,
     ) -> None:
         self._lock, self._turn = threading.Lock(), turn or nullcontext()
         self._requests, self._units = 0, units
+        self._own_way = OwnWay(project).giving(start.surface)
         self.surface, self._certificate = start.surface, start.certificate
         self._wanted, self._failure = start.wanted, start.failure
         self._start = self.surface
         self._steps, self._place = [self.surface], 0
-        self._message = ""
+        self._message = self._note = ""
         self._compared: int | None = None
         self.variants: list[Variant] = []
         self.aims: Aims | None = None
@@ -133,9 +145,12 @@ class Session:
 
         def act(stop: Callable[[], bool]) -> None:
             asked, end = self._with_values(values), time.monotonic() + SETTLE_SECONDS
-            way = reach(self.surface, asked, until(stop, end), **SETTLE)
+            settled = self._own_way.settle(self.surface, asked, stop, end, self._report, **SETTLE)
             if stop():
                 return
+            way, self._note, self._own_way = settled.reached, settled.note, settled.own_way
+            if settled.note:
+                self._wanted = way.surface
             if way.certificate is not None:
                 self._show(way.surface)
             self._failure = way.failed
@@ -157,6 +172,29 @@ class Session:
                 self._add_step()
             else:
                 self._failure = certificate
+
+        return self._run(act)
+
+    def remesh(self) -> State:
+        """New triangles of the mean size for the surface shown, and from there to the values asked for."""
+
+        def act(stop: Callable[[], bool]) -> None:
+            asked, end = values_of(self._wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
+            mean = segment_lengths(self.surface.vertices, self.surface.topology.edges).mean()
+            result = attempt(remesh(self.surface, float(mean)), until(stop, end), **SETTLE)
+            if stop():
+                return
+            if result.certificate.verdict not in AT_REST:
+                self._failure = result.certificate
+                return
+            self._go_on_with(result.surface)
+            self._wanted = wanted(self.surface, asked)
+            if values_of(self.surface) != asked:
+                way = reach(self.surface, self._wanted, until(stop, end), **SETTLE)
+                if way.certificate is not None:
+                    self._show(way.surface)
+                self._failure = way.failed
+                self._add_step()
 
         return self._run(act)
 
@@ -239,6 +277,7 @@ class Session:
 
         def act(stop: Callable[[], bool]) -> None:
             self._start, self._units, self.aims = start.surface, units, None
+            self._own_way = self._own_way.giving(start.surface)
             self.surface, self._certificate = start.surface, start.certificate
             self._wanted, self._failure = start.wanted, start.failure
             self._add_step()
@@ -289,7 +328,7 @@ class Session:
 
         with self._lock, self._turn:
             before = self._wanted
-            self._message = ""
+            self._message = self._note = ""
             if not late():
                 act(late)
             if late():
@@ -300,6 +339,10 @@ class Session:
         """The surface shown, with the values asked for."""
         self._wanted = wanted(self.surface, values)
         return self._wanted
+
+    def _report(self, words: str) -> None:
+        """What the work under way does now."""
+        self.progress = words
 
     def _show(self, surface: Surface) -> None:
         self.surface, self._certificate = surface, certify(surface)
@@ -348,6 +391,7 @@ class Session:
             after,
             superseded,
             self._message,
+            self._note,
             tuple(self.variants),
             self._compared,
         )

@@ -38,7 +38,7 @@ from .cache import folder as cache_folder
 from .designed import designed
 from .documents import Documents, check_model, schedule_paths, schedule_works
 from .drawn import files_of, is_drawing
-from .file import Project, build, load, raised, surface_of
+from .file import Project, build, load, project_of, raised, read_data, surface_of
 from .keys import REQUIRED, Key, Section, reference, sections
 from .outcome import Outcome
 from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
@@ -87,8 +87,10 @@ __all__ = [
     "load",
     "paint",
     "project_text",
+    "project_of",
     "raised",
     "drawing_reference",
+    "read_data",
     "proposal_text",
     "reference",
     "run",

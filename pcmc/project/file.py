@@ -353,7 +353,7 @@ def _placed(entry: Mapping[str, Any], plan: Plan) -> Mapping[str, Any]:
     if name not in plan.points:
         text = f"targets.meet: {unknown('point', name, plan.points)}; name it in [plan.points]"
         raise OptionError(text, what="targets.meet", found=name)
-    return {**entry, "of": plan.points[name]}
+    return {**entry, "of": plan.points[name], "name": name}
 
 
 def _search(table: Mapping[str, Any], plan: Plan) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import { Viewer } from "./viewer.js";
 import { follow } from "./watching.js";
 
 const REPLACE_AFTER = 400; // milliseconds, at least, before a newer request replaces one under way
+const POOR = 0.3; // of the worst triangle: new triangles are offered below it
 const find = (selector) => document.querySelector(selector);
 const KINDS = {
   ".pcmc": "everything", ".3dm": "Rhino", ".obj": "most programs", ".glb": "viewers, AR",
@@ -38,7 +39,7 @@ class Page {
   }
 
   /** Everything that depends on the mesh: at the start, and when the file behind the page was saved. */
-  begin({ header, arrays }) {
+  begin({ header, arrays }, opened = true) {
     Object.assign(this, { size: header.size, units: header.units, mesh: header.mesh, download: header.name });
     find("#title").textContent = header.title || "pcmc explore";
     document.title = header.title ? `${header.title} – pcmc explore` : "pcmc explore";
@@ -56,15 +57,15 @@ class Page {
     this.viewer?.setMesh(header, arrays);
     this.panel = new Panel(find("#patches"), header, find("#together"), (final) => this.request(final));
     this.targets = new Targets(find("#targets"), header, (aims) => this.send("meet", aims, true), () => this.act("stop"));
-    if (header.note) this.targets.say(header.note, header.note.startsWith("met") ? "met" : "missed");
+    if (header.note && opened) this.targets.say(header.note, header.note.startsWith("met") ? "met" : "missed");
     find("#together-row").hidden = header.patches.length < 2;
     addSaving(find("#save-project"), find("#saving"), header, () => this.name, (text) => this.notify(text));
     this.next = null;
     this.show({ header, arrays }, true);
   }
 
-  async reopen() {
-    this.begin(await ask("api/open", { session: this.name }));
+  async reopen(opened = true) {
+    this.begin(await ask("api/open", { session: this.name }), opened);
   }
 
   canvas() {
@@ -76,7 +77,8 @@ class Page {
   startViewer() {
     try {
       this.viewer = new Viewer(find("#canvas"), (spacing) => {
-        find("#scale").textContent = spacing ? `grid ${digits(spacing)}` : "";
+        const unit = this.units?.given ? ` ${this.units.length}` : "";
+        find("#scale").textContent = spacing ? `grid ${digits(spacing)}${unit}` : "";
       });
     } catch (error) {
       find("#canvas").hidden = true;
@@ -97,7 +99,7 @@ class Page {
   }
 
   act(name, values = {}) {
-    if (["undo", "redo", "reset", "recall", "stabilise"].includes(name)) this.targets.say("");
+    if (["undo", "redo", "reset", "recall", "stabilise", "remesh"].includes(name)) this.targets.say("");
     this.next = { act: name, values };
     this.pump(true);
   }
@@ -129,7 +131,7 @@ class Page {
       result = answer.header;
       if (!answer.header.superseded && this.busy === ticket) {
         if (act === "follow") this.lasted = performance.now() - this.since;
-        await this.show(answer, !["follow", "settle"].includes(act));
+        await this.show(answer, !["follow", "settle"].includes(act) || Boolean(answer.header.way));
       }
     } catch (error) {
       failure = error;
@@ -178,7 +180,7 @@ class Page {
   /** Show an answer; with `values` set the sliders too, which must not happen while one moves. */
   async show({ header, arrays }, values) {
     if (header.mesh !== this.mesh) {
-      await this.reopen();
+      await this.reopen(false); // the file behind the page is the same
       return;
     }
     this.header = header;
@@ -193,6 +195,7 @@ class Page {
     find("#undo").disabled = !header.undo;
     find("#redo").disabled = !header.redo;
     find("#stabilise").hidden = !(header.at_rest && header.verdict.name === "saddle");
+    find("#remesh").hidden = header.verdict.name !== "degenerate" && !(header.findings.quality < POOR);
     find("#back").hidden = header.at_rest || !header.undo;
     find("#sway").hidden = !arrays.mode || !header.at_rest || !this.viewer;
     if (!this.swaying || !arrays.mode) {
@@ -329,7 +332,7 @@ class Page {
   }
 
   addActs() {
-    for (const name of ["undo", "redo", "reset", "stabilise"]) {
+    for (const name of ["undo", "redo", "reset", "stabilise", "remesh"]) {
       find(`#${name}`).addEventListener("click", () => this.act(name));
     }
     find("#check").addEventListener("click", () => this.check());

@@ -20,6 +20,11 @@ function table(anchors) {
   return colours;
 }
 
+/** A table of equal steps of constant colour. */
+export function steps(hexes) {
+  return table(Array.from({ length: 256 }, (_, i) => hexes[Math.floor((i * hexes.length) / 256)]));
+}
+
 const gradient = (anchors) => `linear-gradient(to right, ${anchors.map((c) => `#${c}`).join(", ")})`;
 
 export const sequential = { table: table(VIRIDIS), css: gradient(VIRIDIS) };

@@ -2,6 +2,7 @@
 
 import { colourOf, diverging, sequential } from "./colours.js";
 import { element, tableRow, term } from "./elements.js";
+import { familyField, showClasses } from "./families.js";
 import { digits } from "./panel.js";
 
 const SIGNS = {
@@ -14,7 +15,7 @@ export const COLOURS = {
   curvature: { label: "Mean curvature", name: (u) => `Mean curvature H, ${u.curvature} (walls grey)` },
   error: { label: "Curvature error", name: () => "Error (H − H̄) / H̄ of Meyer's mean curvature, %" },
   reactions: { label: "Reactions", name: (u) => `Reaction of the supports, ${u.tension}` },
-  family: { label: "Panels", name: () => "Family of congruent panels, the largest first; edges alike within 1 % of the mean edge" },
+  family: { label: "Panels" }, // the field has its own name
   difference: { label: "Difference", name: (u, than) => `Distance from ${than}, ${u.length}; positive outside it` },
 };
 
@@ -27,7 +28,7 @@ export function showVerdict(root, header) {
   root.querySelector(".sign").textContent = SIGNS[verdict.name] || "?";
   root.querySelector(".word").textContent = verdict.word;
   root.querySelector(".sentence").textContent = capital(sentence);
-  root.querySelector(".detail").textContent = [verdict.detail, atRest ? "" : drawn(header)]
+  root.querySelector(".detail").textContent = [verdict.detail, atRest ? header.way : drawn(header)]
     .filter(Boolean).map((part) => `${capital(part)}.`).join(" ");
 }
 
@@ -133,9 +134,7 @@ export function fieldOf(choice, arrays) {
     const most = Math.max(1e-12, ...ends(arrays.difference, arrays.underPressure).map(Math.abs));
     return { values: arrays.difference, limits: [-most, most], map: diverging, skipWalls: true };
   }
-  if (choice === "family") {
-    return { values: arrays.family, limits: [1, Math.max(2, ends(arrays.family)[1])], map: sequential, byFace: true };
-  }
+  if (choice === "family") return familyField(arrays.family);
   if (choice === "reactions") {
     const values = new Float32Array(arrays.reactions.length / 3);
     for (let v = 0; v < values.length; v++) {
@@ -178,7 +177,9 @@ export function showLegend(root, choice, field, units, than) {
   root.hidden = !field;
   if (!field) return;
   const [low, high] = field.limits;
-  root.querySelector(".name").textContent = COLOURS[choice].name(units, than);
+  root.querySelector(".name").textContent = field.name ?? COLOURS[choice].name(units, than);
+  showClasses(root.querySelector("ul"), field.scale);
+  for (const part of [".bar", ".ends"]) root.querySelector(part).hidden = Boolean(field.scale);
   root.querySelector(".bar").style.background = field.map.css;
   root.querySelector(".low").textContent = digits(low, 3);
   root.querySelector(".middle").textContent = digits((low + high) / 2, 3);

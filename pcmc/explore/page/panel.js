@@ -3,6 +3,7 @@
 import { element, input } from "./elements.js";
 
 const STEPS = 1000;
+const ROOM = 2; // times a value beyond the slider's end: where it ends then
 const QUANTITIES = {
   tensions: { label: "Tension α", unit: "tension" },
   pressures: { label: "Pressure p", unit: "pressure" },
@@ -29,14 +30,16 @@ class Range {
     Object.assign(this, { evenly: true, low: Math.min(one, other), high: Math.max(one, other) });
   }
 
-  /** Make room for a value; zero and a change of sign need an even scale. */
+  /** Make room for a value, and some on its other side; zero and a change of sign need an even scale. */
   widen(value) {
-    if (!this.evenly && !(value / this.low > 0)) this.spread(Math.min(this.low, this.high), Math.max(this.low, this.high));
+    if (!this.evenly && !(value / this.low > 0)) this.spread(this.low, this.high);
+    const beyond = ROOM * value;
     if (this.evenly) {
-      this.spread(Math.min(this.low, value), Math.max(this.high, value));
+      if (value < this.low) this.low = beyond;
+      if (value > this.high) this.high = beyond;
     } else {
-      if (Math.abs(value) < Math.abs(this.low)) this.low = value;
-      if (Math.abs(value) > Math.abs(this.high)) this.high = value;
+      if (Math.abs(value) < Math.abs(this.low)) this.low = value / ROOM;
+      if (Math.abs(value) > Math.abs(this.high)) this.high = beyond;
     }
   }
 

@@ -24,11 +24,11 @@ export class Targets {
     const possible = tensions.map(({ name, patch, wall }) => ({
       label: name, usual: patch !== null && !wall, parameter: { patch: name, kind: patch === null ? "cable" : "tension" },
     }));
-    const same = (a, b) => a.kind === b.kind && a.patch === b.patch;
+    const same = (a, b) => a.kind === b.kind && String(a.patch) === String(b.patch);
     for (const { label, parameter } of aims.vary) {
       const known = possible.find((p) => same(p.parameter, parameter));
       if (known) Object.assign(known, { parameter, given: true });
-      else possible.push({ label, parameter, given: true }); // such as a pressure
+      else possible.push({ label, parameter, given: true }); // such as a pressure, or several tied
     }
     this.vary = possible.map((one) => this.parameter(one, aims.vary.length ? one.given : one.usual));
     root.querySelector(".vary").replaceChildren(...this.vary.map(({ label }) => label));
@@ -44,7 +44,18 @@ export class Targets {
     const box = input("checkbox", `${text} may change`);
     box.checked = Boolean(checked);
     label.append(box, text);
-    return { label, box, parameter };
+    const one = { label, box, parameter };
+    box.addEventListener("change", () => box.checked && this.release(one));
+    return one;
+  }
+
+  /** A tension varies once, alone or tied to others: let go of those that a chosen one has a patch of. */
+  release(chosen) {
+    const names = [chosen.parameter.patch].flat();
+    for (const other of this.vary) {
+      const shared = [other.parameter.patch].flat().some((name) => names.includes(name));
+      if (other !== chosen && shared && other.parameter.kind === chosen.parameter.kind) other.box.checked = false;
+    }
   }
 
   add(target) {
@@ -102,6 +113,7 @@ export class Targets {
     const targets = this.rows.map(({ target, fixed, quantity, of, limit, number }) => ({
       quantity: fixed ? target.quantity : quantity.value,
       of: fixed ? target.of : of.value.slice(1) || null,
+      name: target.name ?? "",
       [limit.value]: number.valueAsNumber,
     }));
     this.say("Searching for the tensions…");

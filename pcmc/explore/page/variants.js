@@ -4,11 +4,16 @@ import { button, element, tableRow } from "./elements.js";
 import { digits } from "./panel.js";
 
 const NAMES = {
-  apex: "Apex", area: "Area", volume: "Volume", reaction: "Largest reaction",
+  apex: "Apex", area: "Area", volume: "Volume", reaction: "Reaction",
   tension: "Tension", pressure: "Pressure", weight: "Weight",
 };
 
-const rowName = ({ quantity, of }) => (of ? `${NAMES[quantity]} of ${of}` : `${NAMES[quantity]}, all`);
+/** The row that begins the rows of a patch, or of all, across the table. */
+function heading(text, kind = "part") {
+  const row = tableRow(element("span", kind, text), []);
+  row.firstChild.colSpan = 5;
+  return row;
+}
 
 export class Variants {
   /** `act(name, body)` asks the server; `picture()` is the canvas to copy small, or null. */
@@ -54,17 +59,25 @@ export class Variants {
     const key = (row) => `${row.quantity} ${row.of}`;
     const before = new Map(other.measures.map((row) => [key(row), row.value]));
     const rows = measures.filter((row) => before.has(key(row)) && row.value !== null && before.get(key(row)) !== null);
-    const changed = rows.filter((row) => Math.abs(row.value - before.get(key(row))) > 1e-9 * Math.abs(row.value));
-    table.querySelector("tbody").replaceChildren(...changed.map((row) => {
+    const changed = rows.filter((row) => digits(row.value) !== digits(before.get(key(row))));
+    const difference = (row) => {
       const then = before.get(key(row));
       const change = row.value - then;
-      const signed = (x) => `${x > 0 ? "+" : ""}${digits(x, 3)}`;
-      const title = units.given ? units[row.kind] : "";
-      return tableRow(rowName(row), [
-        digits(then), digits(row.value), signed(change), then ? `${signed((100 * change) / Math.abs(then))} %` : "",
-      ], title);
-    }));
-    if (!changed.length) table.querySelector("tbody").replaceChildren(tableRow("No number differs", ["", "", "", ""]));
+      const signed = (x) => `${x > 0 ? "+" : ""}${digits(x, 2)}`;
+      const head = element("span", "", NAMES[row.quantity]);
+      if (units.given) head.append(element("span", "unit", ` ${units[row.kind]}`));
+      return tableRow(head, [
+        digits(then), digits(row.value), signed(change), then ? signed((100 * change) / Math.abs(then)) : "",
+      ]);
+    };
+    const parts = ["", ...new Set(changed.map((row) => row.of).filter(Boolean))]; // all, then each
+    const shown = parts.flatMap((part) => {
+      const own = changed.filter((row) => row.of === part);
+      return own.length ? [heading(part || "all"), ...own.map(difference)] : [];
+    });
+    const alike = rows.length - changed.length;
+    const words = changed.length ? `${alike} more numbers are the same to four digits` : "No number differs in four digits";
+    table.querySelector("tbody").replaceChildren(...shown, ...(alike ? [heading(words, "unit")] : []));
   }
 
   item(variant, number, compared) {
