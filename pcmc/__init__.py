@@ -137,6 +137,7 @@ if not TYPE_CHECKING:
             _html.for_type_by_name("pcmc.surface.surface", "Surface", _cell_html)
             _html.for_type_by_name("pcmc.solvers.result", "Result", _cell_html)
             _html.for_type_by_name("pcmc.design.outcome", "Design", _cell_html)
+            _html.for_type_by_name("pcmc.project.outcome", "Outcome", _cell_html)
             _html.for_type_by_name("pcmc.accuracy.adaptive", "AccurateResult", _cell_html)
 
     def __dir__() -> list[str]:

@@ -1,5 +1,7 @@
 """Targets: every bad request, and the search stopped on request."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -8,7 +10,7 @@ from refusals import refused
 from shapes import pyramid
 
 import pcmc
-from generators import double_bubble, joined_caps
+from generators import double_bubble, joined_caps, two_squares
 from pcmc import Parameter, Target, meet, sensitivities
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate.certificate import TOLERANCE
@@ -236,3 +238,17 @@ def test_a_command_stopped_while_it_meets_targets_ends(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         project.run(file, progress=pressed)
     assert [path.name for path in tmp_path.iterdir()] == ["roof.toml"]
+
+
+def test_too_few_parameters_are_counted_and_others_named():
+    """Two apexes cannot follow one tension: the message says so, and which other tension may vary."""
+    surface = two_squares(4, alpha=3.0, alpha_aux=1.0)
+    aims = [Target("apex", "left", 0.7), Target("apex", "right", 1.0)]
+    design = meet(surface, aims, "left")
+    assert design.status is DesignStatus.CONFLICT
+    assert design.message.endswith(
+        "2 targets need 2 parameters, and 1 may vary: add to vary, such as 'right'"
+    )
+    assert re.search(
+        r"apex of left: wanted 0.7, nearest reachable \S+ [(][\d.]+ % (more|less)[)]", design.message
+    )

@@ -10,8 +10,10 @@ from tents import tent
 import pcmc
 from generators import spherical_cap, two_squares
 from pcmc.base.errors import MissingExtra
+from pcmc.base.units import Units
 from pcmc.plan import Divider, Hole, Plan
 from pcmc.plot import notebook
+from pcmc.project import Outcome
 
 CELL = """
 from IPython.core.interactiveshell import InteractiveShell
@@ -22,7 +24,8 @@ corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.4]]
 roof = pcmc.Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
                     [pcmc.Patch("roof", 1.0)], fixed=range(4))
 design = pcmc.meet(roof, [pcmc.Target("apex", value=0.4)], ["roof"])
-for value in (surface, pcmc.solve(surface, iterations=1), design):
+from pcmc.project import Outcome
+for value in (surface, pcmc.solve(surface, iterations=1), design, Outcome(pcmc.solve(roof), ())):
     data, _ = shell.display_formatter.format(value)
     print(data["text/html"].count("data:image/png;base64"), "Surface of " in data["text/plain"])
 """
@@ -99,7 +102,7 @@ def test_many_patches_are_counted():
 
 def test_cells_of_ipython_show_pictures():
     done = subprocess.run([sys.executable, "-c", CELL], capture_output=True, text=True, check=True)
-    assert done.stdout.split("\n") == ["1 True", "1 True", "1 True", ""]
+    assert done.stdout.split("\n") == ["1 True"] * 4 + [""]
 
 
 def test_without_the_plot_extra_cells_show_text(monkeypatch):
@@ -108,3 +111,24 @@ def test_without_the_plot_extra_cells_show_text(monkeypatch):
 
     monkeypatch.setattr("pcmc.plot.pictures.draw", missing)
     assert notebook.cell_html(tent()).startswith("<pre>Surface of 12 triangles")
+
+
+def test_a_result_has_its_verdict_once_it_is_known():
+    result = pcmc.solve(tent())
+    verdict = result.certify().verdict.value
+    assert verdict not in repr(result)
+    assert result.certificate.verdict.value == verdict
+    assert repr(result).splitlines()[1] == verdict
+
+
+def test_an_outcome_is_its_verdict_and_advice_above_the_surface():
+    result = pcmc.solve(tent())
+    outcome = Outcome(result, (), advice=("type in roof.toml:", "[plan] tension = 3"), units=Units("m", "kN"))
+    assert repr(outcome).splitlines() == [
+        result.certificate.verdict.value,
+        result.certificate.detail,
+        "type in roof.toml:",
+        "  [plan] tension = 3",
+        Units("m", "kN").sentence,
+        *repr(result.surface).splitlines(),
+    ]

@@ -10,8 +10,9 @@ from refusals import refused
 from small_project import changed
 
 import pcmc
-from pcmc.base.errors import FileError, OptionError
+from pcmc.base.errors import FileError, OptionError, PcmcError
 from pcmc.project import build, check_names, check_outputs, run
+from pcmc.project.checking import line_with
 
 ROOF = Path(__file__).resolve().parent.parent / "notebooks" / "roof.toml"
 
@@ -175,8 +176,20 @@ def test_targets_are_met(small):
 def test_targets_for_a_patch_that_is_not_there_and_another_method(small):
     aim = '[targets]\nmeet = [{quantity = "apex", of = "rof", value = 0.6}]\nvary = ["roof"]\n[output]'
     changed(small, "[output]", aim)
-    with pytest.raises(OptionError, match=r"small\.toml: unknown patch 'rof'; did you mean 'roof'"):
+    with pytest.raises(OptionError, match=r"small\.toml: line 11: unknown patch 'rof'; did you mean 'roof'"):
         run(small)
     changed(small, '"newton"', '"lbfgs"')
     with refused(OptionError, what="solve.method", found="lbfgs"):
         run(small)
+
+
+def test_a_bad_value_has_its_line(small):
+    changed(small, "tension = 2.0", "tension = -5.0")
+    number = next(k for k, line in enumerate(small.read_text().splitlines(), 1) if "-5.0" in line)
+    with pytest.raises(PcmcError, match=rf"small\.toml: line {number}: tension of .*found -5"):
+        build(small)
+    small.write_text(
+        small.read_text() + "# twice: -5.0\n[targets]\nmeet = [{quantity = 'apex', value = -5.0}]\n"
+    )
+    assert line_with(small, -5.0) == 0
+    assert line_with(small, "apex") == len(small.read_text().splitlines())

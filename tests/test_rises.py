@@ -84,3 +84,20 @@ def test_the_command_takes_a_rise(given, tmp_path, capsys):
     assert "apex 1.2" in capsys.readouterr().out
     assert cli.main(["solve", str(path), "--rise", "1.2", "--apex", "2"]) == 2
     assert "--rise and --apex: give one of them" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("vary", "line"),
+    [('["west", "east"]', 'type vary = ["east"]'), ('["west"]', "remove vary and its targets")],
+)
+def test_a_tension_is_found_for_a_rise_or_for_the_targets(tmp_path, vary, line):
+    path = tmp_path / "roof.toml"
+    path.write_text(
+        "[plan]\nedge_length = 1.5\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\n"
+        "dividers = [[[3, 0], [3, 4]]]\n[plan.patches]\nwest = {rise = 1.0}\neast = {tension = 3.0}\n"
+        f"[targets]\nmeet = [{{quantity = 'apex', of = 'east', value = 1.0}}]\nvary = {vary}\n"
+    )
+    with refused(FileError, what="targets.vary", where="west") as caught:
+        load(path)
+    assert line in str(caught.value)
+    assert "give patch 'west' tension = instead of rise =" in str(caught.value)

@@ -301,3 +301,45 @@ def test_bad_input_is_2_in_one_line(roof, capsys, arguments, message):
     assert (out, err.count("\n")) == ("", 1)
     assert message in err
     assert [p.name for p in roof.parent.iterdir()] == ["roof.toml"]
+
+
+AIMED = """
+[targets]
+meet = [{quantity = "apex", of = "west", value = 1.0}]
+vary = ["west"]
+"""
+
+
+@pytest.mark.parametrize("name", ["west.tension", "plan.patches.west.tension"])
+def test_a_number_that_the_targets_find_is_not_swept(roof, name):
+    roof.write_text(TEXT + AIMED, encoding="utf-8")
+    with refused(OptionError, what=name, where="tension of west"):
+        project_sweep("roof.toml", {name: [3, 4]})
+    assert len(project_sweep("roof.toml", {"east.tension": [3, 4]})) == 2
+    plain = TEXT.split("[plan.patches]")[0].replace("[plan]", "[plan]\ntension = 3.0")
+    roof.write_text(plain + AIMED.replace("west", "patch 1"), encoding="utf-8")
+    with refused(OptionError, what="plan.tension"):
+        project_sweep("roof.toml", {"plan.tension": [3, 4]})
+
+
+def test_the_table_and_the_picture_of_a_sweep_have_the_units_of_the_project(roof, capsys, monkeypatch):
+    seen = {}
+    monkeypatch.setattr("pcmc.plot.lines", lambda *curves, **rest: seen.update(rest))
+    roof.write_text(f'units = "m"\nforce = "kN"\n{TEXT}', encoding="utf-8")
+    given = [
+        "sweep",
+        "roof.toml",
+        "west.tension=3,3.2",
+        "--workers",
+        "1",
+        "--csv",
+        "t.csv",
+        "--plot",
+        "t.png",
+    ]
+    assert cli.main(given) == 0
+    header = capsys.readouterr().out.splitlines()[0]
+    for label in ("west.tension [kN/m]", "west.apex [m]", "roof_area [m²]", "largest_reaction [kN/m]"):
+        assert label in header
+    assert (seen["x"], seen["y"]) == ("west.tension [kN/m]", "apex [m]")
+    assert next(iter(pd.read_csv("t.csv", index_col="case"))) == "west.tension"

@@ -151,6 +151,40 @@ NO_UNITS = Units()
 """Those of numbers whose units are not given."""
 
 
+LARGEST, SMALLEST = 1000.0, 1.0  # metres: the size of a plan is between, as a rule
+
+
+def size_note(size: float, unit: str, drawn: str = "") -> str:
+    """A sentence on a plan whose size is unlikely in its unit, with the line to type; else empty.
+
+    Parameters
+    ----------
+    size : the larger side of the plan, in ``unit``.
+    unit : of the numbers; without one nothing is known.
+    drawn : the unit that the drawing of the plan itself has.
+
+    >>> size_note(12000.0, "m"), size_note(12.0, "m")
+    ('the plan is 12 km long; are its numbers in mm? Then type units = "mm"', '')
+    """
+    if not unit:
+        return ""
+    metres = size * length_factor(unit, "m")
+    if SMALLEST <= metres <= LARGEST:
+        return ""
+    own = size * length_factor(unit, drawn) if drawn else size
+    likely = [name for name in LENGTHS if SMALLEST <= own * length_factor(name, "m") <= LARGEST]
+    shown = f"{metres / 1000:.4g} km" if metres > LARGEST else f"{metres * 1000:.4g} mm"
+    note = f"the plan is {shown} long"
+    if not likely:
+        return f"{note}; check its unit, which is {drawn or unit}"
+    if drawn:
+        note += (
+            f"; is the drawing in {likely[0]}? Its unit is {drawn}: set it to {likely[0]} in CAD, or write"
+        )
+        return f'{note} the project with pcmc plan and type units = "{likely[0]}" there'
+    return f'{note}; are its numbers in {likely[0]}? Then type units = "{likely[0]}"'
+
+
 def as_units(units: object) -> Units:
     """Units as given, or by their unit of length alone.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 
@@ -86,11 +88,19 @@ def too_long(surface: Surface) -> str:
         tension = float(surface.tensions[curve.sheets[0]])
         widest = 2.0 * cable.tension
         if chord * tension > widest:
+            enough = _upwards(chord * tension)  # an arc of 60°, which rises by 0.13 of its chord
             return (
-                f"cable {cable.name!r} spans {chord:.4g}, more than 2 τ/α = {widest / tension:.4g},"
-                " the diameter of the arc along a flat edge; raise its tension, or put a support between"
+                f"cable {cable.name!r} spans {chord:.4g}, more than 2 τ/α = {widest / tension:.4g}, the"
+                f" diameter of the arc along a flat edge; raise its tension, well beyond"
+                f" {0.5 * chord * tension:.3g} (in a plan, cable = {enough:g}), or put a support between"
             )
     return ""
+
+
+def _upwards(value: float) -> float:
+    """The value rounded up to two digits."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(value / step) * step
 
 
 def _parts(surface: Surface) -> list[tuple[Cable, Curve]]:

@@ -46,10 +46,14 @@ class UnbalancedJunction:
     remedy: tuple[str, float, bool] | None = None
 
     def __str__(self) -> str:
+        return f"{self.imbalance}{self.hint}"
+
+    @property
+    def imbalance(self) -> str:
+        """The sentence without the remedy."""
         others = " + ".join(f"{tension:g}" for tension in self.others)
         names = " | ".join(self.junction)
-        text = f"the tensions at the junction {names} cannot balance: {self.strongest:g} > {others}"
-        return f"{text}{self.hint}"
+        return f"the tensions at the junction {names} cannot balance: {self.strongest:g} > {others}"
 
     @property
     def hint(self) -> str:

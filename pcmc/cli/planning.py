@@ -41,6 +41,8 @@ def plan(
         text = f"{output}: is there already; delete it, or name another file"
         raise FileError(text, what=str(output))
     projects.check_outputs([output])
+    if refer:
+        projects.drawing_reference(file, output)  # refuses a drawing elsewhere
     with working() as say:
         say("reading the drawing")
         text, drawing = projects.project_text(file, output.parent, units=units, gap=gap, refer=refer)

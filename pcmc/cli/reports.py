@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from ..certificate.balance import strained_junction
 from ..certificate.leaning import lean_texts
+from ..contact.pinching import standing_part
 from ..design.outcome import values_text
 from ..project import Outcome
 
@@ -13,7 +15,11 @@ UPRIGHT = 'a divider with upright = true keeps its wall in its plane, a target "
 def report(outcome: Outcome, *, verdict: bool = True) -> None:
     """Print how the solver ended, the targets and parameters, the verdict, and the files written."""
     before = "solved before (--no-cache solves it again)"
-    print(f"{outcome.surface.m} triangles; {before if outcome.cached else outcome.result.message}")
+    detail = _advised(outcome.certificate.detail, outcome)
+    message = _advised(outcome.result.message, outcome)
+    if verdict and detail:
+        message = message.removesuffix(f"; {detail}")  # it follows the verdict
+    print(f"{outcome.surface.m} triangles; {before if outcome.cached else message}")
     if outcome.accurate is not None:
         print(outcome.accurate.text(outcome.units))
     if outcome.design is not None:
@@ -34,8 +40,8 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         print(f"pressures that keep the volumes: {', '.join(held)}")
     if verdict:
         print(outcome.certificate.verdict.value)
-        if outcome.certificate.detail:
-            print(outcome.certificate.detail)
+        if detail:
+            print(detail)
         if outcome.whole is not None:
             whole = outcome.whole
             print(f"the whole roof, {whole.surface.m} triangles: {whole.certificate.verdict.value}")
@@ -46,3 +52,12 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         print("\n  ".join(outcome.advice))
     if outcome.files:
         print(f"written: {', '.join(map(str, outcome.files))}")
+
+
+def _advised(text: str, outcome: Outcome) -> str:
+    """A text without its own remedy for a junction where there is advice: that one was tried."""
+    if not outcome.advice:
+        return text
+    surface = outcome.surface
+    strained = strained_junction(surface, standing_part(surface).walls.pinchable)
+    return text if strained is None else text.replace(strained.hint, "")

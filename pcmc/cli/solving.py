@@ -46,7 +46,7 @@ MOST_TRIANGLES = f"The most that the mesh for an accuracy may have, {TRIANGLES} 
 WHOLE_INDEX = "Of a surface with mirror planes certify the whole: motions that are not symmetric count, too."
 RISE = "Find the tension with which the whole roof rises so much over its outline."
 APEX = "The same, over the plane."
-SPAN_RATIO = "The same: the smaller span of the plan over the rise."
+SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
 

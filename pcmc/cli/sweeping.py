@@ -65,6 +65,7 @@ def sweep(
       pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
     """
     from ..sweep import draw_sweep, run, short_table, write_table
+    from ..sweep.projects import column_labels
     from ..sweep.store import FAILED
     from ..sweep.table import TABLES
 
@@ -98,9 +99,10 @@ def sweep(
     first = short_table(table, list(grid))
     if csv is not None:
         write_table(csv, table if every else first)
+    labels = {} if ":" in what and not Path(what).exists() else column_labels(what, map(str, first))
     if plot is not None:
-        draw_sweep(table, list(grid), plot)
-    print(first.to_string(float_format=lambda x: f"{x:.5g}"))
+        draw_sweep(table, list(grid), plot, labels)
+    print(first.rename(columns=labels).to_string(float_format=lambda x: f"{x:.5g}"))
     _print_failures(table[table["status"].isin(FAILED)])
     if len(table) < len(cases):
         return INTERRUPTED

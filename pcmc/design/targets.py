@@ -36,8 +36,8 @@ class Target:
     of : name of the patch, room or cable; for ``"height"`` the point (x, y) in the coordinates of Π. None:
         all patches under pressure together (for ``"reaction"`` the whole held boundary); not for
         ``"curvature"``, ``"pressure"`` and the quantities of cables.
-    value, at_most, at_least : a value, or a limit on one side or both. Give none of them to measure the
-        quantity only.
+    value, at_most, at_least : a value, or a limit on one side or both. A target to be met has at least one of
+        them; ``pcmc.sensitivities`` needs none.
     name : of the point of a height, such as ``"crown"``: shown instead of its coordinates.
 
     Examples

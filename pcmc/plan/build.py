@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import NamedTuple
 
@@ -20,7 +20,16 @@ from ..surface.wall_tensions import balanced_wall
 from .areas import patches_of
 from .corners import most_in_corners
 from .draft import Draft, drafted
-from .edges import NONE, STATES, check_pressures, edge_cables, mirror_planes, raised_heights, strip_mask
+from .edges import (
+    NONE,
+    STATES,
+    check_pressures,
+    edge_cables,
+    mirror_planes,
+    raised_heights,
+    strip_mask,
+    usual_cable,
+)
 from .heights import dome, harmonic_heights
 from .lines import SNAP, Kind, Line
 from .parts import BALANCED, PlanData
@@ -133,10 +142,21 @@ def _warn_of_free_edges(draft: Draft, held: Bools) -> None:
             place = draft.drawn.points[free[0]].round(4).tolist()
             text = (
                 f"nothing holds {line.name} at {place} ({len(free)} such vertices): the tension has"
-                " nothing to pull against there, and there is probably no equilibrium; give the edge a cable"
-                ' (edge = "cable"), or fix it, along a curve in space if it should be above the plane'
+                " nothing to pull against there, and there is probably no equilibrium; fix the edge, along a"
+                " curve in space if it should be above the plane, or give it a cable:"
+                f" {_cable_keys(draft.plan)}"
             )
             warnings.warn(text, PlanWarning, stacklevel=4)
+
+
+def _cable_keys(plan: PlanData) -> str:
+    """The keys that make a free edge of a plan one with a cable; it closes no space for a pressure."""
+    areas = plan.patches
+    if plan.tension is not None and plan.pressure:
+        at_one = usual_cable(replace(plan, tension=1.0))
+        return f'edge = "cable", cable = {at_one:g}, tension = 1.0, pressure = 0.0'
+    pressed = ", and pressure = 0.0 of its patches" if any(area.pressure for area in areas) else ""
+    return f'edge = "cable", cable = {usual_cable(plan):g}{pressed}'
 
 
 def _cables(draft: Draft, held: Bools) -> list[Cable]:

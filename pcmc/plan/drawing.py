@@ -14,7 +14,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PlanError
-from ..base.units import conversion_note, length_factor
+from ..base.units import conversion_note, length_factor, size_note
 from .curves import Curve
 from .layers import Layer, layer_of, left_out, listed, understood
 from .paths import JoinedPath, join_strokes
@@ -164,6 +164,9 @@ class _Sorted:
         dividers = self._dividers([outline, *holes.values()])
         heights, labels = self._heights(), self._labels()
         self._note_rest()
+        width = float(np.ptp(outline.at(outline.dense), axis=0)[:2].max())
+        if note := size_note(width, self.units, self.content.unit):
+            self.notes.append(note)
         if factor != 1.0:
             self.notes.insert(0, conversion_note(self.content.unit, self.units))
         return Drawing(
@@ -304,8 +307,11 @@ class _Sorted:
                     raise PlanError(text, what=where, where=_plain(foot))
                 tops.append(top)
         if tops:
-            text = "a roof held at a point has a peak there as small as the triangles; draw a mast's top as a"
-            self.notes.append(f"layer 'mast': {text} ring, and no mesh changes the roof")
+            text = "a roof held at a point has a peak there as thin as the triangles, which comes to rest on"
+            text += (
+                " some meshes and not on others; draw a mast's top as a ring, and the roof is the same on all"
+            )
+            self.notes.append(f"layer 'mast': {text}")
         return tops
 
     def _heights(self) -> Floats:

@@ -142,6 +142,13 @@ def edge_cables(edges: Boundary, held: Bools, numbers: count[int]) -> list[Cable
     return cables
 
 
+def usual_cable(plan: PlanData) -> float:
+    """A tension of cables with which the edges of a sail bend moderately, two digits: 1.5 α × size."""
+    tension = max(area.tension for area in plan.patches) if plan.tension is None else plan.tension
+    outline = plan.outline.local(plan.plane)
+    return float(f"{1.5 * tension * np.ptp(outline.at(outline.dense)[:, :2], axis=0).max():.2g}")
+
+
 def raised_heights(plan: PlanData, edges: Boundary, drawn: Arrangement, held: Bools) -> Floats:
     """(k,) the heights of the drawn points, with those of points given as supports; NaN where unknown.
 

@@ -181,6 +181,7 @@ def edge_cable(edge: str, cable: Any, what: str) -> float | None:
     """The tension of the cable along an edge; refused without ``edge = "cable"``, and missing with it."""
     if edge == "cable" and cable is None:
         message = f'{what}: edge = "cable" needs the tension of the cable, such as cable = 10.0'
+        message += ", and patches with pressure = 0.0"
         raise OptionError(message, what="cable", where=what)
     if edge != "cable" and cable is not None:
         message = f'{what}: cable = {cable!r} needs edge = "cable", found "{edge}"'

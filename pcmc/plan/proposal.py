@@ -167,7 +167,7 @@ def _areas(
     names = _names(parts, drawing)
     areas = []
     for k, part in enumerate(parts):
-        point = [float(f"{value:.5g}") for value in part.middle]
+        point = [_rounded(value, part.radius) for value in part.middle]
         point = point if shapely.contains_xy(part.area, *point) else list(part.middle)
         label = names.get(k)
         name = label.name if label else "roof" if len(parts) == 1 else f"patch {k + 1}"
@@ -188,6 +188,15 @@ def _areas(
         for area in chosen:
             area |= {"name": name} | {key: value for key, value in attributes.items() if key != "at"}
     return areas
+
+
+def _rounded(value: float, radius: float) -> float:
+    """A coordinate with as many digits as tell a point in a circle, and no zero with a sign or an exponent.
+
+    >>> _rounded(8.9e-16, 2.0), _rounded(18.04321, 2.0), _rounded(12345.678, 250.0)
+    (0.0, 18.04, 12346.0)
+    """
+    return round(value, 2 - math.floor(math.log10(radius))) + 0.0
 
 
 def _contains(part: Part, at: Any) -> bool:

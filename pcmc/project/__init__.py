@@ -42,7 +42,7 @@ from .file import Project, build, load, project_of, raised, read_data, surface_o
 from .keys import REQUIRED, Key, Section, reference, sections
 from .outcome import Outcome
 from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
-from .planning import project_text, proposal_text
+from .planning import drawing_reference, project_text, proposal_text
 from .remeshing import Remeshing
 from .running import (
     MOST_CHECKED,
@@ -89,6 +89,7 @@ __all__ = [
     "project_text",
     "project_of",
     "raised",
+    "drawing_reference",
     "read_data",
     "proposal_text",
     "reference",

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from ..base.errors import PcmcError
 from ..certificate.balance import strained_junction
@@ -17,62 +18,148 @@ from ..plan import Divider, Plan
 from ..plan.parts import BALANCED
 from ..solvers.result import Status
 from ..surface import Surface
+from .accuracy import AccuracyWanted
 from .file import Project
+from .masts import SHARES, point_masts, ring_lines, with_rings
 from .outcome import Outcome
+from .sails import as_sail, sail_lines
+
+if TYPE_CHECKING:
+    from ..design import Parameter
 
 BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of it
 FARTHEST = 20.0  # times the tensions: a fold beyond has another reason, such as an end that slips
 TRIES = 3  # plans tried
 TRIANGLES = 5000  # of the meshes that these are tried on, at most about
 INFLATED = (Overload, Fold)
+Trial = Callable[[Project, Surface], Outcome]  # solves a project from a surface
 
 
-def chosen_walls(project: Project, surface: Surface) -> list[str]:
-    """The tensions of the walls that the project leaves open, in a line."""
-    if project.plan is None or project.drawing is not None:
-        return []
+def chosen_values(project: Project, surface: Surface) -> list[str]:
+    """The tensions and walls that the project leaves open, a line each for the drawing's and the plan's."""
+    if project.plan is None or project.path.suffix.lower() != ".toml":
+        return []  # a drawing alone is proposed as a whole
+    drawn = [project.chosen.text] if project.chosen.text else []
     left_open = [divider for divider in project.plan.dividers if divider.wall == BALANCED]
     chosen = [p for p in surface.patches if any(_is_wall_of(divider, p.name) for divider in left_open)]
     if not chosen:
-        return []
+        return drawn
     values = ", ".join(f"{patch.name!r} {patch.tension:g}" for patch in chosen)
-    return [f"walls balanced with their neighbours: {values} (to choose one, type wall = under its divider)"]
+    return [
+        *drawn,
+        f"walls balanced with their neighbours: {values} (to choose one, type wall = under its divider)",
+    ]
 
 
-def advice(project: Project, given: Surface, start: Surface, outcome: Outcome) -> list[str]:
-    """What to type so that a project, or a surface, comes to rest: a heading, and a line for each change.
+def advice(
+    project: Project, given: Surface, start: Surface, outcome: Outcome, try_project: Trial
+) -> list[str]:
+    """What to type so that a project, or a surface, comes to rest and meets its targets: a heading, and a
+    line for each change.
 
     Parameters
     ----------
     given, start : the start shape of the project, and the one that was solved, with the command's tensions.
+    try_project : solves another project, with its targets.
     """
-    if outcome.certificate.certified:
-        return []
     plan = project.plan
+    if outcome.certificate.certified and (plan is None or outcome.design is None or outcome.design.met):
+        return []
     if plan is None or start is not given:
         strained = strained_junction(start, standing_part(start).walls.pinchable)
         if strained is None or strained.remedy is None:
             return []
         return ["add to the command:", f"--tension {strained.remedy[0]!r}={strained.remedy[1]:g}"]
-    name = project.path.with_suffix(".toml").name
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the project's own warnings were shown
-        better, works = _tried(project, plan, outcome)
-        lines = _lines(plan, better)
-    tried = "which was tried and comes to rest" if works else "as a first step"
-    return [f"type in {name}, {tried}:", *lines] if lines else []
+        if outcome.certificate.certified:
+            base, reshaping, better, rests = plan, Reshaping(), plan, True
+        else:
+            base, reshaping, outcome = _reshaped(project, plan, outcome)
+            better, rests = _tried(project, base, outcome)
+        if reshaping.sail and project.rises:
+            project = replace(project, targets=project.targets[: -len(project.rises)])
+        met, reached = False, ""
+        if rests and project.targets:
+            better, met, reached = _with_targets(project, better, outcome, try_project)
+        lines = _lines(base, better)
+    if not (lines or reshaping.lines):
+        return []
+    tried = "which was tried and comes to rest" if rests else "as a first step"
+    if met:
+        tried = "which was tried, comes to rest and meets the targets"
+    elif rests and project.targets:
+        tried = "which was tried without the targets and comes to rest"
+    ending = [f"with them, the targets are {reached}"] if reached else []
+    return [
+        f"{reshaping.cause}{_where(project, reshaping, lines)}, {tried}:",
+        *reshaping.lines,
+        *lines,
+        *ending,
+    ]
+
+
+@dataclass(frozen=True)
+class Reshaping:
+    """Changes of what holds a roof: a sail instead of free edges, rings instead of points."""
+
+    sail: Sequence[str] = ()
+    rings: Sequence[str] = ()
+
+    @property
+    def lines(self) -> list[str]:
+        """What to type or draw."""
+        return [*self.sail, *self.rings]
+
+    @property
+    def cause(self) -> str:
+        """Why, before a heading; empty without changes."""
+        causes = ["edges that nothing holds"] if self.sail else []
+        causes += ["a roof held at a single point"] if self.rings else []
+        return f"the cause is {' and '.join(causes)}; " if causes else ""
+
+
+def _where(project: Project, reshaping: Reshaping, lines: Sequence[str]) -> str:
+    """Where to make the changes: in the project, or in its drawing."""
+    if project.drawing is None or not reshaping.rings:
+        return f"type in {project.path.with_suffix('.toml').name}"
+    typed = lines or reshaping.sail
+    drawn = f"draw in {project.drawing.path.name}"
+    return f"{drawn} and type in {project.path.with_suffix('.toml').name}" if typed else drawn
+
+
+def _reshaped(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, Reshaping, Outcome]:
+    """The plan as a sail, if edges are free, with rings instead of single points, and its outcome.
+
+    The rings are the smallest with which the roof comes to rest; the plan itself where nothing does.
+    """
+    sail, masts = as_sail(plan, project.rises), point_masts(plan)
+    base = plan if sail is None else sail
+    shares = SHARES if masts else () if sail is None else (0.0,)
+    for share in shares:
+        changed = with_rings(base, masts, share) if masts else base
+        try:
+            result = solve(_coarse(changed, outcome).surface(), project.method, **project.options)
+        except PcmcError:  # such as a patch whose point is in the ring
+            continue
+        if result.certificate.certified:
+            typed = [] if sail is None else sail_lines(plan, sail, project.rises)
+            rings = ring_lines(masts, share, drawn=project.drawing is not None)
+            return changed, Reshaping(typed, rings), Outcome(result, ())
+    return plan, Reshaping(), outcome
 
 
 def _tried(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, bool]:
     """The plan mended until it comes to rest, on a mesh that is not fine; and whether it does."""
+    if outcome.certificate.certified:
+        return plan, True
     for _ in range(TRIES):
         better = mended(plan, outcome)
         if not _lines(plan, better):
             break
-        plan, share = better, outcome.surface.m / TRIANGLES
-        trial = replace(plan, edge_length=plan.edge_length * max(1.0, math.sqrt(share)))
+        plan = better
         try:
-            result = solve(trial.surface(), project.method, **project.options)
+            result = solve(_coarse(plan, outcome).surface(), project.method, **project.options)
         except PcmcError:  # too coarse for this plan
             break
         outcome = Outcome(result, ())
@@ -81,6 +168,46 @@ def _tried(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, bool]:
         if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
             raise KeyboardInterrupt
     return plan, False
+
+
+def _coarse(plan: Plan, outcome: Outcome) -> Plan:
+    """The plan with a mesh that is not fine."""
+    return replace(plan, edge_length=plan.edge_length * max(1.0, math.sqrt(outcome.surface.m / TRIANGLES)))
+
+
+def _with_targets(
+    project: Project, plan: Plan, outcome: Outcome, try_project: Trial
+) -> tuple[Plan, bool, str]:
+    """The first plan that meets the targets, and whether one does; else the plan, and what it reaches."""
+    plain = replace(project, remeshing=(), wanted=AccuracyWanted())
+    looser, reached = _loosened(plan, project.vary), ""
+    for candidate in (plan, looser):
+        if candidate is project.plan or candidate is None:  # tried already, or nothing to loosen
+            continue
+        try:
+            trial = try_project(replace(plain, plan=candidate), _coarse(candidate, outcome).surface())
+        except PcmcError:  # such as a target that the coarse mesh cannot measure
+            continue
+        if trial.good:
+            return candidate, True, ""
+        if trial.design is not None:
+            reached = reached or trial.design.text(project.units)
+    return plan, False, reached
+
+
+def _loosened(plan: Plan, vary: Sequence[Parameter]) -> Plan | None:
+    """The plan with all walls balanced, and the tensions that vary at the mean of the others; or None.
+
+    A wall that was chosen for far tensions holds those that vary near them.
+    """
+    names = {name for parameter in vary if parameter.kind == "tension" for name in parameter.names}
+    others = [area.tension for area in plan.patches if area.name not in names]
+    if not others or len(others) == len(plan.patches):
+        return None
+    mean = float(f"{sum(others) / len(others):.3g}")
+    areas = [replace(area, tension=mean) if area.name in names else area for area in plan.patches]
+    walls = {divider.name for divider in plan.dividers if divider.wall is not None} - names
+    return replace(_with_dividers(plan, walls, wall=BALANCED), patches=areas)
 
 
 def mended(plan: Plan, outcome: Outcome) -> Plan:

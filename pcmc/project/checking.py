@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from ..base.errors import FileError, unknown
@@ -13,6 +14,7 @@ from .keys import KINDS, REQUIRED, Section, main_sections, solve_section, target
 
 OR_CURVE = ("plan.dividers", "plan.holes")  # sections in place of which a curve may stand
 LONGEST = 1023  # bits of a float's exponent
+VALUE = re.compile(r"(?<![\w.])[-+]?\d[\d_]*\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")  # a number of TOML
 Place = tuple[str, ...]  # the keys that lead to a table or a value
 
 
@@ -124,6 +126,23 @@ def line_of(text: str, place: Place, key: str, value: Any = None) -> int:
             inside = header == place or (last is not None and last.search(line) is not None)
             lines.append((not inside, str(value) not in line, number))
     return min(lines, default=(True, True, 1))[2]
+
+
+def line_with(path: Path, found: object) -> int:
+    """The only line of a project file that has a name or a number; 0 if none or several have it."""
+    if path.suffix.lower() != ".toml" or isinstance(found, bool) or not isinstance(found, str | int | float):
+        return 0
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return 0
+    if isinstance(found, str):
+        has = re.compile(rf"""["']{re.escape(found)}["']""").search
+        numbers = [number for number, line in enumerate(lines, 1) if has(line)]
+    else:
+        values = ((number, VALUE.findall(line.split("#")[0])) for number, line in enumerate(lines, 1))
+        numbers = [number for number, texts in values if any(float(text) == found for text in texts)]
+    return numbers[0] if len(numbers) == 1 else 0
 
 
 def _quoted(key: str) -> str:

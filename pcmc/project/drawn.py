@@ -6,6 +6,7 @@ import os
 import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
@@ -55,8 +56,60 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     return [path]
 
 
-def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any], Drawing | None]:
-    """The data of a project with its drawing's lines in them, and the drawing, if its plan refers to one.
+@dataclass(frozen=True)
+class Chosen:
+    """What neither a project nor its drawing says: tensions of patches, walls, edge length."""
+
+    tensions: Mapping[str, float] = field(default_factory=dict)
+    walls: Mapping[str, float] = field(default_factory=dict)
+    edge_length: float | None = None
+
+    @property
+    def text(self) -> str:
+        """All of it in a line, with what to type to choose; empty if nothing was proposed.
+
+        >>> Chosen({"nave": 5.4}, {"chancel": 1.6}).text.split(" (")[0]
+        "chosen for what the project leaves open: tension 5.4 for 'nave'; wall 1.6 for 'chancel'"
+        """
+        values = {"tension": self.tensions, "wall": self.walls}
+        parts = [_by_value(what, named) for what, named in values.items() if named]
+        keys = [f'"{name}" = {{tension = ...}} under [plan.patches]' for name in list(self.tensions)[:1]]
+        keys += [f'[[plan.dividers]] name = "{name}", wall = ...' for name in list(self.walls)[:1]]
+        if self.edge_length is not None:
+            parts.append(f"edges of {self.edge_length:g}")
+            keys.append("edge_length = ... under [plan]")
+        if not parts:
+            return ""
+        return f"chosen for what the project leaves open: {'; '.join(parts)} (to change: {'; '.join(keys)})"
+
+
+def _by_value(what: str, named: Mapping[str, float]) -> str:
+    """Names with their values, those of one value together."""
+    groups: dict[float, list[str]] = {}
+    for name, value in named.items():
+        groups.setdefault(value, []).append(repr(name))
+    return "; ".join(f"{what} {value:g} for {', '.join(names)}" for value, names in groups.items())
+
+
+def _chosen(given: Mapping[str, Any], full: Mapping[str, Any], drawing: Drawing) -> Chosen:
+    """What a plan has for a drawing beyond what is given."""
+    said = {label.name for label in drawing.labels if label.tension is not None}
+    said |= {name for name, values in given.get("patches", {}).items() if "tension" in values}
+    walled = {
+        e["name"] for e in given.get("dividers", []) if isinstance(e, Mapping) and "wall" in e and "name" in e
+    }
+    areas = {} if "tension" in given else full["patches"]
+    own = [e for e in full["dividers"] if isinstance(e, Mapping) and e.get("name") in drawing.dividers]
+    return Chosen(
+        {name: area["tension"] for name, area in areas.items() if name not in said},
+        {entry["name"]: entry["wall"] for entry in own if entry["name"] not in walled},
+        None if "edge_length" in given else full["edge_length"],
+    )
+
+
+def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any], Drawing | None, Chosen]:
+    """The data of a project with its drawing's lines in them, the drawing, if its plan refers to one, and
+    what was chosen.
 
     What neither the project nor the drawing says, such as tensions, is proposed. Points of the layer "height"
     become targets where the project has none. A project without units takes those of the drawing.
@@ -72,7 +125,7 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
     if name is None:
         if gap is not None:
             raise FileError(f"{path}: plan.gap is for a drawing; add drawing = or remove it", what="plan.gap")
-        return data, None
+        return data, None, Chosen()
     if "outline" in plan:
         text = f"{path}: a plan has an outline or a drawing, not both; remove one of them"
         raise FileError(text, what="plan.outline")
@@ -95,7 +148,7 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
         points = (drawing.heights - [0.0, 0.0, drawing.level]).tolist()
         meet = [{"quantity": "height", "of": [x, y], "value": z} for x, y, z in points]
         full["targets"] = {"meet": meet, "vary": list(lines["patches"])}
-    return full, drawing
+    return full, drawing, _chosen(plan, lines, drawing)
 
 
 def read(path: Path, units: str, gap: float | None) -> Drawing:

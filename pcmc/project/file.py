@@ -12,18 +12,21 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .. import io
 from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError, unknown
 from ..base.files import check_name, check_regular, system_error
-from ..base.units import NO_UNITS, Units
+from ..base.units import NO_UNITS, Units, size_note
 from ..plan import Plan, plan_from
 from ..solvers import find_method
 from ..surface import Surface
 from .accuracy import AccuracyWanted, take_accuracy
-from .checking import check_keys
+from .checking import check_keys, line_with
 from .documents import Documents, documents_of
-from .drawn import is_drawing, with_drawing
+from .drawn import Chosen, is_drawing, with_drawing
+from .masts import mast_note
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
 from .rises import Rise, take_rises, with_rises
@@ -64,6 +67,8 @@ class Project:
     views, colour : of the picture, side by side; ``colour`` is one of ``COLOURS``.
     whole : whether the output is the whole roof that a surface with mirror planes is a part of.
     drawing : that the plan refers to, or that ``path`` is; None if there is none.
+    rises : heights that the plan has instead of tensions; each is one of the targets.
+    chosen : values for the drawing that neither it nor the file gives.
     """
 
     path: Path
@@ -87,6 +92,8 @@ class Project:
     colour: str = "patches"
     whole: bool = False
     drawing: Drawing | None = None
+    rises: Sequence[Rise] = ()
+    chosen: Chosen = field(default_factory=Chosen)
 
     @property
     def outputs(self) -> list[Path]:
@@ -121,13 +128,19 @@ def load(path: PathLike) -> Project:
     Warns
     -----
     FileWarning
-        For what was changed and left out of a drawing.
+        For what was changed and left out of a drawing, for a plan whose size is unlikely in its unit,
+        and for a roof held at single points inside.
     """
     path = Path(path)
     project = project_of(path, read_data(path)[1])
     if project.drawing is not None and project.drawing.notes:
         text = f"{project.drawing.path}: {'; '.join(project.drawing.notes)}"
         warnings.warn(text, FileWarning, stacklevel=2)
+    elif project.drawing is None and project.plan is not None:
+        corners = project.plan.outline.at(project.plan.outline.dense)
+        width = float(np.ptp(corners, axis=0).max())
+        for note in filter(None, (size_note(width, project.units.length), mast_note(project.plan))):
+            warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
     return project
 
 
@@ -189,11 +202,12 @@ def _toml_error(text: str, message: str) -> tuple[int | None, str]:
 
 @contextmanager
 def in_file(path: Path, kind: type[PcmcError] | None = None) -> Iterator[None]:
-    """Put the file at the start of the message of an error, and raise it as ``kind`` if that is given."""
+    """Put the file, and the line of what was found, in front of an error's message; raise it as ``kind``."""
     try:
         yield
     except PcmcError as error:
-        raise error.in_file(path, kind) from None
+        line = 0 if str(error).startswith("line ") else line_with(path, error.found)
+        raise error.in_file(f"{path}: line {line}" if line else path, kind) from None
 
 
 def build(path: PathLike) -> Surface:
@@ -226,7 +240,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
     """The project with the given data. Errors as in ``load``."""
     with in_file(path, FileError):
         data, rises = take_rises(data)
-    data, drawing = with_drawing(path, data)
+    data, drawing, chosen = with_drawing(path, data)
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
     method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
     files, picture = output.get("files", []), output.get("picture")
@@ -246,6 +260,7 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
         misfit = None
         if "targets" in data:
             given = _search(data["targets"], plan)
+            _check_sought_once(rises, given["vary"], plan)
             targets, vary = [*given["targets"], *targets], [*given["vary"], *vary]
             misfit = given["misfit"]
         return Project(
@@ -268,7 +283,30 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
             colour=colour,
             whole=output.get("whole", False),
             drawing=drawing,
+            rises=rises,
+            chosen=chosen,
         )
+
+
+def _check_sought_once(rises: Sequence[Rise], vary: Sequence[Parameter], plan: Plan) -> None:
+    """Refuse a tension that both a rise and [targets] find."""
+    for rise in rises:
+        areas = [area.name for area in plan.patches] or ["patch 1"]
+        own = areas if rise.patch is None else [rise.patch]
+        both = [n for parameter in vary if parameter.kind == "tension" for n in parameter.names if n in own]
+        if not both:
+            continue
+        names = [name for parameter in vary for name in parameter.names if name not in own]
+        change = f"type vary = [{', '.join(map(_quoted, names))}]" if names else "remove vary and its targets"
+        where = "[plan]" if rise.patch is None else f"patch {rise.patch!r}"
+        text = f"targets.vary: the tension of {both[0]!r} is found for the {rise.kind} of {where}, too;"
+        text += f" {change}, or give {where} tension = instead of {rise.kind} ="
+        raise OptionError(text, what="targets.vary", where=both[0], found=both[0])
+
+
+def _quoted(name: str) -> str:
+    """A name as TOML writes it."""
+    return '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def raised(project: Project, wanted: Mapping[str, float | None]) -> Project:
@@ -287,7 +325,7 @@ def raised(project: Project, wanted: Mapping[str, float | None]) -> Project:
         text = f"{flag}: {project.path.name} has targets already; change them there"
         raise OptionError(text, what=flag)
     plan, targets, vary = with_rises(project.plan, rises)
-    return replace(project, plan=plan, targets=targets, vary=vary)
+    return replace(project, plan=plan, targets=targets, vary=vary, rises=rises)
 
 
 def _views(output: Mapping[str, Any]) -> list[Any]:

@@ -145,7 +145,7 @@ def _rise_keys(how: str, names: Sequence[str]) -> tuple[Key, ...]:
     meanings = {
         "rise": "the height over a level outline",
         "apex": "the greatest height over the plane",
-        "span_ratio": "the smaller span of the plan over the rise",
+        "span_ratio": "the span of the plan, the diameter of the largest circle in it, over the rise",
     }
     return tuple(Key(name, "a number", None, f"{meanings[name]}, {how}") for name in names)
 

@@ -54,6 +54,22 @@ class Outcome:
     notes: Sequence[str] = ()
     advice: Sequence[str] = ()
 
+    def __repr__(self) -> str:
+        """The verdict, what the targets reached, what was written, and the advice, above the surface."""
+        certificate = self.shown.certificate
+        lines = [certificate.verdict.value]
+        if not certificate.certified and certificate.detail:
+            lines.append(certificate.detail)
+        if self.design is not None:
+            lines.append(f"targets {self.design.text(self.units)}")
+        if self.files:
+            lines.append(f"written: {', '.join(map(str, self.files))}")
+        if self.advice:
+            lines.append("\n  ".join(self.advice))
+        if self.units:
+            lines.append(self.units.sentence)
+        return "\n".join([*lines, repr(self.shown.surface)])
+
     @property
     def surface(self) -> Surface:
         """The surface reached."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..base.errors import MissingExtra
+from ..base.errors import FileError, MissingExtra
 from ..plan.curves import Curve
 from .drawn import FALLBACK, LENGTHS, read
 from .file import Project
@@ -16,6 +16,25 @@ if TYPE_CHECKING:
     from ..plan.drawing import Drawing
 
 DEFAULTS = {"bottom": "held"}
+
+
+def drawing_reference(drawing: Path, project: Path) -> str:
+    """The name by which a project refers to its drawing, which lies in the project's folder or below it.
+
+    Raises
+    ------
+    FileError : for a drawing elsewhere; the message has the line to type.
+    """
+    try:
+        name = Path(os.path.relpath(drawing, project.parent))
+    except ValueError:  # another drive
+        name = drawing.absolute()
+    if name.is_absolute() or ".." in name.parts:
+        beside = drawing.with_name(project.name)
+        text = f"{project}: the drawing {drawing} is outside the folder of this project; to refer"
+        text += f" to it, save the project beside the drawing: pcmc plan {drawing} -o {beside} --refer"
+        raise FileError(text, what=str(project), found=str(drawing), expected=str(drawing.parent))
+    return name.as_posix()
 
 
 def project_text(
@@ -38,7 +57,8 @@ def project_text(
 
     Raises
     ------
-    FileError, PlanError : for a drawing that cannot be read, or is no plan.
+    FileError, PlanError : for a drawing that cannot be read, is no plan, or is outside the folder of a
+        project that refers to it.
     MissingExtra : without tomlkit or the library that reads the drawing.
     """
     try:
@@ -47,7 +67,10 @@ def project_text(
         raise MissingExtra("tomlkit", "cad") from None
     from ..plan.proposal import proposed
 
-    drawing = read(Path(path), units, gap)
+    path = Path(path)
+    project = Path(folder or path.parent) / path.with_suffix(".toml").name
+    name = drawing_reference(path, project) if refer else ""
+    drawing = read(path, units, gap)
     values = proposed(drawing)
     document = tomlkit.document()
     document.add(tomlkit.comment(f"The roof of {drawing.path.name}, written by pcmc plan"))
@@ -61,7 +84,7 @@ def project_text(
     document.add(tomlkit.nl())
     plan = tomlkit.table()
     if refer:
-        plan["drawing"] = os.path.relpath(drawing.path, folder or drawing.path.parent).replace(os.sep, "/")
+        plan["drawing"] = name
         plan["drawing"].comment("its layers are the lines; save it, and the roof follows")
         if gap is not None:
             plan["gap"] = gap

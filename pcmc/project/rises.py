@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -28,8 +29,8 @@ class Rise:
     Attributes
     ----------
     patch : its name; None for all together, which get one tension.
-    kind : "rise", height of the highest point over a level outline; "apex", over Π; "span_ratio", the smaller
-        span of the plan over its rise.
+    kind : "rise", height of the highest point over a level outline; "apex", over Π; "span_ratio", the span
+        of the plan, which is the diameter of the largest circle in it, over its rise.
     value : > 0.
     """
 
@@ -89,7 +90,9 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
         height = _height(plan, one)
         if one.patch is None:
             plan = _retensioned(plan, None, height - _level(plan))
-            names = [patch.name for patch in plan.surface().patches if not patch.auxiliary]
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # the mesh that is solved shows them
+                names = [patch.name for patch in plan.surface().patches if not patch.auxiliary]
             vary.append(Parameter(names))
         else:
             plan = _retensioned(plan, one.patch, height - _level(plan))

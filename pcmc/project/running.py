@@ -25,11 +25,23 @@ from ..meshing.remeshing import remesh, size_note
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface, mirrored
 from . import cache
-from .advice import advice, chosen_walls
+from .advice import advice, chosen_values
+from .aims import aims_below_supports
 from .documents import document_works
 from .file import Project, in_file, load, start_of
 from .outcome import Outcome, Whole
-from .output import OnStep, PathLike, Works, check_names, check_outputs, fields, ignore, paint, write_all
+from .output import (
+    OnStep,
+    PathLike,
+    Works,
+    check_names,
+    check_outputs,
+    fields,
+    ignore,
+    metres_note,
+    paint,
+    write_all,
+)
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
@@ -221,20 +233,26 @@ def solve_from_start(
         raise OptionError(f"{text}, or give the plan mirrors", what="whole")
     _check_balance(start)
     outcome = replace(solve_project(project, start, report), units=units)
-    notes = (*chosen_walls(project, start), *outcome.notes)
+    notes = (*chosen_values(project, start), *outcome.notes)
+    if project.drawing is not None:
+        notes += tuple(metres_note(project.files, units.length))
     if outcome.good:
         return replace(outcome, notes=notes)
+    notes += tuple(aims_below_supports(project.plan, start, project.targets, units))
     report("looking for advice")
-    return replace(outcome, notes=notes, advice=advice(project, given, start, outcome))
+    return replace(outcome, notes=notes, advice=advice(project, given, start, outcome, solve_project))
 
 
 def _check_balance(surface: Surface) -> None:
-    """Warn before a long computation if the tensions alone show that a junction cannot balance."""
+    """Warn before a long computation if the tensions alone show that a junction cannot balance.
+
+    The advice after it names a remedy that was tried.
+    """
     pinchable = standing_part(surface).walls.pinchable
     imbalance = unbalanced(surface, pinchable)
     if imbalance:
         unless = ", unless the junction rests on the plane" if pinchable.any() else ""
-        warnings.warn(f"{imbalance}{unless}; solving anyway", BalanceWarning, stacklevel=4)
+        warnings.warn(f"{imbalance.imbalance}{unless}; solving anyway", BalanceWarning, stacklevel=4)
 
 
 def solve_project(project: Project, surface: Surface, progress: OnStep | None = None) -> Outcome:

@@ -81,6 +81,7 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
     surface = surface_of(_project(path, {}))
     keys = numbers(_data(path))
     known = list(_names(surface))
+    _check_not_sought(path, values)
     for name, given in values.items():
         if name not in keys and name not in known:
             # no coordinates, and patches have shorter names
@@ -93,6 +94,25 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
                 raise OptionError(text, what=name, found=value)
             _project(path, {name: value})
             _retensioned(path, surface, {name: value})
+
+
+def _check_not_sought(path: Path, values: Iterable[str]) -> None:
+    """Refuse values that the search for targets replaces by those that it finds."""
+    project = _project(path, {})
+    sought: dict[str, str] = {}
+    for parameter in project.vary:
+        for one in parameter.names:
+            bare = one.removeprefix(CABLE) if parameter.kind == "cable" else one
+            kind = "tension" if parameter.kind == "cable" else parameter.kind
+            names = [f"{bare}.{kind}", f"{CABLE}{bare}.{kind}", f"plan.patches.{bare}.{kind}"]
+            if project.plan is not None and not project.plan.patches:
+                names.append(f"plan.{kind}")
+            sought |= dict.fromkeys(names, parameter.label)
+    for name in values:
+        if name in sought:
+            text = f"{path}: {name}: the {sought[name]} is found by the search for the targets, so the roof"
+            text += " would have another than the sweep's; sweep another number, or take it out of vary"
+            raise OptionError(text, what=name, where=sought[name])
 
 
 def digest(path: PathLike) -> str:

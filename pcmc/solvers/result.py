@@ -89,8 +89,10 @@ class Result:
     room_changes: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
-        """How the solver ended, above the surface it reached."""
-        return f"{self.message}\nE = {self.energy:.10g}, {self.iterations} iterations\n{self.surface!r}"
+        """How the solver ended, the verdict if the certificate was asked for, and the surface reached."""
+        known = [self.certificate.verdict.value] if "certificate" in vars(self) else []
+        energy = f"E = {self.energy:.10g}, {self.iterations} iterations"
+        return "\n".join([self.message, *known, energy, repr(self.surface)])
 
     @property
     def converged(self) -> bool:

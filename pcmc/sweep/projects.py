@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from .. import io
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError
 from ..solvers import find_method
 from .grid import Sweep
+from .short_table import with_units
 from .solving import mesh_columns, row
 
 
@@ -62,6 +65,16 @@ def project_sweep(
     sweep = Sweep(solve_project, grid, about | fixed)
     projects.check_varied(path, dict(sweep.grid) | {name: [value] for name, value in fixed.items()})
     return sweep
+
+
+def column_labels(path: str | os.PathLike[str], names: Iterable[str]) -> dict[str, str]:
+    """The names of columns with the units of a project or a surface; see ``with_units``."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the sweep showed them
+        project, surface = projects.varied(path, {})
+        units = project.units if project.plan is not None else io.read_bare(path)[1].units
+    cables = {name for cable in surface.cables for name in (cable.name, f"cable {cable.name}")}
+    return with_units(names, units, cables)
 
 
 def solve_project(

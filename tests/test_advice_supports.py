@@ -1,0 +1,145 @@
+"""Roofs held at single points, and roofs with free edges: the cause is named, and what is typed works."""
+
+from __future__ import annotations
+
+import re
+
+import drawn
+import pytest
+import tomlkit
+from drawn import drawing
+
+from pcmc import cli, project
+from pcmc.base.errors import FileWarning, PlanWarning
+from pcmc.plan import Plan
+from pcmc.project.masts import point_masts, with_rings
+
+SQUARE = "[plan]\nedge_length = 1.2\noutline = [[0, 0], [20, 0], [20, 12], [0, 12]]\n"
+TENT = (
+    f'{SQUARE}edge = "cable"\ncable = 20.0\ntension = 1.0\npressure = 0.0\n'
+    "supports = [[0, 0, 0], [20, 0, 4], [20, 12, 0], [0, 12, 4], [10, 6, 6]]\n"
+)
+FREE = f'{SQUARE}edge = "free"\nsupports = [[0, 0], [20, 0, 2], [20, 12], [0, 12, 2]]\nrise = 3.0\n'
+
+
+def advised(path, text):
+    """The advice for a project, its heading first."""
+    path.write_text(text)
+    return project.run_project(project.load(path), use_cache=False).advice
+
+
+def typed(text, lines):
+    """A project with advised lines of [plan] and tables of [[plan.holes]] typed into it."""
+    removed = [line.removeprefix("[plan] supports: remove ") for line in lines if "supports" in line]
+    keys = [line.removeprefix("[plan] ") for line in lines if line.startswith("[plan] ") and " = " in line]
+    plan = [line for line in text.splitlines() if not line.startswith(("edge =", "rise", "pressure"))]
+    for point in removed:
+        plan = [line.replace(f", {point}", "") for line in plan]
+    tables = [line for line in lines if not line.startswith("[plan]")]
+    kept = [line for line in text.splitlines() if line.startswith("edge =")] if not keys else []
+    values = [re.sub(r"  \(.*\)$", "", key) for key in keys] or ["pressure = 0.0"]
+    return "\n".join([*plan, *kept, *values, *tables, ""])
+
+
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FileWarning")
+def test_a_point_mast_is_the_cause_and_the_ring_that_is_printed_works(tmp_path):
+    path = tmp_path / "tent.toml"
+    heading, *lines = advised(path, TENT)
+    assert heading == (
+        "the cause is a roof held at a single point; type in tent.toml, which was tried and comes to rest:"
+    )
+    assert lines[-1] == "[plan] supports: remove [10, 6, 6]"
+    mended = typed(TENT, lines)
+    assert tomlkit.parse(mended)["plan"]["holes"][0]["name"] == "mast 1"
+    path.write_text(mended)
+    assert project.run(path).good
+
+
+def test_a_point_mast_is_noted_before_the_solve(tmp_path):
+    path = tmp_path / "tent.toml"
+    path.write_text(TENT)
+    with pytest.warns(FileWarning, match=r"a single point inside, \[10, 6, 6\].*on some meshes and not on"):
+        project.load(path)
+    path.write_text(TENT.replace(", [10, 6, 6]", ""))
+    project.load(path)  # a warning would be an error
+
+
+def test_supports_on_lines_are_no_point_masts():
+    square = [[0, 0], [8, 0], [8, 8], [0, 8]]
+    plan = Plan(
+        square,
+        dividers=[[[4, 0], [4, 8]]],
+        holes=[[[5, 5], [6, 5], [6, 6]]],
+        supports=[[0, 0], [4, 4], [5, 5], [2, 3, 1], [[6, 1], [7, 2]]],
+        tension=2.0,
+        edge_length=1,
+    )
+    (mast,) = point_masts(plan)
+    assert (mast.number, mast.room) == (3, 2.0)
+    ringed = with_rings(plan, [mast], 0.25)
+    assert len(ringed.supports) == 4
+    assert ringed.holes[-1].curve.length == pytest.approx(3.14159, rel=1e-3)
+
+
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FileWarning")
+@pytest.mark.slow
+def test_for_a_drawing_the_ring_is_drawn(tmp_path, monkeypatch):
+    file = drawing(tmp_path, ("line", "mast", (4, 3, 0), (4, 3, 2.5)))
+    loaded = project.load(file)
+    monkeypatch.setattr("pcmc.project.running.solve", stalled)
+    heading, *lines = project.run_project(loaded, use_cache=False).advice
+    assert heading.endswith("draw in hall.dxf, which was tried and comes to rest:")
+    radius, x, y, z = map(
+        float, re.search(r"radius (\S+) around \((\S+), (\S+)\) at height (\S+)", lines[0]).groups()
+    )
+    assert (x, y, z) == (4.0, 3.0, 2.5)
+    monkeypatch.undo()
+    drawn.drawing(tmp_path, ("circle", "mast", (x, y, z), radius))
+    assert project.run(file).good
+
+
+def stalled(surface, *_, **__):
+    """A solve that is stopped after a step, as on a mesh with too sharp a peak."""
+    from pcmc.solvers import solve
+
+    return solve(surface, iterations=1)
+
+
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.PlanWarning")
+def test_all_that_a_free_edge_needs_is_printed_at_once(tmp_path, capsys):
+    path = tmp_path / "sail.toml"
+    heading, *lines = advised(path, FREE)
+    assert heading == (
+        "the cause is edges that nothing holds; type in sail.toml, which was tried and comes to rest:"
+    )
+    assert [line.split(" = ")[0] for line in lines] == [
+        f"[plan] {key}" for key in ("edge", "cable", "tension", "pressure")
+    ]
+    path.write_text(typed(FREE, lines))
+    assert project.run(path).good
+    assert cli.main(["certify", str(path)]) == 0
+    capsys.readouterr()
+
+
+def test_the_note_on_a_free_edge_has_all_keys():
+    square = [[0, 0], [8, 0], [8, 8], [0, 8]]
+    with pytest.warns(PlanWarning, match="nothing holds the outline") as caught:
+        Plan(square, edge="free", supports=square[:3], tension=2.0, edge_length=1).surface()
+    keys = re.search(r'edge = "cable", cable = (\S+), tension = 1.0, pressure = 0.0', str(caught[0].message))
+    cable = float(keys[1])
+    sail = Plan(
+        square, edge="cable", cable=cable, supports=square[:3], tension=1.0, pressure=0.0, edge_length=1
+    )
+    assert sail.surface().cables
+
+
+def test_an_apex_below_a_raised_ring_is_explained(tmp_path):
+    path = tmp_path / "dome.toml"
+    path.write_text(
+        f'units = "m"\n{SQUARE}tension = 6.0\n'
+        '[[plan.holes]]\nname = "lantern"\ncurve = {circle = {centre = [10, 6, 3], radius = 1.5}}\n'
+        "[targets]\nmeet = [{quantity = 'apex', value = 2.0}]\nvary = ['patch 1']\n"
+    )
+    outcome = project.run_project(project.load(path), use_cache=False)
+    assert not outcome.good
+    assert "hole 'lantern' is held at 3 m, so the apex cannot be 2 m" in outcome.notes

@@ -1,0 +1,107 @@
+"""Drawings that are easily misunderstood: their place, unit and size, and what is chosen for them."""
+
+from __future__ import annotations
+
+import re
+
+import drawn
+import pytest
+from drawn import BOX, drawing
+from ezdxf import units
+from refusals import refused
+
+from pcmc import cli, project
+from pcmc.base.errors import FileError, FileWarning
+from pcmc.plan.proposal import _rounded
+from pcmc.project.advice import chosen_values
+
+SEAM = ("line", "divider seam", (5, 0), (5, 6))
+
+
+def test_a_project_that_cannot_refer_to_its_drawing_is_not_written(tmp_path, capsys):
+    file = drawing(tmp_path)
+    (tmp_path / "other").mkdir()
+    elsewhere = tmp_path / "other" / "hall.toml"
+    with refused(FileError, what=str(elsewhere), found=str(file)):
+        project.drawing_reference(file, elsewhere)
+    assert cli.main(["plan", str(file), "-o", str(elsewhere), "--refer"]) == 2
+    assert not elsewhere.exists()
+    line = re.search(r"pcmc (plan \S+ -o (\S+) --refer)", capsys.readouterr().err)
+    assert cli.main(line[1].split()) == 0
+    assert project.build(line[2]).m > 100
+    above = tmp_path / "above.toml"
+    (tmp_path / "cad").mkdir()
+    drawing(tmp_path / "cad")
+    assert cli.main(["plan", str(tmp_path / "cad" / file.name), "-o", str(above), "--refer"]) == 0
+    assert project.build(above).m > 100
+
+
+def test_tensions_and_walls_that_are_chosen_for_a_drawing_are_printed(tmp_path):
+    file = drawing(tmp_path, SEAM)
+    path = tmp_path / "hall.toml"
+
+    def chosen(plan):
+        path.write_text(f'[plan]\ndrawing = "{file.name}"\n{plan}')
+        loaded = project.load(path)
+        return chosen_values(loaded, project.surface_of(loaded)), loaded
+
+    (text,), loaded = chosen('[plan.patches]\n"patch 1" = {tension = 9}\n')
+    tension, wall = loaded.plan.patches[1].tension, loaded.plan.dividers[0].wall
+    assert f"tension {tension:g} for 'patch 2'; wall {wall:g} for 'seam'; edges of" in text
+    assert '[[plan.dividers]] name = "seam", wall = ...' in text
+    (text,), _ = chosen("edge_length = 1\ntension = 5\n")
+    assert "tension" not in text.split("(")[0]
+    assert "edges" not in text
+    assert chosen('edge_length = 1\ntension = 5\n[[plan.dividers]]\nname = "seam"\nwall = 2\n')[0] == []
+    (text,), _ = chosen('edge_length = 1\ntension = 5\n[[plan.dividers]]\nname = "seam"\nwall = "balanced"\n')
+    assert text.startswith("walls balanced with their neighbours: 'seam'")
+
+
+@pytest.mark.parametrize(
+    ("unit", "scale", "note"),
+    [
+        (units.M, 1000.0, "10 km long; is the drawing in mm? Its unit is m"),
+        (units.MM, 0.001, "0.01 mm long; check its unit, which is mm"),
+        (units.MM, 1.0, "10 mm long; is the drawing in m? Its unit is mm"),
+        (units.M, 99.0, ""),
+        (units.MM, 1000.0, ""),
+    ],
+)
+def test_a_plan_of_an_unlikely_size_is_noted(tmp_path, unit, scale, note, recwarn):
+    document, space = drawn.new(unit)
+    space.add_lwpolyline([(scale * x, scale * y) for x, y in BOX], close=True, dxfattribs=drawn.on("outline"))
+    document.saveas(tmp_path / "hall.dxf")
+    project.load(tmp_path / "hall.dxf")
+    printed = " ".join(str(warning.message) for warning in recwarn)
+    assert (note in printed) if note else not printed
+
+
+def test_the_unit_named_for_a_plan_of_an_unlikely_size_is_right(tmp_path):
+    path = tmp_path / "hall.toml"
+    text = (
+        "{}[plan]\nedge_length = 800\ntension = 5e3\noutline = [[0, 0], [12e3, 0], [12e3, 6e3], [0, 6e3]]\n"
+    )
+    path.write_text(text.format('units = "m"\n'))
+    with pytest.warns(FileWarning, match="12 km long") as caught:
+        project.load(path)
+    line = re.search(r"type (units = .*)", str(caught[0].message))[1]
+    for first in (f"{line}\n", ""):
+        path.write_text(text.format(first))
+        project.load(path)  # a warning would be an error
+
+
+def test_metres_are_assumed_for_a_drawing_without_a_unit(tmp_path, capsys):
+    file = drawing(tmp_path, unit=0)
+    assert cli.main(["solve", str(file), "-o", str(tmp_path / "hall.glb"), "--no-mesh-check"]) == 0
+    assert "hall.glb: the drawing has no unit of length, so metres are assumed" in capsys.readouterr().out
+    assert cli.main(["solve", str(file), "-o", str(tmp_path / "hall.obj"), "--no-mesh-check"]) == 0
+    assert "metres are" not in capsys.readouterr().out
+
+
+def test_points_of_patches_have_few_digits():
+    assert _rounded(8.9e-16, 2.0) == 0.0
+    assert str(_rounded(-1e-20, 0.3)) == "0.0"
+    for radius in (0.002, 3.0, 450.0):
+        value = 1234.56789 * radius
+        assert abs(_rounded(value, radius) - value) <= 0.05 * radius
+        assert len(repr(_rounded(value, radius))) <= 8
