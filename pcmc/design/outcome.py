@@ -52,15 +52,15 @@ def values_text(values: pd.Series, units: Units = NO_UNITS) -> str:
 
 
 def _away(value: float, wanted: float) -> str:
-    """How far a value is from the one wanted, in brackets.
+    """How far a value is from the one wanted, after a comma.
 
     >>> _away(2.00442, 2.0), _away(0.8, 1.0), _away(1.0, 0.0)
-    (' (0.22 % more)', ' (20 % less)', '')
+    (', 0.22 % more', ', 20 % less', '')
     """
     if wanted == 0.0:
         return ""
     share = (value - wanted) / abs(wanted)
-    return f" ({100 * abs(share):.2g} % {'more' if share > 0.0 else 'less'})"
+    return f", {100 * abs(share):.2g} % {'more' if share > 0.0 else 'less'}"
 
 
 class NoStart(SurfaceError):
