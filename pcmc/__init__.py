@@ -1,4 +1,23 @@
-"""Piecewise constant-mean-curvature surfaces: triangle meshes of patches in equilibrium."""
+"""Piecewise constant-mean-curvature surfaces: triangle meshes of patches in equilibrium.
+
+The rooms of the package, from the ground up; a room imports only from those above it in this list.
+
+=========================  ==========================================================================
+base                       errors, arrays, files, units, checks of input
+surface energy             what a surface is; E with its derivatives, and its curvature
+contact meshing            walls that pinch; better, finer and new triangles
+io plan                    surfaces from and to files; surfaces from the lines of a plan
+stability certificate      lowest modes and Morse index; the verdict on a finished surface
+solvers                    the paper's flow, L-BFGS, and the geometric Newton solver
+design                     tensions that meet targets
+continuation existence     branches of equilibria; whether there is one at all
+accuracy                   error bars from finer meshes, and meshes for an accuracy
+compas panels structure    COMPAS; families of panels; structural models
+drawings plot report       sheets, pictures, and pages for those who build
+project                    a whole design in one file
+sweep explore cli          many cases; the page; the command
+=========================  ==========================================================================
+"""
 
 import sys
 from importlib import import_module

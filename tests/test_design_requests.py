@@ -241,7 +241,7 @@ def test_a_command_stopped_while_it_meets_targets_ends(tmp_path):
 
 
 def test_too_few_parameters_are_counted_and_others_named():
-    """Two apexes cannot follow one tension: the message says so, and which other tension may vary."""
+    """Two apexes cannot follow one tension: the message names the other one that may vary."""
     surface = two_squares(4, alpha=3.0, alpha_aux=1.0)
     aims = [Target("apex", "left", 0.7), Target("apex", "right", 1.0)]
     design = meet(surface, aims, "left")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -71,3 +72,18 @@ def test_a_glb_is_coloured_as_the_how_to_says(tmp_path, monkeypatch):
     code = next(one for one in re.findall(r"```python\n(.*?)```", text, re.S) if "colour=" in one)
     exec(compile(code, "files.md", "exec"), {"pcmc": pcmc, "roof": spherical_cap(4)})
     assert (tmp_path / "roof.glb").stat().st_size > 1000
+
+
+def test_the_list_of_rooms_is_that_of_the_folders_and_of_their_order():
+    listed = [room for line in pcmc.__doc__.split("\n") if line[25:27] == "  " for room in line[:25].split()]
+    listed = [room for room in listed if not room.startswith("=")]
+    folders = {path.parent.name for path in DOCS.parent.glob("pcmc/*/__init__.py")}
+    assert set(listed) == folders
+    settings = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    (layers,) = (
+        c["layers"] for c in settings["tool"]["importlinter"]["contracts"] if len(c.get("layers", ())) > 9
+    )
+    floor = {room.strip("() "): k for k, layer in enumerate(reversed(layers)) for room in layer.split("|")}
+    assert set(floor) == folders
+    floors = [floor[room] for room in listed]
+    assert floors == sorted(floors)

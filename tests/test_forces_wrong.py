@@ -1,4 +1,4 @@
-"""Cables, weights, volumes and mirrors that cannot be: one line that says what and where."""
+"""Impossible cables, weights, volumes and mirrors: one line names the mistake and its place."""
 
 from __future__ import annotations
 

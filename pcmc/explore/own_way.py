@@ -12,10 +12,10 @@ from typing import Any
 
 from .. import project as projects
 from ..base.errors import MissingExtra, PcmcError
-from ..meshing.remeshing import remesh
+from ..project.accuracy import AccuracyWanted
 from ..solvers.result import Result
 from ..surface import Surface
-from .following import AT_REST, Reached, attempt, reach, until, values_of, wanted
+from .following import AT_REST, Reached, reach, until, values_of, wanted
 
 FIRST_ATTEMPTS = 4  # of following, before the project's own walls are tried
 START_SECONDS = 6.0  # time limit of solving from the start shape
@@ -26,8 +26,8 @@ Stop = Callable[[], bool]
 class Settled:
     """How settling ended.
 
-    ``note`` says what led to the values where following did not, else it is empty; ``own_way`` is for the
-    next time.
+    ``note`` is empty where following led to the values; else it names what did. ``own_way`` is for the next
+    time.
     """
 
     reached: Reached
@@ -125,17 +125,16 @@ def own_start(path: Path, asked: Surface, moved: Collection[str] = ()) -> Surfac
 
 
 def solved_own_way(path: Path, start: Surface, stop: Stop) -> Result | None:
-    """A start shape solved, remeshed and solved again as its project asks for; None where that fails."""
+    """A start shape solved and remeshed as its project asks for, without targets; None where that fails."""
     stop = until(stop, time.monotonic() + START_SECONDS)
+
+    def check(_: str) -> None:
+        if stop():
+            raise TimeoutError
+
     try:
-        stages = projects.load(path).remeshing
-        for stage in (one for one in stages if one.when == "before"):
-            start = remesh(start, **stage.options)
-        result = attempt(start, stop, target="minimum")
-        for stage in (one for one in stages if one.when == "after"):
-            if result.certificate.verdict not in AT_REST:
-                return None
-            result = attempt(remesh(result.surface, **stage.options), stop, target="minimum")
-    except (PcmcError, MissingExtra):
+        plain = replace(projects.load(path), targets=(), wanted=AccuracyWanted(), search=False)
+        result = projects.solve_project(plain, start, check).result
+    except (PcmcError, MissingExtra, TimeoutError):
         return None
     return result if result.certificate.verdict in AT_REST else None
