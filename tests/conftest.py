@@ -5,10 +5,12 @@ import signal
 
 import pytest
 from browsing import SOFTWARE_GL, Explored, browser
+from explore_cases import designed_hall
 from small_project import SMALL
 
 from generators import bezier_hall, spherical_cap
 from pcmc import explore, solve
+from pcmc.explore.session import Session, solved_start
 
 
 def pytest_sessionstart():
@@ -64,3 +66,19 @@ def driver(tmp_path_factory):
 def page(driver, explorer):
     """The page of the hall in the browser, with a session of its own."""
     return Explored(driver, f"{explorer.url}?session={explorer.open()[0]}")
+
+
+@pytest.fixture(scope="module")
+def hall_folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("project")
+
+
+@pytest.fixture(scope="module")
+def hall_roof(hall_folder):
+    """The hall of ``explore_cases`` at its targets, as the page opens it."""
+    return designed_hall(hall_folder)
+
+
+@pytest.fixture
+def hall_session(hall_roof):
+    return Session(solved_start(hall_roof.surface))

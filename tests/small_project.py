@@ -1,5 +1,13 @@
 """A small project of one patch, and changes of its text."""
 
+WITH_UNITS = """
+units = "m"
+force = "kN"
+[plan]
+edge_length = 1.0
+outline = [[0, 0], [4, 0], [4, 3], [0, 3]]
+patches = {roof = {tension = 2.0}}
+"""
 SMALL = """
 [plan]
 edge_length = 1.0

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from asking import Client
 from browsing import until
-from explore_cases import designed_hall
 
 import pcmc
 from generators import spherical_cap
@@ -17,30 +16,15 @@ from pcmc.base.units import Units
 from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
 from pcmc.explore.roof import Roof, read_roof
-from pcmc.explore.session import Session, solved_start
+from pcmc.explore.session import Session
 from pcmc.explore.variants import difference, measures
 
 CAP = spherical_cap(edge_length=0.25)
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("project")
-
-
-@pytest.fixture(scope="module")
-def roof(folder):
-    return designed_hall(folder)
-
-
 @pytest.fixture
-def session(roof):
-    return Session(solved_start(roof.surface))
-
-
-@pytest.fixture
-def explorer(roof):
-    running = explore.start_roof(roof)
+def explorer(hall_roof):
+    running = explore.start_roof(hall_roof)
     yield running
     running.close()
 
@@ -54,7 +38,7 @@ def apex(surface, name):
     return measure(surface, Target("apex", name)).value
 
 
-def test_a_project_opens_at_its_targets(roof, client):
+def test_a_project_opens_at_its_targets(hall_roof, client):
     header, _ = client.ask("/api/open")
     assert header["note"] == "met: every target is reached"
     assert header["units"]["tension"] == "kN/m"
@@ -66,62 +50,62 @@ def test_a_project_opens_at_its_targets(roof, client):
     assert [t["label"] for t in header["aims"]["targets"]] == ["apex of west", "apex of east"]
 
 
-def test_the_start_shape_is_shown_only_when_asked_for(folder, roof):
-    shape = read_roof(folder / "hall.toml", start_shape=True)
+def test_the_start_shape_is_shown_only_when_asked_for(hall_folder, hall_roof):
+    shape = read_roof(hall_folder / "hall.toml", start_shape=True)
     assert "not met yet" in shape.note
     assert shape.surface.patches[0].tension == 5.0
-    assert roof.surface.patches[0].tension != 5.0
+    assert hall_roof.surface.patches[0].tension != 5.0
 
 
-def test_what_is_measured_agrees_with_targets(roof):
-    rows = measures(roof.surface, pcmc.certify(roof.surface))
+def test_what_is_measured_agrees_with_targets(hall_roof):
+    rows = measures(hall_roof.surface, pcmc.certify(hall_roof.surface))
     for row in rows:
         if row["quantity"] in ("apex", "area", "volume", "reaction"):
-            value = measure(roof.surface, Target(row["quantity"], row["of"] or None)).value
+            value = measure(hall_roof.surface, Target(row["quantity"], row["of"] or None)).value
             assert row["value"] == pytest.approx(value, rel=1e-9), row
 
 
-def test_targets_are_met_from_the_page(session):
+def test_targets_are_met_from_the_page(hall_session):
     aims = (Target("apex", "west", 1.4),), (Parameter("west"), Parameter("east"))
-    state = session.meet(*aims)
+    state = hall_session.meet(*aims)
     assert state.message == "met: every target is reached"
     assert apex(state.surface, "west") == pytest.approx(1.4, rel=1e-6)
     assert state.undo == 1
-    assert session.aims == aims
-    assert apex(session.undo().surface, "west") == pytest.approx(1.2, rel=1e-6)
+    assert hall_session.aims == aims
+    assert apex(hall_session.undo().surface, "west") == pytest.approx(1.2, rel=1e-6)
 
 
-def test_a_target_out_of_reach_keeps_the_surface_and_says_why(session):
-    before = session.surface
-    state = session.meet((Target("apex", "west", 9.0),), (Parameter("west"),))
+def test_a_target_out_of_reach_keeps_the_surface_and_says_why(hall_session):
+    before = hall_session.surface
+    state = hall_session.meet((Target("apex", "west", 9.0),), (Parameter("west"),))
     assert state.surface is before
     assert state.message.startswith("out of reach")
     assert "nearest reachable" in state.message
     assert state.undo == 0
-    assert session.undo().message == ""
+    assert hall_session.undo().message == ""
 
 
-def test_a_search_tells_its_progress_and_can_be_stopped(session, monkeypatch):
+def test_a_search_tells_its_progress_and_can_be_stopped(hall_session, monkeypatch):
     told = []
     real = Session.stop
 
     def met(surface, targets, vary, callback):
         callback(None)
-        told.append(session.progress)
-        stopping = threading.Thread(target=real, args=(session,))
+        told.append(hall_session.progress)
+        stopping = threading.Thread(target=real, args=(hall_session,))
         stopping.start()
-        until(lambda: session._requests == 2, "the stop")
+        until(lambda: hall_session._requests == 2, "the stop")
         with pytest.raises(StopIteration):
             callback(None)
         return pcmc.meet(surface, targets, vary, solves=1)
 
     monkeypatch.setattr("pcmc.explore.session.meet", met)
-    before = session.surface
-    state = session.meet((Target("apex", "west", 1.3),), (Parameter("west"),))
+    before = hall_session.surface
+    state = hall_session.meet((Target("apex", "west", 1.3),), (Parameter("west"),))
     assert told == ["1 solves"]
     assert state.superseded
-    assert session.state().surface is before
-    assert session.progress == ""
+    assert hall_session.state().surface is before
+    assert hall_session.progress == ""
 
 
 @pytest.mark.parametrize(
@@ -182,13 +166,13 @@ def test_an_unknown_patch_in_a_target_or_parameter_is_named(client):
         ("save", {"name": "hall.toml"}, "is there already"),
     ],
 )
-def test_wrong_requests_are_refused_in_one_line(client, folder, act, body, line):
-    before = sorted(folder.iterdir())
+def test_wrong_requests_are_refused_in_one_line(client, hall_folder, act, body, line):
+    before = sorted(hall_folder.iterdir())
     name = client.ask("/api/open")[0]["session"]
     error = client.ask(f"/api/{name}/{act}", body, status=400)
     assert line in error
     assert "\n" not in error
-    assert sorted(folder.iterdir()) == before
+    assert sorted(hall_folder.iterdir()) == before
 
 
 def test_variants_are_kept_compared_shown_again_and_removed(client):
@@ -224,10 +208,10 @@ def test_the_difference_of_two_caps_is_that_of_their_spheres():
     assert errors[0] < 0.2 * errors[1]  # other triangles are hardly another shape
 
 
-def test_a_wall_nearby_does_not_hide_a_difference(roof):
-    higher = pcmc.solve(roof.surface.retensioned({"west": 2.6, "east": 3.0})).surface
-    on_roof = np.unique(roof.surface.faces[~roof.surface.walls[roof.surface.patch_of_face]])
-    away = difference(higher, roof.surface)[on_roof]
+def test_a_wall_nearby_does_not_hide_a_difference(hall_roof):
+    higher = pcmc.solve(hall_roof.surface.retensioned({"west": 2.6, "east": 3.0})).surface
+    on_roof = np.unique(hall_roof.surface.faces[~hall_roof.surface.walls[hall_roof.surface.patch_of_face]])
+    away = difference(higher, hall_roof.surface)[on_roof]
     assert away.min() > -0.02 * away.max()  # lower tensions: higher everywhere
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from asking import Client
 from browsing import until
-from explore_cases import HALL_TOML, designed_hall, followed
+from explore_cases import HALL_TOML, followed
 from refusals import refused
 
 from generators import spherical_cap
@@ -25,26 +25,11 @@ from pcmc.explore.variants import difference
 CAP = spherical_cap(edge_length=0.25)
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("project")
-
-
-@pytest.fixture(scope="module")
-def roof(folder):
-    return designed_hall(folder)
-
-
-@pytest.fixture
-def session(roof):
-    return Session(solved_start(roof.surface))
-
-
-def test_saving_keeps_comments_and_the_shape_found_by_sliders(roof, session, folder):
-    state = session.settle({"tensions": {"west": 4.0, "wall 1": 2.5}, "pressures": {"east": 1.1}})
+def test_saving_keeps_comments_and_the_shape_found_by_sliders(hall_roof, hall_session, hall_folder):
+    state = hall_session.settle({"tensions": {"west": 4.0, "wall 1": 2.5}, "pressures": {"east": 1.1}})
     assert state.failure is None
-    path, note = saving.save(roof, state.surface, "found", False)
-    assert path == folder / "found.toml"
+    path, note = saving.save(hall_roof, state.surface, "found", False)
+    assert path == hall_folder / "found.toml"
     assert "[targets] as comments" in note
     assert "apex of west" in note
     text = path.read_text()
@@ -53,17 +38,17 @@ def test_saving_keeps_comments_and_the_shape_found_by_sliders(roof, session, fol
         assert line in text
     assert tomllib.loads(text)["plan"]["patches"]["east"]["pressure"] == 1.1
     again = read_roof(path, use_cache=False).surface
-    moved = np.abs(difference(state.surface, roof.surface)).max()
+    moved = np.abs(difference(state.surface, hall_roof.surface)).max()
     assert np.abs(difference(again, state.surface)).max() < 0.05 * moved  # other triangles, the same shape
     path.unlink()
 
 
-def test_saving_what_the_page_met_writes_its_targets(roof, session):
+def test_saving_what_the_page_met_writes_its_targets(hall_roof, hall_session):
     targets = Target("apex", "west", at_least=1.4), Target("height", [9, 3], 1.0)
     vary = Parameter("west", low=1.0, high=9.0), Parameter("east")
-    state = session.meet(targets, vary)
+    state = hall_session.meet(targets, vary)
     assert state.message.startswith("met")
-    path, note = saving.save(roof, state.surface, "met.toml", False, session.aims)
+    path, note = saving.save(hall_roof, state.surface, "met.toml", False, hall_session.aims)
     assert note == "with its targets: apex of west, height at (9, 3)"
     again = read_roof(path, use_cache=False)
     assert again.targets == targets
@@ -89,34 +74,34 @@ def test_a_named_point_keeps_its_name(tmp_path):
     assert tomllib.loads(text)["targets"]["meet"][0] == {"quantity": "height", "of": "crown", "value": 1.3}
 
 
-def test_an_unchanged_surface_is_saved_with_the_targets_of_the_file(roof, folder):
-    text, note = saving.project_with(roof, roof.surface)
+def test_an_unchanged_surface_is_saved_with_the_targets_of_the_file(hall_roof, hall_folder):
+    text, note = saving.project_with(hall_roof, hall_roof.surface)
     assert note == ""
     assert tomllib.loads(text)["targets"] == tomllib.loads(HALL_TOML)["targets"]
 
 
-def test_the_same_file_is_replaced_only_if_it_is_as_it_was_read(folder, roof):
+def test_the_same_file_is_replaced_only_if_it_is_as_it_was_read(hall_folder, hall_roof):
     with refused(FileError, what="name", found="hall.toml"):
-        saving.save(roof, roof.surface, "hall.toml", False)
-    path = folder / "hall.toml"
+        saving.save(hall_roof, hall_roof.surface, "hall.toml", False)
+    path = hall_folder / "hall.toml"
     path.write_text(HALL_TOML + "# someone else\n")
     try:
         with pytest.raises(FileError, match="was changed since"):
-            saving.save(roof, roof.surface, "hall.toml", True)
+            saving.save(hall_roof, hall_roof.surface, "hall.toml", True)
         assert path.read_text().endswith("# someone else\n")
     finally:
         path.write_text(HALL_TOML)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="needs links")
-def test_no_link_leads_a_save_out_of_the_folder(roof, folder, tmp_path):
-    os.symlink(tmp_path / "elsewhere.toml", folder / "link.toml")
+@pytest.mark.skipif(sys.platform == "win32", reason="there only administrators make links")
+def test_no_link_leads_a_save_out_of_the_folder(hall_roof, hall_folder, tmp_path):
+    os.symlink(tmp_path / "elsewhere.toml", hall_folder / "link.toml")
     try:
         with pytest.raises(FileError, match="without folder"):
-            saving.save(roof, roof.surface, "link.toml", True)
+            saving.save(hall_roof, hall_roof.surface, "link.toml", True)
         assert not list(tmp_path.iterdir())
     finally:
-        (folder / "link.toml").unlink()
+        (hall_folder / "link.toml").unlink()
 
 
 def test_walls_are_found_by_name_number_and_as_bare_curves(tmp_path):
@@ -138,8 +123,8 @@ def test_surfaces_without_a_project_are_not_saved(tmp_path):
         saving.save(Roof(CAP), CAP, "cap", False)
 
 
-def test_on_the_network_nothing_is_saved(roof, folder):
-    running = explore.start_roof(roof, host="0.0.0.0")
+def test_on_the_network_nothing_is_saved(hall_roof, hall_folder):
+    running = explore.start_roof(hall_roof, host="0.0.0.0")
     try:
         client = Client(running)
         header, _ = client.ask("/api/open")
@@ -147,7 +132,7 @@ def test_on_the_network_nothing_is_saved(roof, folder):
         assert "only a page of this machine" in client.ask(
             f"/api/{header['session']}/save", {"name": "x"}, status=403
         )
-        assert not (folder / "x.toml").exists()
+        assert not (hall_folder / "x.toml").exists()
     finally:
         running.close()
 

@@ -16,7 +16,9 @@ from pcmc.stability import factorisation as factor
 from pcmc.stability.factorisation import SingularMatrix, available, factoriser
 
 BACKENDS = [
-    pytest.param(name, marks=pytest.mark.skipif(name not in available(), reason="not installed"))
+    pytest.param(
+        name, marks=pytest.mark.skipif(name not in available(), reason="this solver is not installed")
+    )
     for name in factor.BACKENDS
 ]
 every_backend = pytest.mark.parametrize("backend", BACKENDS)

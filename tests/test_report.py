@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 import pytest
 from refusals import refused
+from small_project import WITH_UNITS
 from starts import joined_caps, stationary
 
 import pcmc
@@ -23,20 +24,16 @@ from pcmc.report.plan import paper_plan
 
 TEXT = pytest.mark.skipif(shutil.which("pdftotext") is None, reason="pdftotext is not installed")
 UNITS = Units("m", "kN")
-GOAL = """
-units = "m"
-force = "kN"
-[plan]
-edge_length = 1.0
-outline = [[0, 0], [4, 0], [4, 3], [0, 3]]
-patches = {roof = {tension = 2.0}}
-[targets]
+GOAL = (
+    WITH_UNITS
+    + """[targets]
 meet = [{quantity = "apex", of = "roof", value = %s}]
 vary = ["roof"]
 [output]
 tolerance = 0.02
 date = "1 May"
 """
+)
 
 
 def words_of(path):

@@ -3,6 +3,8 @@
 import re
 
 import pytest
+from refusals import refused
+from small_project import WITH_UNITS
 from volume_cases import cap, cap_height, raised
 
 import generators
@@ -14,17 +16,8 @@ from pcmc.base.units import Units, as_units
 from pcmc.explore.page_data import mesh_findings
 from pcmc.explore.session import Session, solved_start
 from pcmc.report.tables import mesh_table, target_table
-from tests.refusals import refused
 
 METRES = Units("m", "kN")
-PROJECT = """
-units = "m"
-force = "kN"
-[plan]
-edge_length = 1.0
-outline = [[0, 0], [4, 0], [4, 3], [0, 3]]
-patches = {roof = {tension = 2.0}}
-"""
 GOAL = """
 [targets]
 meet = [{quantity = "apex", of = "roof", value = 30.0}]
@@ -41,8 +34,8 @@ def bubbles():
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "roof.toml").write_text(PROJECT, encoding="utf-8")
-    (tmp_path / "high.toml").write_text(PROJECT + GOAL, encoding="utf-8")
+    (tmp_path / "roof.toml").write_text(WITH_UNITS, encoding="utf-8")
+    (tmp_path / "high.toml").write_text(WITH_UNITS + GOAL, encoding="utf-8")
     return tmp_path
 
 
