@@ -83,7 +83,7 @@ def control_groups(surface: Surface, values: dict[str, dict[str, float]]) -> lis
     """What has sliders: a group for each patch, cable and room, with the kinds of its values."""
     groups = []
     for number, patch in enumerate(surface.patches):
-        kinds = [kind for kind in ("tensions", "pressures", "weights") if patch.name in values[kind]]
+        kinds = [kind for kind in ("tensions", "pressures", "snows", "weights") if patch.name in values[kind]]
         groups.append({"name": patch.name, "patch": number, "wall": patch.auxiliary, "kinds": kinds})
     for kind in ("cables", "volumes"):
         groups += [{"name": name, "patch": None, "wall": False, "kinds": [kind]} for name in values[kind]]

@@ -151,7 +151,7 @@ class StructuralModel:
     @cached_array
     def active(self) -> Ints:
         """(e,) the faces of the standing surface with a tension or a pressure: the others carry nothing."""
-        pulls = (self.surface.tensions != 0.0) | (self.surface.pressures != 0.0)
+        pulls = (self.surface.tensions != 0.0) | (self.surface.net_pressures != 0.0)
         return np.flatnonzero(pulls[self.standing.patch_of_face])
 
     @cached_array
