@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Bools
 
-if TYPE_CHECKING:
-    from .surface import Surface
-
 NOTHING = 1e-9  # of the surface's size: shorter lengths are rounding
 
 
-def wall_patches(surface: Surface) -> Bools:
+def wall_patches(surface: Any) -> Bools:
     """(k,) bool: the patches that are walls.
 
     These are the patches with ``wall=True``, and those without pressure that stand between two rooms of
@@ -40,7 +37,7 @@ def wall_patches(surface: Surface) -> Bools:
     return declared | open_ones & (between | _hanging(surface, carrying))
 
 
-def _hanging(surface: Surface, carrying: Bools) -> Bools:
+def _hanging(surface: Any, carrying: Bools) -> Bools:
     """(k,) bool: which patches go down below two others along most of their edges at junctions."""
     topo, X, count = surface.topology, surface.vertices, len(surface.patches)
     of_roof = np.zeros(len(topo.edges), dtype=bool)
