@@ -293,7 +293,7 @@ def test_what_is_known_of_a_surface_is_not_computed_again(monkeypatch, squares, 
     other = squares.moved(squares.vertices.copy())
     with refused(OptionError, what="schedule"):
         drawing_set(other, "m", schedule=schedule, certificate=certificate)
-    lower = squares.retensioned({"left": 2.0})
+    lower = squares.retensioned({"left": 3.7})
     with refused(SurfaceError, what="certificate"):
         pcmc.panels(lower, 0.01, certificate=certificate)
 
