@@ -27,11 +27,10 @@ from .edges import (
     edge_cables,
     mirror_planes,
     raised_heights,
-    strip_mask,
     usual_cable,
 )
 from .heights import dome, harmonic_heights
-from .lines import SNAP, Kind, Line
+from .lines import SNAP, Kind
 from .parts import BALANCED, PlanData
 from .pieces import to_space
 from .planar import SIDES, PlanarMesh, signed_areas
@@ -117,17 +116,13 @@ def _rise(draft: Draft, patches: Sequence[Patch], held: Bools) -> Floats:
 
 def _supports(draft: Draft) -> tuple[Bools, Bools]:
     """(n,) fixed and sliding vertices."""
-    plan, drawn, edges = draft.plan, draft.drawn, draft.edges
+    drawn, edges = draft.drawn, draft.edges
     fixed, sliding = np.zeros((2, len(draft.mesh.points)), dtype=bool)
     fixed[edges.vertices("fixed")] = True
     sliding[edges.vertices("sliding")] = True
     for chain in drawn.chains:
         if draft.lines[chain.line].kind is Kind.SUPPORT:
             fixed[chain.vertices] = True
-    rim = np.unique(edges.ends)
-    for support in draft.supports_on_edge:
-        strip = Line("support", Kind.SUPPORT, support)
-        fixed[strip_mask(strip, drawn.points, rim, SNAP * plan.edge_length)] = True
     fixed[drawn.spots] = True
     return fixed, sliding & ~fixed
 

@@ -14,7 +14,7 @@ from ..base.errors import PlanError
 from ..surface import Cable, Patch, Plane
 from .arrangement import Arrangement
 from .curves import Curve
-from .lines import SNAP, Kind, Line, point_text
+from .lines import SNAP, Kind, Line, LineTree, point_text
 from .parts import EDGES, PlanData
 from .pieces import to_local, to_space
 
@@ -49,8 +49,8 @@ class Boundary:
         return np.unique(self.ends[chosen])
 
 
-def boundary(plan: PlanData, lines: Sequence[Line], drawn: Arrangement) -> Boundary:
-    """The boundary of a plan cut into edges.
+def boundary(plan: PlanData, lines: Sequence[Line], on_edge: Sequence[Curve], drawn: Arrangement) -> Boundary:
+    """The boundary of a plan cut into edges; those along the supports ``on_edge`` are fixed.
 
     Raises
     ------
@@ -75,6 +75,9 @@ def boundary(plan: PlanData, lines: Sequence[Line], drawn: Arrangement) -> Bound
             raise PlanError(problem, what=name)
         state[along], cable[along] = STATES.index("cable"), len(cables)
         cables.append((part.tension, part.name))
+    for support in on_edge:  # a held stretch needs no cable
+        along = _along(support, drawn, ends, middle, SNAP * plan.edge_length)
+        state[along], cable[along] = STATES.index("fixed"), NONE
     for number, one in enumerate(plan.mirrors, start=1):
         on = np.abs(mirror_distance(one, plan.plane, drawn.points)) <= ON_MIRROR * _size(drawn.points)
         along = on[ends].all(axis=1)
@@ -87,11 +90,12 @@ def boundary(plan: PlanData, lines: Sequence[Line], drawn: Arrangement) -> Bound
 
 def check_lines(plan: PlanData, lines: Sequence[Line]) -> None:
     """Refuse a cable that leaves the boundary, and a mirror that the plan crosses."""
-    edges = [line for line in lines if line.bounds]
+    edges = LineTree([line for line in lines if line.bounds])
     for number, part in enumerate(plan.cables, start=1):
         local = part.curve.local(plan.plane)
-        for xy in local.at(local.dense)[:, :2]:
-            if all(edge.nearest(xy)[1] > SNAP * plan.edge_length for edge in edges):
+        dense = local.at(local.dense)[:, :2]
+        for xy, places in zip(dense, edges.at(dense, SNAP * plan.edge_length), strict=True):
+            if not places:
                 name = f"cable {part.name!r}" if part.name else f"cable {number}"
                 problem = (
                     f"{name} is at {point_text(xy)} on no edge of the outline or of a hole; draw it along"
@@ -207,9 +211,7 @@ def check_pressures(edges: Boundary, triangles: Ints, patch: Ints, patches: Sequ
 
 def strip_mask(strip: Line, points: Floats, among: Ints, snap: float) -> Ints:
     """Those of the points ``among`` that lie on a line."""
-    reach = snap + 1e-3 * strip.reach[-1]  # of the chords of the dense polyline
-    close = among[shapely.distance(strip.shape, shapely.points(points[among])) <= reach]
-    return np.array([v for v in close if strip.nearest(points[v])[1] <= snap], dtype=np.int64)
+    return among[strip.nearest(points[among])[1] <= snap]
 
 
 def _along(curve: Curve, drawn: Arrangement, ends: Ints, middle: Floats, snap: float) -> Bools:
