@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -46,6 +47,17 @@ class Arrangement:
     heights: Floats
     chains: tuple[Chain, ...]
     spots: Ints
+
+    def along(self, line: int) -> Sequence[Chain]:
+        """The chains of a line."""
+        return self._by_line.get(line, [])
+
+    @cached_property
+    def _by_line(self) -> dict[int, list[Chain]]:
+        chains: dict[int, list[Chain]] = {}
+        for chain in self.chains:
+            chains.setdefault(chain.line, []).append(chain)
+        return chains
 
 
 def arrange(lines: Sequence[Line], edge_length: float, spots: Floats, stops: Floats) -> Arrangement:
@@ -96,7 +108,7 @@ def arrange(lines: Sequence[Line], edge_length: float, spots: Floats, stops: Flo
 def hole_points(drawn: Arrangement, lines: Sequence[Line]) -> list[tuple[float, float]]:
     """A point inside each hole, as its edges enclose it."""
     holes = [number for number, line in enumerate(lines) if line.kind is Kind.HOLE]
-    rims = [np.concatenate([c.vertices[:-1] for c in drawn.chains if c.line == hole]) for hole in holes]
+    rims = [np.concatenate([chain.vertices[:-1] for chain in drawn.along(hole)]) for hole in holes]
     points = [shapely.Polygon(drawn.points[rim]).representative_point() for rim in rims]
     return [(point.x, point.y) for point in points]
 

@@ -114,6 +114,11 @@ class Curve:
         """(n,) parameters at lengths (n,) along the curve."""
         return np.interp(length, self.lengths, self.dense)
 
+    def samples(self, spacing: float) -> Floats:
+        """(n,d) points along the whole curve, no farther apart than ``spacing``, its joints among them."""
+        even = self.parameter(np.linspace(0.0, self.length, 2 + int(self.length / spacing)))
+        return self.at(np.union1d(even, self.dense))
+
     def between(self, start: float, end: float, edge_length: float) -> Floats:
         """(k,) parameters strictly between two others, at about equal lengths near ``edge_length``.
 

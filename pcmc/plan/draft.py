@@ -136,7 +136,7 @@ def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:
     for number, support in enumerate(plan.supports, start=1):
         if isinstance(support, Curve):
             local = support.local(plan.plane)
-            if all(edges.at(local.at(local.dense)[:, :2], snap)):
+            if all(edges.at(local.samples(0.5 * plan.edge_length)[:, :2], snap)):
                 on_edge.append(local)
             else:
                 lines.append(Line(f"support {number}", Kind.SUPPORT, local))

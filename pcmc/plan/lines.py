@@ -56,6 +56,11 @@ class Line:
         return xy
 
     @cached_property
+    def corners(self) -> Floats:
+        """(c,2) the points where the line turns."""
+        return self.curve.at(self.curve.corners)[:, :2]
+
+    @cached_property
     def shape(self) -> Any:
         """The polyline as a shapely LineString."""
         if not np.ptp(self.xy, axis=0).any():
