@@ -89,8 +89,13 @@ class Curve:
     @cached_property
     def _directions(self) -> tuple[Floats, Floats]:
         """(p,d) the unit tangents of the pieces at their starts, and at their ends."""
-        starts, ends = ([piece.direction(end) for piece in self.pieces] for end in (0, 1))
-        return np.array(starts), np.array(ends)
+        (points, straight), d = self._straight, self.pieces[0].points.shape[1]
+        along = points[:, 1] - points[:, 0]
+        starts = along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
+        ends, curved = starts.copy(), np.flatnonzero(~straight)
+        starts[curved] = np.reshape([self.pieces[k].direction(0) for k in curved], (-1, d))
+        ends[curved] = np.reshape([self.pieces[k].direction(1) for k in curved], (-1, d))
+        return starts, ends
 
     @cached_property
     def extremes(self) -> Floats:

@@ -60,7 +60,8 @@ def point_masts(plan: Plan) -> list[Mast]:
     room = np.min([line.nearest(spots[:, :2])[1] for line in lines], axis=0)
     inside = room > SNAP * plan.edge_length
     if len(spots) > 1:
-        room = np.minimum(room, cKDTree(spots[:, :2]).query(spots[:, :2], k=2)[0][:, 1])
+        near, _ = cKDTree(spots[:, :2]).query(spots[:, :2], k=[2])
+        room = np.minimum(room, np.ravel(near))
     found = zip(numbers, spots, room.tolist(), inside, strict=True)
     return [Mast(number, spot, space) for number, spot, space, free in found if free]
 
