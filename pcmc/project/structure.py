@@ -27,7 +27,7 @@ class Structure:
     poisson : Poisson's ratio.
     density : mass per volume; with kN and m, tonnes per m³. Above 0, self-weight is a load.
     gravity : length/time².
-    snow : load per plan area; 0 for none.
+    snow : load per plan area, besides the snow that the form was found under; 0 for none.
     wind : pressures by patch, above 0 for suction on a roof.
     cable_area : of the cables' sections, length², or a table with one for each cable.
     """
