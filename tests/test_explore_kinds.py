@@ -27,7 +27,7 @@ pressure = 0.0
 MIRROR = "mirrors = [[[6, 0], [6, 6]]]\n"
 TEXTS = {
     "patches": f"units = 'm'\n{HALL}{CUT}{PATCHES}{OUTPUT}",
-    "one tension": f"{HALL}tension = 5.0\n{CUT}",
+    "one tension": f"{HALL}tension = 5.0\nsnow = 0.25\n{CUT}",
     "rise": f"{HALL}rise = 1.4\n{CUT}",
     "drawing": 'units = "m"\n[plan]\ndrawing = "hall.dxf"\nedge_length = 1.0\n',
     "sail": SAIL,
@@ -82,6 +82,12 @@ def test_every_kind_of_project_is_saved_with_the_values_of_the_surface(kind, tmp
     surface = changed(roof.surface, *MOVED[kind])
     path, _ = saving.save(roof, surface, "other.toml", False)
     assert not differences(read_roof(path, start_shape=True).surface, surface)
+    if kind == "one tension":
+        plan = tomllib.loads(path.read_text())["plan"]
+        assert (plan["snow"], plan["patches"]) == (
+            0.25,
+            {"patch 1": {"tension": 5.0}, "patch 2": {"tension": 5.5}},
+        )
     if kind == "patches":
         output = tomllib.loads(path.read_text())["output"]
         assert output == {"files": ["other.obj", "other-out.glb"], "report": "other-report.pdf"}

@@ -20,14 +20,15 @@ from .rises import RISES, WHOLE
 
 SAME = 1e-11  # of the largest value of a kind: a difference that counts as none
 DIGITS = 12  # of the values written
-KEYS = {"tensions": "tension", "pressures": "pressure", "weights": "weight"}  # of a patch
+KEYS = {"tensions": "tension", "pressures": "pressure", "snows": "snow", "weights": "weight"}  # of a patch
 Name = tuple[str, str]  # kind and name of a value, such as ("tensions", "west")
 
 
 def values_of(surface: Surface) -> dict[str, dict[str, float]]:
     """The values of a surface that can be changed, by kind and name.
 
-    The pressures around a room of prescribed volume are results, and a wall's follows from its rooms'.
+    The pressures around a room of prescribed volume are results, and a wall's follows from its rooms', as its
+    snow does. Pressures are those of the air: snow is not taken off.
     """
     result = (surface.room_signs != 0.0).any(axis=0) | surface.walls
     return {
@@ -35,6 +36,7 @@ def values_of(surface: Surface) -> dict[str, dict[str, float]]:
         "pressures": {
             p.name: p.pressure for p, r in zip(surface.patches, result.tolist(), strict=True) if not r
         },
+        "snows": {p.name: p.snow for p in surface.patches if p.snow and not p.wall},
         "weights": {p.name: p.weight for p in surface.patches if p.weight},
         "cables": {c.name: c.tension for c in surface.cables},
         "volumes": {r.name: r.volume for r in surface.rooms},
@@ -154,11 +156,11 @@ def _put_on_patches(
     if whole:
         if "tension" not in plan:
             _drop(plan, WHOLE)
-        usual = {"tension": 0.0, "pressure": 1.0, "weight": 0.0}
+        usual = {"tension": 0.0, "pressure": 1.0, "weight": 0.0, "snow": plan.get("snow", 0.0)}
         for patch in patches:
             own = {name: _number(getattr(patch, name)) for name in usual}
             tables[patch.name] = {name: v for name, v in own.items() if v != usual[name]}
-        _drop(plan, usual)
+        _drop(plan, ("tension", "pressure", "weight"))
         return
     for name, value in wanted.items():
         table = tables.setdefault(name, {})
