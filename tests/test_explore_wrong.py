@@ -218,7 +218,8 @@ def test_a_mesh_check_leaves_the_sliders_free_and_ends_with_its_tab(explorer, se
             tab = tabs.enter_context(socket.create_connection(("127.0.0.1", explorer.port), timeout=60))
             tab.sendall(f"{head}Content-Length: 2\r\n\r\n{{}}".encode())
         assert begun.wait(30)
-        moved = asked(explorer, "POST", f"/api/{session}/follow", '{"tensions": {}}')
+        other = unpack(asked(explorer, "POST", "/api/open", "{}")[1])[0]["session"]
+        moved = asked(explorer, "POST", f"/api/{other}/follow", '{"tensions": {}}')
         assert moved[0].status == 200
         assert not ended.is_set()
     assert ended.wait(30)
