@@ -33,7 +33,9 @@ def structure(
         float | None, option("VALUE", "Mass per volume; above 0, self-weight is a load.", parser=number)
     ] = None,
     gravity: Annotated[float | None, option("VALUE", "9.81 by default.", parser=number)] = None,
-    snow: Annotated[float | None, option("VALUE", "Load per plan area.", parser=number)] = None,
+    snow: Annotated[
+        float | None, option("VALUE", "Load per plan area, besides the snow of the form.", parser=number)
+    ] = None,
     wind: Annotated[list[str] | None, option("NAME=VALUE", WIND, "--wind")] = None,
     cable_area: Annotated[float | None, option("VALUE", "Section of the cables.", parser=number)] = None,
     whole: Whole = False,

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import FileWarning, SurfaceError
+from ..base.errors import FileWarning, PcmcError, SurfaceError
 from ..certificate.reactions import reactions
 from ..contact.pinching import standing_part
 from ..energy.curvature import mean_curvature
@@ -42,8 +43,9 @@ def to_meshes(surface: Surface) -> list[Any]:
     -------
     list of Mesh : named after their patches, with
 
-        - ``mesh.attributes``: ``tension`` α (force/length), ``pressure`` p (force/area), ``wall``, and on the
-          first mesh ``"pcmc"`` with the plane Π and the lines and circles that vertices slide along;
+        - ``mesh.attributes``: ``tension`` α (force/length), ``pressure`` p (force/area) with ``weight`` and
+          ``snow``, ``wall``, and on the first mesh ``"pcmc"`` with the plane Π and the lines and circles that
+          vertices slide along;
         - at vertices: ``is_support`` (fixed), ``is_sliding`` (on Π), ``guide`` (the number of the line or
           circle in ``attributes["pcmc"]["guides"]``, or None), ``mean_curvature`` H (1/length; None on
           junctions and boundaries), and ``rx``, ``ry``, ``rz``, the force of the support on the surface.
@@ -99,9 +101,10 @@ def from_meshes(
     Parameters
     ----------
     meshes : a Mesh, or a list of them. A mesh's name is the patch's; a mesh must have the attribute
-        ``tension``, and may have ``pressure`` (otherwise 1) and ``wall``. A vertex is fixed if one of
-        ``is_support``, ``is_anchor`` and ``is_fixed`` is true, and slides on Π if ``is_sliding`` is. If no
-        mesh has any of these attributes, the boundary is fixed. Polygons are cut into triangles.
+        ``tension``, and may have ``pressure`` (otherwise 1), ``weight``, ``snow`` and ``wall``. A vertex is
+        fixed if one of ``is_support``, ``is_anchor`` and ``is_fixed`` is true, and slides on Π if
+        ``is_sliding`` is. If no mesh has any of these attributes, the boundary is fixed. Polygons are cut
+        into triangles.
     tensions, pressures : by mesh name, or one number for all, in place of the attributes.
     weld : join vertices at one place, for meshes that do not share keys. The keys then have no meaning.
 
@@ -125,6 +128,22 @@ def from_meshes(
     (Patch(name='floor', tension=2.0, pressure=1.0),)
     """
     named = mesh_arrays.named_meshes(meshes)
+    validate.flag("weld", weld)
+    try:
+        surface, notes = _surface(named, tensions, pressures, weld)
+    except (TypeError, ValueError, LookupError, AttributeError, OverflowError) as error:
+        if isinstance(error, PcmcError):
+            raise
+        raise mesh_arrays.damaged_mesh(error) from None  # the net under the checks
+    if notes:
+        warnings.warn(f"meshes: {'; '.join(notes)}", FileWarning, stacklevel=2)
+    return surface
+
+
+def _surface(
+    named: Mapping[str, Any], tensions: Any, pressures: Any, weld: bool
+) -> tuple[Surface, tuple[str, ...]]:
+    """The surface of meshes by name, and notes on what was changed or is doubtful."""
     patches = tuple(mesh_arrays.read_patches(named, tensions, pressures))
     whole, vertices = read_whole(named), mesh_arrays.read_vertices(named)
     keep, places = mesh_arrays.shared_vertices(vertices, named, weld)
@@ -149,10 +168,8 @@ def from_meshes(
         support = np.where(topology(F, patch, n).on_boundary, FIXED, support)
         notes = (*notes, "no vertex has the attribute is_support, so the boundary is taken as fixed")
     notes = (*notes, *import_warnings(MeshData(X, F, patch, patches, held)))
-    if notes:
-        warnings.warn(f"meshes: {'; '.join(notes)}", FileWarning, stacklevel=2)
     along = tuple((one, guide == number) for number, one in enumerate(whole.guides))
-    return Surface(
+    surface = Surface(
         X,
         F,
         patch,
@@ -165,6 +182,7 @@ def from_meshes(
         mesh_arrays.read_cables(named, places, whole.cables),
         whole.rooms,
     )
+    return surface, notes
 
 
 def _check_carried(surface: Surface) -> None:

@@ -44,12 +44,13 @@ GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in
 @dataclass(frozen=True, eq=False)
 class _Roof:
     """Positions (n,3), heights (n,) of the surface that the boundary spans, fixed (n,); of each triangle (m,)
-    the pressure, the number of the room of prescribed volume below, -1 for none, and the tension."""
+    pressure, snow, the number of the room of prescribed volume below, -1 for none, and tension."""
 
     positions: Floats
     base: Floats
     fixed: Bools
     pressure: Floats
+    snow: Floats
     room: Ints
     tension: Floats
 
@@ -73,9 +74,10 @@ def build_surface(plan: PlanData) -> Surface:
     height = base + _rise(draft, patches, fixed | sliding)
     inner = np.arange(len(base)) >= len(draft.drawn.points)
     raised = improve_angles(np.column_stack([mesh.points, height]), mesh.triangles, inner, GOOD_ANGLE)
-    pressure, tension = np.array([[p.pressure, p.tension] for p in patches])[patch_of_face].T
+    laws = np.array([[p.pressure, p.snow, p.tension] for p in patches])
+    pressure, snow, tension = laws[patch_of_face].T
     rooms = _room_of_face(plan, patches, patch_of_face)
-    roof = _Roof(to_space(raised, plan.plane), base, fixed, pressure, rooms, tension)
+    roof = _Roof(to_space(raised, plan.plane), base, fixed, pressure, snow, rooms, tension)
     walls, wall_patches, sides = _walls(draft, roof)
     vertices = np.concatenate([roof.positions, walls.vertices])
     surface = Surface(
@@ -110,7 +112,7 @@ def _rise(draft: Draft, patches: Sequence[Patch], held: Bools) -> Floats:
     """(n,) what the initial surface rises above the one that the boundary spans."""
     plan, mesh = draft.plan, draft.mesh
     walled = any(divider.wall is not None for divider in plan.dividers)
-    if plan.rise is None and not walled and all(patch.pressure == 0.0 for patch in patches):
+    if plan.rise is None and not walled and all(patch.net_pressure == 0.0 for patch in patches):
         return np.zeros(len(mesh.points))  # a sail starts without a dome
     return dome(mesh.points, mesh.triangles, held, plan.rise)
 
@@ -238,7 +240,7 @@ def _walls(draft: Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], list[_Side
         suffix = f"-{alike[number].index(sides) + 1}" if len(alike[number]) > 1 else ""
         balanced = divider.wall == BALANCED
         tension = _balanced(draft, roof, number, faces_at[number], radii) if balanced else divider.wall
-        patches.append(Patch(divider.name + suffix, tension, sides.difference, wall=True))
+        patches.append(Patch(divider.name + suffix, tension, sides.pressure, wall=True, snow=sides.snow))
     walls = build_walls(X, tops, plan.edge_length, plan.plane, roof.fixed, floor)
     return walls, patches, [sides._replace(divider=number) for number, sides in kinds]
 
@@ -248,7 +250,8 @@ def _balanced(draft: Draft, roof: _Roof, number: int, beside: Sequence[Ints], ra
 
     ``beside`` are the triangles at each of its junctions, ``radii`` those of the parts of the plan.
     """
-    pressure = min(float(np.abs(roof.pressure[faces]).min(initial=np.inf)) for faces in beside)
+    net = np.abs(roof.pressure - roof.snow)
+    pressure = min(float(net[faces].min(initial=np.inf)) for faces in beside)
     line, outline = draft.lines[1 + len(draft.plan.holes) + number], draft.lines[0]
     width = float(radii[draft.mesh.region[np.concatenate(beside)]].min())
     most = most_in_corners(line.curve, outline, draft.plan.edge_length, pressure)
@@ -279,10 +282,11 @@ def _beside(triangles: Ints, edges: Ints) -> Ints:
 
 
 class _Sides(NamedTuple):
-    """Of a wall: the pressure on the left less that on the right, the rooms there, -1 for none, and its
-    divider."""
+    """Of a wall: the pressure and the snow on the left less those on the right, the rooms there, -1 for none,
+    and its divider."""
 
-    difference: float
+    pressure: float
+    snow: float
     left: int
     right: int
     divider: int = NONE
@@ -290,9 +294,11 @@ class _Sides(NamedTuple):
 
 def _sides(roof: _Roof, left: int, right: int) -> _Sides:
     """The sides of an edge, of the triangles there."""
-    pressures = [float(roof.pressure[face]) if face >= 0 else 0.0 for face in (left, right)]
+    there = [face for face in (left, right) if face >= 0]
+    sign = np.array([1.0 if face == left else -1.0 for face in there])
     rooms = (int(roof.room[face]) if face >= 0 else NONE for face in (left, right))
-    return _Sides(pressures[0] - pressures[1], *rooms)
+    pressure, snow = (float(of[there] @ sign) for of in (roof.pressure, roof.snow))
+    return _Sides(pressure, snow, *rooms)
 
 
 def _rooms(plan: PlanData, walls: Sequence[Patch], sides: Sequence[_Sides]) -> list[Room]:

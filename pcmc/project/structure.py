@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import cast
 
 from ..base.errors import OptionError
+from ..certificate import Certificate
 from ..solvers.result import Result
 from ..structure import Material, SelfWeight, Snow, StructuralModel, Wind
 from ..structure.cables import checked_areas
@@ -26,7 +27,7 @@ class Structure:
     poisson : Poisson's ratio.
     density : mass per volume; with kN and m, tonnes per m³. Above 0, self-weight is a load.
     gravity : length/time².
-    snow : load per plan area; 0 for none.
+    snow : load per plan area, besides the snow that the form was found under; 0 for none.
     wind : pressures by patch, above 0 for suction on a roof.
     cable_area : of the cables' sections, length², or a table with one for each cable.
     """
@@ -71,9 +72,20 @@ class Structure:
         check_loads(self.loads, surface)
         checked_areas(self.cable_area, surface)
 
-    def model(self, surface: Surface | Result, anyway: bool = False) -> StructuralModel:
-        """The structural model of a surface at rest. Errors as in ``pcmc.StructuralModel``."""
+    def model(
+        self, surface: Surface | Result, anyway: bool = False, certificate: Certificate | None = None
+    ) -> StructuralModel:
+        """The structural model of a surface at rest, with the certificate that is known of it.
+
+        Errors as in ``pcmc.StructuralModel``.
+        """
         thickness, given = 0.0 if self.thickness is None else self.thickness, cast("Surface", surface)
         return StructuralModel(
-            given, self.material, thickness, self.loads, anyway=anyway, cable_area=self.cable_area
+            given,
+            self.material,
+            thickness,
+            self.loads,
+            anyway=anyway,
+            cable_area=self.cable_area,
+            certificate=certificate,
         )
