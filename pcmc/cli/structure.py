@@ -35,7 +35,9 @@ def structure(
     gravity: Annotated[
         float | None, option("VALUE", "Length/s²; by default 9.81 m/s².", parser=number)
     ] = None,
-    snow: Annotated[float | None, option("VALUE", "Load per plan area.", parser=number)] = None,
+    snow: Annotated[
+        float | None, option("VALUE", "Load per plan area, besides the snow of the form.", parser=number)
+    ] = None,
     wind: Annotated[list[str] | None, option("NAME=VALUE", WIND, "--wind")] = None,
     cable_area: Annotated[float | None, option("VALUE", "Section of the cables.", parser=number)] = None,
     whole: Whole = False,
