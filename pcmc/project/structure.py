@@ -26,15 +26,9 @@ class Structure:
     young : Young's modulus, force per area.
     thickness : of all patches, length, or a table with one for each patch.
     poisson : Poisson's ratio.
-<<<<<<< HEAD
     density : mass per volume, as of ``Material``: t/m³ with kN and m. Above 0, self-weight is a load.
     gravity : length/s²; by default 9.81 m/s² in the unit of length.
-    snow : load per plan area; 0 for none.
-=======
-    density : mass per volume; with kN and m, tonnes per m³. Above 0, self-weight is a load.
-    gravity : length/time².
     snow : load per plan area, besides the snow that the form was found under; 0 for none.
->>>>>>> main
     wind : pressures by patch, above 0 for suction on a roof.
     cable_area : of the cables' sections, length², or a table with one for each cable.
     """
