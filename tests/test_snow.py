@@ -17,10 +17,11 @@ from pcmc.energy.rooms import room_pressures
 from pcmc.existence.attempts import Attempts
 from pcmc.existence.pressure import raise_pressure
 from pcmc.existence.starts import low_start
-from pcmc.explore.following import between, reach, values_of, wanted
+from pcmc.explore.following import between, reach, wanted
 from pcmc.io.scaling import scaled_surface
 from pcmc.plan import Area, Plan
 from pcmc.project import digest, varied
+from pcmc.project.values import values_of
 from pcmc.structure import Material, Snow, StructuralModel
 from pcmc.surface.wall_pressures import with_pressures
 from studies import evolver
