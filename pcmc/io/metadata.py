@@ -138,9 +138,9 @@ class _Placed:
 
     def __init__(self, data: MeshData) -> None:
         parts, n = data.parts, len(data.vertices)
-        self.X, self.lost = data.vertices, []
-        self.keep = self.group = np.arange(n)
-        support = np.zeros(n, dtype=np.int8) if data.support is None else data.support.copy()
+        self.X, self.lost = data.vertices, dict[str, None]()
+        self.keep: Ints = np.arange(n)
+        self.group: Ints = self.keep
         cables = [
             Cable(name, pull, self.keep[ends])
             for name, pull, where in parts.get("cables", ())
@@ -151,42 +151,47 @@ class _Placed:
             for row, where in parts.get("lines", ())
             if (own := self.groups(where, "what slides along a line is fixed", exact=True)) is not None
         ]
-        what, planes = "what slides on a plane is fixed", parts.get("planes", ())
-        found = [self.groups(where, what, exact=True) for _, where in planes]
-        if any(own is None for own in found):
-            planes, found = (), []
-        for kind, where in zip((FREE, SLIDING), parts.get("slides", ()) if planes else (), strict=False):
-            if len(where) and (own := self.groups(where, what)) is not None:
-                support[np.isin(self.group, own)] = kind
-        masks = [np.isin(self.group, own) for own in found]
-        notes = [f"{', '.join(dict.fromkeys(self.lost))}: {CHANGED}"] if self.lost else []
+        what = "what slides on a plane is fixed"
+        planes = [
+            (Plane(*row), np.isin(self.group, own))
+            for row, where in parts.get("planes", ())
+            if (own := self.groups(where, what, exact=True)) is not None
+        ]
+        support = data.support
+        if support is not None and planes and what not in self.lost:
+            support = support.copy()
+            for kind, where in zip((FREE, SLIDING), parts["slides"], strict=True):
+                if len(where) and (own := self.groups(where, what)) is not None:
+                    support[np.isin(self.group, own)] = kind
         self.result = replace(
             data,
             vertices=self.X,
-            support=support if planes else data.support,
+            support=support,
             cables=tuple(cables),
             rooms=tuple(Room(*row) for row in parts.get("rooms", ())),
             lines=tuple(lines),
-            planes=tuple((Plane(*row), mask) for (row, _), mask in zip(planes, masks, strict=True)),
-            notes=(*data.notes, *notes),
+            planes=() if what in self.lost else tuple(planes),
+            notes=(*data.notes, *([f"{', '.join(self.lost)}: {CHANGED}"] if self.lost else [])),
         )
 
     def groups(self, where: Any, what: str, exact: bool = False) -> Ints | None:
-        """The groups of vertices at one place that are meant, by number or position; None if one is gone.
+        """The groups of vertices at one place that are meant, by number or position.
 
-        With ``exact`` the vertices get the positions of the metadata, to the last digit.
+        None, and ``what`` is lost, if one is gone. With ``exact`` the vertices get the positions of the
+        metadata, to the last digit.
         """
         given = np.array(where)
         if given.dtype.kind in "iu":
             return within(given, "metadata", len(self.X))
         if self.keep is self.group:  # positions: at one place there may be several vertices
             self.keep, self.group = coincident(self.X)
-        distance, near = cKDTree(self.X[self.keep]).query(given.astype(np.float64).reshape(-1, 3))
+        points = given.astype(np.float64).reshape(-1, 3)
+        distance, near = map(np.asarray, cKDTree(self.X[self.keep]).query(points))
         if (distance > ROUNDING * bounding_size(self.X)).any():
-            self.lost.append(what)
+            self.lost[what] = None
             return None
         if exact:
             positions = self.X[self.keep]
-            positions[near] = given.reshape(-1, 3)
+            positions[near] = points
             self.X = positions[self.group]
-        return np.asarray(near).reshape(given.shape[:-1])
+        return near.reshape(given.shape[:-1])
