@@ -8,10 +8,11 @@ from ..surface import Surface
 from .certificate import Certificate, certify
 
 
-def certified(surface: Surface, anyway: bool) -> Certificate:
-    """The certificate of a surface; SurfaceError if it is not certified, unless ``anyway``."""
+def certified(surface: Surface, anyway: bool, known: Certificate | None = None) -> Certificate:
+    """The certificate of a surface, where it is not ``known``; SurfaceError if the surface is not certified,
+    unless ``anyway``."""
     validate.flag("anyway", anyway)
-    certificate = certify(surface)
+    certificate = certify(surface) if known is None else known
     require_certified(certificate, anyway)
     return certificate
 

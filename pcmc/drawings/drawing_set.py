@@ -105,6 +105,8 @@ def drawing_set(
     mirror_images: str = "alike",
     name: str = "",
     anyway: bool = False,
+    certificate: Certificate | None = None,
+    schedule: Panels | None = None,
 ) -> DrawingSet:
     """Draw a roof: plan, elevations, sections, setting-out points, schedule, panels at true size.
 
@@ -122,6 +124,7 @@ def drawing_set(
     mirror_images : as in ``pcmc.panels``.
     name : of the roof, in the title strips.
     anyway : draw a surface that is not certified; every sheet is marked.
+    certificate, schedule : of the surface, where they are known; otherwise computed.
 
     Raises
     ------
@@ -150,10 +153,11 @@ def drawing_set(
     if panel_sheets and tolerance is None:
         text = "panel_sheets: needs the tolerance of the panels' families; add tolerance="
         raise OptionError(text, what="tolerance", expected="a length")
-    certificate = certified(surface, anyway)
-    schedule = None
-    if tolerance is not None:
-        schedule = panels(surface, tolerance, mirror_images=mirror_images, anyway=anyway)
+    certificate = certified(surface, anyway, certificate)
+    if tolerance is not None and schedule is None:
+        schedule = panels(
+            surface, tolerance, mirror_images=mirror_images, anyway=anyway, certificate=certificate
+        )
     curves = views.model_curves(surface)
     points = _setting_out(curves)
     named = [(str(row.point), np.array([row.x, row.y, row.z])) for row in points.itertuples()]

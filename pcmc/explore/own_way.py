@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Collection
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -110,14 +109,14 @@ def own_start(path: Path, asked: Surface, moved: Collection[str] = ()) -> Surfac
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # they were shown when the project was opened
-            data = deepcopy(projects.read_data(path)[1])
+            text, data = projects.read_data(path)
             patches = data.setdefault("plan", {}).setdefault("patches", {})
             if not isinstance(patches, dict):
                 return None
             for patch in asked.patches:
                 if not patch.auxiliary:
                     patches.setdefault(patch.name, {})["tension"] = patch.tension
-            start = projects.surface_of(projects.project_of(path, data))
+            start = projects.surface_of(projects.project_of(path, text, data))
         kept = {name: tension for name, tension in values["tensions"].items() if name not in walls}
         return wanted(start, {**values, "tensions": kept})
     except (PcmcError, MissingExtra):  # such as for a file that holds another plan by now
@@ -134,7 +133,7 @@ def solved_own_way(path: Path, start: Surface, stop: Stop) -> Result | None:
 
     try:
         plain = replace(projects.load(path), targets=(), wanted=AccuracyWanted(), search=False)
-        result = projects.solve_project(plain, start, check).result
+        result = projects.solve_project(plain, start, check).solved
     except (PcmcError, MissingExtra, TimeoutError):
         return None
     return result if result.certificate.verdict in AT_REST else None

@@ -71,9 +71,19 @@ def read(
     return _surface(path, converted(data, units), (tensions, pressures, fixed, on_plane, plane))
 
 
-def read_bare(path: str | os.PathLike[str]) -> tuple[Surface, MeshData]:
-    """The Surface in a file, in the file's own units, and all its data; a note if it has no supports."""
+def read_bare(path: str | os.PathLike[str], units: str = "", assumed: str = "") -> tuple[Surface, MeshData]:
+    """The Surface in a file and all its data; a note if it has no supports.
+
+    Parameters
+    ----------
+    path : of the file.
+    units : the unit of length wanted; by default the file's own.
+    assumed : of a file without a unit; by default the one wanted.
+    """
     data = load(path)
+    if not data.units:
+        data = replace(data, units=Units(assumed or units))
+    data = converted(data, units)
     return _surface(path, data, ()), data
 
 

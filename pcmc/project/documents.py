@@ -6,22 +6,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base import validate
 from ..base.errors import OptionError
 from ..base.files import suffix_of
 from ..base.units import Units, expect_length
 from ..drawings.drawing_set import check_suffix as check_drawing
-from ..drawings.drawing_set import drawing_set
 from ..drawings.sheet import FORMATS
-from ..panels import Panels, panels
+from ..panels import Panels
 from ..report.document import check_suffix as check_report
-from ..report.document import roof_report
 from ..structure import write_structure
-from .outcome import Outcome
 from .output import Works
 from .structure import Structure
+
+if TYPE_CHECKING:
+    from .outcome import Outcome
 
 CSV, INP = ".csv", ".inp"
 SINGLE = ("panels", "structure", "report")  # keys of one file each
@@ -108,7 +108,6 @@ def document_works(
     documents: Documents,
     structure: Structure | None,
     outcome: Outcome,
-    name: str,
     files: Mapping[str, str],
     anyway: bool = False,
 ) -> Works:
@@ -117,7 +116,6 @@ def document_works(
     Parameters
     ----------
     structure : of the project.
-    name : of the roof.
     files : name of each other file of the project, and what it is, for the report.
     anyway : make them of a roof that is not certified; drawings and report are marked.
 
@@ -125,37 +123,19 @@ def document_works(
     ------
     OptionError, SurfaceError : as ``drawing_set``, ``panels``, ``StructuralModel`` and ``roof_report``.
     """
-    surface, units, works = outcome.shown.surface, outcome.units, Works()
+    works = Works()
     if documents.drawings:
-        drawings = drawing_set(
-            surface,
-            units.length,
-            sheet=documents.sheet,
-            tolerance=documents.tolerance,
-            panel_sheets=documents.panel_sheets,
-            name=name,
-            anyway=anyway,
-        )
+        drawings = outcome.drawing_set(documents, anyway=anyway)
         works += drawings.files(*documents.drawings)
     if documents.panels is not None and documents.tolerance is not None:
-        schedule = panels(surface, documents.tolerance, anyway=anyway)
+        schedule = outcome.panels(documents.tolerance, anyway=anyway)
         works += schedule_works(Path(documents.panels), schedule)
     if documents.structure is not None and structure is not None:
-        solved = outcome.result if outcome.whole is None else outcome.whole.surface
-        model = structure.model(solved, anyway)
+        model = outcome.model(structure, anyway)
         works.append((Path(documents.structure), partial(write_structure, model=model)))
     if documents.report is not None:
-        report = roof_report(
-            surface,
-            units,
-            name=name,
-            tolerance=documents.tolerance,
-            mesh_check=outcome.mesh_check,
-            targets=None if outcome.design is None else outcome.design.targets,
-            files={**files, **{path.name: _content(path) for path, _ in works}},
-            date=documents.date,
-            anyway=anyway,
-        )
+        listed = {**files, **{path.name: _content(path) for path, _ in works}}
+        report = outcome.report(documents, files=listed, anyway=anyway)
         works.append((Path(documents.report), report.write))
     return works
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +12,13 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Bools, Floats
-from ..base.errors import FileError, OptionError
-from ..base.files import check_beside
+from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units
 from ..io import read_bare
 from ..io.mesh_data import MeshData
 from ..surface import Patch, Surface
 from ..surface.geometry import area_vectors, segment_lengths
+from .drawn import check_beside
 from .rises import RISES, Rise, first_tension, taken
 
 if TYPE_CHECKING:
@@ -38,8 +39,8 @@ class MeshFile:
     units : of the file's numbers, where it has none itself; by default those of the project.
     tension : of all patches under pressure that ``patches`` does not name.
     patches : by the names in the file: ``tension``, ``pressure``, ``snow``, ``weight``, ``wall``.
-    supports : what is fixed instead of the file's supports: "boundary", all of it; "ground", its lowest level;
-        or a list of points and lines [x, y, z], whose vertices are fixed.
+    supports : what is fixed instead of the file's supports: "boundary", all of it; "ground", its lowest
+        level; or a list of points and lines [x, y, z], whose vertices are fixed.
     rises : heights that it has instead of tensions.
     """
 
@@ -64,7 +65,7 @@ def mesh_of(path: Path, value: Any) -> MeshFile:
     [Rise(patch=None, kind='rise', value=2.0)]
     """
     table = {"file": value} if isinstance(value, str) else dict(value)
-    check_beside(path, table["file"], "mesh")
+    check_beside(path, table.get("file", ""), "mesh")
     rises = taken(table, RISES, None, keep=True)
     return MeshFile(**table, rises=rises)
 
@@ -79,7 +80,12 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
     if mesh.patches or mesh.tension is not None:
         changes["patches"] = _patches(surface, mesh)
     if len(mesh.supports):
-        changes |= {"fixed": _supported(surface, mesh.supports), "on_plane": (), "on_planes": (), "on_line": ()}
+        changes |= {
+            "fixed": _supported(surface, mesh.supports),
+            "on_plane": (),
+            "on_planes": (),
+            "on_line": (),
+        }
     return (surface.rebuilt(**changes) if changes else surface), data
 
 
@@ -130,7 +136,7 @@ def _points(number: int, one: Any) -> Floats:
 def _distance(X: Floats, line: Floats) -> Floats:
     """(n,) the distance of points (n,3) from a line through points (k,3)."""
     away = np.full(len(X), np.inf)
-    for a, b in zip(line[:-1], line[1:], strict=True):
+    for a, b in pairwise(line):
         side = b - a
         part = np.clip((X - a) @ side / max(float(side @ side), 1e-300), 0.0, 1.0)
         away = np.minimum(away, np.linalg.norm(X - a - part[:, None] * side, axis=1))
@@ -162,7 +168,9 @@ def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Targ
             raise OptionError(f"{text} instead, the greatest height over the plane", what=rise.kind)
         height = rise.value if rise.kind == "apex" else level + rise.value
         given = {
-            p.name: first_tension(least, p.pressure, height - level) for p in surface.patches if p.name in names
+            p.name: first_tension(least, p.pressure, height - level)
+            for p in surface.patches
+            if p.name in names
         }
         highest = max(given.values())
         surface = surface.retensioned(dict.fromkeys(given, highest))
@@ -174,10 +182,7 @@ def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Targ
 def mesh_file(path: Path) -> MeshFile:
     """A surface file as the mesh of a project without other values.
 
-    Raises
-    ------
-    FileError : for a name without a suffix of a surface.
+    >>> mesh_file(Path("halls/hall.obj")).file
+    'hall.obj'
     """
-    if not path.name:
-        raise FileError(f"{path}: expected a file", what=str(path))
     return MeshFile(path.name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,9 +21,11 @@ from .documents import Documents
 if TYPE_CHECKING:
     from ..accuracy import AccurateResult, MeshCheck
     from ..design import Design
+    from ..drawings import DrawingSet
     from ..io.mesh_data import MeshData
     from ..panels import Panels
     from ..quantities import Figure
+    from ..report import RoofReport
     from ..structure import StructuralModel
     from .file import Project
     from .output import OnStep
@@ -95,6 +97,11 @@ class Outcome:
         return "\n".join([*lines, repr(self.shown.surface)])
 
     @property
+    def solved(self) -> Result:
+        """``result`` of a roof that was solved."""
+        return cast(Result, self.result)
+
+    @property
     def surface(self) -> Surface:
         """The surface reached, or the one that is shown as it is."""
         return cast(Surface, self.start) if self.result is None else self.result.surface
@@ -137,6 +144,11 @@ class Outcome:
         return self.certified and met and (self.accurate is None or self.accurate.reached)
 
     @property
+    def name(self) -> str:
+        """The name of the roof: of its file, without suffix."""
+        return "" if self.project is None else self.project.path.stem
+
+    @property
     def documents(self) -> Documents:
         """What the project says about its documents."""
         return Documents() if self.project is None else self.project.documents
@@ -175,6 +187,47 @@ class Outcome:
             )
         return cast("Panels", self._known[key])
 
+    def drawing_set(self, documents: Documents, *, anyway: bool = False, **options: Any) -> DrawingSet:
+        """The drawings of what is shown, as ``documents`` says; ``options`` as of ``pcmc.drawing_set``."""
+        from ..drawings import drawing_set
+
+        surface, certificate = self.shown
+        tolerance = documents.tolerance
+        return drawing_set(
+            surface,
+            self.units.length,
+            sheet=documents.sheet,
+            tolerance=tolerance,
+            panel_sheets=documents.panel_sheets,
+            name=self.name,
+            anyway=anyway,
+            certificate=certificate,
+            schedule=None if tolerance is None else self.panels(tolerance, anyway=anyway),
+            **options,
+        )
+
+    def report(self, documents: Documents, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:
+        """The report on what is shown, with the mesh check if it was made."""
+        from ..report import roof_report
+
+        surface, certificate = self.shown
+        tolerance = documents.tolerance
+        return roof_report(
+            surface,
+            self.units,
+            name=self.name,
+            tolerance=tolerance,
+            mesh_check=self.mesh_check,
+            mesh_failure=self.mesh_failure,
+            targets=None if self.design is None else self.design.targets,
+            files=files,
+            date=documents.date,
+            anyway=anyway,
+            certificate=certificate,
+            figures=self.figures,
+            schedule=None if tolerance is None else self.panels(tolerance, anyway=anyway),
+        )
+
     def model(self, structure: Any, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""
         solved = self.shown.surface if self.whole is not None or self.result is None else self.result
@@ -190,15 +243,15 @@ class Outcome:
         """Why a mesh check that was asked for failed; empty if it did not."""
         return str(self._known.get(("mesh failure", self.unfold), ""))
 
-    def wants_mesh_check(self, wanted: bool | None = None) -> bool:
-        """Whether the mesh is to be checked: as ``wanted`` or the project says, else up to 20 000 triangles.
+    def mesh_check_wanted(self, wanted: bool | None = None) -> bool | None:
+        """Whether the mesh is to be checked, as ``wanted`` or the project says; None where neither does."""
+        return self.project.mesh_check if wanted is None and self.project is not None else wanted
 
-        A surface that is not at rest is not checked.
-        """
-        if wanted is None and self.project is not None:
-            wanted = self.project.mesh_check
+    def wants_mesh_check(self, wanted: bool | None = None) -> bool:
+        """The same, where nothing is said up to 20 000 triangles; never of a surface that is not at rest."""
+        asked = self.mesh_check_wanted(wanted)
         small = self.shown.surface.m <= MOST_CHECKED
-        return self.certificate.index is not None and (small if wanted is None else wanted)
+        return self.certificate.index is not None and (small if asked is None else asked)
 
     def check_mesh(self, progress: OnStep | None = None) -> MeshCheck | None:
         """The mesh check of what is shown, made once; None where it fails, and ``mesh_failure`` says why.
@@ -210,10 +263,10 @@ class Outcome:
         key, accurate = ("mesh check", self.unfold), self.accurate
         if key in self._known:
             return self.mesh_check
-        if accurate is not None and accurate.check is not None and accurate.surface is self.surface:
-            if not self.unfold:
-                self._known[key] = accurate.check
-                return self.mesh_check
+        same = accurate is not None and accurate.surface is self.surface and not self.unfold
+        if accurate is not None and accurate.check is not None and same:
+            self._known[key] = accurate.check
+            return self.mesh_check
 
         def callback(state: Progress) -> None:
             if progress is not None:

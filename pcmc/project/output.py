@@ -152,9 +152,12 @@ def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> N
         check_suffix(picture)
 
 
-def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
-    """Refuse, before any work, paths that cannot be written; the folder ``made`` may be missing."""
-    seen = set()
+def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: Iterable[Path] = ()) -> None:
+    """Refuse, before any work, paths that cannot be written, and those of a command's own ``inputs``.
+
+    The folder ``made`` may be missing. A link to an input, and another way to write its path, is the input.
+    """
+    seen, read = set(), [path for path in inputs if path.exists()]
     if made is not None and made.exists() and not made.is_dir():
         raise FileError(f"{made} is a file; the output needs a folder", what=str(made))
     for path in paths:
@@ -169,6 +172,8 @@ def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
         problem = None
         if is_folder:
             problem = "is a folder; give the name of a file"
+        elif path.exists() and any(path.samefile(one) for one in read):
+            problem = "is read here, and is not written over; name another file"
         elif place in seen:
             problem = "is named twice; name two files for the output"
         elif folder != made and not folder.is_dir():

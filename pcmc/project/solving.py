@@ -21,7 +21,7 @@ from .aims import aims_below_supports
 from .file import Project, in_file
 from .outcome import EXTENSIVE, Outcome
 from .output import OnStep, ignore, metres_note
-from .start import Start, start_of
+from .start import start_of
 
 if TYPE_CHECKING:
     from ..design import Design, Target
@@ -86,7 +86,7 @@ def solve_project(project: Project, surface: Surface, progress: OnStep | None = 
         after = [stage for stage in project.remeshing if stage.when == "after"]
         if project.wanted.accuracy and not after and not project.targets:
             outcome = _solve_to_accuracy(project, surface, report)
-            return replace(outcome, notes=[*filter(None, notes), *outcome.notes])
+            return replace(outcome, notes=[*filter(None, notes), *outcome.notes], project=project)
         outcome = _solve_or_meet(project, surface, report)
         notes += outcome.notes
         for stage in after:
@@ -103,7 +103,7 @@ def solve_project(project: Project, surface: Surface, progress: OnStep | None = 
                 notes += outcome.notes
             else:
                 outcome = replace(accurate, design=outcome.design)
-    return replace(outcome, notes=[note for note in notes if note])
+    return replace(outcome, notes=[note for note in notes if note], project=project)
 
 
 def _again(project: Project, surface: Surface, report: OnStep) -> Outcome:

@@ -41,9 +41,7 @@ def start_of(project: Project) -> Start:
         units = Units(data.units.length, project.units.force or data.units.force)
         surface, targets, vary = first_tensions(surface, project.mesh)
         if targets:
-            project = replace(
-                project, targets=[*project.targets, *targets], vary=[*project.vary, *vary]
-            )
+            project = replace(project, targets=[*project.targets, *targets], vary=[*project.vary, *vary])
         return Start(surface, units, project, data)
     assert project.plan is not None
     layers = {} if project.drawing is None else project.drawing.layers

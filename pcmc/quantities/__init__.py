@@ -1,7 +1,7 @@
 """The one table of quantities, and the key figures of a roof in its terms.
 
-Gives ``QUANTITIES``, ``dimension_of`` and ``figures`` to targets, mesh check, page, report, sweep and command.
-May import ``certificate`` and the rooms below it.
+Gives ``QUANTITIES``, ``dimension_of`` and ``figures`` to targets, mesh check, page, report, sweep, command. May
+import ``certificate`` and the rooms below it.
 """
 
 from .figures import Figure, figures
