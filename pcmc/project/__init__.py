@@ -1,9 +1,8 @@
 """A whole design in one TOML file: plan, solver, remeshing, targets, output.
 
-Gives ``load``, ``opened``, ``designed`` and ``run`` to sweeps, page, command. May import ``plot`` and the
-rooms below it. A file becomes a ``Project`` (``load``, which meshes nothing), its ``Start`` (``start_of``), an
-``Outcome`` (``designed``), and files (``run``); each is a value, made once. A drawing or a mesh alone is a
-project, too.
+Gives ``load``, ``opened``, ``designed`` and ``run`` to sweep, page and command. May import ``plot`` and the
+rooms below it. A file becomes a ``Project`` (``load``, which meshes nothing), its ``Start``, an ``Outcome``
+(``designed``), and files (``run``); each is a value, made once. A drawing or a mesh alone is a project, too.
 
 ``designed(path)`` is the roof that a project describes, from a cache if it was solved before.
 ``opened(path)`` is what is in any file: the designed roof of a project, or a surface as it is.

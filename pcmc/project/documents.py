@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..base import validate
 from ..base.errors import OptionError
@@ -16,12 +16,8 @@ from ..drawings.drawing_set import check_suffix as check_drawing
 from ..drawings.sheet import FORMATS
 from ..panels import Panels
 from ..report.document import check_suffix as check_report
-from ..structure import write_structure
 from .output import Works
 from .structure import Structure
-
-if TYPE_CHECKING:
-    from .outcome import Outcome
 
 CSV, INP = ".csv", ".inp"
 SINGLE = ("panels", "structure", "report")  # keys of one file each
@@ -104,42 +100,6 @@ def documents_of(output: Mapping[str, Any]) -> Documents:
     return Documents(**{name: output[name] for name in known if name in output})
 
 
-def document_works(
-    documents: Documents,
-    structure: Structure | None,
-    outcome: Outcome,
-    files: Mapping[str, str],
-    anyway: bool = False,
-) -> Works:
-    """Each document with the function that writes it.
-
-    Parameters
-    ----------
-    structure : of the project.
-    files : name of each other file of the project, and what it is, for the report.
-    anyway : make them of a roof that is not certified; drawings and report are marked.
-
-    Raises
-    ------
-    OptionError, SurfaceError : as ``drawing_set``, ``panels``, ``StructuralModel`` and ``roof_report``.
-    """
-    works = Works()
-    if documents.drawings:
-        drawings = outcome.drawing_set(documents, anyway=anyway)
-        works += drawings.files(*documents.drawings)
-    if documents.panels is not None and documents.tolerance is not None:
-        schedule = outcome.panels(documents.tolerance, anyway=anyway)
-        works += schedule_works(Path(documents.panels), schedule)
-    if documents.structure is not None and structure is not None:
-        model = outcome.model(structure, anyway)
-        works.append((Path(documents.structure), partial(write_structure, model=model)))
-    if documents.report is not None:
-        listed = {**files, **{path.name: _content(path) for path, _ in works}}
-        report = outcome.report(documents, files=listed, anyway=anyway)
-        works.append((Path(documents.report), report.write))
-    return works
-
-
 def check_schedule(path: Path) -> None:
     """Refuse the name of a schedule that does not end with .csv."""
     suffix_of(path, (CSV,), "a schedule of panels")
@@ -160,16 +120,3 @@ def schedule_works(path: Path, schedule: Panels) -> Works:
     tables = (schedule.panels, schedule.families, schedule.edges)
     paths = schedule_paths(path)
     return [(one, partial(table.to_csv, index=False)) for one, table in zip(paths, tables, strict=True)]
-
-
-CONTENTS = {
-    ".csv": "panels",
-    INP: "structural model",
-    ".dxf": "drawings",
-    ".pdf": "drawings",
-    ".svg": "drawing",
-}
-
-
-def _content(path: Path) -> str:
-    return CONTENTS[path.suffix.lower()]

@@ -9,13 +9,22 @@ from typing import Any
 
 from .. import io
 from ..base.files import folder as made
+from ..structure import write_structure
 from ..surface import Surface
 from . import cache
-from .documents import document_works
+from .documents import schedule_works
 from .file import PathLike, Project, in_file, load
 from .outcome import Outcome
 from .output import OnStep, Works, check_names, check_outputs, fields, ignore, paint, write_all
 from .solving import solve_from_start
+
+CONTENTS = {
+    ".csv": "panels",
+    ".inp": "structural model",
+    ".dxf": "drawings",
+    ".pdf": "drawings",
+    ".svg": "drawing",
+}
 
 
 def run(
@@ -90,20 +99,35 @@ def run_project(
 
 
 def _documents(project: Project, outcome: Outcome, anyway: bool, report: OnStep) -> Works:
-    """The project's documents, each with the function that writes it."""
-    if not project.documents.names:
-        return []
-    if project.documents.report is not None and outcome.wants_mesh_check():
+    """The project's documents, each with the function that writes it.
+
+    A document of a roof that is not certified is marked.
+    """
+    documents, works = project.documents, Works()
+    if not documents.names:
+        return works
+    if documents.report is not None and outcome.wants_mesh_check():
         outcome.check_mesh(report)
     report("drawing, sorting panels, modelling")
-    files = {project.path.name: "project"}
-    if project.drawing is not None:
-        files[project.drawing.path.name] = "drawing of the plan"
-    files |= {Path(file).name: "surface" for file in project.files}
-    if project.picture is not None:
-        files[Path(project.picture).name] = "picture"
     with in_file(project.path):
-        return document_works(project.documents, project.structure, outcome, files, anyway)
+        if documents.drawings:
+            works += outcome.drawing_set(documents, anyway=anyway).files(*documents.drawings)
+        if documents.panels is not None and documents.tolerance is not None:
+            schedule = outcome.panels(documents.tolerance, anyway=anyway)
+            works += schedule_works(Path(documents.panels), schedule)
+        if documents.structure is not None and project.structure is not None:
+            model = outcome.model(project.structure, anyway)
+            works.append((Path(documents.structure), partial(write_structure, model=model)))
+        if documents.report is not None:
+            listed = {path.name: "project" for path in project.inputs[:1]}
+            listed |= {path.name: "drawing or mesh of the roof" for path in project.inputs[1:]}
+            listed |= {Path(file).name: "surface" for file in project.files}
+            listed |= {} if project.picture is None else {Path(project.picture).name: "picture"}
+            listed |= {path.name: CONTENTS[path.suffix.lower()] for path, _ in works}
+            works.append(
+                (Path(documents.report), outcome.report(documents, files=listed, anyway=anyway).write)
+            )
+    return works
 
 
 def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "") -> Works:

@@ -1,6 +1,6 @@
 """The one table of quantities, and the key figures of a roof in its terms.
 
-Gives ``QUANTITIES``, ``dimension_of`` and ``figures`` to targets, mesh check, page, report, sweep, command. May
+Gives ``QUANTITIES``, ``dimension_of`` and ``figures`` to targets, mesh check, page, report and sweep. May
 import ``certificate`` and the rooms below it.
 """
 
