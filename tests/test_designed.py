@@ -44,8 +44,8 @@ def folder(tmp_path, monkeypatch):
 def solves(monkeypatch):
     """The list that every project solved from its start is added to."""
     solved = []
-    solve = running.solve_project
-    monkeypatch.setattr(running, "solve_project", lambda *given: solved.append(given) or solve(*given))
+    solve = solving.solve_project
+    monkeypatch.setattr(solving, "solve_project", lambda *given: solved.append(given) or solve(*given))
     return solved
 
 
