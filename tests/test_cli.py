@@ -18,7 +18,7 @@ from generators import two_squares
 from pcmc import cli
 from pcmc.base.units import NO_UNITS
 from pcmc.io import load
-from pcmc.project import running
+from pcmc.project import solving
 
 COMMANDS = [
     "solve",

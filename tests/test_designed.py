@@ -18,7 +18,7 @@ from pcmc.base.units import Units
 from pcmc.design.outcome import UNIT_OF
 from pcmc.design.quantities import QUANTITIES
 from pcmc.explore.page_data import unit_texts
-from pcmc.project import build, cached_files, clear_cache, designed, load, run, running
+from pcmc.project import build, cached_files, clear_cache, designed, load, run, solving
 
 GOAL = """
 [targets]
