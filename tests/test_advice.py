@@ -152,7 +152,7 @@ def test_a_finer_mesh_that_is_not_at_rest_says_what_it_reaches(tmp_path, monkeyp
             replace(project, targets=(), options={"iterations": 1, "levels": 0}), surface, report
         )
 
-    monkeypatch.setattr(running, "_again", again)
+    monkeypatch.setattr(solving, "_again", again)
     outcome = outcome_of(tmp_path, REMESHED)
     assert not outcome.good
     (note,) = outcome.notes

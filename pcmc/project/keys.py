@@ -284,14 +284,15 @@ def solve_section(method: str) -> Section:
 def target_sections() -> tuple[Section, ...]:
     """[targets] and its tables."""
     from ..design import Parameter, Target  # needed by projects with targets only
-    from ..design.quantities import QUANTITIES
+    from ..design.quantities import MEASURES
     from ..design.targets import KINDS as KINDS_OF_PARAMETER
+    from ..design.targets import SHORT
 
     changing = _of_class(
         Parameter, {"patch": "a name or a list of names"}, choices={"kind": KINDS_OF_PARAMETER}
     )
     varied = "what may change; a name is a patch whose tension may, a list of names several with one tension"
-    wanted = _of_class(Target, {"of": "a name or a point [x, y]"}, {"quantity": tuple(QUANTITIES)})
+    wanted = _of_class(Target, {"of": "a name or a point [x, y]"}, {"quantity": (*MEASURES, *SHORT)})
     return (
         Section(
             "targets",
