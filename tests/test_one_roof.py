@@ -1,4 +1,4 @@
-"""One flow of a project: loaded without a mesh, each finding computed once, nothing written over its input."""
+"""One flow of a project: loaded without a mesh, each finding computed once, no input written over."""
 
 import os
 import warnings

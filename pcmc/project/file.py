@@ -153,7 +153,8 @@ def load(path: PathLike, *, units: str = "") -> Project:
     path = Path(path)
     if not is_project(path):
         return Project(path, mesh=mesh_file(path), units=Units(units))
-    project = project_of(path, *read_data(path, units))
+    text, data = read_data(path, units)
+    project = project_of(path, data, text)
     if units and project.units.length not in ("", units):
         text = f"{path}: the project is in {project.units.length}, not in {units}; leave out --units"
         raise OptionError(text, what="units", found=units, expected=project.units.length)
@@ -241,7 +242,7 @@ def in_file(path: Path, kind: type[PcmcError] | None = None) -> Iterator[None]:
         raise error.in_file(f"{path}: line {line}" if line else path, kind) from None
 
 
-def project_of(path: Path, text: str, data: Mapping[str, Any]) -> Project:
+def project_of(path: Path, data: Mapping[str, Any], text: str = "") -> Project:
     """The project with the given data, which were read from a text. Errors as in ``load``."""
     given, mesh = data, None
     with in_file(path, FileError):
