@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from ..surface.geometry import segment_lengths
 
 @dataclass(frozen=True)
 class Load:
-    """A weight or a cable's tension: its value at the start, and its rate with λ."""
+    """A weight or a cable's tension: its value at the start (of ``Loads.line``: at λ = 0), and its rate."""
 
     kind: str
     name: str
@@ -29,7 +29,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Loads:
-    """The loads that vary; ``change`` is that of λ since the start."""
+    """The loads that vary."""
 
     parts: tuple[Load, ...] = ()
 
@@ -52,30 +52,37 @@ class Loads:
                 message = f"the tension of the cable {load.name!r} is 0; start from one > 0"
                 raise OptionError(message, what="parameter", where=load.name, found=load.start)
 
-    @property
-    def starts(self) -> Floats:
-        """(l,) the values at the start."""
-        return np.array([load.start for load in self.parts])
+    def line(self, relative: bool) -> Loads:
+        """These with their values at λ = 0 for those at the start, where λ is 0 if ``relative``."""
+        return self if relative else Loads(tuple(replace(load, start=0.0) for load in self.parts))
+
+    def values(self, value: float) -> Floats:
+        """(l,) the values at λ."""
+        return np.array([load.start + load.rate * value for load in self.parts])
 
     @property
     def rates(self) -> Floats:
         """(l,) the rates."""
         return np.array([load.rate for load in self.parts])
 
-    def allow(self, change: float) -> bool:
-        """Whether every cable still pulls."""
-        return all(load.kind != "cable" or load.start + load.rate * change > 0.0 for load in self.parts)
+    def allow(self, value: float) -> bool:
+        """Whether every cable still pulls at λ."""
+        return all(
+            load.kind != "cable" or pull > 0.0
+            for load, pull in zip(self.parts, self.values(value), strict=True)
+        )
 
-    def at(self, change: float) -> dict[str, Any]:
-        """The loads as arguments of ``Surface.retensioned``."""
-        values: dict[str, Any] = {"weights": {}, "cables": {}}
-        for load in self.parts:
-            values[f"{load.kind}s"][load.name] = load.start + load.rate * change
-        return values
+    def at(self, value: float) -> dict[str, Any]:
+        """The loads at λ as arguments of ``Surface.retensioned``."""
+        kinds: dict[str, Any] = {"weights": {}, "cables": {}}
+        for load, load_value in zip(self.parts, self.values(value).tolist(), strict=True):
+            kinds[f"{load.kind}s"][load.name] = load_value
+        return kinds
 
-    def columns(self, change: float) -> dict[str, float]:
-        """The loads as columns of a table."""
-        return {f"{load.kind} {load.name}": load.start + load.rate * change for load in self.parts}
+    def columns(self, value: float) -> dict[str, float]:
+        """The loads at λ as columns of a table."""
+        names = [f"{load.kind} {load.name}" for load in self.parts]
+        return dict(zip(names, self.values(value).tolist(), strict=True))
 
     def energy_derivative(self, surface: Surface, X: Floats) -> float:
         """∂E/∂λ = Σ ẇ ∫ z dA + Σ τ̇ L at X (n,3)."""
