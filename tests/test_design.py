@@ -161,6 +161,18 @@ def test_a_bound_in_the_way(roof):
     assert design.targets["limit"].iloc[0] == pytest.approx(nearest, rel=1e-6)
 
 
+def test_a_tension_that_stays_and_a_bound_that_is_reached_keep_their_last_digit():
+    """The unknown is 1/α, and 1/(1/49) is not 49."""
+    for tension in np.arange(35, 140) * 0.49:
+        roof = pyramid(tension=tension)
+        met = meet(roof, Target("apex", "roof", at_least=0.0), "roof")
+        assert met.parameters["value"].iloc[0] == met.surface.patches[0].tension == tension
+        low, high = 0.9 * tension, 1.1 * tension
+        bounded = meet(roof, Target("apex", "roof", 9.0), Parameter("roof", low=low, high=high))
+        assert bounded.status is DesignStatus.AT_BOUND
+        assert bounded.surface.patches[0].tension == low
+
+
 def test_targets_that_contradict_each_other():
     targets = [Target("curvature", "cap", 0.5), Target("curvature", "cap", 0.8)]
     design = meet(cap(), targets, ["cap"])

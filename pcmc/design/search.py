@@ -40,6 +40,7 @@ STARTS = 7  # solves with stiffer tensions: 1.5⁶ is 11; if that does not help,
 INFLATION = 4.0  # of a solve, which starts near its solution: a surface that grows more runs away
 ITERATIONS = 60  # of a solve, for the same reason
 SMALL_CHANGE = 0.02  # of an unknown: below it the mesh is not improved, as quantities depend on it a little
+ROUNDING = 1e-12  # of an unknown's size: a bound that is nearer is reached
 OVERLOADED = "overloaded"  # in place of a solve's status where none was tried
 
 
@@ -120,6 +121,7 @@ class Search:
     def __post_init__(self) -> None:
         surface, parameters = self.surface, self.parameters
         self.options = {"inflation": INFLATION, "iterations": ITERATIONS, **self.options}
+        self.given = np.array([p.value(surface) for p in parameters])
         self.limits = np.array([p.bounds(surface) for p in parameters], dtype=float)
         self.reciprocal = np.array([p.tension_under_pressure(surface) for p in parameters])
         self.bounds = np.sort(self.converted(self.limits.T), axis=0)
@@ -142,6 +144,20 @@ class Search:
         safe = np.where(self.reciprocal, values, 1.0)
         return np.where(self.reciprocal, 1.0 / safe, values)
 
+    def values(self, x: Floats) -> Floats:
+        """The parameters of unknowns; the values given and the bounds to the last digit, though 1/(1/49) < 49."""
+        values = self.converted(x)
+        for known in (*self.limits.T, self.given):
+            values = np.where(x == self.converted(known), known, values)
+        return values
+
+    def ahead(self, here: Iterate, step: Floats) -> Floats:
+        """The unknowns a step ahead, which are at a bound where they are beside it only by rounding."""
+        x = here.x + step
+        for bound in self.bounds:
+            x = np.where(np.abs(x - bound) <= ROUNDING * self.sizes(here), bound, x)
+        return x
+
     def run(self) -> Design:
         """Search to the end; if asked to stop, end with the best so far."""
         try:
@@ -161,7 +177,7 @@ class Search:
                 return self.design(DesignStatus.MET, here)
             step, misfit = self.gauss_newton(here)
             if here.phi - misfit <= LEAST_GAIN * here.phi:
-                end = here.x + step
+                end = self.ahead(here, step)
                 bounded = ((end <= self.bounds[0]) | (end >= self.bounds[1])).any()
                 return self.design(DesignStatus.AT_BOUND if bounded else DesignStatus.CONFLICT, here)
             plan = StepPlan.of(before, here, step)
@@ -175,8 +191,7 @@ class Search:
 
     def initial_unknowns(self) -> Floats:
         """The unknowns of the surface given, within their bounds."""
-        values = np.array([p.value(self.surface) for p in self.parameters])
-        return np.clip(self.converted(values), *self.bounds)
+        return np.clip(self.converted(self.given), *self.bounds)
 
     def first_iterate(self) -> Iterate:
         """The first solution; tensions are raised until there is one."""
@@ -217,7 +232,7 @@ class Search:
     def with_unknowns(self, surface: Surface, x: Floats) -> Surface:
         """The surface with the tensions and pressures that the unknowns stand for."""
         values: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
-        for parameter, value in zip(self.parameters, self.converted(x).tolist(), strict=True):
+        for parameter, value in zip(self.parameters, self.values(x).tolist(), strict=True):
             values[parameter.kind] |= dict.fromkeys(parameter.names, value)
         changed = with_pressures(surface, values["tension"], values["pressure"])
         others = {f"{kind}s": values[kind] for kind in ("volume", "weight", "cable") if values[kind]}
@@ -273,7 +288,7 @@ class Search:
         for attempt in range(TRIES):
             if self.solves >= self.max_solves:
                 return DesignStatus.SOLVES
-            x = here.x + t * plan.step
+            x = self.ahead(here, t * plan.step)
             small = (np.abs(x - here.x) < SMALL_CHANGE * self.sizes(here)).all()
             there = self.solve_from(here.result.surface, x, {"min_quality": 0.0} if small else {})
             if there is not None and there.phi < here.phi:
@@ -291,7 +306,7 @@ class Search:
 
     def record(self, x: Floats, status: str, trial: Trial | None = None) -> None:
         """Add a row to the history, and call the callback with it."""
-        row = dict(zip((p.label for p in self.parameters), self.converted(x).tolist(), strict=True))
+        row = dict(zip((p.label for p in self.parameters), self.values(x).tolist(), strict=True))
         if trial is not None:
             row |= zip((t.label for t in self.targets), trial.quantities.tolist(), strict=True)
         misfit = math.nan if trial is None else trial.phi
@@ -317,7 +332,7 @@ class Search:
         )
         parameters = pd.DataFrame(
             {
-                "start": [p.value(self.surface) for p in self.parameters],
+                "start": self.given,
                 "value": [p.value(here.result.surface) for p in self.parameters],
                 "low": self.limits[:, 0],
                 "high": self.limits[:, 1],
