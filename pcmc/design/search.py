@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from scipy.optimize import lsq_linear
+from scipy.spatial import cKDTree
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..certificate.balance import coarseness, load_is_given, load_ratio
 from ..certificate.proof import Overload
@@ -26,6 +27,7 @@ from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 from .outcome import Design, DesignStatus, NoStart
+from .quantities import vertices_up
 from .sensitivity import sensitivities
 from .steps import Iterate, StepPlan, Trial
 from .targets import KINDS, Parameter, Target, as_parameters, as_targets, measure
@@ -129,6 +131,7 @@ class Search:
         self.scale = np.array([t.scale(surface) for t in self.targets])
         self.trust = 1.0  # longest step, as a part of the unknowns' sizes
         self.solves = 0
+        self.instead: dict[int, Target] = {}  # of targets, by their numbers: see ``aimed``
         self.best: Trial | None = None
         self.rows: list[dict[str, Any]] = []
         self.failed: Result | Overload | None = None
@@ -145,7 +148,7 @@ class Search:
         return np.where(self.reciprocal, 1.0 / safe, values)
 
     def values(self, x: Floats) -> Floats:
-        """The parameters of unknowns; the values given and the bounds to the last digit, though 1/(1/49) < 49."""
+        """The parameters of unknowns; given ones and bounds to the last digit, though 1/(1/49) is not 49."""
         values = self.converted(x)
         for known in (*self.limits.T, self.given):
             values = np.where(x == self.converted(known), known, values)
@@ -180,7 +183,7 @@ class Search:
                 end = self.ahead(here, step)
                 bounded = ((end <= self.bounds[0]) | (end >= self.bounds[1])).any()
                 return self.design(DesignStatus.AT_BOUND if bounded else DesignStatus.CONFLICT, here)
-            plan = StepPlan.of(before, here, step)
+            plan = StepPlan.of(before if here.aims == self.targets else None, here, step)
             if plan.at_fold:
                 change = plan.to_limit * (here.jacobian @ plan.step) * self.scale
                 return self.design(DesignStatus.AT_FOLD, here, here.quantities + change)
@@ -241,8 +244,27 @@ class Search:
     def trial(self, x: Floats, result: Result) -> Trial:
         """The quantities and misfits of a solve."""
         quantities = np.array([measure(result.surface, t).value for t in self.targets])
-        r = (quantities - self.wanted(quantities)) / self.scale
-        return Trial(x, result, quantities, r, float(np.linalg.norm(r)))
+        wanted = self.wanted(quantities)
+        aimed = [
+            self.aimed(result.surface, k, *pair)
+            for k, pair in enumerate(zip(quantities, wanted, strict=True))
+        ]
+        r = (np.array([value for _, value in aimed]) - wanted) / self.scale
+        return Trial(x, result, quantities, r, float(np.linalg.norm(r)), [aim for aim, _ in aimed])
+
+    def aimed(self, surface: Surface, number: int, value: float, wanted: float) -> tuple[Target, float]:
+        """The quantity that the search changes for a target, and its value: the target's own, as a rule.
+
+        Where the highest point is held and a higher one is wanted, no small change moves it. There it is the
+        height over the point of Π farthest from what is held, until another point is the highest.
+        """
+        target = self.targets[number]
+        if target.quantity == "apex" and wanted - value > self.tolerance * self.scale[number]:
+            low, held = vertices_up(surface, target.of), surface.pinned | surface.on_ground
+            if held[low[-1]] and not held[low].all():
+                aim = self.instead.setdefault(number, _middle(surface, low, held))
+                return aim, measure(surface, aim).value
+        return target, value
 
     def wanted(self, quantities: Floats) -> Floats:
         """(targets,) the wanted values nearest to these."""
@@ -251,12 +273,12 @@ class Search:
     def with_jacobian(self, at: Trial) -> Iterate | None:
         """The trial with its derivatives; None at a fold."""
         try:
-            slopes = sensitivities(at.result.surface, self.targets, self.parameters).to_numpy()
+            slopes = sensitivities(at.result.surface, at.aims, self.parameters).to_numpy()
         except SurfaceError:
             return None
         jacobian = slopes * np.where(self.reciprocal, -(self.converted(at.x) ** 2), 1.0)
         jacobian = jacobian * (at.r != 0.0)[:, None] / self.scale[:, None]
-        return Iterate(at.x, at.result, at.quantities, at.r, at.phi, jacobian)
+        return Iterate(at.x, at.result, at.quantities, at.r, at.phi, at.aims, jacobian)
 
     def is_met(self, at: Trial) -> bool:
         """Whether every target is met."""
@@ -350,6 +372,14 @@ def _unsolved(surface: Surface) -> Result:
         raise StopIteration
 
     return solve(surface, "newton", stop)
+
+
+def _middle(surface: Surface, vertices: Ints, held: Bools) -> Target:
+    """The height over the vertex of these (k,) that is farthest along Π from the held ones of them."""
+    place = surface.plane.to_local(surface.vertices)[:, :2]
+    free, fixed = vertices[~held[vertices]], vertices[held[vertices]]
+    x, y = place[free[cKDTree(place[fixed]).query(place[free])[0].argmax()]].tolist()
+    return Target("height", (x, y))
 
 
 def _metric(parameters: Sequence[Parameter], reciprocal: Bools) -> Floats:
