@@ -9,8 +9,9 @@ from pcmc import Plane, Surface, Verdict, solve
 from pcmc.base.errors import PlanWarning
 from pcmc.energy.functional import patch_areas
 from pcmc.meshing.quality import edge_lengths, minimum_angle
-from pcmc.plan import Area, Divider, Hole, Plan, plan_from
+from pcmc.plan import Area, Divider, Hole, Plan, draft, patch_names, plan_from
 from pcmc.plan.curves import arc, bezier, circle, join, polyline
+from pcmc.plan.draft import drafted
 from pcmc.plan.heights import dome, harmonic_heights
 from pcmc.plan.pieces import to_local
 from pcmc.plan.planar import triangulate
@@ -89,6 +90,22 @@ def test_an_l_with_a_courtyard_and_three_walls_at_120_degrees(h):
     assert not surface.on_plane.any()
     lengths = edge_lengths(surface)
     assert np.mean(lengths) == pytest.approx(h, rel=0.2)
+
+
+def test_the_names_of_patches_need_no_mesh(monkeypatch):
+    random = np.random.default_rng(3)
+    chords = [[[x, -1], [y, 13]] for x, y in random.uniform(1, 19, (6, 2)).round(2).tolist()]
+    across = [{"curve": [[-1, y], [21, y]], "cable": 1.0, "wall": None} for y in (3.1, 7.7)]
+    holes = [circle([5, 5], 1.0), circle([15, 8], 1.5)]
+    plans = [
+        Plan(BOX, lines, cut, tension=5.0, edge_length=0.7, supports=spots)
+        for lines in ([], chords[:1], chords, across, chords + across)
+        for cut, spots in (([], []), (holes, [[2.5, 1.3]]), ([], [circle([10, 6], 2), [[2, 3], [3, 1]]]))
+    ]
+    meshed = [int(drafted(plan).mesh.region.max()) + 1 for plan in plans]
+    monkeypatch.setattr(draft, "triangulate", None)
+    assert [len(patch_names(plan)) for plan in plans] == meshed
+    assert patch_names(plan_from(tomllib.loads(L_WITH_COURTYARD))) == ("corner", "north", "east")
 
 
 def test_the_same_plan_gives_the_same_surface():

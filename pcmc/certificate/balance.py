@@ -65,9 +65,9 @@ def load_is_given(surface: Surface) -> bool:
 
 
 def load(surface: Surface) -> float:
-    """Σ p A_T ν_T · n - Σ w A_T: the force of pressure and weight along Π's normal n, on the supports."""
+    """Σ (p - s) A_T ν_T · n - Σ w A_T: the force of pressure, snow and weight along Π's normal n."""
     vector = area_vectors(surface.vertices[surface.faces])
-    pressed = surface.pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
+    pressed = surface.net_pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
     if not surface.weights.any():
         return float(pressed)
     return float(pressed - surface.weights[surface.patch_of_face] @ np.linalg.norm(vector, axis=1))
@@ -96,7 +96,7 @@ def coarseness(surface: Surface) -> float:
     """
     X, topo = surface.vertices, surface.topology
     length = segment_lengths(X, topo.edges[topo.boundary_edge & ~surface.mirror_edge])
-    corners = X[surface.faces[~surface.walls[surface.patch_of_face]]]
+    corners = X[surface.faces[~surface.auxiliary[surface.patch_of_face]]]
     plan = abs(float(area_vectors(corners).sum(axis=0) @ np.array(surface.plane.normal)))
     if not len(length) or plan == 0.0:
         return 0.0
@@ -189,7 +189,7 @@ def unheld(surface: Surface, stable: bool) -> Unheld | None:
     (Unheld(vertex=0, pressed=True), None)
     """
     parts, used = surface.topology.components, surface.faces[:, 0]
-    pressed = np.unique(parts[used[surface.pressures[surface.patch_of_face] != 0.0]])
+    pressed = np.unique(parts[used[surface.net_pressures[surface.patch_of_face] != 0.0]])
     held = surface.given_supports.fixed.copy()
     for _, along in surface.given_supports.on_line:
         held |= along

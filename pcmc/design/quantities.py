@@ -55,7 +55,7 @@ def vertices_up(surface: Surface, of: str | None) -> Ints:
 
 
 def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
-    """Height at which the normal of Π through a point of Π meets the highest triangle under pressure.
+    """Height at which the normal of Π through a point of Π meets the highest triangle of the roof.
 
     A corner's displacement d raises the triangle's plane there by λ ⟨d, ν⟩ / ⟨ν, n⟩, with λ the
     corner's barycentric coordinate and ν, n the normals of triangle and Π.
@@ -87,15 +87,15 @@ def _area(surface: Surface, of: str | None) -> Measurement:
 
 
 def _volume(surface: Surface, of: str | None) -> Measurement:
-    """V_i as in ``volumes_below``, of one patch or of all under pressure, length³."""
+    """V_i as in ``volumes_below``, of one patch or of the roof, length³."""
     one = _chosen_patches(surface, of)
     return Measurement(float(one @ volumes_below(surface)), volume_below_gradient(surface, one))
 
 
 def _curvature(surface: Surface, of: str) -> Measurement:
-    """p / (2α), 1/length."""
+    """p / (2α), p net of snow, 1/length."""
     index = surface.patch_index(of)
-    alpha, p = surface.tensions[index], surface.pressures[index]
+    alpha, p = surface.tensions[index], surface.net_pressures[index]
     if surface.patches[index].weight:
         message = f"curvature of {of}: with a weight it differs from place to place; it has no single value"
         raise OptionError(message, what="of", found=of)
@@ -107,9 +107,10 @@ def _curvature(surface: Surface, of: str) -> Measurement:
 
 
 def _pressure(surface: Surface, of: str) -> Measurement:
-    """The pressure of a room of prescribed volume, force/length²."""
+    """The pressure of the air in a room of prescribed volume, force/length²."""
     row = np.linalg.pinv(surface.room_signs.T)[room_index(surface, of)]
-    return Measurement(float(row @ surface.pressures), np.zeros_like(surface.vertices), by_pressure=row)
+    rest, snow = np.zeros_like(surface.vertices), {"snow": np.zeros_like(row)}
+    return Measurement(float(row @ surface.pressures), rest, by_pressure=row, by_load=snow)
 
 
 def room_index(surface: Surface, name: str) -> int:
@@ -166,7 +167,7 @@ def _force_gradient(surface: Surface, v: int, pull: Floats) -> Floats:
     row, corner = np.nonzero(np.equal(F, v))
     np.add.at(slope, F[row], np.einsum("fjab,a->fjb", blocks[row, corner], pull))
     # ⅓ A ν = (q - p) × (r - p) / 6, whose part along u changes by (q - r) × u / 6 as p moves
-    X, sixth = surface.vertices, surface.pressures[surface.patch_of_face[around]] / 6.0
+    X, sixth = surface.vertices, surface.net_pressures[surface.patch_of_face[around]] / 6.0
     for c in range(3):
         opposite = X[F[:, c - 2]] - X[F[:, c - 1]]
         np.add.at(slope, F[:, c], -sixth[:, None] * np.cross(opposite, pull))
@@ -196,7 +197,7 @@ def _chosen_patches(surface: Surface, of: str | None) -> Floats:
 
 
 def _faces_of(surface: Surface, of: str | None) -> Bools:
-    """(m,) faces of the patch, or of all patches under pressure."""
+    """(m,) faces of the patch, or of the roof."""
     return np.asarray(_chosen_patches(surface, of)[surface.patch_of_face] != 0.0)
 
 

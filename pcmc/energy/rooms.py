@@ -110,7 +110,7 @@ def prescribed_volumes(surface: Surface) -> Floats:
 
 
 def room_pressures(surface: Surface) -> Floats:
-    """(r,) the pressure of each room, force/length²: that which fits the patches around it best.
+    """(r,) the pressure of the air in each room, force/length²: that which fits the patches around it best.
 
     >>> from pcmc import Patch
     >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 3.0, 2.0)],
@@ -131,7 +131,7 @@ def with_room_pressures(surface: Surface, change: Floats) -> Surface:
     [1.5]
     """
     pressures = surface.pressures + change @ surface.room_signs
-    pressures[surface.walls & (np.abs(pressures) <= ROUNDING * np.abs(pressures).max())] = 0.0
+    pressures[surface.auxiliary & (np.abs(pressures) <= ROUNDING * np.abs(pressures).max())] = 0.0
     touched = np.flatnonzero(surface.room_signs.any(axis=0))
     names = [patch.name for patch in surface.patches]
     new = {names[k]: float(pressures[k]) for k in touched}

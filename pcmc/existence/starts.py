@@ -35,7 +35,7 @@ def low_start(surface: Surface) -> Surface | None:
     """
     if not _spans(surface.vertices[surface.fixed]) or not _upright(surface):
         return None
-    walls = surface.walls[surface.patch_of_face]
+    walls = surface.auxiliary[surface.patch_of_face]
     faces = surface.faces[~walls] if not walls.all() else surface.faces
     roof = np.zeros(surface.n, dtype=bool)
     roof[faces] = True
@@ -57,7 +57,7 @@ def low_start(surface: Surface) -> Surface | None:
         above *= np.sign(load(_at(surface, low + above[:, None] * [0.0, 0.0, 1.0]))) or 1.0
     rise = RISE * span
     most = float(np.abs(above[roof]).max())
-    if surface.pressures.any() and most > 0.0:
+    if surface.net_pressures.any() and most > 0.0:
         low[:, 2] += above * min(1.0, rise / most) if kept else above * (rise / most)
     if not roof.all():
         # walls below: between their feet and the roof; rows of walls that can pinch right below it

@@ -152,19 +152,20 @@ class _Model:
             RepresentationType="Tessellation",
             Items=[mesh],
         )
+        wall = bool(surface.walls[k])
         element = self.rooted(
-            "IfcWall" if patch.auxiliary else "IfcSlab",
+            "IfcWall" if wall else "IfcSlab",
             f"patch {k}",
             Name=patch.name,
             ObjectPlacement=self.placement(place),
             Representation=self.add("IfcProductDefinitionShape", Representations=[shape]),
-            PredefinedType="NOTDEFINED" if patch.auxiliary else "ROOF",
+            PredefinedType="NOTDEFINED" if wall else "ROOF",
         )
         force = bool(self.units.force)
+        per_area = {"Pressure": patch.pressure, "Weight": patch.weight, "Snow": patch.snow}
         values = {
             "Tension": self.add("IfcLinearForceMeasure" if force else "IfcReal", patch.tension),
-            "Pressure": self.add("IfcPlanarForceMeasure" if force else "IfcReal", patch.pressure),
-            "Weight": self.add("IfcPlanarForceMeasure" if force else "IfcReal", patch.weight),
+            **{k: self.add("IfcPlanarForceMeasure" if force else "IfcReal", v) for k, v in per_area.items()},
             "Area": self.add("IfcAreaMeasure", area),
             "Supports": self._text("".join(map(str, support_of(surface)[used].tolist()))),
         }

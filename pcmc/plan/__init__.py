@@ -10,7 +10,7 @@ May import ``io`` and the rooms below it.
 from .curves import Curve, arc, bezier, circle, curve, ellipse, join, polyline
 from .labelled import surface_from_labels
 from .parts import Area, CableLine, Divider, Hole
-from .plan import Plan, plan_from
+from .plan import Plan, patch_names, plan_from
 from .walls import add_walls
 
 __all__ = [
@@ -27,6 +27,7 @@ __all__ = [
     "curve",
     "ellipse",
     "join",
+    "patch_names",
     "plan_from",
     "polyline",
     "surface_from_labels",

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.errors import PlanError, SurfaceError
+from ..surface.topology import components
 from .arrangement import Arrangement, arrange, hole_points
 from .curves import Curve
 from .edges import Boundary, boundary, check_lines
@@ -51,6 +52,31 @@ def drafted(plan: PlanData) -> Draft:
     PlanError
         For lengths that are probably mistakes, and lines that do not fit together.
     """
+    lines, on_edge, drawn = _arranged(plan)
+    edges = np.concatenate([chain.edges for chain in drawn.chains])
+    try:
+        mesh = triangulate(drawn.points, edges, plan.edge_length, hole_points(drawn, lines))
+    except SurfaceError as error:
+        problem = f"lines of the plan are too close to each other for edges of length {plan.edge_length:g}"
+        raise PlanError(f"{problem}: {error}", what="edge_length", found=plan.edge_length) from None
+    return Draft(plan, lines, on_edge, drawn, mesh, boundary(plan, lines, drawn))
+
+
+def part_count(plan: PlanData) -> int:
+    """The number of parts into which the lines cut the plan, without its mesh.
+
+    By Euler's formula e - v + c for e chains between v vertices in c connected pieces, less the holes.
+    Errors as in ``drafted``.
+    """
+    *_, drawn = _arranged(plan)
+    ends = np.array([chain.vertices[[0, -1]] for chain in drawn.chains])
+    used, renumbered = np.unique(ends, return_inverse=True)
+    pieces = components(renumbered.reshape(-1, 2), len(used))
+    return len(ends) - len(used) + 1 + int(pieces.max()) - len(plan.holes)
+
+
+def _arranged(plan: PlanData) -> tuple[list[Line], list[Curve], Arrangement]:
+    """The lines, the supports on the boundary, and the lines cut where they meet."""
     _check_size(plan)
     lines, on_edge = _lines(plan)
     check_lines(plan, lines)
@@ -59,14 +85,8 @@ def drafted(plan: PlanData) -> Draft:
     stops = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in cut)])
     named = np.array([[*point, np.nan] for point in plan.points.values()]).reshape(-1, 3)
     drawn = arrange(lines, plan.edge_length, np.concatenate([spots.reshape(-1, 3), named]), stops)
-    drawn = replace(drawn, spots=drawn.spots[: len(spots)])  # the named points are vertices, but not held
-    edges = np.concatenate([chain.edges for chain in drawn.chains])
-    try:
-        mesh = triangulate(drawn.points, edges, plan.edge_length, hole_points(drawn, lines))
-    except SurfaceError as error:
-        problem = f"lines of the plan are too close to each other for edges of length {plan.edge_length:g}"
-        raise PlanError(f"{problem}: {error}", what="edge_length", found=plan.edge_length) from None
-    return Draft(plan, lines, on_edge, drawn, mesh, boundary(plan, lines, drawn))
+    # the named points are vertices, but not held
+    return lines, on_edge, replace(drawn, spots=drawn.spots[: len(spots)])
 
 
 def _check_size(plan: PlanData) -> None:

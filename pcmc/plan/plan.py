@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -160,13 +161,35 @@ class Plan(PlanData):
 
     def surface(self) -> Surface:
         """The mesh of the plan at its initial height, with its walls and supports."""
-        try:
-            from .build import build_surface  # needs shapely; a plan without its mesh does not
-        except ModuleNotFoundError as error:
-            if error.name != "shapely":
-                raise
-            raise MissingExtra("shapely", "plan") from None
+        with _needs_shapely():
+            from .build import build_surface  # a plan without its mesh does not need it
         return build_surface(self)
+
+
+def patch_names(plan: Plan) -> tuple[str, ...]:
+    """The names of a plan's patches without walls, in order; nothing is meshed.
+
+    Without ``patches`` they are "patch 1", "patch 2", …, one for each part between the dividers, whose lines
+    must fit together then: errors as from ``Plan.surface``.
+
+    >>> patch_names(Plan([[0, 0], [8, 0], [8, 4], [0, 4]], [[[4, 0], [4, 4]]], tension=2.0))
+    ('patch 1', 'patch 2')
+    """
+    if plan.patches:
+        return tuple(area.name for area in plan.patches)
+    with _needs_shapely():
+        from .draft import part_count
+    return tuple(f"patch {k + 1}" for k in range(part_count(plan)))
+
+
+@contextmanager
+def _needs_shapely() -> Iterator[None]:
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if error.name != "shapely":
+            raise
+        raise MissingExtra("shapely", "plan") from None
 
 
 def plan_from(data: Mapping[str, Any]) -> Plan:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import MissingExtra, OptionError
-from ..plan import Plan
+from ..plan import Plan, patch_names
 
 if TYPE_CHECKING:
     from ..design import Parameter, Target
@@ -90,15 +89,24 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
         height = _height(plan, one)
         if one.patch is None:
             plan = _retensioned(plan, None, height - _level(plan))
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # the mesh that is solved shows them
-                names = [patch.name for patch in plan.surface().patches if not patch.auxiliary]
-            vary.append(Parameter(names))
+            vary.append(Parameter(_lifted(plan, one.kind)))
         else:
             plan = _retensioned(plan, one.patch, height - _level(plan))
             vary.append(Parameter(one.patch))
         targets.append(Target("apex", one.patch, height))
     return plan, targets, vary
+
+
+def _lifted(plan: Plan, kind: str) -> list[str]:
+    """The names of the patches under pressure, whose tensions decide on the height; refused if none is."""
+    load = {
+        area.name: area.pressure - (plan.snow if area.snow is None else area.snow) for area in plan.patches
+    }
+    names = [name for name in patch_names(plan) if load.get(name, plan.pressure - plan.snow)]
+    if not names:
+        problem = f"{kind} is for a roof that a pressure lifts, and none is left here; give"
+        raise OptionError(f"{problem} pressure = ..., or tension = ... instead of {kind}", what=kind)
+    return names
 
 
 def _retensioned(plan: Plan, patch: str | None, rise: float) -> Plan:
