@@ -292,8 +292,9 @@ class State:
 
     def at_value(self, parameter: float | None) -> State:
         """This state at another λ, its inside where it was; itself where that is None or its own."""
-        same = parameter is None or parameter == self.parameter
-        return self if same else self.step(np.zeros_like(self.X), parameter, self.iterations)
+        if parameter is None or parameter == self.parameter:
+            return self
+        return self.step(np.zeros_like(self.X), parameter, self.iterations)
 
     def moved(self, d: Floats) -> Floats:
         """X + d (n,3), with the rows of walls below their crest."""

@@ -378,7 +378,8 @@ def _middle(surface: Surface, vertices: Ints, held: Bools) -> Target:
     """The height over the vertex of these (k,) that is farthest along Π from the held ones of them."""
     place = surface.plane.to_local(surface.vertices)[:, :2]
     free, fixed = vertices[~held[vertices]], vertices[held[vertices]]
-    x, y = place[free[cKDTree(place[fixed]).query(place[free])[0].argmax()]].tolist()
+    distance = np.asarray(cKDTree(place[fixed]).query(place[free])[0])
+    x, y = place[free[distance.argmax()]].tolist()
     return Target("height", (x, y))
 
 
