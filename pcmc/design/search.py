@@ -345,6 +345,7 @@ class Search:
         targets = pd.DataFrame(
             {
                 "value": here.quantities,
+                "dimension": [t.dimension for t in self.targets],
                 "wanted": self.wanted(here.quantities),
                 "misfit": here.r,
                 "met": ~missed,
@@ -356,6 +357,7 @@ class Search:
             {
                 "start": self.given,
                 "value": [p.value(here.result.surface) for p in self.parameters],
+                "dimension": [p.dimension for p in self.parameters],
                 "low": self.limits[:, 0],
                 "high": self.limits[:, 1],
             },
