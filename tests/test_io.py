@@ -199,8 +199,6 @@ def test_paths_that_cannot_be(tmp_path):
         path = tmp_path / "no folder" / f"a{suffix}"
         with refused(FileError, what=str(path)):
             pcmc.write(path, tent())
-    with refused(FileError, what=str(tmp_path / "a.obj"), where="patches", found="a\nb"):
-        pcmc.write(tmp_path / "a.obj", tent(names=("a\nb", "c", "d")))
     with refused(FileError, what="scalars", where="h", found=(3,)):
         pcmc.write(tmp_path / "a.ply", tent(), scalars={"h": np.zeros(3)})
     for suffix in (".ply", ".vtp"):

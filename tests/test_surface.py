@@ -8,6 +8,7 @@ from starts import two_squares
 
 from pcmc import Patch, Plane, Surface
 from pcmc.base.errors import FreeSurfaceWarning, OptionError, PcmcError, SurfaceError
+from pcmc.surface import Cable, Room
 
 SQUARE = {
     "vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1]],
@@ -280,3 +281,40 @@ def test_moving_keeps_sliding_vertices_on_the_plane():
     surface = two_squares(4)
     with refused(SurfaceError, what="vertices", where=int(np.argmax(surface.on_plane))):
         surface.moved(surface.vertices + np.array([0, 0, 0.5]))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "",
+        " a",
+        "a ",
+        "a\n",
+        "a\tb",
+        "a\x00",
+        "a\r\nq",
+        "a\x7f",
+        "\ud800",
+        "a\u2028",
+        "a" * 101,
+        3,
+        None,
+    ],
+)
+def test_names_that_no_part_may_have(name):
+    """One rule for all parts: a line break, say, would write commands into a datafile."""
+    for kind, arguments in (
+        (Patch, (1.0,)),
+        (Cable, (1.0, [[0, 1]])),
+        (Room, ({"a": 1}, 2.0)),
+    ):
+        with refused(SurfaceError, what=f"{kind.__name__}.name", found=name):
+            kind(name, *arguments)
+    if name != "":
+        with refused(SurfaceError, what="Plane.name", found=name):
+            Plane(name=name)
+
+
+@pytest.mark.parametrize("name", ["a" * 100, "Süd/Ost κ_1 (2) $x$ \\ '\"#", "屋根"])
+def test_names_that_every_part_may_have(name):
+    assert Patch(name, 1.0).name == Plane(name=name).name == name

@@ -2,6 +2,8 @@
 
 import warnings
 
+import ezdxf
+import ezdxf.units
 import numpy as np
 import pytest
 import rhino3dm
@@ -11,10 +13,12 @@ import pcmc
 from generators import two_squares
 from pcmc import cli
 from pcmc.base.errors import FileError, FileWarning, LostWarning, OptionError
-from pcmc.base.units import DXF_UNITS, FORCES, LENGTHS, MICROMETRES, Units, conversion_note, length_factor
+from pcmc.base.units import FORCES, LENGTHS, MICROMETRES, Units, conversion_note, length_factor
 from pcmc.io.scaling import scaled, scaled_surface
+from pcmc.plan.drawing import read_drawing
 from pcmc.project import load
 from pcmc.surface import Room
+from tests.drawn import drawing
 from tests.refusals import refused
 
 
@@ -39,8 +43,20 @@ def test_factors_are_exact_quotients():
     assert not conversion_note("m", "m")
 
 
-def test_units_of_drawings_have_a_length():
-    assert set(LENGTHS) <= set(DXF_UNITS.values()) <= set(MICROMETRES)
+@pytest.mark.parametrize("code", [1, 2, 3, 4, 5, 6, 7, 10, 13, 14])
+def test_a_dxf_drawing_in_any_unit_has_the_size_that_its_code_says(tmp_path, code):
+    """The codes of ``$INSUNITS`` against ezdxf's own table; 0 and 21 (US survey feet) are no units here."""
+    metres = ezdxf.units.conversion_factor(ezdxf.units.InsertUnits(code), ezdxf.units.M)
+    plan = read_drawing(drawing(tmp_path, unit=code), "m")
+    size = np.ptp(plan.outline.at(plan.outline.dense), axis=0)[:2]
+    np.testing.assert_allclose(size, [10.0 * metres, 6.0 * metres], rtol=1e-8)
+
+
+@pytest.mark.parametrize(("code", "notes"), [(0, 0), (21, 1)])
+def test_a_dxf_drawing_in_an_unknown_unit_says_so(tmp_path, code, notes):
+    plan = read_drawing(drawing(tmp_path, unit=code), "m")
+    assert not plan.unit
+    assert sum("its unit of length (21) is unknown here" in note for note in plan.notes) == notes
 
 
 def test_every_unit_gives_its_texts():

@@ -3,46 +3,68 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from . import validate
 from .errors import OptionError
 
-MICROMETRES = {
-    "m": 1_000_000,
-    "mm": 1_000,
-    "cm": 10_000,
-    "ft": 304_800,
-    "in": 25_400,
-    "µm": 1,
-    "dm": 100_000,
-    "km": 1_000_000_000,
-    "yd": 914_400,
-    "mi": 1_609_344_000,
+
+class Length(NamedTuple):
+    """A unit of length in every file format: its whole micrometres, and what the formats call it.
+
+    ``dxf`` is the number of ``$INSUNITS``, ``rhino`` the name of a .3dm file's unit system, ``ifc`` the
+    prefix of the metre, or for a unit that is none of the SI its name.
+    """
+
+    micrometres: int
+    dxf: int
+    rhino: str
+    ifc: str
+
+
+TABLE = {
+    "m": Length(1_000_000, 6, "Meters", ""),
+    "mm": Length(1_000, 4, "Millimeters", "MILLI"),
+    "cm": Length(10_000, 5, "Centimeters", "CENTI"),
+    "ft": Length(304_800, 2, "Feet", "foot"),
+    "in": Length(25_400, 1, "Inches", "inch"),
+    "µm": Length(1, 13, "Microns", "MICRO"),
+    "dm": Length(100_000, 14, "Decimeters", "DECI"),
+    "km": Length(1_000_000_000, 7, "Kilometers", "KILO"),
+    "yd": Length(914_400, 10, "Yards", "yard"),
+    "mi": Length(1_609_344_000, 3, "Miles", "mile"),
 }
-"""The whole micrometres in each unit of length that a drawing may have: factors are exact quotients."""
+"""All units of length. Micrometres are whole, so that factors are exact quotients."""
+
+MICROMETRES = {name: unit.micrometres for name, unit in TABLE.items()}
+"""The whole micrometres in each unit of length."""
 
 LENGTHS = ("m", "mm", "cm", "ft", "in")
 """The units of length of a project."""
 
-FORCES = ("N", "kN", "MN", "lbf", "kip")
+NEWTONS = {"N": 1.0, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605, "kip": 4448.2216152605}
+"""The newtons in each unit of force."""
+
+FORCES = tuple(NEWTONS)
 """The units of force of a project."""
 
-DXF_UNITS = {1: "in", 2: "ft", 3: "mi", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 13: "µm", 14: "dm"}
-"""The units of length by ``$INSUNITS`` of a .dxf file; 0 is none."""
 
-RHINO_UNITS = {
-    "Meters": "m",
-    "Millimeters": "mm",
-    "Centimeters": "cm",
-    "Feet": "ft",
-    "Inches": "in",
-    "Microns": "µm",
-    "Decimeters": "dm",
-    "Kilometers": "km",
-    "Yards": "yd",
-    "Miles": "mi",
-}
-"""The units of length by the name of a .3dm file's unit system."""
+def unit_in_file(system: int | str) -> tuple[str, str]:
+    """The unit of length that a drawing names, and a note if it is none of ours; both empty without one.
+
+    ``system`` is the ``$INSUNITS`` of a .dxf file, or the name of a .3dm file's unit system.
+
+    >>> unit_in_file(3), unit_in_file("Microns"), unit_in_file(0)
+    (('mi', ''), ('µm', ''), ('', ''))
+    >>> unit_in_file(21)
+    ('', 'its unit of length (21) is unknown here: the numbers are taken as they are')
+    """
+    if system in (0, "None", "Unset"):
+        return "", ""
+    known = [name for name, unit in TABLE.items() if system in (unit.dxf, unit.rhino)]
+    if known:
+        return known[0], ""
+    return "", f"its unit of length ({system}) is unknown here: the numbers are taken as they are"
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """Surfaces as COMPAS meshes, for Rhino, Grasshopper and Blender.
 
-Gives ``to_meshes``, ``from_meshes`` and functions of meshes and plain data for ``compas.rpc.Proxy``. May
-import ``existence``, ``certificate``, ``io`` and the rooms below them.
+Gives ``to_meshes``, ``from_meshes``, functions of meshes and plain data, and the service that offers them to
+``compas.rpc.Proxy`` (``python -m pcmc.compas``). May import ``existence``, ``certificate``, ``io`` and the
+rooms below them.
 """
 
 from .meshes import from_meshes, to_meshes

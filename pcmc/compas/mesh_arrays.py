@@ -42,6 +42,8 @@ def named_meshes(meshes: Any) -> dict[str, Any]:
         validate.refuse("meshes", meshes, "a COMPAS Mesh or a list of them", error=SurfaceError)
     named: dict[str, Any] = {}
     for number, mesh in enumerate(listed):
+        if not isinstance(mesh.name, str):
+            validate.refuse(f"meshes[{number}].name", mesh.name, "a text", error=SurfaceError)
         if mesh.name in named:
             text = f"meshes[{number}]: {mesh.name!r} is another mesh's name; set mesh.name, a name per patch"
             raise SurfaceError(text, what="meshes", where=mesh.name, found=mesh.name)
@@ -184,6 +186,8 @@ def read_cables(named: Mapping[str, Any], places: Places, names: Sequence[str]) 
             cable, tension = values.get(CABLE), values.get(TENSION)
             if cable is None:
                 continue
+            if not isinstance(cable, str):
+                refuse(CABLE, name, f"edge {ends}: {CABLE!r} must be a name, found {validate.shown(cable)}")
             one, two = sorted(places[name].get(int(key), -1) for key in re.findall(r"\d+", ends))
             if one < 0:
                 refuse(CABLE, name, f"the cable {cable!r} has the edge {ends}, which the mesh does not have")
@@ -197,6 +201,12 @@ def read_cables(named: Mapping[str, Any], places: Places, names: Sequence[str]) 
 def refuse(what: str, name: str, problem: str) -> NoReturn:
     """Raise the error about a mesh."""
     raise SurfaceError(f"mesh {name!r}: {problem}", what=what, where=name)
+
+
+def damaged_mesh(error: Exception) -> SurfaceError:
+    """The error for a mesh that is wrong in a way that none checks."""
+    reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
+    return SurfaceError(f"meshes: one is damaged ({reason}); check it with mesh.is_valid()", what="meshes")
 
 
 def _is_index(value: Any) -> bool:

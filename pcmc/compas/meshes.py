@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import FileWarning, SurfaceError
+from ..base.errors import FileWarning, PcmcError, SurfaceError
 from ..certificate.reactions import reactions
 from ..contact.pinching import standing_part
 from ..energy.curvature import mean_curvature
@@ -125,6 +126,22 @@ def from_meshes(
     (Patch(name='floor', tension=2.0, pressure=1.0),)
     """
     named = mesh_arrays.named_meshes(meshes)
+    validate.flag("weld", weld)
+    try:
+        surface, notes = _surface(named, tensions, pressures, weld)
+    except (TypeError, ValueError, LookupError, AttributeError, OverflowError) as error:
+        if isinstance(error, PcmcError):
+            raise
+        raise mesh_arrays.damaged_mesh(error) from None  # the net under the checks
+    if notes:
+        warnings.warn(f"meshes: {'; '.join(notes)}", FileWarning, stacklevel=2)
+    return surface
+
+
+def _surface(
+    named: Mapping[str, Any], tensions: Any, pressures: Any, weld: bool
+) -> tuple[Surface, tuple[str, ...]]:
+    """The surface of meshes by name, and notes on what was changed or is doubtful."""
     patches = tuple(mesh_arrays.read_patches(named, tensions, pressures))
     whole, vertices = read_whole(named), mesh_arrays.read_vertices(named)
     keep, places = mesh_arrays.shared_vertices(vertices, named, weld)
@@ -149,10 +166,8 @@ def from_meshes(
         support = np.where(topology(F, patch, n).on_boundary, FIXED, support)
         notes = (*notes, "no vertex has the attribute is_support, so the boundary is taken as fixed")
     notes = (*notes, *import_warnings(MeshData(X, F, patch, patches, held)))
-    if notes:
-        warnings.warn(f"meshes: {'; '.join(notes)}", FileWarning, stacklevel=2)
     along = tuple((one, guide == number) for number, one in enumerate(whole.guides))
-    return Surface(
+    surface = Surface(
         X,
         F,
         patch,
@@ -165,6 +180,7 @@ def from_meshes(
         mesh_arrays.read_cables(named, places, whole.cables),
         whole.rooms,
     )
+    return surface, notes
 
 
 def _check_carried(surface: Surface) -> None:

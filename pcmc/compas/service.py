@@ -1,4 +1,4 @@
-"""Functions of meshes and plain data, which ``compas.rpc.Proxy("pcmc.compas")`` can call from any Python."""
+"""Functions of meshes and plain data; ``pcmc.compas.server`` offers them to other programs."""
 
 from __future__ import annotations
 
@@ -85,19 +85,13 @@ def certify(
 
 
 def read(path: str | os.PathLike[str], **options: Any) -> list[Any]:
-    """The meshes of the surface in a file that pcmc reads; options as in ``pcmc.read``.
-
-    Over RPC the path is one of the server's.
-    """
+    """The meshes of the surface in a file that pcmc reads; options as in ``pcmc.read``."""
     surface: Surface = io.read(path, **options)
     return to_meshes(surface)
 
 
 def write(path: str | os.PathLike[str], meshes: Any, weld: bool = False, **options: Any) -> None:
-    """Write the surface of COMPAS meshes to a file, as its suffix says; options as in ``pcmc.write``.
-
-    Over RPC the path is one of the server's.
-    """
+    """Write the surface of COMPAS meshes to a file, as its suffix says; options as in ``pcmc.write``."""
     io.write(path, from_meshes(meshes, weld=weld), **options)
 
 

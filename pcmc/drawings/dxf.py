@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from ..base.errors import MissingExtra
+from ..base.units import TABLE
 from ..surface import Surface
 from .sections import Polyline
 from .sheet import LAYERS, Sheet, Text
 from .views import Curve, section_layer
 
-UNITS = {"m": "M", "cm": "CM", "mm": "MM", "ft": "FT", "in": "IN"}  # their names in ezdxf
 VERSION = "R2018"
 MODEL_TEXT = 0.004  # height of letters in the model, in its size
 
@@ -44,7 +44,7 @@ def document(model: Model, units: str, sheets: Sequence[Sheet]) -> Any:
     """
     ezdxf = _ezdxf()
     doc = ezdxf.new(VERSION)
-    doc.units = getattr(ezdxf.units, UNITS[units])
+    doc.units = TABLE[units].dxf
     doc.header["$MEASUREMENT"] = int(units not in ("ft", "in"))
     doc.styles.add("PCMC", font="LiberationSans-Regular.ttf")
     for name, layer in LAYERS.items():

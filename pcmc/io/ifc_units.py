@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ..base.units import Units, length_factor
+from ..base.units import NEWTONS, TABLE, Units, length_factor
 
-PREFIXES = {"m": None, "mm": "MILLI", "cm": "CENTI", "N": None, "kN": "KILO", "MN": "MEGA"}
-NAMES = {"ft": "foot", "in": "inch", "lbf": "pound-force", "kip": "kip"}
-NEWTONS = {"lbf": 4.4482216152605, "kip": 4448.2216152605}
+NAMES = {name: unit.ifc for name, unit in TABLE.items()}
+NAMES |= {"N": "", "kN": "KILO", "MN": "MEGA", "lbf": "pound-force", "kip": "kip"}
 
 
 def assigned_units(add: Callable[..., Any], units: Units) -> Any:
@@ -25,7 +24,7 @@ def assigned_units(add: Callable[..., Any], units: Units) -> Any:
         add("IfcSIUnit", UnitType="PLANEANGLEUNIT", Name="RADIAN"),
     ]
     if units.force:
-        force = _unit(add, "FORCEUNIT", "NEWTON", units.force, (1, 1, -2), NEWTONS.get(units.force, 1.0))
+        force = _unit(add, "FORCEUNIT", "NEWTON", units.force, (1, 1, -2), NEWTONS[units.force])
         listed.append(force)
         for kind, power in (("LINEARFORCEUNIT", -1), ("PLANARFORCEUNIT", -2)):
             factors = [
@@ -40,8 +39,9 @@ def _unit(
     add: Callable[..., Any], kind: str, name: str, unit: str, powers: tuple[int, int, int], factor: float
 ) -> Any:
     """A unit of the SI with its prefix, or one that is a multiple of it."""
-    plain = add("IfcSIUnit", UnitType=kind, Prefix=PREFIXES.get(unit), Name=name)
-    if unit in PREFIXES:
+    prefix = NAMES[unit] if NAMES[unit].isupper() else None
+    plain = add("IfcSIUnit", UnitType=kind, Prefix=prefix, Name=name)
+    if prefix or not NAMES[unit]:
         return plain
     exponents = add("IfcDimensionalExponents", *powers, 0, 0, 0, 0)
     measure = "IfcLengthMeasure" if kind == "LENGTHUNIT" else "IfcForceMeasure"

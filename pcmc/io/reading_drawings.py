@@ -1,10 +1,11 @@
 """The part of the reading process that reads drawings: entities of a .dxf or .3dm as plain values.
 
 ``reading_script`` loads this file by its path, so it imports nothing of pcmc. Every reader returns a dict
-with the ``unit``, the ``entities``, and the counts of ``others``, by layer and kind, and of ``hidden`` ones,
-by layer. An entity has its ``layer``, ``kind`` and ``handle``, and one of: ``pieces``, the smooth pieces of a
-curve in order; ``point``; ``text`` with its ``point``. A piece is ("bezier", points (k,3)); ("arc", [centre,
-vector to its start, vector a quarter turn on], sweep in radians); ("nurbs", degree, knots, points, weights).
+with the ``unit`` as the format names it, the ``entities``, and the counts of ``others``, by layer and kind,
+and of ``hidden`` ones, by layer. An entity has its ``layer``, ``kind`` and ``handle``, and one of:
+``pieces``, the smooth pieces of a curve in order; ``point``; ``text`` with its ``point``. A piece is
+("bezier", points (k,3)); ("arc", [centre, vector to its start, vector a quarter turn on], sweep in radians);
+("nurbs", degree, knots, points, weights).
 """
 
 from __future__ import annotations
@@ -18,14 +19,13 @@ MOST_ENTITIES = 20_000  # of a drawing, with those of its blocks
 MOST_POINTS = 200_000  # of all its curves
 ROUND = 1e-10  # of its size: a NURBS curve this near to an arc is one
 DEPTH = 8  # of blocks in blocks
-DXF_UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 14: "dm"}
 SOLID = ("3DFACE", "MESH", "3DSOLID", "BODY", "REGION", "SURFACE", "SOLID", "PLANESURFACE", "polyface")
 
 
 class Contents:
     """The entities of a drawing; refuses more than the limits."""
 
-    def __init__(self, unit: str | None) -> None:
+    def __init__(self, unit: int | str) -> None:
         self.unit, self.count = unit, 0
         self.entities: list[dict[str, Any]] = []
         self.others: dict[str, dict[str, int]] = {}
@@ -72,7 +72,7 @@ def dxf_entities(path: str) -> dict[str, Any]:
         document = ezdxf.readfile(path)
     except (ezdxf.DXFError, UnicodeDecodeError, ValueError, KeyError, IndexError, AttributeError, TypeError):
         document, _ = recover.readfile(path)
-    contents = Contents(DXF_UNITS.get(int(document.header.get("$INSUNITS", 0))))
+    contents = Contents(int(document.header.get("$INSUNITS", 0)))
     unseen = {layer.dxf.name.lower() for layer in document.layers if layer.is_off() or layer.is_frozen()}
     for layer, entity in _with_blocks(document.modelspace(), None, 0):
         if layer.lower() in unseen or entity.dxf.get("invisible", 0):
@@ -124,6 +124,8 @@ def _dxf_pieces(kind: str, entity: Any) -> list[tuple[Any, ...]] | None:
     if kind in ("ARC", "CIRCLE", "ELLIPSE"):
         form = (entity if kind == "ELLIPSE" else Ellipse.from_arc(entity)).construction_tool()
         sweep = (form.end_param - form.start_param) % math.tau or math.tau
+        if not math.isfinite(sweep):
+            raise RuntimeError(f"{kind} {entity.dxf.get('handle')}: its ends are no angles; draw it again")
         c, s = math.cos(form.start_param), math.sin(form.start_param)
         u, v = form.major_axis, form.minor_axis
         return [("arc", [tuple(form.center), tuple(u * c + v * s), tuple(v * c - u * s)], sweep)]
@@ -142,10 +144,7 @@ def rhino_entities(path: str) -> dict[str, Any]:
     model = rhino.File3dm.Read(path)
     if model is None:
         raise RuntimeError("not a Rhino file, or cut off")
-    names = ("None", "Millimeters", "Centimeters", "Meters", "Kilometers", "Inches", "Feet", "Yards")
-    short = (None, "mm", "cm", "m", "km", "in", "ft", "yd")
-    unit = str(model.Settings.ModelUnitSystem).rsplit(".", 1)[-1]
-    contents = Contents(dict(zip(names, short, strict=True)).get(unit))
+    contents = Contents(str(model.Settings.ModelUnitSystem.name))
     layers = {layer.Index: (layer.Name, layer.Visible) for layer in model.Layers}
     blocks = {str(block.Id): block for block in model.InstanceDefinitions}
     items = {str(item.Attributes.Id): item for item in model.Objects}

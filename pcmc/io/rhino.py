@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, MissingExtra
-from ..base.units import RHINO_UNITS, Units, length_factor
+from ..base.units import TABLE, Units, length_factor, unit_in_file
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.curve_kinds import curves_by_kind
@@ -32,7 +32,6 @@ from .reading_process import read_arrays
 KEY = "pcmc"
 VERSION = 7  # of Rhino's format
 UNIT = "m"  # of files whose surface has none
-SYSTEMS = {unit: name for name, unit in RHINO_UNITS.items()}
 CURVES = {"PCMC-RIDGE": (200, 0, 0, 255), "PCMC-RIM": (0, 0, 0, 255), "PCMC-WALL": (0, 128, 0, 255)}
 COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255)}
 
@@ -41,7 +40,7 @@ def write(path: Path, surface: Surface, walls: str | None, units: Units, **_: An
     """A layer per patch, in the unit of the surface; in metres if there is none."""
     rhino = load_library("rhino3dm")
     model = rhino.File3dm()
-    model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, SYSTEMS[units.length or UNIT])
+    model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, TABLE[units.length or UNIT].rhino)
     text = metadata_text(surface, units)
     for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
         faces = surface.faces[surface.patch_of_face == k]
@@ -130,7 +129,7 @@ def read(path: Path) -> MeshData:
     if not X:
         text = f"the file has no meshes ({others} other objects); mesh the surfaces in Rhino"
         raise FileError(text, where="meshes", found=0)
-    model, notes = _unit_of(arrays["unit"])
+    model, note = unit_in_file(arrays["unit"])
     if metadata.plane is not None:  # a file of pcmc, whose geometry Rhino may have scaled since
         own = metadata.units.length or UNIT
         factor, model = length_factor(model, own), own
@@ -138,7 +137,7 @@ def read(path: Path) -> MeshData:
         held = {kind: [factor * points for points in parts] for kind, parts in held.items()}
     points = np.concatenate(X)
     F, source, cut = triangulate(points, np.concatenate(corners), np.concatenate(counts))
-    notes = (*notes, *cut)
+    notes = (*filter(None, (note,)), *cut)
     if others:
         notes = (*notes, f"{others} objects that are not meshes were left out")
     support = _supports(points, held) if metadata.plane is not None or any(held.values()) else None
@@ -148,13 +147,6 @@ def read(path: Path) -> MeshData:
     return MeshData(
         points, F, patch[source], patches, support, metadata.plane, notes=notes, walls=walls, units=units
     )
-
-
-def _unit_of(system: str) -> tuple[str, tuple[str, ...]]:
-    """The unit of length of a Rhino unit system, and a note if pcmc does not know it."""
-    if system in RHINO_UNITS or system in ("None", "Unset"):
-        return RHINO_UNITS.get(system, ""), ()
-    return "", (f"its unit {system} is unknown here: the numbers are taken as they are",)
 
 
 def _supports(X: Floats, held: dict[int, list[Floats]]) -> Ints:

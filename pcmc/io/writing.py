@@ -72,10 +72,6 @@ def write(
     check_name(path)
     form = format_of(path, FORMATS)
     surface, certificate = _unpacked(surface, certificate, form)
-    for patch in surface.patches:
-        if "\n" in patch.name or "\r" in patch.name:
-            text = f"{path}: the patch name {patch.name!r} contains a line break; rename the patch"
-            raise FileError(text, what=str(path), where="patches", found=patch.name)
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
     sizes = {"": (), "vertices": (surface.n,), "both": (surface.n, surface.m)}[form.scalars]
     units = as_units(units)

@@ -167,8 +167,8 @@ class _Sorted:
         width = float(np.ptp(outline.at(outline.dense), axis=0)[:2].max())
         if note := size_note(width, self.units, self.content.unit):
             self.notes.append(note)
-        if factor != 1.0:
-            self.notes.insert(0, conversion_note(self.content.unit, self.units))
+        if note := self.content.note or conversion_note(self.content.unit, self.units):
+            self.notes.insert(0, note)
         return Drawing(
             self.path,
             self.content.unit,

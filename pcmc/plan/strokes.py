@@ -19,6 +19,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import FileError, MissingExtra, unknown
 from ..base.files import check_regular, system_error
+from ..base.units import unit_in_file
 from ..io.reading_process import read_arrays
 from .curves import Curve
 from .pieces import Piece
@@ -52,12 +53,13 @@ class Stroke:
 
 @dataclass(frozen=True, eq=False)
 class Strokes:
-    """The strokes of a drawing, the name of its unit ("" for none), and what no plan uses, by layer."""
+    """The strokes of a drawing, its unit ("" for none), what no plan uses, by layer; a note on its unit."""
 
     unit: str
     strokes: Sequence[Stroke]
     others: Mapping[str, Mapping[str, int]]
     hidden: Mapping[str, int]
+    note: str = ""
 
 
 def read_strokes(path: Path) -> Strokes:
@@ -83,7 +85,8 @@ def read_strokes(path: Path) -> Strokes:
         raise system_error(path, "read", error) from None
     except FileError as error:
         raise error.in_file(path, what=str(path)) from None
-    return Strokes(contents["unit"] or "", strokes, contents["others"], contents["hidden"])
+    unit, note = unit_in_file(contents["unit"])
+    return Strokes(unit, strokes, contents["others"], contents["hidden"], note)
 
 
 def _strokes(entity: Mapping[str, Any]) -> list[Stroke]:

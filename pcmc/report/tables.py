@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Bools, Ints
+from ..base.arrays import Ints
 from ..base.units import Units
 from ..certificate import Certificate
 from ..certificate.reactions import held_lengths, reactions_per_length
@@ -53,17 +53,12 @@ def one(value: float) -> str:
     return column([value])[0]
 
 
-def walls(surface: Surface) -> Bools:
-    """(k,) the patches that are walls; one that hangs under its weight alone is a roof."""
-    return ~surface.roof & np.array([patch.weight == 0.0 for patch in surface.patches])
-
-
 def key_figures(surface: Surface, certificate: Certificate, units: Units) -> Table:
     """Size, height, areas, volume, load, and the largest reaction per length."""
     X, length = surface.vertices, units.length
     width, depth, _ = np.ptp(X, axis=0).tolist()
     heights = surface.plane.height(X)
-    area, roof = certificate.patches["area"].to_numpy(), ~walls(surface)
+    area, roof = certificate.patches["area"].to_numpy(), surface.roof
     per_length = np.linalg.norm(reactions_per_length(surface, certificate.reactions), axis=1)
     rows = [
         ["size in the plan", f"{one(width)} × {one(depth)} {length}"],
@@ -97,7 +92,7 @@ def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Tab
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
         columns[f"weight, {units.pressure}"] = column(weights)
-    kind = ["wall" if wall else "roof" for wall in walls(surface)]
+    kind = ["wall" if wall else "roof" for wall in surface.walls.tolist()]
     words = [[name, what] for name, what in zip(table["patch"], kind, strict=True)]
     return _table("Patches", ["patch", "kind"], words, columns)
 

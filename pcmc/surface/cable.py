@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats, Ints, read_only
 from ..base.errors import SurfaceError
+from ..base.names import checked_name
 from . import checks
 
 
@@ -21,7 +22,7 @@ class Cable:
 
     Parameters
     ----------
-    name : str, unique in its surface.
+    name : unique in its surface; 1 to 100 printable characters, no blank at either end.
     tension : τ ≥ 0, force. A free edge of a flat membrane with tension α is at rest on arcs of radius τ/α.
     edges : (k,2) int, the vertices that each edge joins, in any order.
 
@@ -34,8 +35,7 @@ class Cable:
     edges: Ints
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str):
-            validate.refuse("Cable.name", self.name, "a text", error=SurfaceError)
+        object.__setattr__(self, "name", checked_name("Cable.name", self.name, error=SurfaceError))
         number = validate.number(
             "tension", self.tension, least=0.0, most=checks.LARGEST, where=self.name, error=SurfaceError
         )

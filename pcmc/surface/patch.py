@@ -9,6 +9,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import SurfaceError
+from ..base.names import checked_name
 from . import checks
 
 
@@ -18,13 +19,13 @@ class Patch:
 
     Parameters
     ----------
-    name : str, unique in its surface.
+    name : unique in its surface; 1 to 100 printable characters, no blank at either end.
     tension : α ≥ 0, force per length. At rest the patch has mean curvature pressure / (2 α).
     pressure : p, force per area along the positive normal: the pressure below the patch minus the one
         above it. A wall between rooms of pressures p_1 and p_2 has pressure p_1 - p_2, its normal
         pointing from room 1 to room 2; ``pcmc.energy`` describes E for other wall pressures.
     wall : whether the patch is a wall between rooms: its cone is not part of the volume, and it may
-        pinch. A patch without pressure is always a wall.
+        pinch. A patch without pressure that hangs below a junction is a wall, too: see ``Surface.walls``.
     weight : w, force per area of the patch, against Π's normal; negative for a lift.
 
     >>> Patch("roof", tension=2.0).target_curvature
@@ -38,9 +39,7 @@ class Patch:
     weight: float = field(default=0.0, repr=False)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str):
-            validate.refuse("Patch.name", self.name, "a text", error=SurfaceError)
-        object.__setattr__(self, "name", str(self.name))
+        object.__setattr__(self, "name", checked_name("Patch.name", self.name, error=SurfaceError))
         if not isinstance(self.wall, bool | np.bool_):
             validate.refuse("wall", self.wall, "True or False", self.name, error=SurfaceError)
         object.__setattr__(self, "wall", bool(self.wall))
@@ -66,7 +65,7 @@ class Patch:
 
     @property
     def auxiliary(self) -> bool:
-        """Whether the patch is a wall: declared as one, or without pressure."""
+        """Whether the energy and the solvers treat it as a wall: declared as one, or without pressure."""
         return self.wall or self.pressure == 0.0
 
     @property

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats, cached_array
 from ..base.errors import SurfaceError
+from ..base.names import checked_name
 from . import checks
 from .geometry import Vector
 
@@ -50,8 +51,9 @@ class Plane:
         if length == 0.0:
             validate.refuse("Plane.normal", self.normal, "a vector of positive length", error=SurfaceError)
         object.__setattr__(self, "normal", tuple(c / length for c in scaled))
-        if not isinstance(self.name, str):
-            validate.refuse("Plane.name", self.name, "a text", error=SurfaceError)
+        object.__setattr__(
+            self, "name", checked_name("Plane.name", self.name, empty=True, error=SurfaceError)
+        )
         if not isinstance(self.mirror, bool):
             validate.refuse("Plane.mirror", self.mirror, "True or False", error=SurfaceError)
 

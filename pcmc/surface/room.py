@@ -12,6 +12,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import SurfaceError
+from ..base.names import checked_name
 from . import checks
 
 
@@ -21,7 +22,7 @@ class Room:
 
     Parameters
     ----------
-    name : str, unique in its surface.
+    name : unique in its surface; 1 to 100 printable characters, no blank at either end.
     patches : mapping from the names of the patches around the room to 1, where the patch's positive normal
         points out of the room, or -1, where it points into it.
     volume : the volume (length³) of the room at rest.
@@ -38,8 +39,7 @@ class Room:
     volume: float
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str):
-            validate.refuse("Room.name", self.name, "a text", error=SurfaceError)
+        object.__setattr__(self, "name", checked_name("Room.name", self.name, error=SurfaceError))
         pairs = tuple(self.patches.items() if isinstance(self.patches, Mapping) else self.patches)
         if not pairs or not all(len(pair) == 2 and pair[1] in (1, -1) for pair in pairs):
             expected = "a mapping from names of patches to 1 or -1"

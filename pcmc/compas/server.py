@@ -1,0 +1,283 @@
+"""The service that ``compas.rpc.Proxy`` starts: four functions, for its owner alone.
+
+The service of COMPAS itself imports and calls any function for everyone who reaches its port. This one
+listens on the loopback, asks for the secret in its settings, refuses web pages, and reads and writes one
+folder.
+``python -m pcmc.compas --folder FOLDER`` writes the settings, with the arguments for ``Proxy``.
+"""
+
+from __future__ import annotations
+
+import base64
+import hmac
+import inspect
+import json
+import os
+import secrets
+import socket
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from socketserver import ThreadingMixIn
+from typing import Any
+from xmlrpc.server import SimpleXMLRPCRequestHandler
+
+from ..base import validate
+from ..base.errors import FileError, MissingExtra, OptionError, PcmcError, unknown
+from ..base.files import atomic_write, check_name, check_regular, system_error, writing
+from . import service
+from .mesh_arrays import damaged_mesh
+
+try:
+    from compas.data import DataDecoder, DataEncoder
+    from compas.rpc import Server
+except ImportError:
+    raise MissingExtra("compas", "compas") from None
+
+HOST = "127.0.0.1"
+USER = "pcmc"
+PACKAGE = "pcmc.compas"
+LARGEST = 500_000_000  # bytes of a request: some two million triangles
+SECONDS = 20.0  # that a connection may be silent
+STARTS = 600  # of Proxy, a tenth of a second each: the first import after an installation takes long
+MESH = "compas.datastructures/Mesh"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Who may call, and what is read and written.
+
+    Attributes
+    ----------
+    folder : the folder that ``read`` and ``write`` are kept in.
+    secret : what a request must show.
+    port : where the service listens.
+    """
+
+    folder: Path
+    secret: str
+    port: int
+
+    def text(self) -> str:
+        """The settings as their file has them: the folder, and the arguments of ``compas.rpc.Proxy``."""
+        proxy = {
+            "package": PACKAGE,
+            "service": PACKAGE,
+            "python": sys.executable,
+            "url": f"http://{USER}:{self.secret}@{HOST}",
+            "port": self.port,
+            "autoreload": False,
+            "max_conn_attempts": STARTS,
+            "working_directory": str(settings_path().parent),  # Python imports from there: not any folder
+        }
+        return json.dumps({"folder": str(self.folder), "proxy": proxy}, indent=2) + "\n"
+
+    def allows(self, authorization: str) -> bool:
+        """Whether a request's header ``Authorization`` shows the secret."""
+        wanted = "Basic " + base64.b64encode(f"{USER}:{self.secret}".encode()).decode()
+        return hmac.compare_digest(authorization.encode(), wanted.encode())
+
+    def place(self, path: object) -> Path:
+        """The path of a file in the folder, links resolved; FileError for one that leads out of it."""
+        if not isinstance(path, str):
+            validate.refuse("path", path, "a text", error=FileError)
+        check_name(Path(path))
+        place = Path(os.path.realpath(self.folder / path))
+        if not place.is_relative_to(self.folder):
+            text = f"{validate.shown(path)}: is outside {self.folder}, the folder that pcmc may use"
+            text = f"{text}; to name another: python -m {PACKAGE} --folder FOLDER"
+            raise FileError(text, what=path, expected=str(self.folder))
+        return place
+
+
+def settings_path() -> Path:
+    """The file of the settings, ``~/.pcmc/compas.json``."""
+    return Path.home() / ".pcmc" / "compas.json"
+
+
+def set_up(folder: str | os.PathLike[str]) -> Path:
+    """Let the service read and write a folder; make a new secret. The port stays. Returns the file written.
+
+    A service that runs goes on with the new settings.
+    """
+    place = Path(os.path.realpath(Path(folder).expanduser()))
+    if not place.is_dir():
+        text = f"{place}: is no folder; make it, or name another"
+        raise FileError(text, what=str(place))
+    path = settings_path()
+    try:
+        port = read_settings().port
+    except FileError:
+        port = _free_port()
+    with writing(path):
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with atomic_write(path) as temporary:
+            temporary.touch(0o600)
+            temporary.write_text(Settings(place, secrets.token_urlsafe(32), port).text(), encoding="utf-8")
+    return path
+
+
+def read_settings() -> Settings:
+    """The settings in their file; FileError if it is missing, damaged, or others can read it."""
+    path = settings_path()
+    make = f"python -m {PACKAGE} --folder FOLDER"
+    check_regular(path)
+    try:
+        if os.name == "posix" and path.stat().st_mode & 0o077:
+            text = f"{path}: others can read the secret in it; make a new one: {make}"
+            raise FileError(text, what=str(path))
+        values = json.loads(path.read_text(encoding="utf-8"))
+        secret = values["proxy"]["url"].split(":")[2].partition("@")[0]
+        settings = Settings(Path(os.path.realpath(values["folder"])), secret, int(values["proxy"]["port"]))
+    except FileNotFoundError:
+        raise FileError(f"{path}: is missing; make it: {make}", what=str(path)) from None
+    except OSError as error:
+        raise system_error(path, "read", error) from None
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        if isinstance(error, PcmcError):
+            raise
+        raise FileError(f"{path}: is damaged; make it anew: {make}", what=str(path)) from None
+    if not secret:
+        raise FileError(f"{path}: has no secret; make one: {make}", what=str(path))
+    return settings
+
+
+class Handler(SimpleXMLRPCRequestHandler):
+    """Answers a request of the owner's program; refuses all others before their content is read."""
+
+    timeout = SECONDS  # in seconds; a connection that says nothing holds a thread no longer
+    rpc_paths = ("/", "/RPC2")
+
+    def parse_request(self) -> bool:
+        """Read the head of a request; False, with the refusal sent, for one that is not allowed."""
+        if not super().parse_request():
+            return False
+        refusal = self._refusal()
+        if refusal:
+            self.close_connection = True
+            self.send_error(*refusal)
+        return refusal is None
+
+    def _refusal(self) -> tuple[int, str] | None:
+        """Status and sentence for a request that is not allowed."""
+        port = self.connection.getsockname()[1]
+        size = self.headers.get("Content-Length", "")
+        if self.headers.get("Host") not in (f"{HOST}:{port}", f"localhost:{port}"):
+            return 403, f"the service is {HOST}:{port} and has no other name"  # DNS rebinding
+        if "Origin" in self.headers or "Sec-Fetch-Site" in self.headers:
+            return 403, "web pages may not call this service"
+        try:
+            allowed = read_settings().allows(self.headers.get("Authorization", ""))
+        except FileError as error:
+            return 403, str(error).encode("latin-1", "replace").decode("latin-1")
+        if not allowed:
+            return 401, f"the secret is wrong or missing; pass Proxy the url in {settings_path().name}"
+        if self.headers.get_content_type() != "text/xml":
+            return 415, "send XML-RPC as text/xml"
+        if "Transfer-Encoding" in self.headers or not (size.isascii() and size.isdigit()):
+            return 411, "say the size of the request as Content-Length"
+        if len(size) > 12 or int(size) > LARGEST:
+            return 413, f"a request may have {LARGEST} bytes at most"
+        return None
+
+    def log_message(self, *_: object) -> None:
+        """Print nothing: ``Proxy`` never reads what its server prints, and a full pipe would stop it."""
+
+
+class LoopbackServer(ThreadingMixIn, Server):  # type: ignore[misc]
+    """The server on the loopback; a silent connection does not keep others from being answered."""
+
+    daemon_threads = True
+    block_on_close = False
+    allow_reuse_address = os.name == "posix"  # elsewhere it lets another program take the same port
+
+    def __init__(self, port: int) -> None:
+        super().__init__((HOST, port), requestHandler=Handler, logRequests=False)
+        self.register_instance(Dispatcher())
+
+    def handle_error(self, *_: object) -> None:
+        """A connection that broke is not worth a word; ``Handler.log_message`` says why."""
+
+
+class Dispatcher:
+    """Calls the functions of the service by name, one at a time, with arguments as COMPAS encodes them."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()  # warnings are recorded, which two threads cannot do at once
+        self._functions: dict[str, Callable[..., Any]] = {
+            f"{PACKAGE}.{function.__name__}": function
+            for function in (service.solve, service.certify, read, write)
+        }
+
+    def _dispatch(self, name: str, arguments: tuple[Any, ...]) -> str:
+        """The answer to a call, as ``Proxy`` reads it; an error in one line."""
+        answer: dict[str, Any] = {"data": None, "error": None, "profile": None}
+        with self._lock:
+            try:
+                answer["data"] = self._call(name, *arguments[:1])
+            except Exception as error:  # the caller is in another process
+                kind = "" if isinstance(error, PcmcError | MissingExtra) else f"{type(error).__name__}: "
+                answer["error"] = " ".join(f"{kind}{error}".split())
+            return json.dumps(answer, cls=DataEncoder)
+
+    def _call(self, name: str, text: str = "") -> Any:
+        """Call a function with the arguments in a text."""
+        if name not in self._functions:
+            raise OptionError(unknown("function", name, self._functions), what="function", found=name)
+        given = json.loads(text, cls=MeshDecoder)
+        function = self._functions[name]
+        try:
+            bound = inspect.signature(function).bind(*given["args"], **given["kwargs"])
+        except TypeError as error:
+            raise OptionError(f"{name}: {error}", what=name) from None
+        return function(*bound.args, **bound.kwargs)
+
+
+class MeshDecoder(DataDecoder):  # type: ignore[misc]
+    """Decodes meshes. Any other object stays a dict: COMPAS would import the module that it names."""
+
+    def object_hook(self, o: dict[str, Any]) -> Any:
+        """The mesh that a dict describes, or the dict."""
+        if MESH not in [o.get("dtype"), *(o.get("inheritance") or ())]:
+            return o
+        try:
+            return super().object_hook({**o, "dtype": MESH, "inheritance": None})
+        except Exception as error:  # COMPAS checks little
+            raise damaged_mesh(error) from None
+
+
+def read(path: str, **options: Any) -> list[Any]:
+    """The meshes of a file in the service's folder; options as in ``pcmc.read``."""
+    return service.read(read_settings().place(path), **options)
+
+
+def write(path: str, meshes: Any, weld: bool = False, overwrite: bool = False, **options: Any) -> None:
+    """Write meshes to a file in the service's folder; an existing one only with ``overwrite``."""
+    place = read_settings().place(path)
+    if not validate.flag("overwrite", overwrite) and place.exists():
+        raise FileError(f"{path}: exists; pass overwrite=True to replace it", what=path)
+    service.write(place, meshes, weld, **options)
+
+
+def serve(port: int | None = None) -> None:
+    """Answer calls until Ctrl-C or ``Proxy.stop_server``; on the port of the settings unless one is given."""
+    port = read_settings().port if port is None else port
+    try:
+        server = LoopbackServer(port)
+    except (OSError, OverflowError) as error:
+        text = f"port {port}: cannot be opened ({error}); end the program that has it, or remove"
+        raise OptionError(f"{text} {settings_path()} and set up again", what="port", found=port) from None
+    with closing(server.socket):
+        server.serve_forever()
+
+
+def _free_port() -> int:
+    """A port that no program uses, below those that systems give to connections."""
+    while True:
+        port = 20_000 + secrets.randbelow(10_000)
+        with socket.socket() as probe:
+            if probe.connect_ex((HOST, port)) != 0:
+                return port
