@@ -293,7 +293,7 @@ BAD = [
         {"what": "views", "found": 1, "expected": "2, one per surface"},
     ),
     (
-        lambda s: plot.reactions(pcmc.Surface(s.vertices, s.faces, s.patch_of_face, s.patches, fixed=[0])),
+        lambda s: plot.reactions(s.rebuilt(fixed=(), on_plane=(), rooms=[pcmc.Room("all", {"cap": 1}, 1.0)])),
         {"what": "surface"},
     ),
     (lambda s: plot.vectors(s, np.zeros(10)), {"what": "field", "found": (10,)}),

@@ -10,7 +10,6 @@ import numpy as np
 from ..base.arrays import Floats
 from ..certificate import Certificate
 from ..certificate.supports import held_curves
-from ..contact.pinching import standing_part
 from ..energy.rooms import closing_volumes, prescribed_volumes, room_pressures
 from ..surface import Surface
 
@@ -116,7 +115,7 @@ def _boundaries(
 
     Of several curves of one name, each is named with its place.
     """
-    curves = held_curves(standing_part(surface).surface)
+    curves = held_curves(surface)
     table = certificate.boundaries.iloc[: len(curves)]  # the first of the supports
     names = table["boundary"].astype(str).tolist()
     middles = table[["middle_x", "middle_y", "middle_z"]].to_numpy()

@@ -57,9 +57,9 @@ def load_ratio(surface: Surface) -> float:
 def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
     """Force and moment of the loads, of the supports, and what remains of both: a row each.
 
-    The loads are Σ p A_T ν_T - Σ w A_T n, the supports the rows of their table. What remains are the forces at
-    vertices that nothing holds: a mesh at rest balances along its normals; along the sheets forces are left,
-    fewer on finer meshes.
+    The loads are Σ p A_T ν_T - Σ w A_T n, the supports the rows of their table. What remains are the forces
+    at vertices that nothing holds: a mesh at rest balances along its normals; along the sheets forces are
+    left, smaller ones on finer meshes.
 
     Columns: ``of``; ``force_x``, …, and ``moment_x``, …, about the middle of the surface's bounding box at
     ``x``, ``y``, ``z``; ``force_share``, ``moment_share``, the largest component over the sum of the loads'
@@ -90,7 +90,9 @@ def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
 def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:
     """How exactly the supports carry the loads, of the piece between ``mirrors`` if there are any."""
     left = table.iloc[-1]
-    share = f"to {left['force_share']:.1g} of them in x, y and z, and to {left['moment_share']:.1g} in moments"
+    share = (
+        f"to {left['force_share']:.1g} of them in x, y and z, and to {left['moment_share']:.1g} in moments"
+    )
     if not table.iloc[0][[*FORCE]].any():
         return f"the forces of the supports cancel {share}"
     place = ", ".join(f"{left[c] + 0.0:.4g}" for c in "xyz")

@@ -129,6 +129,12 @@ class Certificate:
         return boundary_view(self.supports)
 
     @property
+    def largest_reaction(self) -> float:
+        """The largest force per length of a support, but for the pull across mirror planes; NaN without."""
+        table = self.supports
+        return float(table["per_length_max"][table["kind"] != "mirror"].max())
+
+    @property
     def remainder(self) -> tuple[Floats, Floats]:
         """Force (3,) and moment (3,) that loads and supports leave; see ``balance``."""
         left = self.balance.iloc[-1]

@@ -50,7 +50,7 @@ class SupportForces(NamedTuple):
 
     Attributes
     ----------
-    surface : the part that stands, which the supports hold.
+    surface, standing : the surface, and the part of it that stands, which the supports hold.
     along : (n,3) on lines and sheets.
     points : (n,3) at single points, and of the cables that end on a line.
     mirrors : (n,3) the pull of images across mirror planes.
@@ -64,6 +64,7 @@ class SupportForces(NamedTuple):
     """
 
     surface: Surface
+    standing: Surface
     along: Floats
     points: Floats
     mirrors: Floats
@@ -86,7 +87,7 @@ class SupportForces(NamedTuple):
         own = np.full(len(topo.edges), patch is None)
         own[topo.edge_of_face[self.surface.patch_of_face == patch]] = True
         mask[topo.edges[self.lines & own[:, None]]] = True
-        return mask
+        return mask & (self.lengths > 0.0)
 
 
 def support_forces(surface: Surface, forces: Floats | None = None) -> SupportForces:
@@ -95,20 +96,20 @@ def support_forces(surface: Surface, forces: Floats | None = None) -> SupportFor
     A vertex on several planes divides its force among them: Σ c_i n_i of their normals. Where a fixed vertex
     lies in mirror planes, these take the part across them.
     """
-    surface = standing_part(surface).surface
-    forces = reactions(surface) if forces is None else forces
-    planes, topo = surface.on_planes, surface.topology
+    standing = standing_part(surface).surface
+    forces = reactions(standing) if forces is None else forces
+    planes, topo = standing.on_planes, surface.topology
     ends = np.zeros_like(forces)
-    for _, vertex, force in cable_ends(surface):
+    for _, vertex, force in cable_ends(standing):
         ends[vertex] += force
-    ends -= apply_supports(surface, ends.copy())
-    clamped, by_plane, cables = _divided(surface, forces, ends)
+    ends -= apply_supports(standing, ends.copy())
+    clamped, by_plane, cables = _divided(standing, forces, ends)
     mirror = [False, *(plane.mirror for plane, _ in planes)]
     mirrors = by_plane[mirror].sum(axis=0)
-    boundary, held = _held_boundary(surface), surface.fixed | surface.on_plane
+    boundary, held = _held_boundary(surface), standing.fixed | standing.on_plane
     on_boundary, used = np.zeros((2, surface.n), dtype=bool)
     on_boundary[topo.edges[boundary]] = True
-    used[surface.faces] = used[surface.cable_edges.ends] = True
+    used[standing.faces] = used[standing.cable_edges.ends] = True
     for plane, mask in planes:
         held = held | (mask & (not plane.mirror))
     single, sliding = (used & ~on_boundary & side for side in (clamped, held & ~clamped))
@@ -121,7 +122,7 @@ def support_forces(surface: Surface, forces: Floats | None = None) -> SupportFor
     alone = single & (lengths == 0.0)
     points[alone] = inside[alone]
     along = inside - points
-    return SupportForces(surface, along, points, mirrors, lines, lengths, clamped, alone, by_plane, cables)
+    return SupportForces(surface, standing, along, points, mirrors, lines, lengths, clamped, alone, by_plane, cables)
 
 
 def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floats:
@@ -167,7 +168,11 @@ def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Flo
     for _ in range(2):  # again with those clamped that planes cannot carry, as where a held bottom is pinched
         here = np.where(clamped, on & mirror[:, None], on)
         carried, of_cables = (
-            _by_normal(normals, here, np.where(clamped[:, None], part - symmetric_part(surface.on_planes, part.copy()), part))
+            _by_normal(
+                normals,
+                here,
+                np.where(clamped[:, None], part - symmetric_part(surface.on_planes, part.copy()), part),
+            )
             for part in (forces, ends)
         )
         clamped = clamped | (np.linalg.norm(forces - carried.sum(axis=0), axis=1) > least)
@@ -175,7 +180,7 @@ def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Flo
 
 
 def _by_normal(normals: Floats, on: Bools, vectors: Floats) -> Floats:
-    """(k,n,3) the parts c_i n_i of vectors (n,3), n_i the normals (k,3) of those planes ``on`` (k,n) of each."""
+    """(k,n,3) the parts c_i n_i of vectors (n,3); n_i (k,3) are the normals of the planes that each is ``on``."""
     parts = np.zeros((len(normals), *vectors.shape))
     some = np.flatnonzero(on.any(axis=0))
     for pattern in np.unique(on[:, some], axis=1).T:

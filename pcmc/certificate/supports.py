@@ -1,4 +1,4 @@
-"""The table of supports: each line, point, plane, mirror and cable end that holds a surface, with its force."""
+"""The table of supports: each line, point, plane, mirror and end of a cable that holds a surface."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STEEP = 1e-9  # of a normal's part along that of Π, up to which a plane is upri
 
 
 class _Part(NamedTuple):
-    """A support: its name and kind, its vertices (k,), its share of the force at each (k,3), length and place."""
+    """A support: name and kind, its vertices (k,), its share of the force at each (k,3), length, place."""
 
     name: str
     kind: str
@@ -50,13 +50,13 @@ def support_table(surface: Surface, forces: Floats | None = None) -> pd.DataFram
     ``moment_x``, …, that of these forces about the middle; ``per_length_max``, the largest force per length.
     """
     acting = support_forces(surface, forces)
-    surface = acting.surface
     parts = [*_held_lines(acting), *_mirrors(acting), *_inner_lines(acting), *_planes(acting)]
     rows, count = [], {"B": 0, "S": 0, "C": 0}
+    size = surface.size
     for part in (*parts, *_points(acting), *_ends_of_cables(acting)):
         letter = {"point": "S", "cable end": "C"}.get(part.kind, "B")
         count[letter] += 1
-        at = np.where(np.abs(part.place) <= 1e-12 * surface.size, 0.0, part.place)
+        at = np.where(np.abs(part.place) <= 1e-12 * size, 0.0, part.place)
         moment = np.cross(surface.vertices[part.vertices] - at, part.forces).sum(axis=0)
         label = f"{letter}{count[letter]}"
         numbers = [part.length, *at, *part.forces.sum(axis=0), *moment, part.per_length]
@@ -74,11 +74,17 @@ def boundary_view(supports: pd.DataFrame) -> pd.DataFrame:
 
 
 def held_curves(surface: Surface) -> tuple[Curve, ...]:
-    """The curves of the held boundary, but for those in mirror planes, cut where boundaries meet."""
+    """The curves of the held boundary, but for those in mirror planes, each along one patch."""
     topo = surface.topology
     boundary = topo.boundary_edge & ~surface.mirror_edge
     held = boundary & surface.held[topo.edges].all(axis=1)
-    return topo.chains(topo.edges[held], vertex_kind(topo.edges[boundary], surface.n) == POINT)
+    stop = vertex_kind(topo.edges[boundary], surface.n) == POINT
+    patch = _patch_of_edge(surface)
+    for p in np.unique(patch[held]):
+        there = np.zeros((2, surface.n), dtype=bool)
+        there[0, topo.edges[held & (patch == p)]] = there[1, topo.edges[held & (patch != p)]] = True
+        stop |= there.all(axis=0)
+    return topo.chains(topo.edges[held], stop)
 
 
 def _held_lines(acting: SupportForces) -> Iterator[_Part]:
@@ -100,8 +106,7 @@ def _mirrors(acting: SupportForces) -> Iterator[_Part]:
     """The pull of the image along each curve in a mirror plane, and of single vertices there."""
     surface = acting.surface
     topo = surface.topology
-    patch = np.empty(len(topo.edges), dtype=np.int64)
-    patch[topo.edge_of_face] = surface.patch_of_face[:, None]
+    patch = _patch_of_edge(surface)
     for k, (plane, mask) in enumerate(surface.on_planes, start=1):
         if not plane.mirror:
             continue
@@ -135,10 +140,15 @@ def _planes(acting: SupportForces) -> Iterator[_Part]:
         if plane.mirror or not (mask & inside).any():
             continue
         kind = "ground" if k == 0 else _kind(surface, plane)
-        where = f" in the {plane}" if plane.name else {"ground": ", at rest"}.get(kind, f", {kind.split()[0]}")
+        where = (
+            f" in the {plane}" if plane.name else {"ground": ", at rest"}.get(kind, f", {kind.split()[0]}")
+        )
         listed = np.where(acting.lengths[:, None] > 0.0, acting.cables[k], 0.0)  # as ends of cables
-        pull, flat = np.where(inside[:, None], acting.by_plane[k] - listed, 0.0), mask[surface.faces].all(axis=1)
-        held = (topo.junction_edge | topo.seam_edge) & mask[topo.edges].all(axis=1)
+        pull, flat = (
+            np.where(inside[:, None], acting.by_plane[k] - listed, 0.0),
+            mask[surface.faces].all(axis=1),
+        )
+        held = (topo.junction_edge | topo.seam_edge) & (mask | acting.clamped)[topo.edges].all(axis=1)
         walls = np.unique(surface.patch_of_face[flat]) if k else []
         groups: list[tuple[str, Ints, Bools]] = []
         for wall in walls:
@@ -148,7 +158,7 @@ def _planes(acting: SupportForces) -> Iterator[_Part]:
             groups.append((surface.patches[wall].name, np.unique(surface.faces[faces]), own & held))
         done = np.zeros_like(inside)
         done[[v for _, vertices, _ in groups for v in vertices]] = True
-        rest = held & (inside & ~done)[topo.edges].any(axis=1)
+        rest = held & (mask & inside & ~done)[topo.edges].any(axis=1)
         for curve in topo.curves_among(rest):
             numbers = np.zeros_like(held)
             numbers[topo.edge_numbers(curve.pairs)] = True
@@ -174,12 +184,14 @@ def _points(acting: SupportForces) -> Iterator[_Part]:
 def _ends_of_cables(acting: SupportForces) -> Iterator[_Part]:
     """The vertices of lines where cables end, with the force of all of these."""
     names: dict[int, list[str]] = {}
-    for cable, vertex, _ in cable_ends(acting.surface):
+    for cable, vertex, _ in cable_ends(acting.standing):
         names.setdefault(vertex, []).append(cable.name)
     for v in sorted(names):
         if acting.lengths[v] > 0.0 and acting.points[v].any():
             at = np.array([v])
-            yield _Part(" + ".join(names[v]), "cable end", at, acting.points[at], 0.0, acting.surface.vertices[v])
+            yield _Part(
+                " + ".join(names[v]), "cable end", at, acting.points[at], 0.0, acting.surface.vertices[v]
+            )
 
 
 def _line(
@@ -228,7 +240,7 @@ def _others(
 
 def _on_ground(acting: SupportForces) -> Bools:
     """(n,) vertices that slide or rest on Π."""
-    surface = acting.surface
+    surface = acting.standing
     return surface.on_ground | (acting.by_plane[0].any(axis=1) & ~acting.clamped)
 
 
@@ -239,10 +251,17 @@ def _on_held_boundary(acting: SupportForces) -> Bools:
     return mask
 
 
+def _patch_of_edge(surface: Surface) -> Ints:
+    """(e,) a patch at each edge: the patch, at the boundary."""
+    patch = np.empty(len(surface.topology.edges), dtype=np.int64)
+    patch[surface.topology.edge_of_face] = surface.patch_of_face[:, None]
+    return patch
+
+
 def _kind(surface: Surface, plane: Plane) -> str:
     steep = abs(float(np.dot(plane.normal, surface.plane.normal))) <= STEEP
     return "upright plane" if steep else "plane"
 
 
 def _names(surface: Surface, sheets: Iterable[int]) -> str:
-    return " | ".join(surface.patches[i].name for i in sheets)
+    return " | ".join(dict.fromkeys(surface.patches[i].name for i in sheets))
