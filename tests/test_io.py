@@ -248,8 +248,8 @@ def test_damaged_native_files(tmp_path):
             np.savez(file, **{**arrays, "meta": np.array(json.dumps({**meta, **changes}))})
         return path
 
-    with refused(FileError, where="version", found=5, expected=4):
-        pcmc.read(changed(version=5))
+    with refused(FileError, where="version", found=6, expected=5):
+        pcmc.read(changed(version=6))
     with refused(FileError, where="format", found="other", expected="pcmc surface"):
         pcmc.read(changed(format="other"))
     with refused(FileError, where="metadata", found="{}"):

@@ -104,11 +104,13 @@ def test_weight_and_snow_are_those_of_the_patches():
     areas = [Area("west", 3.0, at=[1, 1], weight=0.1), Area("east", 3.0, at=[9, 1], snow=0.5)]
     surface = Plan(HALL, [[[5, 0], [5, 6]]], patches=areas, snow=0.25).surface()
     assert surface.weights.tolist() == [0.1, 0.0, 0.0]
-    assert surface.pressures.tolist() == [0.75, 0.5, 0.25]
+    assert surface.pressures.tolist() == [1.0, 1.0, 0.0]  # of the air, also on the wall
+    assert surface.snows.tolist() == [0.25, 0.5, -0.25]
+    assert surface.net_pressures.tolist() == [0.75, 0.5, 0.25]
     assert surface.uncancelled.max() == 0.0
     snowy = Plan(HALL, tension=3.0, snow=0.25, edge_length=1.5).surface()
     bare = Plan(HALL, tension=3.0, edge_length=1.5).surface()
-    assert snowy.pressures.tolist() == bare.with_snow(0.25).pressures.tolist()
+    assert snowy.patches == bare.with_snow(0.25).patches
 
 
 def test_a_patch_with_a_negative_volume_hangs_below_the_plane():

@@ -24,6 +24,7 @@ from .arguments import (
     Loads,
     Pressures,
     Settings,
+    Snows,
     Start,
     ViewName,
     Volumes,
@@ -43,6 +44,7 @@ def convert(
     tension: Settings = None,
     pressure: Pressures = None,
     weight: Weights = None,
+    snow: Snows = None,
     cable: Cables = None,
     volume: Volumes = None,
     start: Start = False,
@@ -65,7 +67,7 @@ def convert(
     """
     projects.check_names([output])
     projects.check_outputs([output])
-    shown = _shown(file, Loads(tension, pressure, weight, cable, volume), start, cache)
+    shown = _shown(file, Loads(tension, pressure, weight, cable, volume, snow), start, cache)
     if shown is None:
         return NOT_CERTIFIED
     data: dict[str, Any] = {"units": shown.units, "colour": colour}
@@ -108,6 +110,7 @@ def plot(
     tension: Settings = None,
     pressure: Pressures = None,
     weight: Weights = None,
+    snow: Snows = None,
     cable: Cables = None,
     volume: Volumes = None,
     start: Start = False,
@@ -126,7 +129,7 @@ def plot(
     seen = arguments.view_of(view)
     projects.check_picture([seen], colour)
     projects.check_outputs([picture])
-    shown = _shown(file, Loads(tension, pressure, weight, cable, volume), start, cache)
+    shown = _shown(file, Loads(tension, pressure, weight, cable, volume, snow), start, cache)
     if shown is None:
         return NOT_CERTIFIED
     surface = mirrored(shown.surface) if whole else shown.surface

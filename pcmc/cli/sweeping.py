@@ -51,11 +51,11 @@ def sweep(
 ) -> int:
     """Solve every combination of the values; exit code 0 if all are certified.
 
-    For a project or a surface, NAME is PATCH.tension, PATCH.pressure or PATCH.weight of a patch or wall,
-    CABLE.tension of a cable, or ROOM.volume of a room that has one. For a project it may also be the keys of
-    a number in the file: plan.edge_length, plan.outline.3.1 (the first coordinate of the third corner). For a
-    generator it is one of its parameters, or an option of the method. With a store, values may be added
-    later: only new cases are run. If the project file has changed, name a new store.
+    For a project or a surface, NAME is PATCH.tension, PATCH.pressure, PATCH.weight or PATCH.snow of a patch
+    or wall, CABLE.tension of a cable, or ROOM.volume of a room that has one. For a project it may also be the
+    keys of a number in the file: plan.edge_length, plan.outline.3.1 (the first coordinate of the third
+    corner). For a generator it is one of its parameters, or an option of the method. With a store, values may
+    be added later: only new cases are run. If the project file has changed, name a new store.
     The table has the parameters, the verdict, the apex of each patch, the rise, the area, and the largest
     reaction per length; with --all it has every number of the certificate, too.
 

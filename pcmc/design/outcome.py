@@ -27,7 +27,7 @@ class DesignStatus(Enum):
 
 
 UNIT_OF = dict.fromkeys(("apex", "height", "sag"), "length")
-UNIT_OF |= {"reaction": "tension", "weight": "pressure", "lean": "angle"}
+UNIT_OF |= {"reaction": "tension", "weight": "pressure", "snow": "pressure", "lean": "angle"}
 """The unit of quantities and parameters, as a name of ``Units``; others are named as their units."""
 
 

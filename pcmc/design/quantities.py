@@ -89,9 +89,9 @@ def _volume(surface: Surface, of: str | None) -> Measurement:
 
 
 def _curvature(surface: Surface, of: str) -> Measurement:
-    """p / (2α), 1/length."""
+    """p / (2α), p net of snow, 1/length."""
     index = surface.patch_index(of)
-    alpha, p = surface.tensions[index], surface.pressures[index]
+    alpha, p = surface.tensions[index], surface.net_pressures[index]
     if surface.patches[index].weight:
         message = f"curvature of {of}: with a weight it differs from place to place; it has no single value"
         raise OptionError(message, what="of", found=of)
@@ -103,9 +103,10 @@ def _curvature(surface: Surface, of: str) -> Measurement:
 
 
 def _pressure(surface: Surface, of: str) -> Measurement:
-    """The pressure of a room of prescribed volume, force/length²."""
+    """The pressure of the air in a room of prescribed volume, force/length²."""
     row = np.linalg.pinv(surface.room_signs.T)[room_index(surface, of)]
-    return Measurement(float(row @ surface.pressures), np.zeros_like(surface.vertices), by_pressure=row)
+    rest, snow = np.zeros_like(surface.vertices), {"snow": np.zeros_like(row)}
+    return Measurement(float(row @ surface.pressures), rest, by_pressure=row, by_load=snow)
 
 
 def room_index(surface: Surface, name: str) -> int:
@@ -161,7 +162,7 @@ def _force_gradient(surface: Surface, v: int, pull: Floats) -> Floats:
     row, corner = np.nonzero(np.equal(F, v))
     np.add.at(slope, F[row], np.einsum("fjab,a->fjb", blocks[row, corner], pull))
     # ⅓ A ν = (q - p) × (r - p) / 6, whose part along u changes by (q - r) × u / 6 as p moves
-    X, sixth = surface.vertices, surface.pressures[surface.patch_of_face[around]] / 6.0
+    X, sixth = surface.vertices, surface.net_pressures[surface.patch_of_face[around]] / 6.0
     for c in range(3):
         opposite = X[F[:, c - 2]] - X[F[:, c - 1]]
         np.add.at(slope, F[:, c], -sixth[:, None] * np.cross(opposite, pull))

@@ -219,7 +219,7 @@ class Search:
         values: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
         for parameter, value in zip(self.parameters, self.converted(x).tolist(), strict=True):
             values[parameter.kind] |= dict.fromkeys(parameter.names, value)
-        changed = with_pressures(surface, values["tension"], values["pressure"])
+        changed = with_pressures(surface, values["tension"], values["pressure"], snows=values["snow"])
         others = {f"{kind}s": values[kind] for kind in ("volume", "weight", "cable") if values[kind]}
         return changed.retensioned(**others) if others else changed
 

@@ -13,7 +13,7 @@ from ..energy.rooms import refuse_varied_pressure
 from ..surface import Surface
 from .quantities import QUANTITIES, Measurement, room_index
 
-KINDS = ("tension", "pressure", "volume", "weight", "cable")
+KINDS = ("tension", "pressure", "volume", "weight", "snow", "cable")
 CABLE_QUANTITIES = ("sag", "length", "force")
 NAMED = {"curvature": "patch", "pressure": "room"} | dict.fromkeys(CABLE_QUANTITIES, "cable")
 """Quantities of one patch, room or cable alone."""
@@ -28,7 +28,7 @@ class Target:
     ----------
     quantity : ``"apex"``, greatest height over Π of a patch; ``"height"`` over a point of Π;
         ``"volume"`` between a patch and Π (``volumes_below``), and ``"area"``; ``"curvature"``,
-        p / (2α), a patch's mean curvature at rest; ``"reaction"``, the greatest force per length
+        (p - s) / (2α), a patch's mean curvature at rest; ``"reaction"``, the greatest force per length
         on the held boundary of a patch; ``"lean"`` of a wall, its largest angle from the vertical, degrees;
         ``"pressure"`` of a room of prescribed volume; ``"sag"`` of a
         cable, the largest distance of its vertices from the chord between its ends, its ``"length"``,
@@ -104,14 +104,14 @@ class Target:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A tension, a pressure, a weight, a cable's tension, or a room's prescribed volume, that may vary.
+    """A tension, a pressure, a weight, snow, a cable's tension, or a room's prescribed volume, that may vary.
 
     Parameters
     ----------
     patch : name of the patch, or of the room or cable; or several names, which all get one value.
-    kind : ``"tension"``, ``"pressure"`` or ``"weight"`` of a patch, ``"cable"``, the tension of a cable, or
-        ``"volume"`` of a room. Where the pressure of a room varies, those of its walls, the differences
-        between rooms, are updated, unless they are parameters themselves.
+    kind : ``"tension"``, ``"pressure"``, ``"weight"`` or ``"snow"`` of a patch, ``"cable"``, the tension of a
+        cable, or ``"volume"`` of a room. Where the pressure of a room, or the snow over it, varies, that of
+        its walls, the difference between rooms, is updated, unless it is a parameter itself.
     low, high : bounds; by default a twentieth of the present value and twenty times it.
 
     >>> Parameter("wall", low=0.0, high=3.0).label
@@ -166,11 +166,11 @@ class Parameter:
             refuse_varied_pressure(surface, [surface.patch_index(name) for name in self.names])
 
     def tension_under_pressure(self, surface: Surface) -> bool:
-        """Whether it is the tension of a patch with a pressure or weight; such a tension is never 0."""
+        """Whether it is the tension of a patch with a pressure, weight or snow; such a tension is never 0."""
         if self.kind != "tension":
             return False
         patches = [surface.patches[surface.patch_index(name)] for name in self.names]
-        return any(patch.pressure != 0.0 or patch.weight != 0.0 for patch in patches)
+        return any((patch.pressure, patch.weight, patch.snow) != (0.0, 0.0, 0.0) for patch in patches)
 
     def bounds(self, surface: Surface) -> tuple[float, float]:
         """(low, high), with the defaults that follow from its present value."""

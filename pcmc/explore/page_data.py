@@ -83,7 +83,7 @@ def control_groups(surface: Surface, values: dict[str, dict[str, float]]) -> lis
     """What has sliders: a group for each patch, cable and room, with the kinds of its values."""
     groups = []
     for number, (patch, wall) in enumerate(zip(surface.patches, surface.walls.tolist(), strict=True)):
-        kinds = [kind for kind in ("tensions", "pressures", "weights") if patch.name in values[kind]]
+        kinds = [kind for kind in ("tensions", "pressures", "snows", "weights") if patch.name in values[kind]]
         groups.append({"name": patch.name, "patch": number, "wall": wall, "kinds": kinds})
     for kind in ("cables", "volumes"):
         groups += [{"name": name, "patch": None, "wall": False, "kinds": [kind]} for name in values[kind]]

@@ -1,7 +1,8 @@
-"""Cables and weights in Surface Evolver datafiles.
+"""Cables, weights and snow in Surface Evolver datafiles.
 
 A cable is a line ``tension`` of its edges, which also have its number as the attribute ``cable``. A weight
 w is the attribute ``weight`` of faces, and one quantity for each w, ``self_weight_k``: their integral of w z.
+Snow is the attribute ``snow`` of faces, which the reader adds to the net pressures of the bodies.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ def names(surface: Surface) -> list[str]:
 def definitions(surface: Surface, origin: Floats) -> str:
     """The attributes and quantities, coordinates seen from ``origin`` (3,)."""
     text = "DEFINE EDGE ATTRIBUTE cable INTEGER\n" if surface.cables else ""
+    text += "DEFINE FACET ATTRIBUTE snow REAL\n" if surface.snows.any() else ""
     weights = _weights(surface)
     if not len(weights):
         return text
@@ -45,9 +47,11 @@ def edge_tags(surface: Surface, tags: Any) -> Any:
 
 
 def patch_tags(surface: Surface, tags: Any) -> Any:
-    """The tags (k,) of the faces of patches with their weight and its quantity."""
+    """The tags (k,) of the faces of patches with their weight and its quantity, and their snow."""
     tags, weights = tags.astype(object), _weights(surface).tolist()
     for k, patch in enumerate(surface.patches):
+        if patch.snow:
+            tags[k] += f" snow {patch.snow!r}"
         if patch.weight:
             tags[k] += f" weight {patch.weight!r} self_weight_{1 + weights.index(patch.weight)}"
     return tags

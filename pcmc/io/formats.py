@@ -61,6 +61,7 @@ class Format:
         """What of a surface the format cannot hold, in words."""
         parts = (
             (surface.weights.any() and "tensions" in self.loses, "weights"),
+            (surface.snows.any() and "tensions" in self.loses, "snow"),
             (
                 surface.given_supports.on_line and not self.lines,
                 "lines or circles that vertices slide along (they are fixed in it)",

@@ -162,10 +162,10 @@ class _Model:
             PredefinedType="NOTDEFINED" if wall else "ROOF",
         )
         force = bool(self.units.force)
+        per_area = {"Pressure": patch.pressure, "Weight": patch.weight, "Snow": patch.snow}
         values = {
             "Tension": self.add("IfcLinearForceMeasure" if force else "IfcReal", patch.tension),
-            "Pressure": self.add("IfcPlanarForceMeasure" if force else "IfcReal", patch.pressure),
-            "Weight": self.add("IfcPlanarForceMeasure" if force else "IfcReal", patch.weight),
+            **{k: self.add("IfcPlanarForceMeasure" if force else "IfcReal", v) for k, v in per_area.items()},
             "Area": self.add("IfcAreaMeasure", area),
             "Supports": self._text("".join(map(str, support_of(surface)[used].tolist()))),
         }

@@ -13,16 +13,16 @@ from ..surface import Patch, Plane, Surface
 
 def metadata_text(surface: Surface, units: Units = NO_UNITS) -> str:
     """Patches, plane, counts, and units if there are any, as JSON: a format's comment or metadata."""
-    patches = [_row(patch) for patch in surface.patches]
+    patches = [row_of(patch) for patch in surface.patches]
     plane = surface.plane.point, surface.plane.normal
     values: dict[str, object] = {"patches": patches, "plane": plane, "counts": [surface.n, surface.m]}
     return json.dumps(values | ({"units": astuple(units)} if units else {}))
 
 
-def _row(patch: Patch) -> tuple[object, ...]:
-    """The fields of a patch in their order; without a weight as versions before weights wrote them."""
+def row_of(patch: Patch) -> tuple[object, ...]:
+    """The fields of a patch in their order; without weight and snow as versions before these wrote them."""
     row = astuple(patch)
-    return row if patch.weight else row[:-1]
+    return row if patch.snow else row[:-1] if patch.weight else row[:-2]
 
 
 @dataclass(frozen=True)

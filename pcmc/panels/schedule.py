@@ -135,6 +135,7 @@ def panels(
     mirror_images: str = "alike",
     walls: bool = False,
     anyway: bool = False,
+    certificate: Certificate | None = None,
 ) -> Panels:
     """The panels of a roof, in as few families of congruent triangles as a search finds.
 
@@ -146,10 +147,11 @@ def panels(
         mirror images are of different families.
     walls : whether triangles of walls are panels, too.
     anyway : accept a surface that is not certified.
+    certificate : of the surface, where it is known; by default it is computed.
 
     Raises
     ------
-    SurfaceError : the surface is not certified, or has no panels.
+    SurfaceError : the surface is not certified, or has no panels; the certificate is another surface's.
 
     Examples
     --------
@@ -165,7 +167,7 @@ def panels(
     tolerance = validate.positive("tolerance", tolerance)
     validate.choice("mirror_images", mirror_images, MIRROR_IMAGES)
     validate.flag("walls", walls)
-    certificate = certified(surface, anyway)
+    certificate = certified(surface, anyway, certificate)
     faces = np.flatnonzero(surface.roof[surface.patch_of_face] | walls)
     if not len(faces):
         hint = "; pass walls=True to count walls as panels" if surface.m else ""

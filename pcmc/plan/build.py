@@ -44,12 +44,13 @@ GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in
 @dataclass(frozen=True, eq=False)
 class _Roof:
     """Positions (n,3), heights (n,) of the surface that the boundary spans, fixed (n,); of each triangle (m,)
-    the pressure, the number of the room of prescribed volume below, -1 for none, and the tension."""
+    pressure, snow, the number of the room of prescribed volume below, -1 for none, and tension."""
 
     positions: Floats
     base: Floats
     fixed: Bools
     pressure: Floats
+    snow: Floats
     room: Ints
     tension: Floats
 
@@ -73,9 +74,10 @@ def build_surface(plan: PlanData) -> Surface:
     height = base + _rise(draft, patches, fixed | sliding)
     inner = np.arange(len(base)) >= len(draft.drawn.points)
     raised = improve_angles(np.column_stack([mesh.points, height]), mesh.triangles, inner, GOOD_ANGLE)
-    pressure, tension = np.array([[p.pressure, p.tension] for p in patches])[patch_of_face].T
+    laws = np.array([[p.pressure, p.snow, p.tension] for p in patches])
+    pressure, snow, tension = laws[patch_of_face].T
     rooms = _room_of_face(plan, patches, patch_of_face)
-    roof = _Roof(to_space(raised, plan.plane), base, fixed, pressure, rooms, tension)
+    roof = _Roof(to_space(raised, plan.plane), base, fixed, pressure, snow, rooms, tension)
     walls, wall_patches, sides = _walls(draft, roof)
     vertices = np.concatenate([roof.positions, walls.vertices])
     surface = Surface(
@@ -110,7 +112,7 @@ def _rise(draft: Draft, patches: Sequence[Patch], held: Bools) -> Floats:
     """(n,) what the initial surface rises above the one that the boundary spans."""
     plan, mesh = draft.plan, draft.mesh
     walled = any(divider.wall is not None for divider in plan.dividers)
-    if plan.rise is None and not walled and all(patch.pressure == 0.0 for patch in patches):
+    if plan.rise is None and not walled and all(patch.net_pressure == 0.0 for patch in patches):
         return np.zeros(len(mesh.points))  # a sail starts without a dome
     return dome(mesh.points, mesh.triangles, held, plan.rise)
 
@@ -232,7 +234,7 @@ def _walls(draft: Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], list[_Side
         divider, alike = plan.dividers[number], [kind for kind in kinds if kind[0] == number]
         suffix = f"-{alike.index((number, sides)) + 1}" if len(alike) > 1 else ""
         tension = _balanced(draft, roof, number) if divider.wall == BALANCED else divider.wall
-        patches.append(Patch(divider.name + suffix, tension, sides.difference, wall=True))
+        patches.append(Patch(divider.name + suffix, tension, sides.pressure, wall=True, snow=sides.snow))
     walls = build_walls(X, tops, plan.edge_length, plan.plane, roof.fixed, floor)
     return walls, patches, [sides._replace(divider=number) for number, sides in kinds]
 
@@ -241,7 +243,8 @@ def _balanced(draft: Draft, roof: _Roof, number: int) -> float:
     """A tension for the wall of a divider with which all of its junctions balance, if there is one."""
     line = 1 + len(draft.plan.holes) + number
     beside = [_beside(draft.mesh.triangles, *c.vertices[:2]) for c in draft.drawn.chains if c.line == line]
-    pressure = min(float(np.abs(roof.pressure[faces]).min(initial=np.inf)) for faces in beside)
+    net = np.abs(roof.pressure - roof.snow)
+    pressure = min(float(net[faces].min(initial=np.inf)) for faces in beside)
     curve, outline = draft.lines[line].curve, draft.lines[0].curve
     parts = np.unique(draft.mesh.region[np.concatenate(beside)])
     width = min(_radius(draft.mesh, int(part)) for part in parts)
@@ -266,10 +269,11 @@ def _beside(triangles: Ints, one: int, two: int) -> Ints:
 
 
 class _Sides(NamedTuple):
-    """Of a wall: the pressure on the left less that on the right, the rooms there, -1 for none, and its
-    divider."""
+    """Of a wall: the pressure and the snow on the left less those on the right, the rooms there, -1 for none,
+    and its divider."""
 
-    difference: float
+    pressure: float
+    snow: float
     left: int
     right: int
     divider: int = NONE
@@ -281,7 +285,8 @@ def _sides(triangles: Ints, roof: _Roof, one: int, two: int) -> _Sides:
     left = ((triangles == one) & (ahead == two)).any(axis=1)
     right = ((triangles == two) & (ahead == one)).any(axis=1)
     rooms = (int(roof.room[side].max(initial=NONE)) for side in (left, right))
-    return _Sides(float(roof.pressure[left].sum() - roof.pressure[right].sum()), *rooms)
+    pressure, snow = (float(of[left].sum() - of[right].sum()) for of in (roof.pressure, roof.snow))
+    return _Sides(pressure, snow, *rooms)
 
 
 def _rooms(plan: PlanData, walls: Sequence[Patch], sides: Sequence[_Sides]) -> list[Room]:

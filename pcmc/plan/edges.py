@@ -190,19 +190,18 @@ def raised_heights(plan: PlanData, edges: Boundary, drawn: Arrangement, held: Bo
 
 
 def check_pressures(edges: Boundary, triangles: Ints, patch: Ints, patches: Sequence[Patch]) -> None:
-    """Refuse pressure on a patch with a cable along a free edge: it would push on the cone below, too."""
+    """Refuse pressure or snow on a patch with a cable along a free edge: it acts on the cone below, too."""
     free = np.sort(edges.ends[edges.cable != NONE], axis=1)
     n = np.array([int(triangles.max()) + 1, 1])
     sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
     beside = np.isin(sides @ n, free @ n).any(axis=1)
     for k in np.unique(patch[beside]):
-        name, pressure = patches[k].name, patches[k].pressure
-        if pressure != 0.0:
-            problem = (
-                f"patch {name!r} has the pressure {pressure:g} and a free edge with a cable, which closes"
-            )
-            problem += " no space for it; give the patch pressure = 0 (and a weight), or hold that edge"
-            raise PlanError(problem, what="pressure", where=name, found=pressure)
+        for key, instead in (("pressure", "pressure = 0 (and a weight)"), ("snow", "a weight in its place")):
+            name, value = patches[k].name, getattr(patches[k], key)
+            if value != 0.0:
+                problem = f"patch {name!r} has the {key} {value:g} and a free edge with a cable, which closes"
+                problem += f" no space for it; give the patch {instead}, or hold that edge"
+                raise PlanError(problem, what=key, where=name, found=value)
 
 
 def strip_mask(strip: Line, points: Floats, among: Ints, snap: float) -> Ints:

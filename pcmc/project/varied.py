@@ -17,8 +17,8 @@ from ..surface.wall_pressures import with_pressures
 from .drawn import files_of, is_drawing
 from .file import PathLike, Project, in_file, project_of, read_data, surface_of
 
-QUANTITIES = ("tension", "pressure", "weight")  # of a patch
-LOADS = ("tensions", "pressures", "weights", "cables", "volumes")
+QUANTITIES = ("tension", "pressure", "weight", "snow")  # of a patch
+LOADS = ("tensions", "pressures", "weights", "snows", "cables", "volumes")
 CABLE = "cable "  # before the name of a cable, where a patch has the same
 KeyPath = tuple[str | int, ...]
 
@@ -53,7 +53,7 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
     Parameters
     ----------
     path : of a project (``.toml``), or of a surface, which has no keys.
-    values : by ``NAME.tension``, ``NAME.pressure`` and ``NAME.weight`` of a patch or wall, by
+    values : by ``NAME.tension``, ``NAME.pressure``, ``NAME.weight`` and ``NAME.snow`` of a patch or wall, by
         ``NAME.tension`` of a cable, ``NAME.volume`` of a room, or by the dotted name of a number in the file,
         such as ``plan.edge_length``. Numbers of the file are replaced before the plan is meshed, those of
         patches, cables and rooms afterwards. For a cable with the name of a patch write
@@ -135,6 +135,8 @@ def digest(path: PathLike) -> str:
         sha.update(repr((plane, plane.name, plane.mirror)).encode() + on.tobytes())
     if surface.rooms or surface.weights.any():
         sha.update(repr((surface.rooms, surface.weights.tolist())).encode())
+    if surface.snows.any():
+        sha.update(repr(("snow", surface.snows.tolist())).encode())
     return sha.hexdigest()
 
 

@@ -77,7 +77,7 @@ def key_figures(surface: Surface, certificate: Certificate, units: Units) -> Tab
 
 
 def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Table:
-    """A row per patch: tension, pressure, weight, area, mean curvature and its error."""
+    """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
     table, length = certificate.patches, units.length
     columns = {
         f"tension, {units.tension}": column(table["tension"]),
@@ -86,6 +86,9 @@ def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Tab
         f"mean curvature, 1/{length}": column(table["mean_H"]),
         "its largest error": [small(x) for x in table["variational_max"].tolist()],
     }
+    if "snow" in table:
+        columns[f"snow, {units.pressure}"] = column(table["snow"])
+        columns[f"net pressure, {units.pressure}"] = column(table["net"])
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
         columns[f"weight, {units.pressure}"] = column(weights)

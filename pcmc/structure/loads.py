@@ -33,7 +33,9 @@ class SelfWeight:
 
 @dataclass(frozen=True)
 class Snow:
-    """A load per plan area, against Π's normal. It keeps its size and direction while the surface deforms.
+    """A load per plan area, against Π's normal, besides the snow that the form was found under.
+
+    It keeps its size and direction while the surface deforms.
 
     Parameters
     ----------
@@ -90,8 +92,8 @@ class Step:
 
     Attributes
     ----------
-    name : "form pressure", or the names of its loads.
-    pressures : (k,) force per area on each patch along its normal.
+    name : "form pressure" ("… less snow", where the form was found under snow), or the names of its loads.
+    pressures : (k,) force per area on each patch along its normal; the form's, net of its snow, and wind.
     forces : (n,3) forces on the vertices that keep their direction.
     gravity : length/time², 0 without self-weight.
     """
@@ -112,7 +114,8 @@ def load_steps(surface: Surface, loads: Sequence[Load | Sequence[Load]]) -> tupl
     >>> both.name, both.pressures.tolist(), both.forces.sum(axis=0).round(9).tolist()
     ('snow and wind', [3.0], [0.0, 0.0, -2.0])
     """
-    form = Step("form pressure", surface.pressures, _dead_weight(surface))
+    name = "form pressure less snow" if surface.snows.any() else "form pressure"
+    form = Step(name, surface.net_pressures, _dead_weight(surface))
     permanent, steps = form, [form]
     for entry in loads:
         together = entry if isinstance(entry, tuple) else (entry,)
