@@ -68,7 +68,7 @@ def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
     X, n = surface.vertices, np.array(surface.plane.normal)
     corners, patch = X[surface.faces], surface.patch_of_face
     vector = area_vectors(corners)
-    force = surface.pressures[patch, None] * vector
+    force = surface.net_pressures[patch, None] * vector
     force -= (surface.weights[patch] * np.linalg.norm(vector, axis=1))[:, None] * n
     about = 0.5 * (X.min(axis=0) + X.max(axis=0))
     arm = corners.mean(axis=1) - about

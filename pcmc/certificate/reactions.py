@@ -114,15 +114,17 @@ def support_forces(surface: Surface, forces: Floats | None = None) -> SupportFor
         held = held | (mask & (not plane.mirror))
     single, sliding = (used & ~on_boundary & side for side in (clamped, held & ~clamped))
     junction = (topo.junction_edge | topo.seam_edge) & held[topo.edges].all(axis=1)
-    lines = (junction[:, None] & sliding[topo.edges]) | single[topo.edges].all(axis=1)[:, None]
-    lines |= boundary[:, None]
+    inner = single[topo.edges].all(axis=1)
+    lines = (junction[:, None] & sliding[topo.edges]) | (inner | boundary)[:, None]
     lengths = _half_lengths(surface, lines)
     points = np.where(lengths[:, None] > 0.0, ends - cables[mirror].sum(axis=0), 0.0)
     inside = forces - mirrors
     alone = single & (lengths == 0.0)
     points[alone] = inside[alone]
     along = inside - points
-    return SupportForces(surface, standing, along, points, mirrors, lines, lengths, clamped, alone, by_plane, cables)
+    return SupportForces(
+        surface, standing, along, points, mirrors, lines, lengths, clamped, alone, by_plane, cables
+    )
 
 
 def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floats:
@@ -180,7 +182,7 @@ def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Flo
 
 
 def _by_normal(normals: Floats, on: Bools, vectors: Floats) -> Floats:
-    """(k,n,3) the parts c_i n_i of vectors (n,3); n_i (k,3) are the normals of the planes that each is ``on``."""
+    """(k,n,3) the parts c_i n_i of vectors (n,3), n_i the normals (k,3) of the planes each is ``on``."""
     parts = np.zeros((len(normals), *vectors.shape))
     some = np.flatnonzero(on.any(axis=0))
     for pattern in np.unique(on[:, some], axis=1).T:

@@ -16,8 +16,8 @@ from .cables import cable_ends
 from .curve_tables import middle
 from .reactions import SupportForces, support_forces
 
-COLUMNS = ("support", "name", "kind", "length", "x", "y", "z", "force_x", "force_y", "force_z")
-COLUMNS += ("moment_x", "moment_y", "moment_z", "per_length_max")
+COLUMNS = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
+COLUMNS += ["moment_x", "moment_y", "moment_z", "per_length_max"]
 AT_POINTS = ("point", "cable end")  # the kinds whose forces act at one point
 STEEP = 1e-9  # of a normal's part along that of Π, up to which a plane is upright
 
@@ -113,7 +113,7 @@ def _mirrors(acting: SupportForces) -> Iterator[_Part]:
         edges = surface.mirror_edge & mask[topo.edges].all(axis=1)
         curves = [c for p in np.unique(patch[edges]) for c in topo.curves_among(edges & (patch == p))]
         ends = np.repeat(0.5 * segment_lengths(surface.vertices, topo.edges[edges]), 2)
-        share = np.bincount(topo.edges[edges].ravel(), ends, surface.n)
+        share = np.asarray(np.bincount(topo.edges[edges].ravel(), ends, surface.n), dtype=float)
         pull, even = acting.by_plane[k], acting.by_plane[k] - acting.cables[k]
         groups = [curve.vertices for curve in curves]
         for curve, forces in zip(curves, _shared(pull, groups), strict=True):
@@ -125,8 +125,9 @@ def _mirrors(acting: SupportForces) -> Iterator[_Part]:
 def _inner_lines(acting: SupportForces) -> Iterator[_Part]:
     """The lines inside the surface that are held."""
     surface, topo = acting.surface, acting.surface.topology
-    inner = acting.lines.all(axis=1) & (acting.clamped & ~_on_held_boundary(acting))[topo.edges].all(axis=1)
-    curves = topo.curves_among(inner)
+    inside = acting.clamped & ~_on_held_boundary(acting)
+    chosen: Bools = acting.lines.all(axis=1) & inside[topo.edges].all(axis=1)
+    curves = topo.curves_among(chosen)
     for curve, forces in zip(curves, _shared(acting.along, [c.vertices for c in curves]), strict=True):
         yield _line(acting, "line", curve, forces, f"{_names(surface, curve.sheets)}, inside")
 
@@ -149,9 +150,8 @@ def _planes(acting: SupportForces) -> Iterator[_Part]:
             mask[surface.faces].all(axis=1),
         )
         held = (topo.junction_edge | topo.seam_edge) & (mask | acting.clamped)[topo.edges].all(axis=1)
-        walls = np.unique(surface.patch_of_face[flat]) if k else []
         groups: list[tuple[str, Ints, Bools]] = []
-        for wall in walls:
+        for wall in np.unique(surface.patch_of_face[flat]).tolist() if k else ():
             faces = flat & (surface.patch_of_face == wall)
             own = np.zeros_like(held)
             own[topo.edge_of_face[faces]] = True
@@ -177,8 +177,8 @@ def _planes(acting: SupportForces) -> Iterator[_Part]:
 
 def _points(acting: SupportForces) -> Iterator[_Part]:
     """The single fixed points, with the cables that end there."""
-    for v in np.flatnonzero(acting.single):
-        yield _Part("", "point", v[None], acting.points[[v]], 0.0, acting.surface.vertices[v])
+    for v in np.flatnonzero(acting.single)[:, None]:
+        yield _Part("", "point", v, acting.points[v], 0.0, acting.surface.vertices[v[0]])
 
 
 def _ends_of_cables(acting: SupportForces) -> Iterator[_Part]:

@@ -52,7 +52,7 @@ def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]
         return float(sizes[own].max()) if own.any() else None
 
     roofs = np.flatnonzero(surface.roof)
-    for k in roofs:
+    for k in roofs.tolist():
         name, faces = surface.patches[k].name, surface.patch_of_face == k
         add("apex", name, "length", float(height[surface.faces[faces]].max()))
         add("area", name, "area", float(areas[k]))
