@@ -9,7 +9,7 @@ from refusals import refused
 from volume_cases import cap
 
 import pcmc
-from generators import spherical_cap
+from generators import hypar_roof, spherical_cap
 from pcmc import Parameter, Patch, Target, cli, io
 from pcmc.base.errors import LostWarning, SurfaceError
 from pcmc.design.targets import measure
@@ -17,10 +17,11 @@ from pcmc.energy.rooms import room_pressures
 from pcmc.existence.attempts import Attempts
 from pcmc.existence.pressure import raise_pressure
 from pcmc.existence.starts import low_start
-from pcmc.explore.following import between, reach, values_of, wanted
+from pcmc.explore.following import between, reach, wanted
 from pcmc.io.scaling import scaled_surface
 from pcmc.plan import Area, Plan
 from pcmc.project import digest, varied
+from pcmc.project.values import values_of
 from pcmc.structure import Material, Snow, StructuralModel
 from pcmc.surface.wall_pressures import with_pressures
 from studies import evolver
@@ -221,3 +222,20 @@ def test_the_search_raises_what_is_net_of_the_snow(tension, word):
         assert found.surface.patches == snowy.patches
     else:
         assert found.fold.value == other.fold.value == pytest.approx(0.8, rel=0.1)
+
+
+def test_a_branch_in_the_snow_keeps_the_wall_between_the_rooms():
+    roof = pcmc.solve(hall()).surface
+    branch = pcmc.follow(roof, Parameter("east", "snow"), 0.3)
+    assert branch.last.snows.tolist() == pytest.approx([0.25, 0.3, -0.05], abs=1e-12)
+    np.testing.assert_array_equal(branch.last.pressures, roof.pressures)
+    assert branch.points["snow east"].iloc[-1] == pytest.approx(0.3)
+    there = pcmc.solve(with_pressures(roof, snows={"east": 0.3})).surface
+    assert pcmc.energy(branch.last) == pytest.approx(pcmc.energy(there), rel=1e-7)
+    line, more = pcmc.Direction(snows={"east": 1.0}).line(roof), with_pressures(roof, snows={"east": 1.5})
+    rate = line.energy_derivative(roof, roof.vertices, 0.5)  # E is linear in the snow
+    assert rate == pytest.approx(pcmc.energy(more) - pcmc.energy(roof), rel=1e-12)
+    force = pcmc.gradient(more) - pcmc.gradient(roof)
+    np.testing.assert_allclose(line.gradient(roof, roof.vertices), force, atol=1e-13 * abs(force).max())
+    with refused(SurfaceError, what="snow"):
+        pcmc.follow(pcmc.solve(hypar_roof(4)).surface, pcmc.Direction(snows={"roof": 1.0}), 0.1)

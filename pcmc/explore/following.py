@@ -95,25 +95,6 @@ def between(start: Surface, end: Surface, part: float) -> Surface:
     )
 
 
-def values_of(surface: Surface) -> dict[str, dict[str, float]]:
-    """The values that can be changed, by kind and name.
-
-    The pressures around a room of prescribed volume are results, and a wall's follows from its rooms', as its
-    snow does. Pressures are those of the air: snow is not taken off.
-    """
-    result = (surface.room_signs != 0.0).any(axis=0) | surface.walls
-    return {
-        "tensions": {p.name: p.tension for p in surface.patches},
-        "pressures": {
-            p.name: p.pressure for p, r in zip(surface.patches, result.tolist(), strict=True) if not r
-        },
-        "snows": {p.name: p.snow for p in surface.patches if p.snow and not p.wall},
-        "weights": {p.name: p.weight for p in surface.patches if p.weight},
-        "cables": {c.name: c.tension for c in surface.cables},
-        "volumes": {r.name: r.volume for r in surface.rooms},
-    }
-
-
 def wanted(surface: Surface, values: Values) -> Surface:
     """The surface with other values, kinds as in ``values_of``; walls follow the pressures of their rooms."""
     given = {kind: dict(values.get(kind) or {}) for kind in KINDS}

@@ -20,11 +20,11 @@ from ..design import Parameter, Target
 from ..energy.curvature import curvature_error, mean_curvature
 from ..energy.functional import patch_areas
 from ..panels.families import families
+from ..project.values import values_of
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.geometry import edge_vectors
 from ..surface.mirroring import Whole, unfolded
-from .following import values_of
 from .session import State
 from .variants import Variant, difference
 

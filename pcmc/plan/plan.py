@@ -63,8 +63,8 @@ class Plan(PlanData):
     tension : α of all patches, instead of ``patches``, force/length.
     pressure, weight : of all patches, with ``tension``: force per area along the normal, and per area against
         Π's normal.
-    snow : force per area of the plan, on all patches that have none of their own. It is the same as a change
-        of pressure: a load s on the plan area has the potential s V, so a patch takes the pressure p - s.
+    snow : s, force per area of the plan, on all patches that have none of their own. A load s on the plan
+        area has the potential s V, so it acts as a lower pressure, p - s; ``pressure`` stays that of the air.
     cable : tension of the cables along the outline, with ``edge = "cable"``, force. Each stretch between
         supports is a cable: "cable 1", "cable 2", … in order.
     cables : parts of the outline and of holes that are free and carry a cable of their own: CableLines.

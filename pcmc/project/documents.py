@@ -142,7 +142,7 @@ def document_works(
         works += schedule_works(Path(documents.panels), schedule)
     if documents.structure is not None and structure is not None:
         solved = outcome.result if outcome.whole is None else outcome.whole.surface
-        model = structure.model(solved, anyway)
+        model = structure.model(solved, anyway, units=units)
         works.append((Path(documents.structure), partial(write_structure, model=model)))
     if documents.report is not None:
         report = roof_report(

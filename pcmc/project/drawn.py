@@ -12,7 +12,7 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
-from ..base.files import check_name
+from ..base.files import check_name, check_regular
 from ..base.units import LENGTHS
 
 if TYPE_CHECKING:
@@ -48,8 +48,9 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     [PosixPath('notebooks/roof.toml')]
     """
     path = Path(path)
-    with suppress(OSError, ValueError):  # of TOML, of UTF-8
+    with suppress(OSError, ValueError, RecursionError, FileError):  # of TOML, of UTF-8, of a pipe
         if path.suffix.lower() == ".toml":
+            check_regular(path)
             plan = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("plan")
             name = plan.get("drawing") if isinstance(plan, Mapping) else None
             return [path] if not isinstance(name, str) else [path, path.parent / name]
