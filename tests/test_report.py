@@ -239,7 +239,7 @@ def test_masts_have_their_reactions(tmp_path):
 
 @TEXT
 def test_upright_and_leaning_walls_and_the_balance(tmp_path):
-    """What holds an upright wall is a support as others are; how far the other leans is told, with the place."""
+    """What holds an upright wall is a support like others; how far the other wall leans is told."""
     walls = [Divider([[4, 0], [4, 4]], upright=True), Divider([[8, 0], [8, 4]])]
     patches = {
         name: {"tension": t, "pressure": p} for name, t, p in zip("abc", (4, 3, 3), (1, 1.3, 1), strict=True)

@@ -126,7 +126,7 @@ def _inner_lines(acting: SupportForces) -> Iterator[_Part]:
     """The lines inside the surface that are held."""
     surface, topo = acting.surface, acting.surface.topology
     inside = acting.clamped & ~_on_held_boundary(acting)
-    chosen: Bools = acting.lines.all(axis=1) & inside[topo.edges].all(axis=1)
+    chosen = np.asarray(acting.lines.all(axis=1) & inside[topo.edges].all(axis=1), dtype=bool)
     curves = topo.curves_among(chosen)
     for curve, forces in zip(curves, _shared(acting.along, [c.vertices for c in curves]), strict=True):
         yield _line(acting, "line", curve, forces, f"{_names(surface, curve.sheets)}, inside")
