@@ -89,6 +89,11 @@ class SupportForces(NamedTuple):
         mask[topo.edges[self.lines & own[:, None]]] = True
         return mask & (self.lengths > 0.0)
 
+    def largest_per_length(self, patch: int | None = None) -> float | None:
+        """The largest force per length on lines at the edges of a patch, or on all; None without any."""
+        chosen = self.of_patch(patch)
+        return float(np.linalg.norm(self.per_length[chosen], axis=1).max()) if chosen.any() else None
+
 
 def support_forces(surface: Surface, forces: Floats | None = None) -> SupportForces:
     """The reactions of a surface by how they act; ``forces`` (n,3) are by default those of its standing part.

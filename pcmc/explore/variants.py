@@ -42,14 +42,10 @@ def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]
     """
     height, areas = surface.plane.height(surface.vertices), certificate.patches["area"].to_numpy()
     acting, volumes = support_forces(surface, certificate.reactions), volumes_below(surface)
-    sizes, rows = np.linalg.norm(acting.per_length, axis=1), []
+    rows: list[dict[str, Any]] = []
 
     def add(quantity: str, of: str, kind: str, value: float | None) -> None:
         rows.append({"quantity": quantity, "of": of, "kind": kind, "value": value})
-
-    def largest(patch: int | None) -> float | None:
-        own = acting.of_patch(patch)
-        return float(sizes[own].max()) if own.any() else None
 
     roofs = np.flatnonzero(surface.roof)
     for k in roofs.tolist():
@@ -57,11 +53,11 @@ def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]
         add("apex", name, "length", float(height[surface.faces[faces]].max()))
         add("area", name, "area", float(areas[k]))
         add("volume", name, "volume", float(volumes[k]))
-        add("reaction", name, "tension", largest(k))
+        add("reaction", name, "tension", acting.largest_per_length(k))
     add("apex", "", "length", float(height.max()))
     add("area", "", "area", float(areas[roofs].sum()))
     add("volume", "", "volume", float(certificate.volume))
-    add("reaction", "", "tension", largest(None))
+    add("reaction", "", "tension", acting.largest_per_length())
     for patch, of_roof in zip(surface.patches, surface.roof.tolist(), strict=True):
         add("tension", patch.name, "tension", patch.tension)
         if of_roof:
