@@ -66,7 +66,8 @@ class Certificate:
     modes : (k,n,3) their displacement fields, unit mass.
     curvature_error : largest |H - H̄|/H̄ by the variational definition.
     quality : smallest triangle quality outside walls that can pinch; ``walls_quality`` in these.
-    patches : one row per patch: target, area, tension, errors by both definitions, quality.
+    patches : one row per patch: tension, pressure (and, where there is snow, snow and net pressure), target,
+        area, errors by both definitions, quality.
     junctions : one row per junction curve: length, its middle (the centre of a closed one), forces
         left and Σ α n, force/length.
     supports : one row per support: a line, point, plane, mirror or end of a cable, with its length, middle,

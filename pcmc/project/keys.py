@@ -329,7 +329,7 @@ def sections() -> tuple[Section, ...]:
     """Every section that a project file may have, with its keys.
 
     >>> [key.name for key in sections()[0].keys]
-    ['units', 'force', 'plan', 'solve', 'remesh', 'targets', 'structure', 'output']
+    ['units', 'force', 'plan', 'mesh', 'solve', 'remesh', 'targets', 'structure', 'output']
     """
     solve = (solve_section(method) for method in METHODS)
     return (*main_sections(), *solve, *target_sections(), _CURVE)

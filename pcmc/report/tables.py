@@ -81,16 +81,14 @@ def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Ta
 def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Table:
     """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
     table, length = certificate.patches, units.length
+    loads = {"pressure": "pressure", "snow": "snow", "net": "net pressure"}
     columns = {
         f"tension, {units.tension}": column(table["tension"]),
-        f"pressure, {units.pressure}": column(table["pressure"]),
+        **{f"{name}, {units.pressure}": column(table[key]) for key, name in loads.items() if key in table},
         f"area, {units.area}": column(table["area"]),
         f"mean curvature, 1/{length}": column(table["mean_H"]),
         "its largest error": [small(x) for x in table["variational_max"].tolist()],
     }
-    if "snow" in table:
-        columns[f"snow, {units.pressure}"] = column(table["snow"])
-        columns[f"net pressure, {units.pressure}"] = column(table["net"])
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
         columns[f"weight, {units.pressure}"] = column(weights)
