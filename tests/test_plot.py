@@ -11,7 +11,7 @@ from refusals import refused
 from tents import tent
 
 import pcmc
-from generators import two_squares
+from generators import double_bubble, two_squares
 from pcmc import plot
 from pcmc.base.errors import FileError, MissingExtra, OptionError
 from pcmc.explore.page_data import fields as page_fields
@@ -120,7 +120,7 @@ def test_legend_names_what_is_seen(monkeypatch):
 
 
 def test_names_are_drawn_as_written_and_not_as_mathematics():
-    """Between two signs $ matplotlib reads mathematics: one name would be shown as another, or be an error."""
+    """Between two signs $ matplotlib reads mathematics: another name, or an error."""
     pictures = []
     for name in ("$x$", "$\\frac{$", "x"):
         surface = tent(names=(name, "50 $", "a" * 100))
@@ -304,7 +304,7 @@ BAD = [
         {"what": "views", "found": 1, "expected": "2, one per surface"},
     ),
     (
-        lambda s: plot.reactions(pcmc.Surface(s.vertices, s.faces, s.patch_of_face, s.patches, fixed=[0])),
+        lambda s: plot.reactions(double_bubble()),
         {"what": "surface"},
     ),
     (lambda s: plot.vectors(s, np.zeros(10)), {"what": "field", "found": (10,)}),

@@ -77,9 +77,8 @@ def write(
     if not isinstance(scalars, Mapping | None):
         refuse("scalars", scalars, "arrays by name, such as {'height': [...]}")
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
-    sizes = {"": (), "vertices": (surface.n,), "both": (surface.n, surface.m)}[form.scalars]
     units = as_units(units)
-    lost = [name for name, scalar in scalars.items() if len(scalar) not in sizes]
+    lost = [name for name in scalars if name not in form.carried(surface, scalars)]
     if colour:
         choice("colour", colour, [name for name, scalar in scalars.items() if len(scalar) == surface.n])
         if not form.colours:
