@@ -141,7 +141,8 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
     if outcome.result is None and not outcome.unfold:
         about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
         return [(Path(file), partial(io.write, surface=surface, **about)) for file in files]
-    scalars, works = fields(surface, certificate), []
+    works: Works = []
+    scalars = fields(surface, certificate)
     for file in map(Path, files):
         form = io.FORMATS[file.suffix.lower()]
         coloured = {name: values for name, values in scalars.items() if name == colour}
