@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pydoc
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,7 +15,7 @@ import pcmc
 from generators import two_squares
 from pcmc import cli
 from pcmc.base.errors import FileError, OptionError, PcmcError
-from pcmc.project import digest, run, varied
+from pcmc.project import check_varied, digest, run, varied
 from pcmc.sweep import draw_sweep, read_store
 from pcmc.sweep import run as run_sweep
 from pcmc.sweep.projects import project_sweep, solve_project
@@ -67,6 +69,90 @@ def test_numbers_of_the_file_and_of_patches_are_replaced(roof):
     again, same_start = varied(roof, {})
     assert again.plan.edge_length == plain.plan.edge_length == 1.5
     assert pcmc.energy(same_start) == pcmc.energy(start)
+
+
+DRAWN = """
+[plan]
+edge_length = 1.5
+tension = 4.0
+outline = [[0, 0], [9, 0], [9, 6], [0, 6]]
+dividers = [[[3, -1], [3, 7]], {name = "eye", curve = {arc = [[6, -1], [7, 3], [6, 7]]}}]
+holes = [{name = "eye", curve = {circle = {centre = [1.5, 3], radius = 0.5}}}]
+supports = [[8, 3, 2]]
+points = {crown = [4.5, 3]}
+"""
+
+
+def test_lines_and_points_are_shifted_as_they_are(roof):
+    roof.write_text(DRAWN, encoding="utf-8")
+    aims = '[targets]\nmeet = [{quantity = "height", of = "crown", value = 1}]\nvary = ["patch 2"]\n'
+
+    plain = varied(roof, {})[0].plan
+    shifts = {
+        "wall 1.x": 0.5,
+        "divider eye.x": -0.25,
+        "hole eye.y": 1.0,
+        "hole eye.z": 0.75,
+        "support 1.z": 1.0,
+    }
+    roof.write_text(DRAWN + aims, encoding="utf-8")
+    project, surface = varied(roof, shifts | {"crown.x": 0.25, "crown.y": -1.0})
+    moved = project.plan
+    t = np.array([0.0, 0.5, 1.0])
+    for before, after, by in (
+        (plain.dividers[0].curve, moved.dividers[0].curve, [0.5, 0.0]),
+        (plain.dividers[1].curve, moved.dividers[1].curve, [-0.25, 0.0]),
+    ):
+        np.testing.assert_array_equal(after.at(t), before.at(t) + by)
+    assert moved.holes[0].curve.at(0.0).tolist() == [[2.0, 4.0, 0.75]]
+    assert moved.supports[0].tolist() == [8.0, 3.0, 3.0]
+    assert moved.points == {"crown": (4.75, 2.0)}
+    assert project.targets[0].of == (4.75, 2.0)  # the target goes with its point
+    assert surface.vertices[surface.fixed, 2].max() == 3.0
+    same = varied(roof, dict.fromkeys(shifts, 0.0))[1]
+    np.testing.assert_array_equal(same.vertices, varied(roof, {})[1].vertices)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("eye.x", "several lines; type divider eye.x or hole eye.x"),
+        ("wal 1.x", "unknown number 'wal 1.x'; did you mean 'wall 1.x'"),
+        ("wall 1.z", "only its place in plan counts"),
+        ("crown.z", "only its place in plan counts"),
+    ],
+)
+def test_a_shift_that_cannot_be_is_refused(roof, name, message):
+    roof.write_text(DRAWN, encoding="utf-8")
+    with pytest.raises(PcmcError, match=message) as caught:
+        project_sweep(roof, {name: [0.0, 0.5]})
+    assert str(caught.value).startswith(f"{roof}: ")
+
+
+def test_the_file_is_read_once_and_meshed_for_names_alone(roof, monkeypatch):
+    counts = {"read": 0, "meshed": 0}
+    for place, name in (("tomllib.loads", "read"), ("pcmc.plan.Plan.surface", "meshed")):
+        original = pydoc.locate(place)
+
+        def counted(*given, original=original, name=name, **rest):
+            counts[name] += 1
+            return original(*given, **rest)
+
+        monkeypatch.setattr(place, counted)
+    check_varied(roof, {"plan.edge_length": [1.0, 2.0], "wall 1.x": [0.0, 0.1], "plan.snow": [0.0, 0.1]})
+    assert counts == {"read": 1, "meshed": 0}
+    check_varied(roof, {"west.tension": [1.0, 2.0, 3.0], "wall 1.tension": [0.5, 1.0]})
+    assert counts == {"read": 2, "meshed": 1}
+    varied(roof, {"west.tension": 3.0, "plan.edge_length": 1.2})
+    assert counts == {"read": 3, "meshed": 2}
+
+
+def test_numbers_that_the_file_leaves_out_vary_too(roof):
+    values = {"plan.rise": 0.7, "plan.patches.west.snow": 0.2, "plan.dividers.1.cable": 2.0}
+    project = varied(roof, values | {"solve.iterations": 7})[0]
+    plan = project.plan
+    assert (plan.rise, plan.patches[0].snow, plan.dividers[0].cable) == (0.7, 0.2, 2.0)
+    assert project.options["iterations"] == 7
 
 
 def test_a_case_is_what_the_project_with_these_numbers_gives(roof):
