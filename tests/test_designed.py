@@ -18,7 +18,7 @@ from pcmc.base.units import Units
 from pcmc.design.outcome import UNIT_OF
 from pcmc.design.quantities import QUANTITIES
 from pcmc.explore.page_data import unit_texts
-from pcmc.project import build, cached_files, clear_cache, designed, load, run, running
+from pcmc.project import build, cached_files, clear_cache, designed, load, run, solving
 
 GOAL = """
 [targets]
@@ -44,8 +44,8 @@ def folder(tmp_path, monkeypatch):
 def solves(monkeypatch):
     """The list that every project solved from its start is added to."""
     solved = []
-    solve = running.solve_project
-    monkeypatch.setattr(running, "solve_project", lambda *given: solved.append(given) or solve(*given))
+    solve = solving.solve_project
+    monkeypatch.setattr(solving, "solve_project", lambda *given: solved.append(given) or solve(*given))
     return solved
 
 

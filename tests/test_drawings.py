@@ -277,6 +277,27 @@ def test_a_surface_that_is_not_certified_is_refused_or_every_sheet_is_marked():
         ]
 
 
+def test_what_is_known_of_a_surface_is_not_computed_again(monkeypatch, squares, drawings):
+    def computed(*_, **__):
+        raise AssertionError
+
+    certificate, schedule = drawings.certificate, drawings.schedule
+    monkeypatch.setattr("pcmc.certificate.required.certify", computed)
+    again = pcmc.panels(squares, 0.01, certificate=certificate)
+    assert again.certificate is certificate
+    model = pcmc.StructuralModel(squares, pcmc.Material(1e6), 0.001, certificate=certificate)
+    assert (model.certificate, model.certified) == (certificate, True)
+    drawn = drawing_set(squares, "m", sheet="A3", certificate=certificate, schedule=schedule)
+    assert (drawn.certificate, drawn.schedule) == (certificate, schedule)
+    assert [sheet.title for sheet in drawn.sheets] == [sheet.title for sheet in drawings.sheets]
+    other = squares.moved(squares.vertices.copy())
+    with refused(OptionError, what="schedule"):
+        drawing_set(other, "m", schedule=schedule, certificate=certificate)
+    lower = squares.retensioned({"left": 3.7})
+    with refused(SurfaceError, what="certificate"):
+        pcmc.panels(lower, 0.01, certificate=certificate)
+
+
 def test_a_certified_surface_has_no_mark(drawings):
     assert not [t for sheet in drawings.sheets for t in sheet.texts if t.layer == "PCMC-MARK"]
 

@@ -62,8 +62,39 @@ def test_patches_turned_against_each_other_are_named(tmp_path):
 
 @pytest.mark.parametrize(("axes", "named"), [((0, 2, 1), "y"), ((2, 0, 1), "x")])
 def test_a_roof_on_its_side_gives_a_warning(tmp_path, axes, named):
-    with pytest.warns(FileWarning, match=f"faces {named}, but z is up here; rotate it if {named} was up"):
+    with pytest.warns(
+        FileWarning, match=f"faces {named}, but z is up here; if {named} was up, turn it: pcmc repair"
+    ):
         pcmc.read(write_obj(tmp_path / "lying.obj", axes=axes))
+
+
+def test_a_roof_on_its_side_whose_areas_cancel_gives_a_warning_and_the_command_turns_it(tmp_path, capsys):
+    """Patches turned against each other have no sum of areas; their boundary has a plane."""
+    path = write_obj(tmp_path / "lying.obj", turned=True, axes=(0, 2, 1))
+    with pytest.warns(FileWarning, match="the surface faces y") as caught:
+        lying = pcmc.read(path)
+    command = str(caught[0].message).split("turn it: pcmc ")[1].split(";")[0]
+    assert cli.main([*command.replace("turned.obj", str(tmp_path / "turned.obj")).split()]) == 0
+    upright = pcmc.read(tmp_path / "turned.obj")
+    assert np.ptp(upright.vertices, axis=0).tolist() == np.ptp(lying.vertices, axis=0)[[0, 2, 1]].tolist()
+    assert upright.vertices[:, 2].tolist() == lying.vertices[:, 1].tolist()
+    capsys.readouterr()
+
+
+def test_a_mesh_without_a_unit_says_so_and_takes_the_one_given(tmp_path):
+    path = write_obj(tmp_path / "plain.obj")
+    with pytest.warns(FileWarning, match="no unit of length in the file; name it with --units mm, say"):
+        bare = pcmc.io.read_bare(path)[0]
+    for units, assumed, factor, unit in (
+        ("mm", "", 1.0, "mm"),
+        ("m", "mm", 1e-3, "m"),
+        ("", "ft", 1.0, "ft"),
+    ):
+        with pytest.warns(FileWarning) as caught:
+            surface, data = pcmc.io.read_bare(path, units, assumed)
+        assert "no unit of length" not in str(caught[0].message)
+        assert data.units.length == unit
+        np.testing.assert_allclose(surface.vertices, factor * bare.vertices)
 
 
 def test_files_that_pcmc_wrote_give_no_warning(tmp_path):

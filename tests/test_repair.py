@@ -159,6 +159,38 @@ def test_a_polygon_that_read_refuses_is_read_by_meshlab(tmp_path):
     assert area(surface.vertices, surface.faces) == pytest.approx(np.pi, rel=1e-3)
 
 
+def test_a_wall_quad_without_height_is_left_out_and_the_groups_stay(tmp_path):
+    X, F = sheet()
+    flat = [[0, 1, 1 + len(X), len(X)]]  # below the first edge of the sheet, and at its place
+    path = obj(tmp_path / "a.obj", np.concatenate([X, X[:2]]), {"roof": F, "wall": flat})
+    surface, changes = changed(path)
+    assert [patch.name for patch in surface.patches] == ["roof"]
+    assert surface.m == len(F)
+    assert changes["triangles without area left out"] == 2
+    with pytest.raises(SurfaceError, match=r"pcmc repair .* -o clean.obj"):
+        pcmc.read(path)
+
+
+def test_a_file_that_only_meshlab_reads_says_why_in_full(tmp_path):
+    star = np.array([[0, 0, 0], [4, 0, 0], [1, 1, 0], [0, 4, 0], [4, 4, 0.0]])
+    path = obj(tmp_path / "a.obj", star, {"roof": [[0, 4, 1, 3, 2], [0, 1, 2]]})
+    notes = [note for note in pcmc.repair(path, holes=0).notes if "MeshLab" in note]
+    assert notes[0].endswith("in the program that wrote it, or with pcmc repair)")
+
+
+@pytest.mark.parametrize("suffix", [".3dm", ".obj"])
+def test_a_repaired_mesh_keeps_its_unit(tmp_path, suffix):
+    X, F = sheet()
+    plain, path, out = tmp_path / "a.obj", tmp_path / f"b{suffix}", tmp_path / f"c{suffix}"
+    obj(plain, 12000.0 * X, {"roof": F})
+    for file, more, to in ((plain, ["--units", "mm"], path), (path, [], out), (out, ["--units", "m"], plain)):
+        assert cli.main(["repair", str(file), "-o", str(to), *more]) == 0
+        data = pcmc.io.load(to)
+        unit, factor = ("m", 1e-3) if to == plain else ("mm", 1.0)
+        assert data.units.length == unit
+        np.testing.assert_allclose(np.ptp(data.vertices, axis=0)[:2], [12000.0 * factor] * 2)
+
+
 def test_a_scan_is_simplified_to_an_edge_length(tmp_path):
     X, F = sheet(61)
     X[:, 2] += np.random.default_rng(2).normal(0, 1e-4, len(X))

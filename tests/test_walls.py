@@ -4,11 +4,19 @@ import numpy as np
 import pytest
 from refusals import refused
 
+import pcmc
+from generators import hypar_roof, lens, two_squares
 from pcmc import Plane, Surface
 from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.base.units import Units
+from pcmc.drawings import drawing_set
 from pcmc.energy.functional import patch_areas
+from pcmc.explore.following import values_of
+from pcmc.explore.page_data import control_groups, outline
 from pcmc.meshing.quality import minimum_angle
 from pcmc.plan import Divider, Plan, add_walls, surface_from_labels
+from pcmc.report.tables import patch_table
+from pcmc.surface.colours import SHEETS, patch_colors, rgb
 
 BOX = [[0, 0], [8, 0], [8, 6], [0, 6]]
 
@@ -229,3 +237,45 @@ def test_a_moebius_strip_is_refused():
 def test_wrong_labels_are_refused(arguments, error, fields):
     with refused(error, **fields):
         surface_from_labels(*grid(2, bump), **{"tension": 1.0, **arguments})
+
+
+def sail_hall() -> Surface:
+    """A hall of a patch under pressure and a sail without, with a wall under their border."""
+    patches = {"west": {"tension": 4.0}, "sail": {"tension": 4.0, "pressure": 0.0}}
+    return Plan(BOX, [Divider([[4, 0], [4, 6]])], edge_length=1.0, patches=patches).surface()
+
+
+def test_a_sail_is_roof_and_what_hangs_below_a_junction_is_a_wall():
+    def walls(surface):
+        return [p.name for p, wall in zip(surface.patches, surface.walls, strict=True) if wall]
+
+    hall, squares = sail_hall(), two_squares(4)
+    assert walls(hall) == ["wall 1"]
+    assert walls(hall.retensioned(pressures={"west": 0.0})) == ["wall 1"]  # declared by the plan
+    assert walls(hall.retensioned(walls=["sail"])) == ["sail", "wall 1"]
+    assert walls(hypar_roof(4, weight=0.1)) == []
+    assert walls(lens(0.4)) == []  # a film around a cushion hangs below nothing
+    assert walls(squares) == ["wall"]
+    assert not squares.patches[2].wall
+    flat = squares.vertices * [1.0, 1.0, 0.0]
+    below = squares.vertices * [1.0, 1.0, -1.0]
+    assert walls(squares.moved(flat)) == walls(squares.moved(below)) == ["wall"]  # pinched; under suction
+    heavy = squares.retensioned(pressures={"left": 0.0, "right": 0.0}, weights={"left": -1.0, "right": -1.0})
+    assert walls(heavy) == ["wall"]
+    assert walls(squares.retensioned(pressures={"left": 0.0, "right": 0.0})) == []  # three films
+
+
+def test_files_tables_and_pictures_show_a_sail_as_roof(tmp_path):
+    hall, certificate = sail_hall(), pcmc.certify(sail_hall())
+    pcmc.write(tmp_path / "hall.ifc", hall)
+    text = (tmp_path / "hall.ifc").read_text()
+    assert (text.count("IFCSLAB("), text.count("IFCWALL(")) == (2, 1)
+    np.testing.assert_array_equal(patch_colors(hall)[:2], [rgb(color) for color in SHEETS[:2]])
+    rows = patch_table(hall, certificate, Units("m")).rows
+    assert [row[1] for row in rows] == ["roof", "roof", "wall"]
+    assert [patch["wall"] for patch in outline(hall)[0]["patches"]] == [False, False, True]
+    assert [group["wall"] for group in control_groups(hall, values_of(hall))] == [False, False, True]
+    assert pcmc.panels(hall, 0.1, anyway=True).area == pytest.approx(patch_areas(hall)[:2].sum())
+    drawn = [c.vertices for c in drawing_set(hall, "m", anyway=True).curves if c.layer == "PCMC-WALL"]
+    assert set(np.concatenate(drawn)) <= set(hall.faces[hall.patch_of_face == 2].ravel())
+    assert repr(hall).splitlines()[2].startswith("  walls: wall 1 ")

@@ -61,7 +61,7 @@ def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[
         found[quantity, "" if curve[1] else of, *curve] = Reading(quantity, of, value, value, share * scale)
 
     for k, patch in enumerate(surface.patches):
-        if not patch.auxiliary:
+        if surface.roof[k]:
             height, estimate = _height(surface, k)
             reading = Reading("height", patch.name, height, estimate, share * size)
             found["height", patch.name, (), b""] = reading
@@ -102,7 +102,7 @@ def given_volume(surface: Surface) -> float | None:
     """
     if not surface.rooms or np.any(closing_volumes(surface)):
         return None
-    signs, roof = surface.room_signs, (~surface.walls).astype(float)
+    signs, roof = surface.room_signs, (~surface.auxiliary).astype(float)
     share = np.round(np.linalg.lstsq(signs.T, roof)[0], 9)  # most are whole: no rounding in the sum
     known = np.abs(share @ signs - roof).max() <= ROUNDING
     return float(share @ prescribed_volumes(surface)) if known else None

@@ -96,7 +96,7 @@ def coarseness(surface: Surface) -> float:
     """
     X, topo = surface.vertices, surface.topology
     length = segment_lengths(X, topo.edges[topo.boundary_edge & ~surface.mirror_edge])
-    corners = X[surface.faces[~surface.walls[surface.patch_of_face]]]
+    corners = X[surface.faces[~surface.auxiliary[surface.patch_of_face]]]
     plan = abs(float(area_vectors(corners).sum(axis=0) @ np.array(surface.plane.normal)))
     if not len(length) or plan == 0.0:
         return 0.0

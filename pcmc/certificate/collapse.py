@@ -51,7 +51,7 @@ def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
     """
     patch = int(surface.patch_of_face[_worst_face(surface, pinchable)[0]])
     edge = float(np.median(edge_lengths(surface)))
-    return bool(surface.walls[patch]) and _height(surface, patch) < LOW * edge
+    return bool(surface.auxiliary[patch]) and _height(surface, patch) < LOW * edge
 
 
 def _worst_face(surface: Surface, pinchable: Bools) -> tuple[int, float]:

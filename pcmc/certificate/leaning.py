@@ -29,8 +29,6 @@ def lean_sines(surface: Surface) -> Floats:
 def lean_table(surface: Surface) -> pd.DataFrame:
     """A row per wall: the largest angle of its triangles from the vertical of Π, degrees, and where it is.
 
-    Patches without pressure are walls only where others are under pressure.
-
     >>> from pcmc.plan import Divider, Plan
     >>> halves = [Divider([[4, 0], [4, 4]])]
     >>> hall = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], halves, tension=4.0, edge_length=1.0)
@@ -39,7 +37,7 @@ def lean_table(surface: Surface) -> pd.DataFrame:
     """
     rows = []
     sines = lean_sines(surface)
-    for wall in np.flatnonzero(surface.walls) if not surface.walls.all() else ():
+    for wall in np.flatnonzero(surface.walls):
         faces = np.flatnonzero(surface.patch_of_face == wall)
         if not len(faces):  # a wall that is pinched all along
             continue

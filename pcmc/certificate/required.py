@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 from ..base import validate
 from ..base.errors import SurfaceError
+from ..energy.functional import energy
 from ..surface import Surface
 from .certificate import Certificate, certify
 
 
 def certified(surface: Surface, anyway: bool, known: Certificate | None = None) -> Certificate:
     """The certificate of a surface, where it is not ``known``; SurfaceError if the surface is not certified,
-    unless ``anyway``."""
+    unless ``anyway``, and if the known certificate belongs to another surface."""
     validate.flag("anyway", anyway)
+    if known is not None:
+        same = len(known.reactions) == surface.n and math.isclose(known.energy, energy(surface), rel_tol=1e-9)
+        if not same:
+            text = "certificate: belongs to another surface; pass certify(surface), or leave it out"
+            raise SurfaceError(text, what="certificate", found=known.energy, expected=energy(surface))
     certificate = certify(surface) if known is None else known
     require_certified(certificate, anyway)
     return certificate

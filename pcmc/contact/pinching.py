@@ -79,7 +79,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
     """
     n = surface.n
     height = surface.plane.height(surface.vertices)
-    topo, roof = surface.topology, ~surface.walls[surface.patch_of_face]
+    topo, roof = surface.topology, ~surface.auxiliary[surface.patch_of_face]
     roof_edge, roof_vertex = np.zeros(len(topo.edges), dtype=bool), np.zeros(n, dtype=bool)
     roof_edge[topo.edge_of_face[roof]] = True
     roof_vertex[surface.faces[roof]] = True
@@ -333,7 +333,7 @@ def _standing_faces(surface: Surface, walls: Walls, resting: Bools, owner: Ints)
     """(m,3) faces between the owners of their vertices, and which of them stand (m,)."""
     F = owner[surface.faces]
     apart = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
-    wall = surface.walls[surface.patch_of_face]
+    wall = surface.auxiliary[surface.patch_of_face]
     apart[wall] &= ~_lie_on_plane(walls, resting)[F[wall]].all(axis=1)
     apart[_folded(F, np.flatnonzero(apart & wall & resting[F].any(axis=1)))] = False
     return F, apart
@@ -382,6 +382,6 @@ def _pressure_push(surface: Surface, at: Bools) -> Floats:
     """(n,) force of the pressure of sheets along Π's normal on the vertices ``at``; elsewhere 0."""
     near = at[surface.faces].any(axis=1)
     F, patch = surface.faces[near], surface.patch_of_face[near]
-    force = (surface.pressures * ~surface.walls)[patch] / 3.0
+    force = (surface.pressures * ~surface.auxiliary)[patch] / 3.0
     push = force * (area_vectors(surface.vertices[F]) @ np.array(surface.plane.normal))
     return np.where(at, vertex_sums(push[:, None], F, surface.n)[:, 0], 0.0)

@@ -66,7 +66,7 @@ class BranchMesh:
         self.part = part = standing_part(surface)
         self.surface, self.walls, self.resting = part.surface, part.walls, part.resting
         self.classes, self.quality_faces = part.classes, part.quality_faces
-        self.loaded: Floats = (~surface.walls).astype(float)
+        self.loaded: Floats = (~surface.auxiliary).astype(float)
         self._curves_move = bool(((self.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None
         self._inside: HarmonicExtension | None = None

@@ -51,7 +51,7 @@ def _apex(surface: Surface, of: str | None) -> Measurement:
 
 
 def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
-    """Height at which the normal of Π through a point of Π meets the highest triangle under pressure.
+    """Height at which the normal of Π through a point of Π meets the highest triangle of the roof.
 
     A corner's displacement d raises the triangle's plane there by λ ⟨d, ν⟩ / ⟨ν, n⟩, with λ the
     corner's barycentric coordinate and ν, n the normals of triangle and Π.
@@ -83,7 +83,7 @@ def _area(surface: Surface, of: str | None) -> Measurement:
 
 
 def _volume(surface: Surface, of: str | None) -> Measurement:
-    """V_i as in ``volumes_below``, of one patch or of all under pressure, length³."""
+    """V_i as in ``volumes_below``, of one patch or of the roof, length³."""
     one = _chosen_patches(surface, of)
     return Measurement(float(one @ volumes_below(surface)), volume_below_gradient(surface, one))
 
@@ -192,7 +192,7 @@ def _chosen_patches(surface: Surface, of: str | None) -> Floats:
 
 
 def _faces_of(surface: Surface, of: str | None) -> Bools:
-    """(m,) faces of the patch, or of all patches under pressure."""
+    """(m,) faces of the patch, or of the roof."""
     return np.asarray(_chosen_patches(surface, of)[surface.patch_of_face] != 0.0)
 
 

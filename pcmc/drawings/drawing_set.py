@@ -124,7 +124,8 @@ def drawing_set(
     mirror_images : as in ``pcmc.panels``.
     name : of the roof, in the title strips.
     anyway : draw a surface that is not certified; every sheet is marked.
-    certificate, schedule : of the surface, where they are known; otherwise computed.
+    certificate, schedule : of the surface, where they are known; by default they are computed, the schedule
+        with ``tolerance``.
 
     Raises
     ------
@@ -150,14 +151,18 @@ def drawing_set(
     if scale is not None:
         validate.integer("scale", scale, least=1)
     validate.flag("panel_sheets", panel_sheets)
-    if panel_sheets and tolerance is None:
+    if schedule is not None and (
+        schedule.surface is not surface or tolerance not in (None, schedule.tolerance)
+    ):
+        text = "schedule: belongs to another surface or tolerance; pass panels(surface, tolerance)"
+        raise OptionError(text, what="schedule", found=schedule.tolerance, expected=tolerance)
+    if panel_sheets and tolerance is None and schedule is None:
         text = "panel_sheets: needs the tolerance of the panels' families; add tolerance="
         raise OptionError(text, what="tolerance", expected="a length")
     certificate = certified(surface, anyway, certificate)
     if tolerance is not None and schedule is None:
-        schedule = panels(
-            surface, tolerance, mirror_images=mirror_images, anyway=anyway, certificate=certificate
-        )
+        options: dict[str, Any] = {"anyway": anyway, "certificate": certificate}
+        schedule = panels(surface, tolerance, mirror_images=mirror_images, **options)
     curves = views.model_curves(surface)
     points = _setting_out(curves)
     named = [(str(row.point), np.array([row.x, row.y, row.z])) for row in points.itertuples()]

@@ -210,4 +210,4 @@ def patch_volumes(surface: Surface) -> Floats:
 
 def volume(surface: Surface) -> float:
     """Σ V_i of the energy over the patches that are no walls, length³; under a roof see ``volume_below``."""
-    return float(patch_volumes(surface)[~surface.walls].sum())
+    return float(patch_volumes(surface)[~surface.auxiliary].sum())

@@ -131,7 +131,7 @@ def with_room_pressures(surface: Surface, change: Floats) -> Surface:
     [1.5]
     """
     pressures = surface.pressures + change @ surface.room_signs
-    pressures[surface.walls & (np.abs(pressures) <= ROUNDING * np.abs(pressures).max())] = 0.0
+    pressures[surface.auxiliary & (np.abs(pressures) <= ROUNDING * np.abs(pressures).max())] = 0.0
     touched = np.flatnonzero(surface.room_signs.any(axis=0))
     names = [patch.name for patch in surface.patches]
     new = {names[k]: float(pressures[k]) for k in touched}

@@ -39,7 +39,7 @@ def volumes_below(surface: Surface) -> Floats:
 
 
 def volume_below(surface: Surface) -> float:
-    """The volume under the roof: Σ V_i over all patches under pressure, or all but walls if none is."""
+    """The volume under the roof: Σ V_i over all patches that are no walls."""
     return float(volumes_below(surface)[surface.roof].sum())
 
 

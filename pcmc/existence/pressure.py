@@ -20,11 +20,10 @@ def raise_pressure(low: Surface, attempts: Attempts) -> Further:
     The branch begins at the highest of a few pressures at which a minimum is found from the low start.
     """
     pressures = {patch.name: patch.pressure for patch in low.patches if patch.pressure != 0.0}
-    walls = [patch.name for patch in low.patches if patch.auxiliary]
     carried = min(1.0, 1.0 / max(load_ratio(low), 1e-300))
     for share in SHARES:
         begin = share * carried
-        less = low.retensioned(None, {name: begin * p for name, p in pressures.items()}, walls)
+        less = low.retensioned(None, {name: begin * p for name, p in pressures.items()})
         result = attempts.solve(less, levels=0, target="minimum")
         if result.converged:
             break
@@ -37,7 +36,7 @@ def raise_pressure(low: Surface, attempts: Attempts) -> Further:
         return Further()
     end = way(branch)
     if end.arrival is Arrival.REACHED:
-        last = branch.last.retensioned(None, pressures, walls)
+        last = branch.last.retensioned(None, pressures)
         return Further(last, f"by raising the pressure from {begin:.3g} of it")
     if end.arrival is Arrival.FOLD:
         return Further(fold=Fold("pressure", end.farthest * carried, begin))

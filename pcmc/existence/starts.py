@@ -35,7 +35,7 @@ def low_start(surface: Surface) -> Surface | None:
     """
     if not _spans(surface.vertices[surface.fixed]) or not _upright(surface):
         return None
-    walls = surface.walls[surface.patch_of_face]
+    walls = surface.auxiliary[surface.patch_of_face]
     faces = surface.faces[~walls] if not walls.all() else surface.faces
     roof = np.zeros(surface.n, dtype=bool)
     roof[faces] = True

@@ -113,8 +113,8 @@ def own_start(path: Path, asked: Surface, moved: Collection[str] = ()) -> Surfac
             patches = data.setdefault("plan", {}).setdefault("patches", {})
             if not isinstance(patches, dict):
                 return None
-            for patch in asked.patches:
-                if not patch.auxiliary:
+            for patch, wall in zip(asked.patches, asked.walls.tolist(), strict=True):
+                if not wall:
                     patches.setdefault(patch.name, {})["tension"] = patch.tension
             start = projects.surface_of(projects.project_of(path, text, data))
         kept = {name: tension for name, tension in values["tensions"].items() if name not in walls}

@@ -48,9 +48,9 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
     topo = surface.topology
     header = {
         "patches": [
-            {"name": p.name, "wall": not roof, "color": color}
-            for p, roof, color in zip(
-                surface.patches, surface.roof.tolist(), patch_colors(surface).tolist(), strict=True
+            {"name": p.name, "wall": wall, "color": color}
+            for p, wall, color in zip(
+                surface.patches, surface.walls.tolist(), patch_colors(surface).tolist(), strict=True
             )
         ],
         "controls": groups,
@@ -82,9 +82,9 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
 def control_groups(surface: Surface, values: dict[str, dict[str, float]]) -> list[dict[str, Any]]:
     """What has sliders: a group for each patch, cable and room, with the kinds of its values."""
     groups = []
-    for number, patch in enumerate(surface.patches):
+    for number, (patch, wall) in enumerate(zip(surface.patches, surface.walls.tolist(), strict=True)):
         kinds = [kind for kind in ("tensions", "pressures", "weights") if patch.name in values[kind]]
-        groups.append({"name": patch.name, "patch": number, "wall": patch.auxiliary, "kinds": kinds})
+        groups.append({"name": patch.name, "patch": number, "wall": wall, "kinds": kinds})
     for kind in ("cables", "volumes"):
         groups += [{"name": name, "patch": None, "wall": False, "kinds": [kind]} for name in values[kind]]
     return groups
@@ -99,7 +99,7 @@ def on_cables(surface: Surface) -> Bools:
 
 def mesh_key(surface: Surface, origin: Floats) -> int:
     """A number that changes with all that ``outline`` holds."""
-    names = repr([(p.name, p.auxiliary) for p in surface.patches])
+    names = repr([p.name for p in surface.patches]) + repr(surface.walls.tolist())
     return crc32(surface.faces.tobytes() + origin.tobytes() + names.encode())
 
 

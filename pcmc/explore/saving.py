@@ -97,9 +97,9 @@ def project_with(
     document = tomlkit.parse(text)
     before = {patch.name: patch for patch in roof.surface.patches}
     plan: Any = document["plan"]
-    for patch in surface.patches:
+    for patch, wall in zip(surface.patches, surface.walls.tolist(), strict=True):
         old = before.get(patch.name)
-        if old is not None and patch.auxiliary:
+        if old is not None and wall:
             _set_wall(tomlkit, plan, patch, old, surface)
         elif old is not None:
             _set_patch(tomlkit, plan, patch, old)

@@ -64,9 +64,9 @@ def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]
     add("area", "", "area", float(areas[roofs].sum()))
     add("volume", "", "volume", float(certificate.volume))
     add("reaction", "", "tension", largest(sizes))
-    for patch in surface.patches:
+    for patch, of_roof in zip(surface.patches, surface.roof.tolist(), strict=True):
         add("tension", patch.name, "tension", patch.tension)
-        if not patch.auxiliary:
+        if of_roof:
             add("pressure", patch.name, "pressure", patch.pressure)
         if patch.weight:
             add("weight", patch.name, "pressure", patch.weight)

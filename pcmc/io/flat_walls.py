@@ -25,7 +25,7 @@ CHANGED = "walls without height were left out: the surface has changed since the
 
 def encode_walls(surface: Surface, shown: Surface) -> str:
     """The walls of a surface as text; ``shown`` is the surface without the triangles that have no area."""
-    wall = surface.walls[surface.patch_of_face]
+    wall = surface.auxiliary[surface.patch_of_face]
     used, local = np.unique(surface.faces[wall], return_inverse=True)
     values = {
         "vertices": surface.vertices[used].tolist(),
@@ -34,7 +34,7 @@ def encode_walls(surface: Surface, shown: Surface) -> str:
         "faces": local.reshape(-1, 3).tolist(),
         "patch": surface.patch_of_face[wall].tolist(),
         "patches": [astuple(p) for p in surface.patches],
-        "shown": int(np.count_nonzero(shown.walls[shown.patch_of_face])),
+        "shown": int(np.count_nonzero(shown.auxiliary[shown.patch_of_face])),
     }
     return json.dumps(values)
 

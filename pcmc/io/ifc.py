@@ -152,13 +152,14 @@ class _Model:
             RepresentationType="Tessellation",
             Items=[mesh],
         )
+        wall = bool(surface.walls[k])
         element = self.rooted(
-            "IfcWall" if patch.auxiliary else "IfcSlab",
+            "IfcWall" if wall else "IfcSlab",
             f"patch {k}",
             Name=patch.name,
             ObjectPlacement=self.placement(place),
             Representation=self.add("IfcProductDefinitionShape", Representations=[shape]),
-            PredefinedType="NOTDEFINED" if patch.auxiliary else "ROOF",
+            PredefinedType="NOTDEFINED" if wall else "ROOF",
         )
         force = bool(self.units.force)
         values = {

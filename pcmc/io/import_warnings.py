@@ -5,6 +5,8 @@ Such a mesh can be solved, but probably gives another roof than the one drawn.
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -16,10 +18,14 @@ from .mesh_data import MeshData
 GAP = 0.05  # of the boundary edges next to it: closer vertices are one, drawn twice
 FACES_ONE_WAY = 0.5  # part of the area: then it is a roof, and not a column or a ball
 FACES_UP = 1e-2  # part of the projected area: less, and another axis is up
+FLAT = 0.5  # smallest spread of the boundary over the next: below, it has a plane
+UPRIGHT = 0.9  # of the normal of that plane along x or y: more, and another axis is up
 
 
-def import_warnings(data: MeshData) -> tuple[str, ...]:
+def import_warnings(data: MeshData, path: str | os.PathLike[str] = "FILE") -> tuple[str, ...]:
     """A sentence for each probable mistake; none where the format has supports, as pcmc's files do.
+
+    ``path`` is the file, for the command to type.
 
     >>> from pcmc import Patch
     >>> X = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
@@ -30,8 +36,11 @@ def import_warnings(data: MeshData) -> tuple[str, ...]:
     if data.support is not None or not len(data.faces):
         return ()
     topo = topology(data.faces, data.patch_of_face, len(data.vertices))
-    seam = _open_seam(data.vertices, topo.edges[topo.boundary_edge])
-    return tuple(filter(None, (seam, _opposed_patches(data, topo), _wrong_up(data))))
+    outer = topo.edges[topo.boundary_edge]
+    seam, axis = _open_seam(data.vertices, outer), _up(data, outer)
+    turn = f"the surface faces {axis}, but z is up here; if {axis} was up, turn it: pcmc repair"
+    wrong_up = f"{turn} {os.fspath(path)} -o turned.obj --up {axis}" if axis else ""
+    return tuple(filter(None, (seam, _opposed_patches(data, topo), wrong_up)))
 
 
 def _open_seam(X: Floats, outer: Ints) -> str:
@@ -66,11 +75,17 @@ def _opposed_patches(data: MeshData, topo: Topology) -> str:
     )
 
 
-def _wrong_up(data: MeshData) -> str:
+def _up(data: MeshData, outer: Ints) -> str:
+    """The axis that was up, "x" or "y", by the sum of area vectors and the best plane of the boundary."""
     vector = area_vectors(data.vertices[data.faces])
     total = np.abs(vector.sum(axis=0))
     size = float(np.linalg.norm(total))
-    if size < FACES_ONE_WAY * float(np.linalg.norm(vector, axis=1).sum()) or total[2] > FACES_UP * size:
+    if size > FACES_ONE_WAY * float(np.linalg.norm(vector, axis=1).sum()) and total[2] <= FACES_UP * size:
+        return "xy"[int(total[:2].argmax())]
+    rim = data.vertices[np.unique(outer)]
+    if len(rim) < 3:
         return ""
-    axis = "xy"[int(total[:2].argmax())]
-    return f"the surface faces {axis}, but z is up here; rotate it if {axis} was up"
+    _, spread, axes = np.linalg.svd(rim - rim.mean(axis=0), full_matrices=False)
+    normal = np.abs(axes[2])
+    upright = spread[2] < FLAT * spread[1] and normal[:2].max() > UPRIGHT
+    return "xy"[int(normal[:2].argmax())] if upright else ""

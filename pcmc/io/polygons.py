@@ -74,7 +74,7 @@ def _best_fans(X: Floats, polygon: Ints, number: Ints) -> Ints:
     quality = triangle_quality(X, fans.reshape(-1, 3)).reshape(side.shape)
     worst = (side * quality).min(axis=2)
     best = worst.argmax(axis=0)
-    bad = np.flatnonzero(worst.max(axis=0) <= 0.0)
+    bad = np.flatnonzero(worst.max(axis=0) < 0.0)  # one without area becomes triangles without area
     if len(bad):
         text = f"face {number[bad[0]]} is a polygon of {k} corners that no fan of triangles fills; cut it"
         text = f"{text} in the program that wrote it, or with pcmc repair"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,15 +18,16 @@ from ..base.units import MICROMETRES, Units
 from ..base.validate import choice
 from ..surface import Plane, Surface
 from .flat_walls import restore_walls
-from .formats import FORMATS, READ_ONLY, format_of
+from .formats import FORMATS, READ_ONLY, Format, format_of
 from .import_warnings import import_warnings
 from .libraries import unreadable
 from .mesh_data import MeshData, checked, merged, to_surface, without_unused
-from .scaling import converted
+from .scaling import converted, stated
 
 NO_SUPPORTS = (
     "no supports in the file: its boundary is taken as fixed; tensions and pressures are 1 unless given"
 )
+NO_UNIT = "no unit of length in the file; name it with --units mm, say"
 
 
 def read(
@@ -72,18 +74,15 @@ def read(
 
 
 def read_bare(path: str | os.PathLike[str], units: str = "", assumed: str = "") -> tuple[Surface, MeshData]:
-    """The Surface in a file and all its data; a note if it has no supports.
+    """The Surface in a file and all its data; a note if the file has no supports, or no unit of length.
 
     Parameters
     ----------
     path : of the file.
     units : the unit of length wanted; by default the file's own.
-    assumed : of a file without a unit; by default the one wanted.
+    assumed : of the numbers in a file without a unit; by default the one wanted.
     """
-    data = load(path)
-    if not data.units:
-        data = replace(data, units=Units(assumed or units))
-    data = converted(data, units)
+    data = converted(stated(load(path), assumed or units), units)
     return _surface(path, data, ()), data
 
 
@@ -96,9 +95,9 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
         if isinstance(error, SurfaceError):
             raised.args = (f"{raised}; or try: pcmc repair {os.fspath(path)} -o clean.obj",)
         raise raised from None
-    notes = (*data.notes, *import_warnings(data))
+    notes = (*data.notes, *import_warnings(data, path))
     if not given and data.support is None:
-        notes = (*notes, NO_SUPPORTS)
+        notes = (*notes, NO_SUPPORTS, *([] if data.units else [NO_UNIT]))
     if notes:
         warnings.warn(f"{os.fspath(path)}: {'; '.join(notes)}", FileWarning, stacklevel=3)
     return surface
@@ -107,6 +106,20 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
 def load(path: str | os.PathLike[str]) -> MeshData:
     """Everything in a file, scalars and certificate too. Errors as in ``read``."""
     path = Path(path)
+    with opened(path) as form:
+        data = without_unused(checked(contents(form, path)))
+        return data if form.shared else restore_walls(merged(data))
+
+
+def contents(form: Format, path: Path) -> MeshData:
+    """What the reader of a format finds in a file, in the unit that the format prescribes."""
+    data: MeshData = form.functions.read(path)
+    return replace(data, units=Units(form.unit, data.units.force)) if form.unit else data
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Format]:
+    """The format of a file that is read in the block; what goes wrong there is a FileError with its name."""
     check_regular(path)
     form = format_of(path, {**FORMATS, **READ_ONLY})
     if not form.reads:
@@ -116,12 +129,7 @@ def load(path: str | os.PathLike[str]) -> MeshData:
         raise FileError(text, what=str(path), found=path.suffix)
     try:
         path.open("rb").close()  # the libraries' errors for a missing file differ
-        data = without_unused(checked(form.functions.read(path)))
-        if form.unit:
-            data = replace(data, units=Units(form.unit, data.units.force))
-        if form.shared:
-            return data
-        return restore_walls(merged(data))
+        yield form
     except OSError as error:
         raise system_error(path, "read", error) from None
     except UnicodeDecodeError as error:

@@ -5,25 +5,29 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base import validate
-from ..base.errors import FileError, PcmcError, unknown
-from ..base.files import check_regular, system_error
-from ..surface import Surface
-from . import FORMATS, READ_ONLY, meshlab
+from ..base.errors import FileError, PcmcError
+from ..base.units import NO_UNITS, Units
+from ..surface import Plane, Surface
+from . import meshlab
 from .libraries import unreadable
 from .mesh_data import MeshData, to_surface, within
+from .reading import contents, opened
 from .reading_process import read_arrays
+from .scaling import converted, stated
 
 WELD = 1e-5  # of the size
 HOLES = 8  # edges of a hole
 MESHLAB_READS = (".obj", ".ply", ".stl")
+TURNS = {"x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]], "y": [[1, 0, 0], [0, 0, -1], [0, 1, 0]], "z": np.eye(3)}
+"""The rotations that turn an axis to be z."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,11 +39,13 @@ class Repaired:
     surface : a patch per group of the file, its boundary fixed; tensions and pressures are the file's, or 1.
     changes : what was done and how often, as in {"vertices welded": 12}; empty if the mesh was clean.
     notes : other changes, a sentence each, as that the mesh was cut into new triangles.
+    units : of its numbers; no unit where the file has none and none was given.
     """
 
     surface: Surface
     changes: Mapping[str, int]
     notes: Sequence[str] = ()
+    units: Units = NO_UNITS
 
     def __str__(self) -> str:
         """The changes and notes in one line."""
@@ -53,6 +59,8 @@ def repair(
     weld: float | None = None,
     holes: int = HOLES,
     edge_length: float | None = None,
+    units: str = "",
+    up: str = "z",
 ) -> Repaired:
     """Repair the mesh in a file, which stays as it is.
 
@@ -69,6 +77,8 @@ def repair(
     holes : edges of the largest hole that is closed; 0 closes none. The outer edge is no hole.
     edge_length : of new triangles, for a scan; None keeps the triangles. A mesh of several patches needs the
         extra ``remesh`` for this.
+    units : the unit of length wanted, by default the file's own; the numbers of a file without one are in it.
+    up : the axis that was up in the program that drew the mesh, "x", "y" or "z"; it is turned to be z.
 
     Raises
     ------
@@ -89,9 +99,13 @@ def repair(
     validate.integer("holes", holes, least=0)
     if edge_length is not None:
         validate.positive("edge_length", edge_length)
+    validate.choice("up", up, tuple(TURNS))
     meshlab.require_meshlab()
     path = Path(path)
-    data = _loaded(path)
+    data = converted(stated(_read(path), units), units)
+    turn = np.array(TURNS[up], dtype=float)
+    plane = data.plane and Plane(tuple(turn @ data.plane.point), tuple(turn @ data.plane.normal))
+    data = replace(data, vertices=np.asarray(data.vertices) @ turn.T, plane=plane)
     try:
         return _repaired(data, weld, holes, edge_length)
     except PcmcError as error:
@@ -122,50 +136,30 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     )
     surface = to_surface(clean)
     changes = {done: number for done, number in answer["changes"].items() if number}
-    notes = tuple(data.notes)
+    given = {"supports": data.support is not None, "cables": data.cables, "rooms": data.rooms}
+    given |= {"planes": data.planes, "lines": data.lines}
+    left_out = ", ".join(name for name, there in given.items() if there)
+    notes = (*data.notes, *([f"left out: {left_out}; the boundary is fixed"] if left_out else []))
     if edge_length is not None:
         if several:
             from ..meshing.remeshing import remesh  # needs the extra remesh
 
             surface = remesh(surface, edge_length)
         notes = (*notes, f"{len(F)} triangles became {surface.m}")
-    return Repaired(surface, changes, notes)
+    return Repaired(surface, changes, notes, data.units)
 
 
-def _loaded(path: Path) -> MeshData:
+def _read(path: Path) -> MeshData:
     """The mesh of a file as it is; MeshLab reads what pcmc's readers refuse."""
-    check_regular(path)
-    suffix = path.suffix.lower()
-    known = {**FORMATS, **READ_ONLY}
-    if suffix not in known:
-        text = f"{path}: {unknown('suffix', suffix, known)}"
-        raise FileError(text, what=str(path), found=suffix, expected=list(known))
-    try:
-        path.open("rb").close()
-        return _read(path, known[suffix].module)
-    except OSError as error:
-        raise system_error(path, "read", error) from None
-    except UnicodeDecodeError as error:
-        raise FileError(
-            f"{path}: byte {error.start} is not text", what=str(path), where=error.start
-        ) from None
-    except FileError as error:
-        raise error.in_file(path, what=str(path)) from None
-
-
-def _read(path: Path, module: str) -> MeshData:
-    suffix = path.suffix.lower()
-    try:
-        data: MeshData = import_module(f".{module}", __package__).read(path)
-        return data
-    except (PcmcError, ValueError, IndexError) as error:
-        if suffix not in MESHLAB_READS:
-            raise error if isinstance(error, PcmcError) else unreadable(suffix, error) from None
+    with opened(path) as form:
         try:
-            data = meshlab.read(path)
-        except FileError:
-            raise error if isinstance(error, PcmcError) else unreadable(suffix, error) from None
-        note = (
-            f"read by MeshLab, without groups, as pcmc's reader stops ({' '.join(str(error).split())[:100]})"
-        )
-        return replace(data, notes=(*data.notes, note))
+            return contents(form, path)
+        except (PcmcError, ValueError, IndexError) as error:
+            refused = error if isinstance(error, PcmcError) else unreadable(path.suffix, error)
+            if path.suffix.lower() not in MESHLAB_READS:
+                raise refused from None
+            with suppress(FileError):
+                data = meshlab.read(path)
+                note = f"read by MeshLab, without groups, as pcmc's reader stops ({refused})"
+                return replace(data, notes=(*data.notes, note))
+            raise refused from None

@@ -64,8 +64,13 @@ def scaled_surface(surface: Surface, factor: float) -> Surface:
     return Surface(**parts | supports | {"vertices": factor * surface.vertices})
 
 
+def stated(data: MeshData, length: str) -> MeshData:
+    """A file's data, taken to be in this unit of length if the file names none."""
+    return data if data.units else replace(data, units=Units(length, data.units.force))
+
+
 def converted(data: MeshData, length: str) -> MeshData:
-    """A file's data in another unit of length, with a note if that changes them.
+    """A file's data in another unit of length, if any is given, with a note if that changes them.
 
     Tensions and pressures change only where the file has them; scalars stay.
     """

@@ -147,11 +147,11 @@ def panels(
         mirror images are of different families.
     walls : whether triangles of walls are panels, too.
     anyway : accept a surface that is not certified.
-    certificate : of the surface, where it is known; otherwise computed.
+    certificate : of the surface, where it is known; by default it is computed.
 
     Raises
     ------
-    SurfaceError : the surface is not certified, or has no panels.
+    SurfaceError : the surface is not certified, or has no panels; the certificate is another surface's.
 
     Examples
     --------

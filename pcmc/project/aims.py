@@ -35,8 +35,8 @@ def aims_below_supports(
         highest = target.at_most if target.value is None else target.value
         if target.quantity != "apex" or highest is None:
             continue
-        own = [not p.auxiliary if target.of is None else p.name == target.of for p in surface.patches]
-        corners = np.unique(surface.faces[np.array(own)[surface.patch_of_face]])
+        own = surface.roof if target.of is None else np.array([p.name == target.of for p in surface.patches])
+        corners = np.unique(surface.faces[own[surface.patch_of_face]])
         held = corners[surface.pinned[corners]]
         if not len(held) or heights[held].max() <= highest + SAME * surface.size:
             continue

@@ -45,10 +45,11 @@ def fields(surface: Surface, certificate: Certificate) -> dict[str, Floats]:
     }
 
 
-def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
+def write_all(works: Works, progress: OnStep | None = None, *, losses: bool = False) -> list[Path]:
     """Write files, each by its own function of a path; all of them appear together, or none.
 
-    The functions write to temporary files; errors and warnings name the final ones.
+    The functions write to temporary files; errors and warnings name the final ones. ``losses`` warns of what
+    a format cannot hold.
     """
     report = progress or ignore
     paths = [path for path, _ in works]
@@ -57,7 +58,7 @@ def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
         for (path, write), temporary in zip(works, temporaries, strict=True):
             report(f"writing {path.name}")
             try:
-                with writing(temporary), defer_interrupts(), _final_name_in_warnings(temporary, path):
+                with writing(temporary), defer_interrupts(), _final_name_in_warnings(temporary, path, losses):
                     write(temporary)
             except PcmcError as error:
                 text = str(error).replace(f"{temporary}: ", "")
@@ -66,13 +67,13 @@ def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
 
 
 @contextmanager
-def _final_name_in_warnings(temporary: Path, path: Path) -> Iterator[None]:
-    """Warnings name the final file. Losses due to the format are not shown: nobody asked for more."""
+def _final_name_in_warnings(temporary: Path, path: Path, losses: bool) -> Iterator[None]:
+    """Warnings name the final file. Losses due to the format are shown only if asked for."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FileWarning)
         yield
     for warning in caught:
-        if not issubclass(warning.category, LostWarning):
+        if losses or not issubclass(warning.category, LostWarning):
             text = str(warning.message).replace(str(temporary), str(path))
             warnings.warn(text, warning.category, stacklevel=4)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import cast
 
 from ..base.errors import OptionError
+from ..certificate import Certificate
 from ..solvers.result import Result
 from ..structure import Material, SelfWeight, Snow, StructuralModel, Wind
 from ..structure.cables import checked_areas
@@ -71,9 +72,20 @@ class Structure:
         check_loads(self.loads, surface)
         checked_areas(self.cable_area, surface)
 
-    def model(self, surface: Surface | Result, anyway: bool = False) -> StructuralModel:
-        """The structural model of a surface at rest. Errors as in ``pcmc.StructuralModel``."""
+    def model(
+        self, surface: Surface | Result, anyway: bool = False, certificate: Certificate | None = None
+    ) -> StructuralModel:
+        """The structural model of a surface at rest, with the certificate that is known of it.
+
+        Errors as in ``pcmc.StructuralModel``.
+        """
         thickness, given = 0.0 if self.thickness is None else self.thickness, cast("Surface", surface)
         return StructuralModel(
-            given, self.material, thickness, self.loads, anyway=anyway, cable_area=self.cable_area
+            given,
+            self.material,
+            thickness,
+            self.loads,
+            anyway=anyway,
+            cable_area=self.cable_area,
+            certificate=certificate,
         )

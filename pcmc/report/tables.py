@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Bools, Ints
+from ..base.arrays import Ints
 from ..base.units import Units
 from ..certificate import Certificate
 from ..certificate.reactions import held_lengths
@@ -54,11 +54,6 @@ def one(value: float) -> str:
     return column([value])[0]
 
 
-def walls(surface: Surface) -> Bools:
-    """(k,) the patches that are walls; one that hangs under its weight alone is a roof."""
-    return ~surface.roof & np.array([patch.weight == 0.0 for patch in surface.patches])
-
-
 LISTED = {
     ("apex", "roof"): "highest point above the plane",
     ("area", "roof"): "area of the roof",
@@ -99,7 +94,7 @@ def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Tab
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
         columns[f"weight, {units.pressure}"] = column(weights)
-    kind = ["wall" if wall else "roof" for wall in walls(surface)]
+    kind = ["wall" if wall else "roof" for wall in surface.walls.tolist()]
     words = [[name, what] for name, what in zip(table["patch"], kind, strict=True)]
     return _table("Patches", ["patch", "kind"], words, columns)
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array
-from ..certificate.certificate import certify
-from ..certificate.required import require_certified
+from ..certificate import Certificate
+from ..certificate.required import certified
 from ..contact.pinching import standing_faces, standing_part
 from ..energy.functional import apply_supports
 from ..energy.weight import effective_tensions
@@ -65,6 +65,7 @@ class StructuralModel:
         stiff in bending where triangles are much wider than thick: their deflections are too small.
     cable_area : length², of the sections of the surface's cables, or one for each, by name.
     cable_material : of the cables; by default that of the patches.
+    certificate : of the surface, where it is known; by default it is computed.
 
     Raises
     ------
@@ -90,6 +91,7 @@ class StructuralModel:
     elements: str = "membrane"
     cable_area: float | Mapping[str, float] | None = None
     cable_material: Material | None = None
+    certificate: Certificate | None = field(default=None, repr=False)
     verdict: str = field(init=False, repr=False)
     certified: bool = field(init=False, repr=False)
 
@@ -112,10 +114,12 @@ class StructuralModel:
         ):
             hint = "SelfWeight needs it"
             validate.refuse("Material.density", 0.0, "a finite number > 0", hint=hint)
-        certificate = certify(self.surface, modes=0) if solved is None else solved.certify(modes=0)
+        if self.certificate is None and solved is not None:
+            object.__setattr__(self, "certificate", solved.certificate)
+        certificate = certified(self.surface, self.anyway, self.certificate)
+        object.__setattr__(self, "certificate", certificate)
         object.__setattr__(self, "verdict", certificate.verdict.value)
         object.__setattr__(self, "certified", certificate.certified)
-        require_certified(certificate, self.anyway)
 
     def _single_loads(self) -> list[Load]:
         return [load for entry in self.loads for load in (entry if isinstance(entry, tuple) else (entry,))]

@@ -28,7 +28,7 @@ def rgb(color: str) -> Floats:
 
 
 def patch_colors(surface: Surface) -> Floats:
-    """(k,3) RGB: one palette for sheets under pressure, another for walls."""
+    """(k,3) RGB: one palette for the roof, another for walls."""
     sheets, walls = cycle(SHEETS), cycle(WALLS)
     return np.array([rgb(next(walls if wall else sheets)) for wall in surface.walls])
 

@@ -25,7 +25,7 @@ class Patch:
         above it. A wall between rooms of pressures p_1 and p_2 has pressure p_1 - p_2, its normal
         pointing from room 1 to room 2; ``pcmc.energy`` describes E for other wall pressures.
     wall : whether the patch is a wall between rooms: its cone is not part of the volume, and it may
-        pinch. A patch without pressure is always a wall.
+        pinch. A patch without pressure that hangs below a junction is a wall, too: see ``Surface.walls``.
     weight : w, force per area of the patch, against Π's normal; negative for a lift.
 
     >>> Patch("roof", tension=2.0).target_curvature
@@ -65,7 +65,7 @@ class Patch:
 
     @property
     def auxiliary(self) -> bool:
-        """Whether the patch is a wall: declared as one, or without pressure."""
+        """Whether the energy and the solvers treat it as a wall: declared as one, or without pressure."""
         return self.wall or self.pressure == 0.0
 
     @property

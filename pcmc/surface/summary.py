@@ -15,8 +15,8 @@ def summary(surface: Any) -> str:
     patches = {
         wall: [
             f"{p.name} (tension {p.tension:g}, pressure {p.pressure:g})"
-            for p in surface.patches
-            if p.auxiliary == wall
+            for p, is_wall in zip(surface.patches, surface.walls.tolist(), strict=True)
+            if is_wall == wall
         ]
         for wall in (False, True)
     }

@@ -26,6 +26,7 @@ from .renewed import renewed
 from .room import Room, room_signs
 from .summary import summary
 from .topology import Topology, topology
+from .walls import wall_patches
 
 MESH = ("vertices", "faces", "patch_of_face", "patches")
 PARTS = (*MESH, "fixed", "on_plane", "plane", "on_line", "on_planes", "cables", "rooms")  # that are given
@@ -174,15 +175,19 @@ class Surface:
         return tuple(pair for pair in self.on_line if all(pair[0] is not line for line in given))
 
     @cached_array
-    def walls(self) -> Bools:
-        """(k,) bool: which patches are walls."""
+    def auxiliary(self) -> Bools:
+        """(k,) bool: the patches without pressure and the declared walls, which solvers let pinch."""
         return np.array([p.auxiliary for p in self.patches])
 
     @cached_array
+    def walls(self) -> Bools:
+        """(k,) bool: which patches are walls, in every file, table and picture: see ``wall_patches``."""
+        return wall_patches(self)
+
+    @property
     def roof(self) -> Bools:
-        """(k,) bool: the patches that are no walls; where none has pressure, those not declared walls."""
-        declared = np.array([p.wall for p in self.patches])
-        return ~declared if self.walls.all() else ~self.walls
+        """(k,) bool: the patches that are no walls."""
+        return ~self.walls
 
     @cached_array
     def tensions(self) -> Floats:

@@ -144,7 +144,7 @@ def mesh_columns(result: Result, check: Callable[[Result], MeshCheck]) -> dict[s
 
 def _heights(surface: Surface, certificate: Certificate) -> dict[str, float]:
     """The apex of each patch over Π, the rise over the lowest support, the roof's area, and the reactions."""
-    height, walls = surface.plane.height(surface.vertices), ~surface.roof
+    height, walls = surface.plane.height(surface.vertices), surface.walls
     apex = np.full(len(surface.patches), -np.inf)
     np.maximum.at(apex, surface.patch_of_face, height[surface.faces].max(axis=1))
     lowest = height[surface.held].min(initial=height.max()) if surface.held.any() else height.min()
