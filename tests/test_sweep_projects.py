@@ -15,12 +15,12 @@ import pcmc
 from generators import two_squares
 from pcmc import cli
 from pcmc.base.errors import FileError, OptionError, PcmcError
-from pcmc.project import check_varied, digest, run, varied
+from pcmc.project import check_varied, designed, digest, run, varied
 from pcmc.sweep import draw_sweep, read_store
 from pcmc.sweep import run as run_sweep
 from pcmc.sweep.projects import project_sweep, solve_project
 
-NUMBERS = ["west.apex", "east.apex", "rise", "roof_area", "largest_reaction"]
+NUMBERS = ["west.apex", "east.apex", "rise", "area", "reaction per length"]
 TEXT = """
 [plan]
 edge_length = 1.5                 # coarse: these are tests
@@ -165,6 +165,70 @@ def test_a_case_is_what_the_project_with_these_numbers_gives(roof):
     assert case["west.tension_reached"] == 3.2
 
 
+HALF = """
+[plan]
+edge_length = 1.5
+tension = 4.0
+outline = [[0, 0], [6, 0], [6, 4], [0, 4]]
+mirrors = [[[6, 0], [6, 4]]]
+"""
+
+
+@pytest.mark.parametrize(
+    ("output", "extent"), [("[output]\nwhole = true\n", "whole"), ("", "part between mirrors")]
+)
+def test_a_case_has_the_figures_of_the_roof_that_the_project_shows(roof, output, extent):
+    roof.write_text(HALF + output, encoding="utf-8")
+    case = solve_project("roof.toml", digest(roof))
+    outcome = designed(roof, use_cache=False)
+    assert case["extent"] == extent
+    for figure in outcome.figures:
+        name = f"{figure.of}.{figure.quantity}" if figure.of else figure.quantity
+        assert case[name] == pytest.approx(figure.value, rel=1e-9), name
+    assert (case["area"] > 40.0) == bool(output)
+    assert case["volume"] == pytest.approx(outcome.shown.certificate.volume, rel=1e-9)
+
+
+def test_cells_are_empty_where_nothing_is_at_rest(roof, capsys):
+    given = ["sweep", "roof.toml", "east.tension=0.2,3", "--csv", "t.csv", "--workers", "1"]
+    assert cli.main([*given, "--all"]) == 1
+    shown = capsys.readouterr().out.splitlines()
+    assert "NaN" not in "".join(shown)
+    table = pd.read_csv("t.csv", index_col="case")
+    assert table["verdict"].eq("stable").tolist() == [False, True]
+    numbers = table.select_dtypes("number")
+    kept = {"triangles", "iterations_taken", "evaluations_made", "gradient_squared", "residual", "load_ratio"}
+    assert set(numbers.columns[numbers.loc[0].notna()]) == kept | {"east.tension"}
+    assert table.loc[1, NUMBERS].notna().all()
+
+
+def test_any_quantity_is_shown_and_drawn(roof, capsys, monkeypatch):
+    drawn = {}
+    monkeypatch.setattr("pcmc.plot.lines", lambda curves, path, **rest: drawn.update(rest, curves=curves))
+    roof.write_text(f'units = "m"\nforce = "kN"\n{TEXT}', encoding="utf-8")
+    given = ["sweep", "roof.toml", "wall 1.x=0,0.5", "--workers", "1", "--csv", "t.csv", "--plot", "t.png"]
+    assert cli.main([*given, "--show", "volume", "--show", "west.area", "--show", "sag"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    for label in ("wall 1.x [m]", "west.volume [m³]", "volume [m³]", "west.area [m²]"):
+        assert label in shown[0]
+    assert "rise" not in shown[0]
+    assert shown[-1] == "no case has sag"
+    table = pd.read_csv("t.csv", index_col="case")
+    assert list(table) == [
+        "wall 1.x",
+        "status",
+        "verdict",
+        "west.volume",
+        "east.volume",
+        "volume",
+        "west.area",
+    ]
+    assert table["west.volume"].diff()[1] > 0.2  # the wall has moved to the east
+    assert (drawn["y"], set(drawn["curves"])) == ("volume [m³]", {"west", "east", "roof"})
+    assert cli.main([*given, "--show", "west.volum"]) == 2
+    assert "did you mean 'volume'" in capsys.readouterr().err
+
+
 def test_targets_and_remeshing_are_the_projects(roof):
     aim = '[targets]\nmeet = [{quantity = "apex", of = "west", value = 0.3}]\nvary = ["west"]\n'
     roof.write_text(TEXT + aim + "[remesh]\nedge_length = 0.9\n", encoding="utf-8")
@@ -255,8 +319,8 @@ def test_the_command_makes_a_table(roof, capsys):
     start = varied(roof, {"west.tension": 3.0, "wall 1.tension": 0.5, "east.tension": 3.1})[1]
     first = pcmc.solve(start).certificate
     row = short.loc[0]
-    assert row["roof_area"] == pytest.approx(first.patches["area"][:2].sum(), rel=1e-9)
-    assert row["largest_reaction"] == pytest.approx(first.boundaries["per_length_max"].max(), rel=1e-9)
+    assert row["area"] == pytest.approx(first.patches["area"][:2].sum(), rel=1e-9)
+    assert row["reaction per length"] == pytest.approx(first.boundaries["per_length_max"].max(), rel=1e-9)
 
 
 def test_one_varied_number_is_drawn_as_curves_of_the_certified_cases():
@@ -425,7 +489,7 @@ def test_the_table_and_the_picture_of_a_sweep_have_the_units_of_the_project(roof
     ]
     assert cli.main(given) == 0
     header = capsys.readouterr().out.splitlines()[0]
-    for label in ("west.tension [kN/m]", "west.apex [m]", "roof_area [m²]", "largest_reaction [kN/m]"):
+    for label in ("west.tension [kN/m]", "west.apex [m]", "area [m²]", "reaction per length [kN/m]"):
         assert label in header
     assert (seen["x"], seen["y"]) == ("west.tension [kN/m]", "apex [m]")
     assert next(iter(pd.read_csv("t.csv", index_col="case"))) == "west.tension"
