@@ -90,8 +90,8 @@ def draw_sweep(
     Parameters
     ----------
     labels : the names of columns as they are shown, such as ``with_units`` gives.
-    show : what is drawn, as of ``columns_of``; over two numbers the last of its columns. By default the apexes
-        over one number, the rise over two.
+    show : what is drawn, as of ``columns_of``; over two numbers the last of its columns. By default the
+        apexes over one number, the rise over two.
 
     Raises
     ------
