@@ -103,13 +103,9 @@ def solve_project(
     """
     digest = projects.digest(project)
     if digest != project_digest:
-        raise FileError(
-            f"{project}: has changed since the sweep was begun (its digest was {project_digest:.12}…, now"
-            f" it is {digest:.12}…); undo the change, or begin a new sweep with a new store",
-            what=project,
-            found=digest,
-            expected=project_digest,
-        )
+        text = f"{project}: has changed since the sweep was begun (its digest was {project_digest:.12}…, now"
+        text += f" it is {digest:.12}…); undo the change, or begin a new sweep with a new store"
+        raise FileError(text, what=project, found=digest, expected=project_digest)
     design, start = projects.varied(project, values)
     if method not in (None, design.method):
         design = replace(design, method=method, options={})

@@ -29,12 +29,9 @@ def _split(generator: str, method: str, arguments: Mapping[str, Any]) -> Parts:
         build = resolve(generator)
         own = inspect.signature(build).parameters
     except (ImportError, AttributeError, ValueError, TypeError) as error:
-        raise OptionError(
-            f"the generator {generator!r} cannot be found ({error}); expected 'generators:two_caps'"
-            " or 'package.module:function'",
-            what="generator",
-            found=generator,
-        ) from error
+        text = f"the generator {generator!r} cannot be found ({error}); expected 'generators:two_caps'"
+        text += " or 'package.module:function'"
+        raise OptionError(text, what="generator", found=generator) from error
     options = find_method(method).options
     known = [f.name for f in fields(options)]
     for name in arguments:
