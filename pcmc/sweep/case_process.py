@@ -65,9 +65,9 @@ class CaseProcess:
         except (EOFError, OSError, pickle.UnpicklingError):
             kind, text = "failed", self._end()[1]
         if kind == "failed":
-            text = f"a worker on {platform.node()} cannot load the case {case!r};"
-            text += f" install its package where the workers run:\n{text.strip()}"
-            raise SweepError(text, what=case, where=platform.node())
+            problem = f"a worker on {platform.node()} cannot load the case {case!r};"
+            problem += f" install its package where the workers run:\n{text.strip()}"
+            raise SweepError(problem, what=case, where=platform.node())
 
     def run(self, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
         """Run one case; the fields of its record from ``status`` on."""

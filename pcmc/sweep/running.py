@@ -242,9 +242,9 @@ def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any]:
                 "wall_time": float("nan"),
                 "provenance": {"output": text},
             }
-        text = f"the executor failed ({text}); the cases stored so far are safe: run the same sweep"
-        text += " again to go on from there"
-        raise SweepError(text, what="executor", found=text) from error
+        problem = f"the executor failed ({text}); the cases stored so far are safe: run the same sweep"
+        problem += " again to go on from there"
+        raise SweepError(problem, what="executor", found=text) from error
 
 
 def _of_this_version(outcome: dict[str, Any]) -> dict[str, Any]:
