@@ -42,11 +42,12 @@ def answers(surface: Surface, asked: list[dict[str, float]]) -> list[float]:
     explorer = start(surface)
     line = http.client.HTTPConnection("127.0.0.1", explorer.port, timeout=60)
     try:
-        name = unpack(_post(line, "/api/open", {}))[0]["session"]
+        token = explorer.token
+        name = unpack(_post(line, token, "/api/open", {}))[0]["session"]
         seconds = []
         for tensions in [asked[0], *asked]:
             begun = time.perf_counter()
-            header, _ = unpack(_post(line, f"/api/{name}/follow", {"tensions": tensions}))
+            header, _ = unpack(_post(line, token, f"/api/{name}/follow", {"tensions": tensions}))
             seconds.append(time.perf_counter() - begun)
             assert header["at_rest"], header["verdict"]
         return seconds[1:]
@@ -55,8 +56,8 @@ def answers(surface: Surface, asked: list[dict[str, float]]) -> list[float]:
         explorer.close()
 
 
-def _post(line: http.client.HTTPConnection, path: str, body: object) -> bytes:
-    line.request("POST", path, json.dumps(body))
+def _post(line: http.client.HTTPConnection, token: str, path: str, body: object) -> bytes:
+    line.request("POST", path, json.dumps(body), {"X-Token": token})
     return line.getresponse().read()
 
 

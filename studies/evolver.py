@@ -84,7 +84,7 @@ def gradient(surface: pcmc.Surface) -> Floats:
     """
     convert = "convert_to_quantities\n"
     if len(surface.cable_edges.ends):
-        if len(np.unique(surface.pressures[surface.pressures != 0.0])) > 1:
+        if len(np.unique(surface.net_pressures[surface.net_pressures != 0.0])) > 1:
             raise EvolverError(f"{PROGRAM}: no forces of cables where patches differ in pressure")
         convert = ""
     out = run(

@@ -12,7 +12,7 @@ from pcmc.explore.messages import unpack
 def asked(explorer: Any, method: str, path: str, body: str | None = None, **headers: str) -> Any:
     """An answer and its body."""
     line = http.client.HTTPConnection("127.0.0.1", explorer.port, timeout=60)
-    line.request(method, path, body, headers)
+    line.request(method, path, body, {"X-Token": explorer.token} | headers)
     answer = line.getresponse()
     content = answer.read()
     line.close()

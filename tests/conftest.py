@@ -65,7 +65,7 @@ def driver(tmp_path_factory):
 @pytest.fixture
 def page(driver, explorer):
     """The page of the hall in the browser, with a session of its own."""
-    return Explored(driver, f"{explorer.url}?session={explorer.open()[0]}")
+    return Explored(driver, f"{explorer.url}&session={explorer.open()[0]}")
 
 
 @pytest.fixture(scope="module")

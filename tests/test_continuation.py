@@ -145,6 +145,7 @@ def pyramid_height(ratio):
         ("roof", lambda v: 1.0 / (3.0 * v)),
         (Parameter("roof"), lambda v: 1.0 / (3.0 * v)),
         (Parameter("roof", "pressure"), lambda v: v / 3.0),
+        (Parameter("roof", "snow"), lambda v: (1.0 - v) / 3.0),
         (Direction(pressures={"roof": 2.0}), lambda v: 2.0 * v / 3.0),
         (Direction({"roof": -1.0}, relative=True), lambda v: 1.0 / (3.0 * (1.0 - v))),
         (
@@ -152,7 +153,7 @@ def pyramid_height(ratio):
             lambda v: (1.0 + 0.5 * v) / (3.0 * (1.0 + v)),
         ),
     ],
-    ids=["tension", "Parameter", "pressure", "weight", "relative", "both"],
+    ids=["tension", "Parameter", "pressure", "snow", "weight", "relative", "both"],
 )
 @pytest.mark.parametrize("sign", [1, -1])
 def test_pyramid_follows_its_closed_form(parameter, ratio, sign):

@@ -12,6 +12,7 @@ from generators import spherical_cap
 from pcmc import explore
 from pcmc.explore import own_way
 from pcmc.explore.following import Reached
+from pcmc.explore.own_way import OwnWay
 from pcmc.explore.roof import read_roof
 from pcmc.explore.session import Session, solved_start
 
@@ -33,6 +34,10 @@ def path(tmp_path):
     return path
 
 
+def own(path):
+    return OwnWay(path, read_roof(path, start_shape=True).data)
+
+
 def tensions(surface):
     return {p.name: p.tension for p in surface.patches}
 
@@ -41,7 +46,7 @@ def test_walls_that_a_project_leaves_open_follow_the_tensions(path):
     start = solved_start(read_roof(path, use_cache=False).surface)
     asked = {"tensions": {"east": 9.0}}
     assert Session(start).settle(asked).failure is not None  # 9 against 5 and the wall
-    session = Session(start, project=path)
+    session = Session(start, own_way=own(path))
     state = session.settle(asked)
     path.write_text(OPEN_WALL.replace("east = {tension = 5.0}", "east = {tension = 9.0}"))
     again = read_roof(path, use_cache=False).surface
@@ -56,11 +61,11 @@ def test_walls_that_a_project_leaves_open_follow_the_tensions(path):
 
 def test_walls_that_were_moved_stay(path):
     start = solved_start(read_roof(path, use_cache=False).surface)
-    state = Session(start, project=path).settle({"tensions": {"east": 9.0, "wall 1": 1.0}})
+    state = Session(start, own_way=own(path)).settle({"tensions": {"east": 9.0, "wall 1": 1.0}})
     assert state.failure is not None
     assert "cannot balance" in state.failure.detail
     assert state.note == ""
-    state = Session(start, project=path).settle({"tensions": {"wall 1": 1.0}})
+    state = Session(start, own_way=own(path)).settle({"tensions": {"wall 1": 1.0}})
     assert state.failure is None
     assert tensions(state.surface)["wall 1"] == 1.0
 
@@ -70,7 +75,7 @@ def test_a_roof_that_following_does_not_reach_is_solved_from_the_start_shape(pat
     nowhere = Reached(start.surface, None, pcmc.certify(CAP.retensioned({"cap": 0.01})))
     monkeypatch.setattr(own_way, "reach", lambda *arguments, **options: nowhere)
     path.write_text(OPEN_WALL + "[remesh]\nedge_length = 0.8\n")
-    state = Session(start, project=path).settle({"tensions": {"east": 4.0}})
+    state = Session(start, own_way=own(path)).settle({"tensions": {"east": 4.0}})
     assert state.failure is None
     assert "from the start shape" in state.note
     assert tensions(state.surface)["east"] == 4.0
@@ -79,13 +84,31 @@ def test_a_roof_that_following_does_not_reach_is_solved_from_the_start_shape(pat
     assert failed.failure is nowhere.failed
 
 
-def test_a_file_that_holds_another_plan_has_no_way(path):
-    surface = read_roof(path, use_cache=False).surface
-    for text in ("", "[plan]\n", "[plan]\npatches = 3\n", OPEN_WALL.replace("west", "north")):
-        path.write_text(text)
-        assert own_way.own_start(path, surface) is None
-    path.unlink()
-    assert own_way.own_start(path, surface) is None
+@pytest.mark.parametrize(
+    ("key", "asked"),
+    [
+        ("tension = 5.0", {"patch 1": 5.0, "patch 2": 9.0}),
+        ("rise = 1.0", {"patch 1": 4.0, "patch 2": 4.5}),
+    ],
+)
+def test_a_project_with_one_tension_or_a_rise_has_its_own_way_too(path, key, asked):
+    path.write_text(OPEN_WALL.partition("[plan.patches]")[0] + key + "\n")
+    before = read_roof(path, start_shape=True).surface
+    project, start = own(path).start(before.retensioned(asked))
+    assert tensions(start).items() >= asked.items()
+    assert not project.targets
+    assert tensions(start)["wall 1"] != tensions(before)["wall 1"]  # balanced anew
+
+
+def test_why_a_project_has_no_own_way_is_said(path, monkeypatch):
+    start = solved_start(read_roof(path, use_cache=False).surface)
+    nowhere = Reached(start.surface, None, pcmc.certify(CAP.retensioned({"cap": 0.01})))
+    monkeypatch.setattr(own_way, "reach", lambda *arguments, **options: nowhere)
+    way = own(path)
+    del way.data["plan"]["patches"]["west"]  # as if the plan were another one
+    state = Session(start, own_way=way).settle({"tensions": {"east": 4.0}})
+    assert state.failure is nowhere.failed
+    assert "one for each part" in state.note
 
 
 def poor_cap():

@@ -15,7 +15,7 @@ from refusals import refused
 
 from generators import spherical_cap
 from pcmc import explore
-from pcmc.base.errors import FileError
+from pcmc.base.errors import FileError, OptionError
 from pcmc.design import Parameter, Target
 from pcmc.explore import saving
 from pcmc.explore.roof import Roof, read_roof
@@ -64,18 +64,18 @@ def test_a_named_point_keeps_its_name(tmp_path):
     roof = read_roof(path, use_cache=False)
     assert roof.targets[0].label == "height at crown"
     state = Session(solved_start(roof.surface)).settle({"tensions": {"west": 4.0}})
-    text, note = saving.project_with(roof, state.surface)
+    text, note, _ = saving.project_with(roof, state.surface)
     assert "(height at crown, apex of east)" in note
     met = Session(solved_start(roof.surface))
     targets = Target("height", (3, 3), 1.3, name="crown"), roof.targets[1]
     assert met.meet(targets, roof.vary).message.startswith("met")
-    text, note = saving.project_with(roof, met.surface, met.aims)
+    text, note, _ = saving.project_with(roof, met.surface, met.aims)
     assert note == "with its targets: height at crown, apex of east"
     assert tomllib.loads(text)["targets"]["meet"][0] == {"quantity": "height", "of": "crown", "value": 1.3}
 
 
 def test_an_unchanged_surface_is_saved_with_the_targets_of_the_file(hall_roof, hall_folder):
-    text, note = saving.project_with(hall_roof, hall_roof.surface)
+    text, note, _ = saving.project_with(hall_roof, hall_roof.surface)
     assert note == ""
     assert tomllib.loads(text)["targets"] == tomllib.loads(HALL_TOML)["targets"]
 
@@ -91,6 +91,24 @@ def test_the_same_file_is_replaced_only_if_it_is_as_it_was_read(hall_folder, hal
         assert path.read_text().endswith("# someone else\n")
     finally:
         path.write_text(HALL_TOML)
+
+
+@pytest.mark.parametrize("text", ["[project]\nname = 'other'\n", "not TOML"])
+def test_a_file_that_is_no_project_is_never_replaced(hall_roof, hall_folder, text):
+    path = hall_folder / "pyproject.toml"
+    path.write_text(text)
+    with refused(FileError, what="name", found="pyproject.toml"):
+        saving.save(hall_roof, hall_roof.surface, "pyproject.toml", True)
+    assert path.read_text() == text
+    path.unlink()
+
+
+def test_values_that_a_project_cannot_hold_are_refused(hall_roof, hall_folder):
+    heavy = hall_roof.surface.retensioned(weights={"wall 1": 0.1})
+    with refused(OptionError, what="values") as caught:
+        saving.save(hall_roof, heavy, "heavy", False)
+    assert "weight of wall 1" in str(caught.value)
+    assert not (hall_folder / "heavy.toml").exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there only administrators make links")
@@ -168,6 +186,14 @@ def test_the_page_follows_the_file_and_survives_a_broken_save(tmp_path):
         assert saved["saved"] == "hall.toml"
         path.unlink()
         until(lambda: "cannot be read" in news()["problem"], "the missing file")
+        os.mkfifo(path)
+        until(lambda: "a pipe or a device" in news()["problem"], "the pipe")
+        path.unlink()
+        path.symlink_to("/dev/null")
+        until(lambda: "a pipe or a device" in news()["problem"], "the device")
+        path.unlink()
+        path.write_text(HALL_TOML)
+        until(lambda: news()["version"] == 2, "the file again")
 
 
 def test_a_drawing_that_a_project_refers_to_is_followed(tmp_path):

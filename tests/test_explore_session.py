@@ -141,16 +141,41 @@ def test_a_newer_request_ends_the_work_on_an_older_one(cap):
     with turn:
         old = threading.Thread(target=ask, args=("old", 0.7))
         old.start()
-        until(lambda: session._requests == 1, "the first request")
+        until(lambda: session._arrived == 1, "the first request")
         new = threading.Thread(target=ask, args=("new", 0.8))
         new.start()
-        until(lambda: session._requests == 2, "the second request")
+        until(lambda: session._arrived == 2, "the second request")
     old.join()
     new.join()
     assert states["old"].superseded
     assert not states["new"].superseded
     assert [p.tension for p in session.surface.patches] == [0.8]
     assert states["new"].undo == 1
+
+
+def test_acts_are_done_in_order_and_none_is_dropped(cap, hall):
+    """While a move is under way: a variant is kept, the file is saved, and newer values are asked for."""
+    turn = threading.Lock()
+    session = Session(cap, turn)
+    acts = [
+        lambda: session.settle({"tensions": {"cap": 0.7}}),
+        lambda: session.keep("before"),
+        lambda: session.renew(hall),
+        lambda: session.compare(0),
+        lambda: session.settle({"tensions": {"left wall": 11.0}}),
+    ]
+    threads = [threading.Thread(target=act) for act in acts]
+    with turn:
+        for number, thread in enumerate(threads, 1):
+            thread.start()
+            until(lambda number=number: session._arrived == number, "the request")
+    for thread in threads:
+        thread.join()
+    state = session.state()
+    assert [variant.name for variant in state.variants] == ["before"]
+    assert state.compared == 0
+    assert state.surface.patches[3].tension == 11.0
+    assert session.reset().surface is hall.surface
 
 
 def test_the_mesh_check_is_of_the_surface_shown(cap):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import socket
+import threading
 import time
 from contextlib import ExitStack
 from http.server import BaseHTTPRequestHandler
@@ -52,6 +53,16 @@ def sent(explorer, data):
         ("NAME/follow", '{"tensions": {"%s": 1}}' % ("a" * 500_000), "a name of 500000 characters"),
         ("NAME/settle", '{"tensions": null}', "expected numbers by name"),
         ("NAME/settle", DEEP, "nested too deep"),
+        (
+            "NAME/meet",
+            '{"targets": [{"value": 1}], "vary": [{"patch": "cap"}]}',
+            "targets: each needs a quantity",
+        ),
+        (
+            "NAME/meet",
+            '{"targets": [{"quantity": "apex", "value": 1}], "vary": [{"low": 1}]}',
+            "vary: each needs a patch",
+        ),
         ("NAME/settle", '{"tensions": ' + DEEP, "nested too deep"),
     ],
 )
@@ -62,6 +73,15 @@ def test_wrong_values_are_answered_in_one_line(explorer, session, path, body, li
     assert line in error
     assert "\n" not in error
     assert len(error) < 300
+
+
+@pytest.mark.parametrize("token", ["", "x", "\xe9"])
+@pytest.mark.parametrize(("method", "path"), [("POST", "/api/open"), ("GET", "/"), ("GET", "/api/x/export")])
+def test_without_the_token_of_its_address_nothing_is_answered(explorer, method, path, token):
+    answer, content = asked(explorer, method, path, "{}", **{"X-Token": token})
+    assert answer.status == 403
+    assert "token" in json.loads(content)["error"]
+    assert asked(explorer, "GET", f"/?token={explorer.token}", **{"X-Token": ""})[0].status == 200
 
 
 @pytest.mark.parametrize(
@@ -88,7 +108,7 @@ def test_broken_headers_are_answered(explorer, headers, status):
 )
 def test_broken_addresses_are_answered(explorer, path):
     answer = sent(explorer, f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
-    assert answer[:12] in (b"HTTP/1.1 400", b"HTTP/1.1 404")
+    assert answer[:12] in (b"HTTP/1.1 400", b"HTTP/1.1 403", b"HTTP/1.1 404")
     assert len(json.loads(answer.split(b"\r\n\r\n")[1])["error"]) < 300
 
 
@@ -103,7 +123,7 @@ def test_the_rest_of_a_refused_request_is_no_request(explorer):
 
 def test_forty_browsers_at_once_are_all_served(explorer):
     lines = [socket.create_connection(("127.0.0.1", explorer.port), timeout=60) for _ in range(40)]
-    request = f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{explorer.port}\r\n\r\n".encode()
+    request = f"GET /?token={explorer.token} HTTP/1.1\r\nHost: 127.0.0.1:{explorer.port}\r\n\r\n".encode()
     for line in lines:
         line.sendall(request)
     answers = [line.recv(12) for line in lines]
@@ -169,3 +189,37 @@ def test_an_error_that_nobody_foresaw_is_answered_too(explorer, monkeypatch):
     answer, content = asked(explorer, "POST", "/api/open", "{}")
     assert answer.status == 500
     assert "\n" not in json.loads(content)["error"]
+
+
+@pytest.fixture
+def endless(monkeypatch):
+    """A mesh check that goes on until it is ended; the events of its begin and its end."""
+    begun, ended = threading.Event(), threading.Event()
+
+    def check(surface, callback):
+        begun.set()
+        try:
+            while not ended.wait(0.02):
+                callback(None)
+        except StopIteration:
+            ended.set()
+            raise KeyboardInterrupt from None
+
+    monkeypatch.setattr("pcmc.explore.session.check_mesh", check)
+    yield begun, ended
+    ended.set()
+
+
+def test_a_mesh_check_leaves_the_sliders_free_and_ends_with_its_tab(explorer, session, endless):
+    begun, ended = endless
+    head = f"POST /api/{session}/check HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Token: {explorer.token}\r\n"
+    with ExitStack() as tabs:
+        for _ in range(2):
+            tab = tabs.enter_context(socket.create_connection(("127.0.0.1", explorer.port), timeout=60))
+            tab.sendall(f"{head}Content-Length: 2\r\n\r\n{{}}".encode())
+        assert begun.wait(30)
+        other = unpack(asked(explorer, "POST", "/api/open", "{}")[1])[0]["session"]
+        moved = asked(explorer, "POST", f"/api/{other}/follow", '{"tensions": {}}')
+        assert moved[0].status == 200
+        assert not ended.is_set()
+    assert ended.wait(30)

@@ -28,7 +28,7 @@ WRONG = {
     "an edge without the tension of its cable": (SAIL | {"cable": None}, OptionError, "cable"),
     "a cable on a fixed edge": ({"cable": 2.0, "tension": 1.0}, OptionError, "edge"),
     "pressure beside a free edge": (SAIL | {"pressure": 1.0, "supports": ENDS}, PlanError, "pressure"),
-    "snow beside a free edge": (SAIL | {"snow": 1.0, "supports": ENDS}, PlanError, "pressure"),
+    "snow beside a free edge": (SAIL | {"snow": 1.0, "supports": ENDS}, PlanError, "snow"),
     "a cable edge that nothing holds": (SAIL | {"supports": []}, PlanError, "supports"),
     "a mast beside its edge": ({"tension": 4.0, "supports": [[10, 3, 2]]}, PlanError, "supports"),
     "a room without a wall": (

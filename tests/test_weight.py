@@ -84,7 +84,8 @@ def test_snow_is_a_change_of_pressure():
     a, b, c = (snowed.vertices[F[:, k], :2] for k in range(3))
     plan = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     potential = 0.25 * float(plan @ z[F].mean(axis=1))
-    still = snowed.retensioned(pressures={"cap": 1.0})
+    assert (snowed.pressures.tolist(), snowed.snows.tolist()) == ([1.0], [0.25])
+    still = snowed.retensioned(snows={"cap": 0.0})
     assert pcmc.energy(snowed) - pcmc.energy(still) == pytest.approx(potential, rel=1e-12)
 
 

@@ -189,9 +189,10 @@ def _reaction_slope(surface: Surface, pull: Floats) -> Floats:
     A_T ν_T changes along u by (q - r) × u / 2 as the corner opposite the side q, r moves.
     """
     X, F = surface.vertices, surface.faces
-    weights = surface.retensioned(pressures=dict.fromkeys((p.name for p in surface.patches), 0.0))
+    none = dict.fromkeys((p.name for p in surface.patches), 0.0)
+    weights = surface.retensioned(pressures=none, snows=none)
     slope = _along(weights, pull)
-    sixth = surface.pressures[surface.patch_of_face][:, None] / 6.0 * pull[F].sum(axis=1)
+    sixth = surface.net_pressures[surface.patch_of_face][:, None] / 6.0 * pull[F].sum(axis=1)
     for c in range(3):
         np.add.at(slope, F[:, c], -np.cross(X[F[:, c - 2]] - X[F[:, c - 1]], sixth))
     return slope

@@ -65,9 +65,9 @@ def load_is_given(surface: Surface) -> bool:
 
 
 def load(surface: Surface) -> float:
-    """Σ p A_T ν_T · n - Σ w A_T: the force of pressure and weight along Π's normal n, on the supports."""
+    """Σ (p - s) A_T ν_T · n - Σ w A_T: the force of pressure, snow and weight along Π's normal n."""
     vector = area_vectors(surface.vertices[surface.faces])
-    pressed = surface.pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
+    pressed = surface.net_pressures[surface.patch_of_face] @ (vector @ np.array(surface.plane.normal))
     if not surface.weights.any():
         return float(pressed)
     return float(pressed - surface.weights[surface.patch_of_face] @ np.linalg.norm(vector, axis=1))
@@ -189,7 +189,7 @@ def unheld(surface: Surface, stable: bool) -> Unheld | None:
     (Unheld(vertex=0, pressed=True), None)
     """
     parts, used = surface.topology.components, surface.faces[:, 0]
-    pressed = np.unique(parts[used[surface.pressures[surface.patch_of_face] != 0.0]])
+    pressed = np.unique(parts[used[surface.net_pressures[surface.patch_of_face] != 0.0]])
     held = surface.given_supports.fixed.copy()
     for _, along in surface.given_supports.on_line:
         held |= along

@@ -339,6 +339,7 @@ def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Fl
             "patch": patch.name,
             "tension": patch.tension,
             "pressure": patch.pressure,
+            **({"snow": patch.snow, "net": patch.net_pressure} if surface.snows.any() else {}),
             "target": float(target[inside].mean())
             if patch.weight and inside.any()
             else patch.target_curvature,

@@ -72,8 +72,8 @@ class Fold:
     Attributes
     ----------
     parameter : what grows along the branch: ``"pressure"``, all pressures in proportion, or
-        ``"distance"``, that of the held curves from each other; ``"tensions"``, the share of the way from
-        equal tensions of the patches under pressure.
+        ``"net pressure"``, that less the snow; ``"distance"``, that of the held curves from each other;
+        ``"tensions"``, the share of the way from equal tensions of the patches under pressure.
     value : the parameter at the fold; 1 is what the surface asks for.
     start : the parameter where the branch starts.
     tensions : names and tensions at the fold, where these vary.
@@ -103,9 +103,9 @@ class Fold:
                 f" {start} of it): bring them nearer to each other"
             )
         return (
-            f"the equilibria end at a fold at {value} of the pressure (followed from {start} of it): lower"
-            f" all pressures below {value} of theirs, or raise all tensions above {_three(1.0 / self.value)}"
-            " times theirs"
+            f"the equilibria end at a fold at {value} of the {self.parameter} (followed from {start} of it):"
+            f" lower all {self.parameter}s below {value} of theirs, or raise all tensions above"
+            f" {_three(1.0 / self.value)} times theirs"
         )
 
 

@@ -38,7 +38,7 @@ def reactions(surface: Surface) -> Floats:
     forces = kernels.measure(kernels.energy_mesh(surface, pressure=zero), X)[2]
     add_cables_and_weights(surface, X, forces)
     third = area_vectors(X[F]) / 3.0
-    forces -= vertex_sums(third * surface.pressures[surface.patch_of_face, None], F, surface.n)
+    forces -= vertex_sums(third * surface.net_pressures[surface.patch_of_face, None], F, surface.n)
     return forces - apply_supports(surface, forces.copy())
 
 

@@ -41,6 +41,8 @@ Weights = Annotated[
     list[str] | None,
     option("NAME=VALUE", "Weight of a patch per area. A bare VALUE applies to every patch.", "--weight"),
 ]
+SNOW = "Snow on a patch, per area of the plan. A bare VALUE applies to every patch under pressure."
+Snows = Annotated[list[str] | None, option("NAME=VALUE", SNOW, "--snow")]
 Cables = Annotated[
     list[str] | None, option("NAME=VALUE", "Tension of a cable. A bare VALUE applies to all.", "--cable")
 ]
@@ -87,6 +89,7 @@ class Loads:
     weight: list[str] | None = None
     cable: list[str] | None = None
     volume: list[str] | None = None
+    snow: list[str] | None = None
 
     def __bool__(self) -> bool:
         """Whether there are any."""
@@ -103,6 +106,7 @@ class Loads:
             by_name(loaded, self.tension, "--tension"),
             pressures,
             weights=by_name(sheets, self.weight, "--weight"),
+            snows=by_name(loaded, self.snow, "--snow"),
             cables=by_name([cable.name for cable in surface.cables], self.cable, "--cable"),
             volumes=by_name([room.name for room in surface.rooms], self.volume, "--volume"),
         )

@@ -25,7 +25,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
     if outcome.design is not None:
         print(f"targets {outcome.design.text(outcome.units)}")
         if outcome.design.met:  # otherwise the message has the values
-            tables = (outcome.design.targets["value"], outcome.design.parameters["value"])
+            tables = (outcome.design.targets, outcome.design.parameters)
             print(", with ".join(values_text(table, outcome.units) for table in tables))
     for note in outcome.notes:
         print(note)

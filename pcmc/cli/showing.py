@@ -23,6 +23,7 @@ from .arguments import (
     Loads,
     Pressures,
     Settings,
+    Snows,
     Start,
     ViewName,
     Volumes,
@@ -42,6 +43,7 @@ def convert(
     tension: Settings = None,
     pressure: Pressures = None,
     weight: Weights = None,
+    snow: Snows = None,
     cable: Cables = None,
     volume: Volumes = None,
     start: Start = False,
@@ -65,7 +67,7 @@ def convert(
     """
     projects.check_names([output])
     projects.check_outputs([output], inputs=projects.files_of(file))
-    loads = Loads(tension, pressure, weight, cable, volume)
+    loads = Loads(tension, pressure, weight, cable, volume, snow)
     roof = _shown(file, loads, whole, start=start, use_cache=cache, units=units)
     if roof is None:
         return NOT_CERTIFIED
@@ -97,6 +99,7 @@ def plot(
     tension: Settings = None,
     pressure: Pressures = None,
     weight: Weights = None,
+    snow: Snows = None,
     cable: Cables = None,
     volume: Volumes = None,
     start: Start = False,
@@ -115,7 +118,7 @@ def plot(
     seen = arguments.view_of(view)
     projects.check_picture([seen], colour)
     projects.check_outputs([picture], inputs=projects.files_of(file))
-    loads = Loads(tension, pressure, weight, cable, volume)
+    loads = Loads(tension, pressure, weight, cable, volume, snow)
     roof = _shown(file, loads, whole, start=start, use_cache=cache)
     if roof is None:
         return NOT_CERTIFIED

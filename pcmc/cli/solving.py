@@ -26,6 +26,7 @@ from .arguments import (
     Loads,
     Pressures,
     Settings,
+    Snows,
     Start,
     Volumes,
     Weights,
@@ -61,6 +62,7 @@ def solve_(
     tension: Settings = None,
     pressure: Pressures = None,
     weight: Weights = None,
+    snow: Snows = None,
     cable: Cables = None,
     volume: Volumes = None,
     rise: Annotated[float | None, option("LENGTH", RISE, parser=number)] = None,
@@ -103,7 +105,7 @@ def solve_(
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
     with working() as say:
-        loads = Loads(tension, pressure, weight, cable, volume)
+        loads = Loads(tension, pressure, weight, cable, volume, snow)
         changed = loads.of if loads else None
         how: dict[str, Any] = {"anyway": anyway, "use_cache": cache, "check_after": False}
         outcome = projects.run_project(project, say, changed=changed, **how)
@@ -129,6 +131,7 @@ def certify_(
     tension: Settings = None,
     pressure: Pressures = None,
     weight: Weights = None,
+    snow: Snows = None,
     cable: Cables = None,
     volume: Volumes = None,
     meshes: Annotated[int | None, option("NUMBER", MESHES, parser=arguments.integer)] = None,
@@ -147,7 +150,7 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as say:
-        loads = Loads(tension, pressure, weight, cable, volume)
+        loads = Loads(tension, pressure, weight, cable, volume, snow)
         roof = arguments.opened(file, say, loads, start=start, use_cache=cache)
         if whole:
             roof = roof.unfolded()

@@ -31,8 +31,12 @@ def structure(
     density: Annotated[
         float | None, option("VALUE", "Mass per volume; above 0, self-weight is a load.", parser=number)
     ] = None,
-    gravity: Annotated[float | None, option("VALUE", "9.81 by default.", parser=number)] = None,
-    snow: Annotated[float | None, option("VALUE", "Load per plan area.", parser=number)] = None,
+    gravity: Annotated[
+        float | None, option("VALUE", "Length/s²; by default 9.81 m/s².", parser=number)
+    ] = None,
+    snow: Annotated[
+        float | None, option("VALUE", "Load per plan area, besides the snow of the form.", parser=number)
+    ] = None,
     wind: Annotated[list[str] | None, option("NAME=VALUE", WIND, "--wind")] = None,
     cable_area: Annotated[float | None, option("VALUE", "Section of the cables.", parser=number)] = None,
     whole: Whole = False,
@@ -69,6 +73,8 @@ def structure(
         say("certifying")
         model = roof.model(wanted, anyway)
         projects.write_all([(output, partial(write_structure, model=model))], say)
+    if model.note:
+        print(model.note)
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     print(f"written: {output}; run it with: ccx {output.with_suffix('')}")

@@ -13,7 +13,7 @@ from ..base.errors import MissingExtra, OptionError
 from ..base.files import suffix_of
 from ..io import FORMATS, READ_ONLY
 from ..plot.figure import check_suffix
-from ..project import check_outputs
+from ..project import check_outputs, files_of
 from . import INTERRUPTED, NOT_CERTIFIED, OK
 from .arguments import DXF, TOML, integer, number, option, values_of
 from .progress import sweeping
@@ -53,12 +53,12 @@ def sweep(
 ) -> int:
     """Solve every combination of the values; exit code 0 if all are certified.
 
-    For a project or a surface, NAME is PATCH.tension, PATCH.pressure or PATCH.weight of a patch or wall,
-    CABLE.tension of a cable, or ROOM.volume of a room that has one. For a project it may also be the keys of
-    a number in the file: plan.edge_length, plan.outline.3.1 (the first coordinate of the third corner); or
-    the shift of a whole divider, hole, support or named point along x, y or z: "wall 1.x". For a generator it
-    is one of its parameters, or an option of the method. With a store, values may be added later: only new
-    cases are run. If the project file has changed, name a new store.
+    For a project or a surface, NAME is PATCH.tension, PATCH.pressure, PATCH.weight or PATCH.snow of a patch
+    or wall, CABLE.tension of a cable, or ROOM.volume of a room that has one. For a project it may also be the
+    keys of a number in the file: plan.edge_length, plan.outline.3.1 (the first coordinate of the third
+    corner); or the shift of a whole divider, hole, support or named point along x, y or z: "wall 1.x". For a
+    generator it is one of its parameters, or an option of the method. With a store, values may be added
+    later: only new cases are run. If the project file has changed, name a new store.
     The table has the parameters, the verdict, the apex of each patch, the rise, the area, and the largest
     reaction per length, or what --show names; with --all it has every number of the certificate, too. Cells
     are empty where nothing is at rest.
@@ -76,7 +76,8 @@ def sweep(
     from ..sweep.store import FAILED
     from ..sweep.table import TABLES
 
-    check_outputs([path for path in (csv, store, plot) if path is not None])
+    inputs = files_of(what) if Path(what).exists() else ()
+    check_outputs([path for path in (csv, store, plot) if path is not None], inputs=inputs)
     if csv is not None and suffix_of(csv, TABLES, "a table") == ".parquet" and not find_spec("pyarrow"):
         raise MissingExtra("pyarrow", "files")
     if plot is not None:

@@ -382,6 +382,6 @@ def _pressure_push(surface: Surface, at: Bools) -> Floats:
     """(n,) force of the pressure of sheets along Π's normal on the vertices ``at``; elsewhere 0."""
     near = at[surface.faces].any(axis=1)
     F, patch = surface.faces[near], surface.patch_of_face[near]
-    force = (surface.pressures * ~surface.auxiliary)[patch] / 3.0
+    force = (surface.net_pressures * ~surface.auxiliary)[patch] / 3.0
     push = force * (area_vectors(surface.vertices[F]) @ np.array(surface.plane.normal))
     return np.where(at, vertex_sums(push[:, None], F, surface.n)[:, 0], 0.0)

@@ -2,8 +2,8 @@
 
     α_i(λ) = a_i + w_i λ,    p_i(λ) = b_i + u_i λ,    V̄_r(λ) = c_r + v_r λ
 
-and in the same way weights and the tensions of cables. E is linear in all but the volumes, so
-∂E/∂λ = Σ w_i A_i - Σ u_i V_i + Σ ẇ_i ∫ z dA + Σ τ̇_c L_c, whatever λ is.
+and in the same way weights, snow and the tensions of cables. E is linear in all but the volumes, so
+∂E/∂λ = Σ w_i A_i - Σ (u_i - ṡ_i) V_i + Σ ẇ_i ∫ z dA + Σ τ̇_c L_c, whatever λ is.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from ..base.errors import OptionError
 from ..energy.functional import apply_supports, weighted
 from ..energy.rooms import prescribed_volumes, refuse_varied_pressure
 from ..surface import Surface
-from ..surface.wall_pressures import wall_pressure_changes
+from ..surface.wall_pressures import wall_pressure_changes, with_pressures
 from .loads import Loads
 
-KINDS = ("tensions", "pressures", "volumes", "weights", "cables")
+KINDS = ("tensions", "pressures", "volumes", "weights", "snows", "cables")
 SAME_VALUE = 1e-9  # relative difference up to which two tensions give the same λ
 
 
@@ -35,8 +35,9 @@ class Direction:
     ----------
     tensions : weight w_i by patch name.
     pressures : weight u_i by patch name. The pressure of a wall that is not named changes with the
-        difference between its rooms, as in ``pcmc.surface.wall_pressures.with_pressures``.
-    weights : rate of the self-weight by patch name; cables : rate of the tension by the cable's name.
+        difference between its rooms, as in ``pcmc.surface.wall_pressures.with_pressures``. Snow stays.
+    weights, snows : rates of the self-weight and of the snow by patch name; walls under snow follow, too.
+    cables : rate of the tension by the cable's name.
     volumes : weight v_r by the name of a room of prescribed volume, whose pressure is a result.
     relative : False: α_i = w_i λ, so that with ``{"roof": 1.0}`` λ is the tension of "roof" itself.
         True: α_i = α_i(start) + w_i λ, so that λ = 0 at the start. The same for pressures and volumes.
@@ -54,6 +55,7 @@ class Direction:
     relative: bool = False
     volumes: Mapping[str, float] = field(default_factory=dict)
     weights: Mapping[str, float] = field(default_factory=dict)
+    snows: Mapping[str, float] = field(default_factory=dict)
     cables: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -82,7 +84,7 @@ class Direction:
         """The tensions and pressures along this direction, starting from those of a surface."""
         w, u = _rates(surface, self.tensions), _rates(surface, self.pressures)
         v = _volume_rates(surface, self.volumes)
-        loads = Loads.of(surface, self.weights, self.cables)
+        loads = Loads.of(surface, self.weights, self.cables, self.snows)
         value = 0.0 if self.relative else _common_value(surface, w, u, v, loads)
         u = u + wall_pressure_changes(surface, u, {surface.patch_index(name) for name in self.pressures})
         refuse_varied_pressure(surface, np.flatnonzero(u))
@@ -91,6 +93,8 @@ class Direction:
             message = f"the tension of {name!r} is 0, where its triangles stop pulling; start from one > 0"
             raise OptionError(message, what="parameter", where=name, found=0.0)
         loads.check()
+        loads = loads.with_walls(surface)
+        with_pressures(surface, snows=loads.at(1.0)["snows"])  # refuses snow beside free edges
         start = surface.tensions - w * value, surface.pressures - u * value
         return ParameterLine(value, *start, w, u, prescribed_volumes(surface) - v * value, v, loads)
 
@@ -105,7 +109,7 @@ class ParameterLine:
     tensions, pressures : (k,) a and b, those at λ = 0.
     tension_rates, pressure_rates : (k,) w and u.
     volumes, volume_rates : (r,) c, the volumes of the rooms at λ = 0, and v.
-    loads : the weights and the tensions of cables that vary.
+    loads : the weights, the snow and the tensions of cables that vary.
     """
 
     value: float
@@ -141,10 +145,15 @@ class ParameterLine:
         return surface.retensioned(
             {names[i]: self.tensions[i] + w[i] * value for i in np.flatnonzero(w)},
             {names[i]: self.pressures[i] + u[i] * value for i in np.flatnonzero(u)},
-            walls=[names[i] for i in np.flatnonzero(surface.walls & (u != 0.0))],
+            walls=[names[i] for i in self._followed() if surface.walls[i]],
             volumes=self._varied_volumes(surface, value),
             **self.loads.at(value - self.value),
         )
+
+    def _followed(self) -> list[int]:
+        """The patches whose pressure or snow varies."""
+        snowy = [load.index for load in self.loads.parts if load.kind == "snow"]
+        return [*np.flatnonzero(self.pressure_rates).tolist(), *snowy]
 
     def _varied_volumes(self, surface: Surface, value: float) -> dict[str, float]:
         """The volumes that vary, at λ, by the names of their rooms."""

@@ -18,7 +18,8 @@ class Measurement:
     by_position : (n,3).
     by_tension, by_pressure : (k,) by those of the patches; None where it depends on them only through the
         positions.
-    by_load : the same by "weight", (k,), of the patches and by "cable", (c,), the tensions of the cables.
+    by_load : the same by "weight", (k,), of the patches and by "cable", (c,), the tensions of the cables; by
+        "snow", (k,), where that is not -``by_pressure``.
     """
 
     value: float
@@ -30,4 +31,6 @@ class Measurement:
     def by(self, kind: str) -> Floats | None:
         """The derivatives by a kind of parameter."""
         direct = {"tension": self.by_tension, "pressure": self.by_pressure}
-        return direct.get(kind, self.by_load.get(kind))
+        if self.by_pressure is not None:
+            direct["snow"] = -self.by_pressure
+        return {**direct, **self.by_load}.get(kind)

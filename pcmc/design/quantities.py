@@ -30,7 +30,7 @@ from .measurement import Measurement
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Measure:
     """How a quantity is measured, ``of`` as in ``Target``.
 
     Misfits are divided by its usual ``size`` where the value wanted is 0.
@@ -89,9 +89,9 @@ def _volume(surface: Surface, of: str | None) -> Measurement:
 
 
 def _curvature(surface: Surface, of: str) -> Measurement:
-    """p / (2α), 1/length."""
+    """p / (2α), p net of snow, 1/length."""
     index = surface.patch_index(of)
-    alpha, p = surface.tensions[index], surface.pressures[index]
+    alpha, p = surface.tensions[index], surface.net_pressures[index]
     if surface.patches[index].weight:
         message = f"curvature of {of}: with a weight it differs from place to place; it has no single value"
         raise OptionError(message, what="of", found=of)
@@ -103,9 +103,10 @@ def _curvature(surface: Surface, of: str) -> Measurement:
 
 
 def _pressure(surface: Surface, of: str) -> Measurement:
-    """The pressure of a room of prescribed volume, force/length²."""
+    """The pressure of the air in a room of prescribed volume, force/length²."""
     row = np.linalg.pinv(surface.room_signs.T)[room_index(surface, of)]
-    return Measurement(float(row @ surface.pressures), np.zeros_like(surface.vertices), by_pressure=row)
+    rest, snow = np.zeros_like(surface.vertices), {"snow": np.zeros_like(row)}
+    return Measurement(float(row @ surface.pressures), rest, by_pressure=row, by_load=snow)
 
 
 def room_index(surface: Surface, name: str) -> int:
@@ -162,7 +163,7 @@ def _force_gradient(surface: Surface, v: int, pull: Floats) -> Floats:
     row, corner = np.nonzero(np.equal(F, v))
     np.add.at(slope, F[row], np.einsum("fjab,a->fjb", blocks[row, corner], pull))
     # ⅓ A ν = (q - p) × (r - p) / 6, whose part along u changes by (q - r) × u / 6 as p moves
-    X, sixth = surface.vertices, surface.pressures[surface.patch_of_face[around]] / 6.0
+    X, sixth = surface.vertices, surface.net_pressures[surface.patch_of_face[around]] / 6.0
     for c in range(3):
         opposite = X[F[:, c - 2]] - X[F[:, c - 1]]
         np.add.at(slope, F[:, c], -sixth[:, None] * np.cross(opposite, pull))
@@ -196,18 +197,18 @@ def _faces_of(surface: Surface, of: str | None) -> Bools:
     return np.asarray(_chosen_patches(surface, of)[surface.patch_of_face] != 0.0)
 
 
-QUANTITIES = {
-    "apex": Quantity(_apex, lambda surface: surface.size),
-    "height": Quantity(_height, lambda surface: surface.size),
-    "volume": Quantity(_volume, lambda surface: surface.size**3),
-    "area": Quantity(_area, lambda surface: surface.size**2),
-    "curvature": Quantity(_curvature, lambda surface: 1.0 / surface.size),
-    "pressure": Quantity(_pressure, lambda surface: float(surface.tensions.max()) / surface.size),
-    "lean": Quantity(lean, lambda surface: 90.0),
-    "sag": Quantity(cable_quantities.sag, lambda surface: surface.size),
-    "length": Quantity(cable_quantities.length, lambda surface: surface.size),
-    "force": Quantity(
+MEASURES = {
+    "apex": Measure(_apex, lambda surface: surface.size),
+    "height": Measure(_height, lambda surface: surface.size),
+    "volume": Measure(_volume, lambda surface: surface.size**3),
+    "area": Measure(_area, lambda surface: surface.size**2),
+    "curvature": Measure(_curvature, lambda surface: 1.0 / surface.size),
+    "pressure": Measure(_pressure, lambda surface: float(surface.tensions.max()) / surface.size),
+    "lean": Measure(lean, lambda surface: 90.0),
+    "sag": Measure(cable_quantities.sag, lambda surface: surface.size),
+    "length": Measure(cable_quantities.length, lambda surface: surface.size),
+    "force": Measure(
         cable_quantities.force, lambda surface: max(cable.tension for cable in surface.cables) or 1.0
     ),
-    "reaction": Quantity(_reaction, lambda surface: float(surface.tensions.max())),
+    "reaction per length": Measure(_reaction, lambda surface: float(surface.tensions.max())),
 }

@@ -219,7 +219,7 @@ class Search:
         values: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
         for parameter, value in zip(self.parameters, self.converted(x).tolist(), strict=True):
             values[parameter.kind] |= dict.fromkeys(parameter.names, value)
-        changed = with_pressures(surface, values["tension"], values["pressure"])
+        changed = with_pressures(surface, values["tension"], values["pressure"], snows=values["snow"])
         others = {f"{kind}s": values[kind] for kind in ("volume", "weight", "cable") if values[kind]}
         return changed.retensioned(**others) if others else changed
 
@@ -308,6 +308,7 @@ class Search:
         targets = pd.DataFrame(
             {
                 "value": here.quantities,
+                "dimension": [t.dimension for t in self.targets],
                 "wanted": self.wanted(here.quantities),
                 "misfit": here.r,
                 "met": ~missed,
@@ -319,6 +320,7 @@ class Search:
             {
                 "start": [p.value(self.surface) for p in self.parameters],
                 "value": [p.value(here.result.surface) for p in self.parameters],
+                "dimension": [p.dimension for p in self.parameters],
                 "low": self.limits[:, 0],
                 "high": self.limits[:, 1],
             },

@@ -117,14 +117,14 @@ def _slopes(
 
 
 def _rates(surface: Surface, parameter: Parameter, parameters: Sequence[Parameter]) -> Floats:
-    """(k,) d/dλ of each patch's or cable's own number; wall pressures change with those of the rooms."""
+    """(k,) d/dλ of each patch's or cable's own number; those of walls change with those of their rooms."""
     of_cable = parameter.kind == "cable"
     one = np.zeros(len(surface.cables) if of_cable else len(surface.patches))
     for name in parameter.names:
         one[surface.cable_index(name) if of_cable else surface.patch_index(name)] = 1.0
-    if parameter.kind != "pressure":
+    if parameter.kind not in ("pressure", "snow"):
         return one
-    named = {surface.patch_index(name) for p in parameters if p.kind == "pressure" for name in p.names}
+    named = {surface.patch_index(name) for p in parameters if p.kind == parameter.kind for name in p.names}
     return one + wall_pressure_changes(surface, one, named)
 
 

@@ -62,10 +62,11 @@ def add_flat_pieces(
     """Add the part of the pressure on the flat pieces that close volumes on sliding planes."""
     pieces = flat_pieces(surface)
     if pieces:
-        pressed = classes.active[pieces.face] & (surface.pressures[surface.patch_of_face[pieces.face]] != 0.0)
+        pressure = surface.net_pressures[surface.patch_of_face[pieces.face]]
+        pressed = classes.active[pieces.face] & (pressure != 0.0)
         number = np.cumsum(classes.active) - 1
         sides = np.column_stack([number[pieces.face[pressed]], pieces.corner[pressed]])
-        weight = hessian * surface.pressures[surface.patch_of_face[pieces.face[pressed]]] / 6.0
+        weight = hessian * pressure[pressed] / 6.0
         _add_flat_pieces(classes.faces, sides, -weight[:, None] * pieces.apex[pressed], space, pattern, data)
 
 

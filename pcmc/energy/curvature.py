@@ -59,8 +59,9 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
 def target_curvature(surface: Surface) -> Floats:
     """H̄ (n,) of the sheet each vertex lies in; NaN where ``mean_curvature`` is.
 
-    H̄ = p / (2 α), and with a weight H̄ = (p - w ⟨ν, n⟩) / (2 (α + w z)) at the vertex's height z over Π and
-    its normal ν; see ``weight``. A mesh at rest has the latter up to the square of its edge length.
+    H̄ = p / (2 α), p net of snow, and with a weight H̄ = (p - w ⟨ν, n⟩) / (2 (α + w z)) at the vertex's
+    height z over Π and its normal ν; see ``weight``. A mesh at rest has the latter up to the square of its
+    edge length.
     """
     expect_surface(surface)
     patch = np.zeros(surface.n, dtype=np.int64)
@@ -69,7 +70,7 @@ def target_curvature(surface: Surface) -> Floats:
     if surface.weights.any():
         heavy = surface.weights[patch] != 0.0
         push, pull = _push_and_pull(surface, patch)
-        target[heavy] = ((surface.pressures[patch] - push) / (2.0 * pull))[heavy]
+        target[heavy] = ((surface.net_pressures[patch] - push) / (2.0 * pull))[heavy]
     target[~_within_one_sheet(surface)] = np.nan
     return target
 
@@ -97,7 +98,7 @@ def curvature_error(surface: Surface, method: Method = "cotangent") -> Floats:
         patch = np.zeros(surface.n, dtype=np.int64)
         patch[surface.faces] = surface.patch_of_face[:, None]
         pull = np.abs(_push_and_pull(surface, patch)[1])
-        loads = np.abs(surface.pressures[patch]) + np.abs(surface.weights[patch])
+        loads = np.abs(surface.net_pressures[patch]) + np.abs(surface.weights[patch])
         scale = np.where(surface.weights[patch] != 0.0, loads / (2.0 * pull), target)
     return np.divide(H - target, scale, out=np.full(surface.n, np.nan), where=scale != 0.0)
 

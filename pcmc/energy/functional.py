@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 def energy(surface: Surface) -> float:
-    """E = Σ α A - Σ p V + Σ τ L + Σ w ∫ z dA, Eq. (20) with cables and weights, force·length.
+    """E = Σ α A - Σ (p - s) V + Σ τ L + Σ w ∫ z dA, Eq. (20) with snow, cables, weights, force·length.
 
     >>> from pcmc import Patch, Surface
     >>> tent = Surface([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]],
@@ -52,7 +52,7 @@ def energy_at(surface: Surface, X: Floats) -> float:
     """E of the surface with its vertices at X (n,3)."""
     areas, volumes = kernels.areas_and_volumes(kernels.energy_mesh(surface), X)
     add_plane_volumes(surface, X, volumes)
-    return total(surface.tensions, areas, surface.pressures, volumes) + add_cables_and_weights(surface, X)
+    return total(surface.tensions, areas, surface.net_pressures, volumes) + add_cables_and_weights(surface, X)
 
 
 def add_cables_and_weights(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
@@ -79,11 +79,11 @@ def energy_and_gradient(
     X = surface.vertices if X is None else X
     areas, volumes, gradient = kernels.measure(kernels.energy_mesh(surface), X, workers)
     add_plane_volumes(surface, X, volumes)
-    add_plane_forces(surface, surface.pressures, X, gradient)
+    add_plane_forces(surface, surface.net_pressures, X, gradient)
     further = add_cables_and_weights(surface, X, gradient)
     if supports:
         apply_supports(surface, gradient, X)
-    return total(surface.tensions, areas, surface.pressures, volumes) + further, gradient
+    return total(surface.tensions, areas, surface.net_pressures, volumes) + further, gradient
 
 
 def gradient(surface: Surface) -> Floats:
@@ -175,8 +175,8 @@ def weighted(
 def gradient_by(surface: Surface, kind: str, index: int, X: Floats | None = None) -> Floats:
     """∂∇E/∂λ (n,3), supports not applied, λ one of the numbers that E is linear in.
 
-    ``kind`` is "tension", "pressure" or "weight" of the patch ``index``, or "cable", the tension of that
-    cable: ∇A_i, -∇V_i, ∇∫z dA, ∇L.
+    ``kind`` is "tension", "pressure", "snow" or "weight" of the patch ``index``, or "cable", the tension of
+    that cable: ∇A_i, -∇V_i, ∇V_i, ∇∫z dA, ∇L.
     """
     X = surface.vertices if X is None else X
     one = np.zeros(len(surface.patches))
@@ -184,8 +184,8 @@ def gradient_by(surface: Surface, kind: str, index: int, X: Floats | None = None
         one[index] = 1.0
     if kind == "tension":
         return weighted(surface, one, X=X)[2]
-    if kind == "pressure":
-        return weighted(surface, 0.0, one, X)[2]
+    if kind in ("pressure", "snow"):
+        return weighted(surface, 0.0, one if kind == "pressure" else -one, X)[2]
     out = np.zeros_like(X)
     if kind == "weight":
         moments(surface, X, one, out)

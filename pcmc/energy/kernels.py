@@ -44,7 +44,7 @@ class Mesh(NamedTuple):
 def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Floats | None = None) -> Mesh:
     """All triangles of a surface, with its own tensions and pressures (k,) or with others."""
     tension = surface.tensions if tension is None else read_only(tension)
-    pressure = surface.pressures if pressure is None else read_only(pressure)
+    pressure = surface.net_pressures if pressure is None else read_only(pressure)
     return Mesh(surface.faces, surface.patch_of_face, surface.origin, tension, pressure)
 
 

@@ -139,12 +139,12 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     Without pressure they are so whichever way their faces run; a Möbius band keeps a curve across.
     """
     in_room = surface.room_signs.any(axis=0)  # the pressure of a room may take any value
-    pulls = (surface.tensions != 0.0) | (surface.pressures != 0.0) | in_room
+    pulls = (surface.tensions != 0.0) | (surface.net_pressures != 0.0) | in_room
     active = pulls[surface.patch_of_face]
     faces, patch = surface.faces, surface.patch_of_face
     if not active.all():
         faces, patch = np.ascontiguousarray(faces[active]), np.ascontiguousarray(patch[active])
-    laws = np.vstack([surface.tensions, surface.pressures, surface.weights, surface.room_signs])
+    laws = np.vstack([surface.tensions, surface.net_pressures, surface.weights, surface.room_signs])
     kinds = np.unique(laws, axis=1, return_inverse=True)
     alike = np.asarray(kinds[1]).ravel()[patch].astype(np.int32)
     if active.all():
@@ -152,7 +152,7 @@ def vertex_classes(surface: Surface, crest: Ints | None = None, level: Bools | N
     else:
         topo = topology(faces, alike, surface.n)
     if (topo.one_way_edge & ~topo.seam_edge).any():
-        turned = _against_the_others(topo) & ((surface.pressures == 0.0) & ~in_room)[patch]
+        turned = _against_the_others(topo) & ((surface.net_pressures == 0.0) & ~in_room)[patch]
         faces = np.where(turned[:, None], faces[:, ::-1], faces)
         topo = topology(faces, alike, surface.n)
     faces.setflags(write=False)  # compiled loops then see one type of array

@@ -54,7 +54,7 @@ def add_plane_turns(surface: Surface, D: Floats, change: Floats) -> Floats:
     pieces = flat_pieces(surface)
     if pieces:
         a, b = _sides(surface, pieces)
-        p = surface.pressures[surface.patch_of_face[pieces.face], None] / 6.0
+        p = surface.net_pressures[surface.patch_of_face[pieces.face], None] / 6.0
         np.subtract.at(change, a, p * np.cross(pieces.apex, D[b]))
         np.add.at(change, b, p * np.cross(pieces.apex, D[a]))
     return change
@@ -66,7 +66,7 @@ def plane_hessian(surface: Surface) -> csr_array:
 
     pieces = flat_pieces(surface)
     a, b = _sides(surface, pieces)
-    sixth_p = surface.pressures[surface.patch_of_face[pieces.face]] / 6.0
+    sixth_p = surface.net_pressures[surface.patch_of_face[pieces.face]] / 6.0
     columns = np.cross(pieces.apex[:, None, :], np.eye(3))  # c × e_s
     blocks = -sixth_p[:, None, None] * columns.transpose(0, 2, 1)
     rows = np.broadcast_to(3 * a[:, None, None] + np.arange(3)[:, None], blocks.shape)

@@ -110,7 +110,7 @@ def prescribed_volumes(surface: Surface) -> Floats:
 
 
 def room_pressures(surface: Surface) -> Floats:
-    """(r,) the pressure of each room, force/length²: that which fits the patches around it best.
+    """(r,) the pressure of the air in each room, force/length²: that which fits the patches around it best.
 
     >>> from pcmc import Patch
     >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 3.0, 2.0)],

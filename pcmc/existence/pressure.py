@@ -1,4 +1,4 @@
-"""Raising the pressure along the branch of equilibria, from a low pressure to the one asked for."""
+"""Raising the pressure along the branch of equilibria, from a low one to the one asked for, net of snow."""
 
 from __future__ import annotations
 
@@ -15,11 +15,15 @@ SMALLEST = 1e-4
 
 
 def raise_pressure(low: Surface, attempts: Attempts) -> Further:
-    """Follow the equilibria from a low pressure, all pressures growing in proportion.
+    """Follow the equilibria from a low pressure, all net pressures growing in proportion.
 
-    The branch begins at the highest of a few pressures at which a minimum is found from the low start.
+    What grows is p - s, so the snow is not there at the start and comes with the pressure. The branch begins
+    at the highest of a few pressures at which a minimum is found from the low start.
     """
-    pressures = {patch.name: patch.pressure for patch in low.patches if patch.pressure != 0.0}
+    load = "net pressure" if low.snows.any() else "pressure"
+    gross, snows = ({p.name: getattr(p, key) for p in low.patches} for key in ("pressure", "snow"))
+    pressures = {patch.name: patch.net_pressure for patch in low.patches if patch.net_pressure != 0.0}
+    low = low.retensioned(None, dict.fromkeys(gross, 0.0) | pressures, snows=dict.fromkeys(snows, 0.0))
     carried = min(1.0, 1.0 / max(load_ratio(low), 1e-300))
     for share in SHARES:
         begin = share * carried
@@ -36,8 +40,8 @@ def raise_pressure(low: Surface, attempts: Attempts) -> Further:
         return Further()
     end = way(branch)
     if end.arrival is Arrival.REACHED:
-        last = branch.last.retensioned(None, pressures)
-        return Further(last, f"by raising the pressure from {begin:.3g} of it")
+        last = branch.last.retensioned(None, gross, snows=snows)
+        return Further(last, f"by raising the {load} from {begin:.3g} of it")
     if end.arrival is Arrival.FOLD:
-        return Further(fold=Fold("pressure", end.farthest * carried, begin))
+        return Further(fold=Fold(load, end.farthest * carried, begin))
     return Further()

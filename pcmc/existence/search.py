@@ -71,7 +71,7 @@ def _further_ways(start: Surface, attempts: Attempts, pinchable: Bools) -> list[
     if low.rooms:  # their pressures are not given, and no way begins at others
         return [partial(Further, low, "from a lower start")]
     ways: list[Callable[[], Further]] = []
-    if low.pressures.any():
+    if low.net_pressures.any():
         ways += [partial(Further, low, "from a lower start"), partial(raise_pressure, low, attempts)]
         if not hardly_balanced(start, pinchable):
             ways.append(partial(relax_tensions, low, attempts))

@@ -57,7 +57,7 @@ def low_start(surface: Surface) -> Surface | None:
         above *= np.sign(load(_at(surface, low + above[:, None] * [0.0, 0.0, 1.0]))) or 1.0
     rise = RISE * span
     most = float(np.abs(above[roof]).max())
-    if surface.pressures.any() and most > 0.0:
+    if surface.net_pressures.any() and most > 0.0:
         low[:, 2] += above * min(1.0, rise / most) if kept else above * (rise / most)
     if not roof.all():
         # walls below: between their feet and the roof; rows of walls that can pinch right below it

@@ -15,7 +15,7 @@ from ..surface.wall_pressures import with_pressures
 
 AT_REST = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.SADDLE)
 SMALLEST_STEP = 1.0 / 64.0  # part of the way; settling takes no smaller step
-KINDS = ("tensions", "pressures", "weights", "cables", "volumes")  # of values that can be changed
+KINDS = ("tensions", "pressures", "snows", "weights", "cables", "volumes")  # of values that can be changed
 Values = Mapping[str, Mapping[str, float]]
 
 
@@ -80,7 +80,7 @@ def between(start: Surface, end: Surface, part: float) -> Surface:
     names = [p.name for p in start.patches]
     by_patch = [
         dict(zip(names, mixed(getattr(start, kind).tolist(), getattr(end, kind).tolist()), strict=True))
-        for kind in ("tensions", "pressures", "weights")
+        for kind in ("tensions", "pressures", "snows", "weights")
     ]
     cables = mixed([c.tension for c in start.cables], [c.tension for c in end.cables])
     volumes = mixed([r.volume for r in start.rooms], [r.volume for r in end.rooms])
@@ -88,32 +88,14 @@ def between(start: Surface, end: Surface, part: float) -> Surface:
         by_patch[0],
         by_patch[1],
         [p.name for p in end.patches if p.wall],
-        weights=by_patch[2],
+        snows=by_patch[2],
+        weights=by_patch[3],
         cables=dict(zip([c.name for c in start.cables], cables, strict=True)),
         volumes=dict(zip([r.name for r in start.rooms], volumes, strict=True)),
     )
 
 
-def values_of(surface: Surface) -> dict[str, dict[str, float]]:
-    """The values that can be changed, by kind and name.
-
-    The pressures around a room of prescribed volume are results, and a wall's follows from its rooms'.
-    """
-    result = (surface.room_signs != 0.0).any(axis=0) | surface.walls
-    return {
-        "tensions": {p.name: p.tension for p in surface.patches},
-        "pressures": {
-            p.name: p.pressure for p, r in zip(surface.patches, result.tolist(), strict=True) if not r
-        },
-        "weights": {p.name: p.weight for p in surface.patches if p.weight},
-        "cables": {c.name: c.tension for c in surface.cables},
-        "volumes": {r.name: r.volume for r in surface.rooms},
-    }
-
-
 def wanted(surface: Surface, values: Values) -> Surface:
     """The surface with other values, kinds as in ``values_of``; walls follow the pressures of their rooms."""
     given = {kind: dict(values.get(kind) or {}) for kind in KINDS}
-    changed = with_pressures(surface, given["tensions"], given["pressures"])
-    others = {kind: given[kind] for kind in KINDS[2:] if given[kind]}
-    return changed.retensioned(**others) if others else changed
+    return with_pressures(surface, **given)

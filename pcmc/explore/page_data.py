@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ..accuracy.mesh_check import MeshCheck, with_bar
-from ..accuracy.quantities import UNIT_OF
 from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
 from ..base.units import NO_UNITS, Units
@@ -20,11 +19,12 @@ from ..design import Parameter, Target
 from ..energy.curvature import curvature_error, mean_curvature
 from ..energy.functional import patch_areas
 from ..panels.families import families
+from ..project.values import values_of
+from ..quantities import dimension_of
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.geometry import edge_vectors
 from ..surface.mirroring import Whole, unfolded
-from .following import values_of
 from .session import State
 from .variants import Variant, difference
 
@@ -83,7 +83,7 @@ def control_groups(surface: Surface, values: dict[str, dict[str, float]]) -> lis
     """What has sliders: a group for each patch, cable and room, with the kinds of its values."""
     groups = []
     for number, (patch, wall) in enumerate(zip(surface.patches, surface.walls.tolist(), strict=True)):
-        kinds = [kind for kind in ("tensions", "pressures", "weights") if patch.name in values[kind]]
+        kinds = [kind for kind in ("tensions", "pressures", "snows", "weights") if patch.name in values[kind]]
         groups.append({"name": patch.name, "patch": number, "wall": wall, "kinds": kinds})
     for kind in ("cables", "volumes"):
         groups += [{"name": name, "patch": None, "wall": False, "kinds": [kind]} for name in values[kind]]
@@ -195,7 +195,7 @@ def mesh_findings(check: MeshCheck, units: Units = NO_UNITS) -> dict[str, Any]:
     word, _, sentence = check.verdict.value.partition(": ")
     rows = []
     for row in check.table.to_dict(orient="records"):
-        unit = units.behind(UNIT_OF.get(row["quantity"], row["quantity"]))
+        unit = units.behind(dimension_of(row["quantity"]))
         rows.append(
             {
                 "name": " of ".join(filter(None, (row["quantity"], row["of"]))),

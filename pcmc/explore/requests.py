@@ -55,6 +55,8 @@ def _entries(key: str, asked: dict[str, Any], known: tuple[str, ...]) -> list[di
         raise RequestError(f"{key}: expected a list of objects, at least one")
     if len(listed) > MOST_AIMS:
         raise RequestError(f"{key}: {len(listed)} are too many; at most {MOST_AIMS}")
+    if not all(known[0] in entry for entry in listed):
+        raise RequestError(f"{key}: each needs a {known[0]}")
     return [{name: _aim(key, name, value, known) for name, value in e.items()} for e in listed]
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from ..design import Parameter, Target
 from ..io import read_bare
 from ..surface import Surface
 
-Signature = tuple[tuple[str, int, int], ...]
+Signature = tuple[tuple[str, tuple[int, ...]], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +29,10 @@ class Roof:
     units : of its numbers.
     path : of the file that it was read from; None for a surface from a program.
     text : of the project file when it was read; empty for other files.
+    data : of the project when it was read; empty for other files.
     targets, vary : those of the project.
     note : how the project ended, in one sentence; empty where that needs no words.
+    met : whether the project met its targets and is certified.
     good : False where the project has no roof to show: ``note`` says why.
     signature : of the file and those it refers to, before they were read.
     """
@@ -40,9 +42,11 @@ class Roof:
     units: Units = NO_UNITS
     path: Path | None = None
     text: str = ""
+    data: Mapping[str, Any] = field(default_factory=dict)
     targets: tuple[Target, ...] = ()
     vary: tuple[Parameter, ...] = ()
     note: str = ""
+    met: bool = False
     good: bool = True
     signature: Signature = ()
 
@@ -93,6 +97,7 @@ def read_roof(
     project = projects.load(path)
     text = text_of(path) if path.suffix.lower() == ".toml" else ""
     more: dict[str, Any] = {"path": path, "text": text, "signature": before}
+    more["data"] = projects.read_data(path)[1]
     more |= {"targets": tuple(project.targets), "vary": tuple(project.vary)}
     if start_shape:
         note = "the targets are not met yet: the page opened its start shape" if project.targets else ""
@@ -104,19 +109,23 @@ def read_roof(
     note = "" if design is None else design.text(outcome.units)
     if not certificate.certified:
         note = "; ".join(filter(None, (note, certificate.verdict.value, certificate.detail)))
-    at_rest = certificate.index is not None
-    return Roof(outcome.surface, path.name, outcome.units, note=note, good=at_rest, **more)
+    more |= {
+        "good": certificate.index is not None,
+        "met": certificate.certified and bool(design and design.met),
+    }
+    return Roof(outcome.surface, path.name, outcome.units, note=note, **more)
 
 
 def signature(path: Path) -> Signature:
-    """Name, time and size of a file and of those that it refers to; a missing file has time 0."""
-    states = []
+    """What tells that a file, or one that it refers to, was saved, replaced, or can no longer be read."""
+    states: list[tuple[str, tuple[int, ...]]] = []
     for file in projects.files_of(path):
         try:
-            state = file.stat()
-            states.append((str(file), state.st_mtime_ns, state.st_size))
-        except OSError:
-            states.append((str(file), 0, -1))
+            state, readable = file.stat(), os.access(file, os.R_OK)
+            seen = (state.st_mtime_ns, state.st_size, state.st_mode, state.st_ino, readable)
+            states.append((str(file), seen))
+        except (OSError, ValueError):  # missing, or no name of a file
+            states.append((str(file), ()))
     return tuple(states)
 
 

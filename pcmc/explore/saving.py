@@ -1,9 +1,10 @@
-"""Saving a page's surface as a project: the file's own text with other tensions, its comments kept."""
+"""Saving a page's surface as a project: the file's own text with other values, its comments kept."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,30 +12,38 @@ from ..base.errors import FileError, MissingExtra, OptionError
 from ..base.files import atomic_write
 from ..design import Parameter, Target
 from ..design.targets import measure
-from ..project import load, project_text
-from ..surface import Patch, Surface
+from ..project import read_data, surface_of
+from ..project.file import project_of
+from ..project.planning import project_text
+from ..project.rises import take_rises
+from ..project.values import differences, with_values
+from ..surface import Surface
 from .roof import Roof, text_of
 
 HELD = 1e-6  # relative misfit up to which a surface still meets a target
-SAME = 1e-12  # relative difference of values that counts as none
 FIELDS = ("quantity", "of", "value", "at_most", "at_least")
+OUTPUTS = {
+    "files",
+    "picture",
+    "drawings",
+    "panels",
+    "structure",
+    "report",
+}  # keys of [output] that name files
+Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]
 
 
 def save(
-    roof: Roof,
-    surface: Surface,
-    name: str,
-    replace: bool,
-    aims: tuple[tuple[Target, ...], tuple[Parameter, ...]] | None = None,
+    roof: Roof, surface: Surface, name: str, replace: bool, aims: Aims | None = None
 ) -> tuple[Path, str]:
-    """Write a project with the tensions and pressures of a surface into the folder of its file.
+    """Write a project with the values of a surface into the folder of its file.
 
     Parameters
     ----------
     roof : what the page opened.
     surface : the one to save.
     name : of the file, without folder.
-    replace : whether a file of that name may be replaced.
+    replace : whether a project of that name may be replaced.
     aims : targets met by the page, with what they vary.
 
     Returns
@@ -44,29 +53,46 @@ def save(
     Raises
     ------
     FileError
-        For a name that leads elsewhere, a file that is there already, or was changed since it was read.
+        For a name that leads elsewhere, a file that is there already, was changed since it was read, or is no
+        project of pcmc.
     OptionError
         For a surface whose values the project cannot hold.
     MissingExtra
         Without tomlkit.
     """
     path = _place(roof, name)
-    text, note = project_with(roof, surface, aims)
+    text, note, left = project_with(roof, surface, aims, path.stem)
     if path.exists():
-        if not replace:
-            text = f"{path.name} is there already; check that it may be replaced, or give another name"
-            raise FileError(text, what="name", found=path.name)
-        if roof.path is not None and path.resolve() == roof.path.resolve() and text_of(path) != roof.text:
-            message = f"{path.name} was changed since the page read it; save under another name"
-            raise FileError(message, what="name", found=path.name)
+        _check_replaced(roof, path, replace)
     with atomic_write(path) as temporary:
         temporary.write_bytes(text.encode())
-        try:
-            load(temporary)
+        try:  # read back: the file, not what it was made from, is what counts
+            saved = surface_of(project_of(temporary, read_data(temporary)[1]))
         except FileError as error:
             message = str(error).replace(str(temporary), path.name)
             raise FileError(f"{message}; nothing is saved", what="name") from None
+        wrong = [f"{kind.removesuffix('s')} of {name}" for kind, name in differences(saved, surface, left)]
+        if wrong:
+            message = f"{path.name} would have another {', '.join(wrong[:5])}; nothing is saved"
+            raise OptionError(message, what="values", found=wrong)
     return path, note
+
+
+def _check_replaced(roof: Roof, path: Path, replace: bool) -> None:
+    """Refuse to replace a file without leave, one that is no project, and one that was changed."""
+    problem = ""
+    if not replace:
+        problem = "is there already; check that it may be replaced, or give another name"
+    elif roof.path is not None and path.resolve() == roof.path.resolve():
+        problem = "was changed since the page read it; save under another name"
+        problem = problem if text_of(path) != roof.text else ""
+    else:
+        try:
+            read_data(path)
+        except FileError:
+            problem = "is no project of pcmc, so it is not replaced; give another name"
+    if problem:
+        raise FileError(f"{path.name} {problem}", what="name", found=path.name)
 
 
 def _place(roof: Roof, name: str) -> Path:
@@ -85,110 +111,70 @@ def _place(roof: Roof, name: str) -> Path:
 
 
 def project_with(
-    roof: Roof, surface: Surface, aims: tuple[tuple[Target, ...], tuple[Parameter, ...]] | None = None
-) -> tuple[str, str]:
-    """The text of a roof's project with the values of a surface, and a note on its targets."""
+    roof: Roof, surface: Surface, aims: Aims | None = None, stem: str = ""
+) -> tuple[str, str, set[tuple[str, str]]]:
+    """The text of a roof's project with the values of a surface, a note on its targets, and what these find.
+
+    Targets that the surface meets are kept: those of the page, else those of the file. Others become comments
+    or, for a rise, the tension: with them, solving the project would lead away from the surface saved. With
+    ``stem``, the name of the new file, the output gets other names, too.
+    """
     try:
         import tomlkit
     except ModuleNotFoundError:
         raise MissingExtra("tomlkit", "cad") from None
     assert roof.path is not None
     text = roof.text or project_text(roof.path, refer=True)[0]
-    document = tomlkit.parse(text)
-    before = {patch.name: patch for patch in roof.surface.patches}
-    plan: Any = document["plan"]
-    for patch, wall in zip(surface.patches, surface.walls.tolist(), strict=True):
-        old = before.get(patch.name)
-        if old is not None and wall:
-            _set_wall(tomlkit, plan, patch, old, surface)
-        elif old is not None:
-            _set_patch(tomlkit, plan, patch, old)
-    note = _set_targets(tomlkit, document, roof, surface, aims)
-    return tomlkit.dumps(document), note
-
-
-def _set_patch(tomlkit: Any, plan: Any, patch: Patch, old: Patch) -> None:
-    """Tension and pressure of a patch under pressure."""
-    patches = plan.setdefault("patches", tomlkit.table())
-    if patch.name not in patches:
-        patches[patch.name] = tomlkit.inline_table()
-    for key, default in (("tension", None), ("pressure", 1.0)):
-        value = getattr(patch, key)
-        if key in patches[patch.name] or value != default:
-            _put(patches[patch.name], key, value)
-
-
-def _set_wall(tomlkit: Any, plan: Any, patch: Patch, old: Patch, surface: Surface) -> None:
-    """The tension of a wall: of its divider, by the name or the number that it has in the plan."""
-    if _same(patch.tension, old.tension):
-        return
-    dividers = plan.setdefault("dividers", tomlkit.aot())
-    names = [_name(entry, k) for k, entry in enumerate(dividers, start=1)]
-    short = re.sub(r"-\d+$", "", patch.name)
-    name = patch.name if patch.name in names else short
-    parts = [p for p in surface.patches if re.fullmatch(re.escape(name) + r"-\d+", p.name)]
-    if any(not _same(p.tension, patch.tension) for p in parts):
-        text = f"{name}: the parts of one divider have one tension in a project; give them the same"
-        raise OptionError(text, what="tension", where=patch.name)
-    if name not in names:
-        entry = tomlkit.table()
-        entry["name"] = patch.name
-        dividers.append(entry)
-        names.append(name)
-    place = names.index(name)
-    if not isinstance(dividers[place], Mapping):
-        table = tomlkit.inline_table()
-        table["curve"] = dividers[place]
-        dividers[place] = table
-    _put(dividers[place], "wall", patch.tension)
-
-
-def _name(entry: Any, number: int) -> str:
-    named = entry.get("name") if isinstance(entry, Mapping) else None
-    return str(named) if named else f"wall {number}"
-
-
-def _put(table: Any, key: str, value: float) -> None:
-    """Set a number unless it is there already, so that its text stays."""
-    old = table.get(key)
-    if not isinstance(old, int | float) or not _same(float(old), value):
-        table[key] = float(f"{value:.12g}")
-
-
-def _same(one: float, other: float) -> bool:
-    return abs(one - other) <= SAME * max(abs(one), abs(other))
-
-
-def _set_targets(
-    tomlkit: Any,
-    document: Any,
-    roof: Roof,
-    surface: Surface,
-    aims: tuple[tuple[Target, ...], tuple[Parameter, ...]] | None,
-) -> str:
-    """Keep the targets that the surface meets: those of the page, else those of the file.
-
-    Others become comments: with them, solving the project would lead away from the surface saved.
-    """
-    if aims is not None and _meets(surface, aims[0]):
-        table = tomlkit.table()
-        points = document["plan"].get("points", {})
-        table["meet"] = _array(tomlkit, [_target(t, points) for t in aims[0]])
-        table["vary"] = _array(tomlkit, [_plain(p) for p in aims[1]])
-        document["targets"] = table
-        return f"with its targets: {', '.join(t.label for t in aims[0])}"
-    if not roof.targets or _meets(surface, roof.targets):
-        return ""
-    labels = ", ".join(t.label for t in roof.targets if not _meets(surface, (t,)))
-    if "targets" in document:
-        kept = tomlkit.dumps({"targets": document["targets"]}).strip()
-        del document["targets"]
+    document, data = tomlkit.parse(text), tomllib.loads(text)
+    given, note, dropped = data.get("targets"), "", ""
+    kept: Aims = (roof.targets, roof.vary)
+    if aims is not None and aims != kept and _meets(surface, aims[0]):
+        kept, points = aims, data["plan"].get("points", {})
+        entries = [_target(target, points) for target in aims[0]]
+        data["targets"] = {"meet": entries, "vary": [_parameter(p) for p in aims[1]]}
+        note = f"with its targets: {', '.join(t.label for t in aims[0])}"
+    elif not _meets(surface, roof.targets):
+        kept = (), ()
+        labels = ", ".join(t.label for t in roof.targets if not _meets(surface, (t,)))
+        if given is not None:
+            del data["targets"]
+            dropped = tomlkit.dumps({"targets": document["targets"]}).strip()
+            note = f"its [targets] as comments, as the surface saved does not meet them ({labels})"
+        elif not take_rises(data)[1]:
+            problem = f"the drawing asks for {labels}, and the surface shown does not meet it"
+            raise OptionError(f"{problem}; change the drawing", what="targets")
+        else:
+            note = f"with tensions instead of heights that the surface saved does not have ({labels})"
+    sought = {(f"{p.kind}s", name) for p in kept[1] for name in p.names}
+    left = sought - differences(roof.surface, surface).keys() if kept[0] == roof.targets else set()
+    data = with_values(roof.path, data, surface, left)[0]
+    if stem and stem != roof.path.stem:
+        output = data.get("output", {})
+        for key in OUTPUTS & output.keys():
+            names = output[key]
+            one = isinstance(names, str)
+            output[key] = (
+                _renamed(names, roof.path.stem, stem)
+                if one
+                else [_renamed(n, roof.path.stem, stem) for n in names]
+            )
+    _change(tomlkit, document, data)
+    if dropped:
         document.add(tomlkit.nl())
-        for line in ("not met by the tensions saved here:", *kept.splitlines()):
+        for line in ("not met by the values saved here:", *dropped.splitlines()):
             document.add(tomlkit.comment(line))
-        return f"its [targets] as comments, as the surface saved does not meet them ({labels})"
-    text = f"the drawing asks for {labels}, and the surface shown does not meet it; change the drawing"
-    raise OptionError(text, what="targets")
+    return tomlkit.dumps(document), note, left
+
+
+def _renamed(name: str, old: str, new: str) -> str:
+    """The name of an output of the project ``new``, from that of ``old``.
+
+    >>> _renamed("out/roof-plan.dxf", "roof", "higher"), _renamed("all.glb", "roof", "higher")
+    ('out/higher-plan.dxf', 'higher-all.glb')
+    """
+    path = Path(name)
+    rest = path.name.removeprefix(old) if path.name.startswith(old) else f"-{path.name}"
+    return path.with_name(new + rest).as_posix()
 
 
 def _meets(surface: Surface, targets: tuple[Target, ...]) -> bool:
@@ -201,31 +187,48 @@ def _meets(surface: Surface, targets: tuple[Target, ...]) -> bool:
 
 def _target(target: Target, points: Mapping[str, Any]) -> dict[str, Any]:
     """A target as in a project: a point that the plan names by its name."""
-    entry = {key: getattr(target, key) for key in FIELDS}
-    return entry | {"of": target.name} if target.name in points else entry
+    entry = {key: getattr(target, key) for key in FIELDS} | (
+        {"of": target.name} if target.name in points else {}
+    )
+    return {k: list(v) if isinstance(v, tuple) else v for k, v in entry.items() if v is not None}
 
 
-def _plain(parameter: Parameter) -> Any:
+def _parameter(parameter: Parameter) -> Any:
     """A parameter as in a project: its name, a list of names, or a table."""
     names = list(parameter.names) if len(parameter.names) > 1 else parameter.names[0]
-    return names if _bare(parameter) else {**vars(parameter), "patch": names}
+    entry = {k: v for k, v in vars(parameter).items() if v is not None} | {"patch": names}
+    return names if entry == {"patch": names, "kind": "tension"} else entry
 
 
-def _bare(parameter: Parameter) -> bool:
-    """Whether a project can name a parameter by its patch alone."""
-    return parameter.kind == "tension" and (parameter.low, parameter.high) == (None, None)
-
-
-def _array(tomlkit: Any, values: Sequence[Any]) -> Any:
-    """A list of names and tables, each table in one line and without empty values."""
-    array = tomlkit.array()
-    for value in values:
-        if isinstance(value, Mapping):
-            table = tomlkit.inline_table()
-            table.update(
-                {k: list(v) if isinstance(v, tuple) else v for k, v in value.items() if v is not None}
-            )
-            array.append(table)
+def _change(tomlkit: Any, table: Any, data: Mapping[str, Any]) -> None:
+    """Give a table of a document the values of ``data``; where nothing differs, the text stays."""
+    for key in [key for key in table if key not in data]:
+        del table[key]
+    for key, value in data.items():
+        if key in table:
+            _change_item(tomlkit, table, key, value)
         else:
-            array.append(list(value) if isinstance(value, tuple) else value)
-    return array
+            table[key] = _item(tomlkit, value)
+
+
+def _change_item(tomlkit: Any, table: Any, key: Any, value: Any) -> None:
+    """Give an entry of a table or a list another value."""
+    old = table[key]
+    if isinstance(value, Mapping) and isinstance(old, Mapping):
+        _change(tomlkit, old, value)
+    elif isinstance(value, list) and isinstance(old, list) and len(value) >= len(old) > 0:
+        for place in range(len(old)):
+            _change_item(tomlkit, old, place, value[place])
+        for more in value[len(old) :]:
+            old.append(more if isinstance(old, tomlkit.items.AoT) else _item(tomlkit, more))
+    elif old != value:
+        table[key] = _item(tomlkit, value)
+
+
+def _item(tomlkit: Any, value: Any) -> Any:
+    """Plain data for a document: a table of plain values in one line."""
+    if isinstance(value, Mapping) and not any(isinstance(v, Mapping) for v in value.values()):
+        item = tomlkit.inline_table()
+        item.update(value)
+        return item
+    return value

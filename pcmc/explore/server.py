@@ -10,6 +10,8 @@ import json
 import math
 import re
 import secrets
+import select
+import socket
 import tempfile
 import threading
 import warnings
@@ -22,15 +24,17 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
-from ..base.errors import MissingExtra, PcmcError, SurfaceError, unknown
+from ..base.errors import FileWarning, MissingExtra, PcmcError, SurfaceError, unknown
 from ..certificate.certificate import Certificate
 from ..io import FORMATS, write
+from ..project import read_data
 from ..project.output import fields as written_fields
+from ..project.values import values_of
 from ..surface import Patch, Surface
 from . import requests, saving
-from .following import values_of
 from .listening import LOOPBACK, Listener, listen
 from .messages import pack, plain
+from .own_way import OwnWay
 from .page_data import (
     aims_data,
     centre,
@@ -56,6 +60,7 @@ TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".s
 HEADERS = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
     "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:",
 }
 OTHERS = ("check", "families", "news", "save")  # acts that answer with no surface
@@ -78,11 +83,14 @@ class Explorer:
         self.start = solved_start(roof.surface)
         self.version = 0
         self.sessions: OrderedDict[str, Session] = OrderedDict()
-        self._turn = threading.Semaphore(SOLVES_AT_ONCE)
+        self.token = secrets.token_urlsafe(16)
+        self._turn, self._checks = threading.Semaphore(SOLVES_AT_ONCE), threading.Semaphore(1)
         self._lock, self._saving = threading.Lock(), threading.Lock()
         self.port = int(self._server.server_address[1])
         named = f"[{host}]" if ":" in host else host
-        self.url = f"http://{'127.0.0.1' if host in ('', '0.0.0.0') else named}:{self.port}/"
+        self.url = (
+            f"http://{'127.0.0.1' if host in ('', '0.0.0.0') else named}:{self.port}/?token={self.token}"
+        )
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self._thread.start()
         self.watch: Watch | None = None
@@ -98,8 +106,11 @@ class Explorer:
             self.roof, self.origin, self.start = roof, centre(roof.surface), start
             sessions = list(self.sessions.values())
         for session in sessions:
-            session.renew(start, roof.units)
+            session.renew(start, roof.units, self._own_way())
         self.version += 1
+
+    def _own_way(self) -> OwnWay:
+        return OwnWay(self.roof.path or Path(), self.roof.data)
 
     def save(self, session: Session, name: str, replace: bool) -> dict[str, Any]:
         """Save the surface of a session as a project beside the file that was opened."""
@@ -107,18 +118,19 @@ class Explorer:
             text = f"only a page of this machine saves files; here the server listens on {self.url}"
             raise RequestError(text, HTTPStatus.FORBIDDEN)
         with self._saving:
-            path, note = saving.save(self.roof, session.surface, name, replace, session.aims)
+            surface = session.state().surface  # after all that was asked for before
+            path, note = saving.save(self.roof, surface, name, replace, session.aims)
             if self.roof.path is not None and path == self.roof.path:
                 text = path.read_bytes().decode("utf-8-sig")
-                self.roof = dataclasses.replace(self.roof, text=text)
+                self.roof = dataclasses.replace(self.roof, text=text, data=read_data(path)[1])
                 if self.watch is not None:  # the page shows this already
                     self.watch.seen = signature(path)
         return {"saved": path.name, "note": note}
 
     def open(self) -> tuple[str, Session]:
         """A new session and its name in addresses."""
-        project = self.roof.path if self.roof.is_project else None
-        name, session = secrets.token_urlsafe(12), Session(self.start, self._turn, self.roof.units, project)
+        name = secrets.token_urlsafe(12)
+        session = Session(self.start, self._turn, self.roof.units, self._own_way(), self._checks)
         with self._lock:
             self.sessions[name] = session
             while len(self.sessions) > MOST_SESSIONS:
@@ -164,7 +176,7 @@ class View:
     @property
     def url(self) -> str:
         """The page's address, to open it in a window."""
-        return f"{self.explorer.url}?session={self._name}"
+        return f"{self.explorer.url}&session={self._name}"
 
     def close(self) -> None:
         """End the server behind the page."""
@@ -201,7 +213,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _answer(self, act: Any) -> None:
         try:
             self._content = self._read_content()
-            self._check_origin()
+            self._check_sender()
             act()
         except (RequestError, PcmcError, MissingExtra) as error:
             self._refuse(str(error), getattr(error, "status", HTTPStatus.BAD_REQUEST))
@@ -215,8 +227,8 @@ class _Handler(BaseHTTPRequestHandler):
         self.close_connection = True
         self._send(json.dumps({"error": " ".join(line.split())}).encode(), "application/json", status=status)
 
-    def _check_origin(self) -> None:
-        """Refuse requests from pages of other sites, and under other names of this machine."""
+    def _check_sender(self) -> None:
+        """Refuse requests from pages of other sites, under other names of this machine, and without token."""
         host = self.headers.get("Host", "")
         origin = self.headers.get("Origin")
         explorer = self.server.explorer
@@ -230,6 +242,13 @@ class _Handler(BaseHTTPRequestHandler):
             raise RequestError(f"open this page at {explorer.url}", HTTPStatus.FORBIDDEN)
         if source is not None and source != host:
             raise RequestError("requests from pages of other sites are refused", HTTPStatus.FORBIDDEN)
+        parts = urlsplit(self.path)
+        given = self.headers.get("X-Token") or parse_qs(parts.query).get("token", [""])[0]
+        if not parts.path.startswith("/page/") and not secrets.compare_digest(
+            given.encode(), explorer.token.encode()
+        ):
+            text = "open the address that pcmc explore printed: its token is missing here, or of another run"
+            raise RequestError(text, HTTPStatus.FORBIDDEN)
 
     def _get(self) -> None:
         parts = urlsplit(self.path)
@@ -257,7 +276,7 @@ class _Handler(BaseHTTPRequestHandler):
             raise RequestError(f"there is nothing at {self.path:.60}", HTTPStatus.NOT_FOUND)
         session, act = explorer.session(steps[1]), steps[2]
         if act == "check":
-            check = session.check_mesh()
+            check = session.check_mesh(self._gone)
             found = None if check is None else mesh_findings(check, explorer.roof.units)
             self._send_header({"superseded": True} if found is None else {"check": found})
         elif act == "families":
@@ -269,7 +288,14 @@ class _Handler(BaseHTTPRequestHandler):
         elif act == "save":
             self._send_header(explorer.save(session, *requests.file_to_save(asked)))
         else:
-            self._send_state(session, getattr(session, act)(*requests.ACTS[act](asked)))
+            arguments = requests.ACTS[act](asked)
+            more = (self._gone,) if act == "meet" else ()
+            self._send_state(session, getattr(session, act)(*arguments, *more))
+
+    def _gone(self) -> bool:
+        """Whether the page has closed the connection, and waits for no answer."""
+        ready = select.select([self.connection], [], [], 0.0)[0]
+        return bool(ready) and not self.connection.recv(1, socket.MSG_PEEK)
 
     def _opening(self, name: str, session: Session) -> dict[str, Any]:
         """What the page learns once."""
@@ -282,6 +308,7 @@ class _Handler(BaseHTTPRequestHandler):
             "name": roof.name,
             "units": unit_texts(roof.units),
             "note": roof.note,
+            "note_met": roof.met,
             "project": roof.is_project and explorer.local,
             "file": roof.path.name if roof.path is not None else "",
             "aims": aims_data(*(session.aims or (roof.targets, roof.vary))),
@@ -338,6 +365,8 @@ class _Handler(BaseHTTPRequestHandler):
                 "undo": state.undo,
                 "redo": state.redo,
                 "message": state.message,
+                "met": state.met,
+                "number": state.number,
                 "way": state.note,
                 "variants": [variant_data(variant) for variant in state.variants],
                 "compared": state.compared,
@@ -349,8 +378,9 @@ class _Handler(BaseHTTPRequestHandler):
         state, roof = session.state(), self.server.explorer.roof
         if suffix not in FORMATS:
             raise RequestError(unknown("format", suffix[:60], FORMATS))
-        with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the page lists the formats that carry the numbers
+        # the page lists what formats carry; a rule for this module alone, as threads share the rules
+        warnings.filterwarnings("ignore", category=FileWarning, module=re.escape(__name__))
+        with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"surface{suffix}"
             scalars = written_fields(state.surface, state.certificate)
             numbers = plain(state.certificate.numbers())

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from itertools import count
-from pathlib import Path
 from typing import Any
 
 from .. import existence
@@ -22,11 +21,12 @@ from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
 from ..design import Parameter, Target, meet
 from ..meshing.remeshing import remesh
+from ..project.values import values_of
 from ..solvers import solve
 from ..solvers.result import Progress
 from ..surface import Patch, Surface
 from ..surface.geometry import segment_lengths
-from .following import AT_REST, Values, attempt, reach, until, values_of, wanted
+from .following import AT_REST, Values, attempt, reach, until, wanted
 from .own_way import OwnWay
 from .variants import MOST_VARIANTS, Variant
 
@@ -52,6 +52,8 @@ class State:
     undo, redo : how many steps there are either way.
     superseded : whether newer values have arrived meanwhile, so that the page ignores this state.
     message : how the search for targets ended; empty after other acts.
+    met : whether it met them, with a surface at rest.
+    number : of the state; a later one is greater.
     note : how the values were reached where following did not lead there; else empty.
     variants : those kept; ``compared`` is the number of the one compared with, or None.
     """
@@ -64,6 +66,8 @@ class State:
     redo: int = 0
     superseded: bool = False
     message: str = ""
+    met: bool = False
+    number: int = 0
     note: str = ""
     variants: tuple[Variant, ...] = ()
     compared: int | None = None
@@ -72,6 +76,11 @@ class State:
     def asked(self) -> tuple[Patch, ...]:
         """The patches with the values asked for."""
         return self.wanted.patches
+
+
+def never() -> bool:
+    """False."""
+    return False
 
 
 def solved_start(surface: Surface) -> State:
@@ -92,8 +101,10 @@ def solved_start(surface: Surface) -> State:
 class Session:
     """A surface that follows its values; every method is safe to call from any thread.
 
-    A newer call ends the work on an older one. Each call holds ``turn`` while it works. ``project`` is the
-    file that the surface is designed by: where following leads nowhere, its own way is tried.
+    Calls are answered in the order in which they come, and none is dropped: but a move (to other values, to
+    targets, to new triangles) ends early when a newer move, or an act that shows another surface, has come
+    after it. Each move holds ``turn`` while it works, a mesh check ``checks``. ``own_way`` is what the
+    project behind the surface does where following leads nowhere.
     """
 
     def __init__(
@@ -101,16 +112,19 @@ class Session:
         start: State,
         turn: AbstractContextManager[Any] | None = None,
         units: Units = NO_UNITS,
-        project: Path | None = None,
+        own_way: OwnWay | None = None,
+        checks: AbstractContextManager[Any] | None = None,
     ) -> None:
-        self._lock, self._turn = threading.Lock(), turn or nullcontext()
-        self._requests, self._units = 0, units
-        self._own_way = OwnWay(project).giving(start.surface)
+        self._order, self._turn = threading.Condition(), turn or nullcontext()
+        self._checks = checks or nullcontext()
+        self._arrived = self._served = self._newest = self._states = 0
+        self._units = units
+        self._own_way = (own_way or OwnWay()).giving(start.surface)
         self.surface, self._certificate = start.surface, start.certificate
         self._wanted, self._failure = start.wanted, start.failure
         self._start = self.surface
         self._steps, self._place = [self.surface], 0
-        self._message = self._note = ""
+        self._message, self._met, self._note = "", False, ""
         self._compared: int | None = None
         self.variants: list[Variant] = []
         self.aims: Aims | None = None
@@ -118,8 +132,7 @@ class Session:
 
     def state(self) -> State:
         """The present state."""
-        with self._lock:
-            return self._state()
+        return self._run(lambda stop: None)
 
     def follow(self, values: Values) -> State:
         """Move towards these values while a slider moves: as far as two quick attempts lead."""
@@ -135,7 +148,7 @@ class Session:
             else:
                 self._failure = way.failed
 
-        return self._run(act)
+        return self._run(act, moves=True)
 
     def settle(self, values: Values) -> State:
         """Move to these values, or as close as possible, in as many steps as needed.
@@ -148,15 +161,15 @@ class Session:
             settled = self._own_way.settle(self.surface, asked, stop, end, self._report, **SETTLE)
             if stop():
                 return
-            way, self._note, self._own_way = settled.reached, settled.note, settled.own_way
-            if settled.note:
+            way, self._note, self._own_way = settled
+            if self._note and way.failed is None:
                 self._wanted = way.surface
             if way.certificate is not None:
                 self._show(way.surface)
             self._failure = way.failed
             self._add_step()
 
-        return self._run(act)
+        return self._run(act, moves=True)
 
     def stabilise(self) -> State:
         """Move from a saddle to a stable shape, if there is one nearby."""
@@ -173,7 +186,7 @@ class Session:
             else:
                 self._failure = certificate
 
-        return self._run(act)
+        return self._run(act, moves=True)
 
     def remesh(self) -> State:
         """New triangles of the mean size for the surface shown, and from there to the values asked for."""
@@ -196,17 +209,22 @@ class Session:
                 self._failure = way.failed
                 self._add_step()
 
-        return self._run(act)
+        return self._run(act, moves=True)
 
-    def meet(self, targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> State:
-        """Move to tensions that meet the targets; if there are none, ``message`` says why."""
+    def meet(
+        self, targets: tuple[Target, ...], vary: tuple[Parameter, ...], gone: Callable[[], bool] = never
+    ) -> State:
+        """Move to values that meet the targets; if there are none, ``message`` says why.
+
+        The search ends when ``gone``: its page was closed.
+        """
 
         def act(stop: Callable[[], bool]) -> None:
             solves = count(1)
 
             def check(_: object) -> None:
                 self.progress = f"{next(solves)} solves"
-                if stop():
+                if stop() or gone():
                     raise StopIteration
 
             try:
@@ -217,7 +235,8 @@ class Session:
                 return
             certificate = design.certificate
             self._message = design.text(self._units)
-            if design.met and certificate.verdict in AT_REST:
+            self._met = design.met and certificate.verdict in AT_REST
+            if self._met:
                 self._show(design.surface)
                 self._wanted, self._failure = design.surface, None
                 self.aims = targets, vary
@@ -225,7 +244,7 @@ class Session:
             elif design.met:
                 self._message += f"; but {certificate.verdict.value}; {certificate.detail}"
 
-        return self._run(act)
+        return self._run(act, moves=True)
 
     def keep(self, name: str) -> State:
         """Keep the surface shown as a variant; one of the same name is replaced."""
@@ -260,7 +279,7 @@ class Session:
         def act(stop: Callable[[], bool]) -> None:
             self._go_on_with(self._variant(number).surface)
 
-        return self._run(act)
+        return self._run(act, ends=True)
 
     def compare(self, number: int | None) -> State:
         """Compare the surface shown with a variant, or with none."""
@@ -272,31 +291,31 @@ class Session:
 
         return self._run(act)
 
-    def renew(self, start: State, units: Units = NO_UNITS) -> State:
+    def renew(self, start: State, units: Units = NO_UNITS, own_way: OwnWay | None = None) -> State:
         """Show another start, as a new step: the file behind the page was saved."""
 
         def act(stop: Callable[[], bool]) -> None:
             self._start, self._units, self.aims = start.surface, units, None
-            self._own_way = self._own_way.giving(start.surface)
+            self._own_way = (own_way or self._own_way).giving(start.surface)
             self.surface, self._certificate = start.surface, start.certificate
             self._wanted, self._failure = start.wanted, start.failure
             self._add_step()
 
-        return self._run(act)
+        return self._run(act, ends=True)
 
     def stop(self) -> State:
         """End the work under way."""
-        return self._run(lambda stop: None)
+        return self._run(lambda stop: None, ends=True)
 
-    def check_mesh(self) -> MeshCheck | None:
-        """The mesh check of the surface shown; None if the page shows another one before it ends."""
+    def check_mesh(self, gone: Callable[[], bool] = never) -> MeshCheck | None:
+        """The mesh check of the surface shown; None if the page shows another one, or is closed, before."""
         checked = self.surface
 
         def check(_: Progress) -> None:
-            if self.surface is not checked:
+            if self.surface is not checked or gone():
                 raise StopIteration
 
-        with self._turn:
+        with self._checks:
             try:
                 return check_mesh(checked, callback=check)
             except KeyboardInterrupt:
@@ -304,36 +323,49 @@ class Session:
 
     def undo(self) -> State:
         """One step back; if the values asked for were not reached, back to those of the surface shown."""
-        return self._run(
-            lambda stop: self._go(self._place if self._has_unsaved_changes else max(self._place - 1, 0))
-        )
+
+        def act(stop: Callable[[], bool]) -> None:
+            self._go(self._place if self._has_unsaved_changes else max(self._place - 1, 0))
+
+        return self._run(act, ends=True)
 
     def redo(self) -> State:
         """Repeat the step that was undone."""
-        return self._run(lambda stop: self._go(min(self._place + 1, len(self._steps) - 1)))
+        return self._run(lambda stop: self._go(min(self._place + 1, len(self._steps) - 1)), ends=True)
 
     def reset(self) -> State:
         """Return to the start, as a new step."""
+        return self._run(lambda stop: self._go_on_with(self._start), ends=True)
 
-        return self._run(lambda stop: self._go_on_with(self._start))
+    # -- below here it is a call's turn -----------------------------------------------------------------
 
-    # -- below here the lock is held ---------------------------------------------------------------
-
-    def _run(self, act: Callable[[Callable[[], bool]], None]) -> State:
-        self._requests += 1
-        mine = self._requests
+    def _run(
+        self, act: Callable[[Callable[[], bool]], None], moves: bool = False, ends: bool = False
+    ) -> State:
+        """Do an act after those before it; one that ``moves`` or ``ends`` moves ends moves before it."""
+        with self._order:
+            mine = self._arrived
+            self._arrived += 1
+            if moves or ends:
+                self._newest = mine
+            self._order.wait_for(lambda: self._served == mine)
 
         def late() -> bool:
-            return mine < self._requests
+            return moves and self._newest > mine
 
-        with self._lock, self._turn:
-            before = self._wanted
-            self._message = self._note = ""
-            if not late():
-                act(late)
-            if late():
-                self._wanted = before
-            return self._state(superseded=late())
+        try:
+            with self._turn if moves else nullcontext():
+                before = self._wanted
+                self._message, self._met, self._note = "", False, ""
+                if not late():
+                    act(late)
+                if late():
+                    self._wanted = before
+                return self._state(superseded=late())
+        finally:
+            with self._order:
+                self._served += 1
+                self._order.notify_all()
 
     def _with_values(self, values: Values) -> Surface:
         """The surface shown, with the values asked for."""
@@ -380,6 +412,7 @@ class Session:
         return self.surface is not here or values_of(self._wanted) != values_of(here)
 
     def _state(self, superseded: bool = False) -> State:
+        self._states += 1
         after = len(self._steps) - 1 - self._place
         before = self._place + self._has_unsaved_changes
         return State(
@@ -391,6 +424,8 @@ class Session:
             after,
             superseded,
             self._message,
+            self._met,
+            self._states,
             self._note,
             tuple(self.variants),
             self._compared,

@@ -68,8 +68,9 @@ def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]
         add("tension", patch.name, "tension", patch.tension)
         if of_roof:
             add("pressure", patch.name, "pressure", patch.pressure)
-        if patch.weight:
-            add("weight", patch.name, "pressure", patch.weight)
+        for kind in ("weight", "snow"):
+            if getattr(patch, kind):
+                add(kind, patch.name, "pressure", getattr(patch, kind))
     for cable in surface.cables:
         add("tension", cable.name, "force", cable.tension)
     for room in surface.rooms:

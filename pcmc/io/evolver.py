@@ -29,22 +29,24 @@ from ..energy.rooms import room_pressures, room_volumes
 from ..meshing.refinement import edges_on_planes
 from ..surface import Surface
 from . import evolver_forces
+from .evolver_forces import SPECIAL
 from .evolver_reading import ROUNDING, read
 from .mesh_data import FREE, SLIDING, given_support
-from .text import format_rows
+from .text import escaped, format_rows
 
 __all__ = ["read", "write"]
 
 HEADER = """\
 // Piecewise constant-mean-curvature surface, written by pcmc.
 // total_energy is E = sum tension * area - sum pressure * volume, volumes seen from the origin.
-// origin {origin}
+{snow}// origin {origin}
 {names}
 SPACE_DIMENSION 3
 SYMMETRIC_CONTENT
 DEFINE FACET ATTRIBUTE patch INTEGER
 
 """
+SNOW = "// The pressures of bodies are net: those of the air less the snow, an attribute of the faces.\n"
 
 
 def write(path: Path, surface: Surface, **_: Any) -> None:
@@ -57,10 +59,12 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
     X = surface.vertices - origin
     sides = ((surface.topology.edge_of_face + 1) * surface.topology.sense)[:, [2, 0, 1]]
     header = HEADER.format(
+        snow=SNOW if surface.snows.any() else "",
         origin=" ".join(map(repr, origin.tolist())),
         names="\n".join(
-            [f"// patch {k} {p.name}" for k, p in patches]
-            + [f"// room {k} {room.name}" for k, room in enumerate(surface.rooms, 1)]
+            [f"// patch {k} {escaped(p.name, SPECIAL)}" for k, p in patches]
+            + [f"// wall {k}" for k, p in patches if p.wall]
+            + [f"// room {k} {escaped(room.name, SPECIAL)}" for k, room in enumerate(surface.rooms, 1)]
             + evolver_forces.names(surface)
         ),
     )
@@ -89,9 +93,8 @@ def _constraints(surface: Surface, origin: Floats) -> str:
         terms = zip(plane.normal, "xyz", strict=True)
         formula = " + ".join(c if a == 1.0 else f"({a!r})*{c}" for a, c in terms if a != 0.0)
         if number > 1:
-            text += (
-                f"// plane {number} {'mirror' if plane.mirror else 'support'} {plane.name}".rstrip() + "\n"
-            )
+            kind = "mirror" if plane.mirror else "support"
+            text += f"// plane {number} {kind} {escaped(plane.name, SPECIAL)}".rstrip() + "\n"
         offset = -float(plane.height(origin)) or 0  # and not -0.0
         text += f"CONSTRAINT {number}\nFORMULA: {formula} = {offset!r}\n"
         own = np.flatnonzero(mask[tail] & mask[head])
@@ -101,7 +104,7 @@ def _constraints(surface: Surface, origin: Floats) -> str:
                 f"CONTENT\nC1: ({y!r})*z - ({z!r})*y\nC2: ({z!r})*x - ({x!r})*z\nC3: ({x!r})*y - ({y!r})*x\n"
             )
     for k, (patch, normal) in enumerate(zip(pieces.end_patch, pieces.normal, strict=True)):
-        x, y, z = (-surface.pressures[patch] * normal).tolist()
+        x, y, z = (-surface.net_pressures[patch] * normal).tolist()
         text += f"QUANTITY corner_{k} ENERGY METHOD VERTEX_SCALAR_INTEGRAL\n"
         text += f"SCALAR_INTEGRAND: ({x!r})*x + ({y!r})*y + ({z!r})*z\n"
     return text
@@ -137,8 +140,12 @@ def _edge_support(surface: Surface) -> Ints:
 
 
 def _bodies(surface: Surface) -> str:
-    """A body for each room, with its volume, and one for each pressure that is not that of a room."""
-    text, pressures = "", surface.pressures
+    """A body for each room, with its volume, and one for each net pressure beside that of a room.
+
+    It is on the positive side of a face or, where a room is there, on the other.
+    """
+    text, pressures = "", surface.net_pressures
+    side = np.where((surface.room_signs > 0.0).any(axis=0), -1, 1)[surface.patch_of_face]
     if surface.rooms:
         multipliers, pressures = _room_pressures(surface)
         beyond = room_volumes(surface) - surface.room_signs @ _cones(surface)
@@ -148,9 +155,9 @@ def _bodies(surface: Surface) -> str:
             text += _body(
                 k + 1, members[members != 0], f"{rest} lagrange_multiplier {float(multipliers[k])!r}"
             )
-    of_face = pressures[surface.patch_of_face]
+    of_face = side * pressures[surface.patch_of_face]
     for body, pressure in enumerate(np.unique(of_face[of_face != 0.0]), 1 + len(surface.rooms)):
-        members = np.flatnonzero(of_face == pressure) + 1
+        members = (side * _count(surface.faces))[of_face == pressure]
         text += _body(body, members, f" pressure {float(pressure)!r}")
     return text
 
@@ -170,16 +177,17 @@ def _cones(surface: Surface) -> Floats:
 
 
 def _room_pressures(surface: Surface) -> tuple[Floats, Floats]:
-    """(r,) the pressures of the rooms, and (k,) those of the patches beside them."""
+    """(r,) the pressures of the rooms, and (k,) the net ones of the patches beside them, as of snow."""
     signs = surface.room_signs
     multipliers = room_pressures(surface)
     left = surface.pressures - multipliers @ signs
     left[np.abs(left) <= ROUNDING * np.abs(surface.pressures).max(initial=0.0)] = 0.0
-    both = np.flatnonzero((signs > 0.0).any(axis=0) & (left != 0.0))
+    left -= surface.snows
+    both = np.flatnonzero((signs > 0.0).any(axis=0) & (signs < 0.0).any(axis=0) & (left != 0.0))
     if len(both):
         name = surface.patches[both[0]].name
         text = f"patch {name!r} has a pressure of {left[both[0]]:g} beside that of its rooms, and a datafile"
-        text += " has one body on each side of a face; give its pressure to all patches of the room"
+        text += " has one body on each side of a face; give its pressure to all patches of the rooms"
         raise FileError(text, where=name, found=float(left[both[0]]))
     return multipliers, left
 

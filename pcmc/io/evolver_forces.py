@@ -1,7 +1,8 @@
-"""Cables and weights in Surface Evolver datafiles.
+"""Cables, weights and snow in Surface Evolver datafiles.
 
 A cable is a line ``tension`` of its edges, which also have its number as the attribute ``cable``. A weight
 w is the attribute ``weight`` of faces, and one quantity for each w, ``self_weight_k``: their integral of w z.
+Snow is the attribute ``snow`` of faces, which the reader adds to the net pressures of the bodies.
 """
 
 from __future__ import annotations
@@ -9,21 +10,37 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 
 from ..base.arrays import Floats, Ints
+from ..base.names import names_from_file
 from ..surface import Cable, Surface
+from .text import escaped
+
+WRITTEN = "written by pcmc"
+
+
+SPECIAL = "\\*"  # in names: the program joins lines at a backslash, and "/*" begins a comment
+
+
+def names_in(header: str, kind: str) -> dict[str, str]:
+    """The names that comments give to patches, rooms or cables, by number."""
+    rows = re.findall(rf"^// {kind} (\d+) ([^\n]+)$", header, re.M)
+    names = names_from_file(name for _, name in rows)[0]
+    return {number: unquote(names[name]) if WRITTEN in header else names[name] for number, name in rows}
 
 
 def names(surface: Surface) -> list[str]:
     """A comment for each cable's name."""
-    return [f"// cable {k} {cable.name}" for k, cable in enumerate(surface.cables, 1)]
+    return [f"// cable {k} {escaped(cable.name, SPECIAL)}" for k, cable in enumerate(surface.cables, 1)]
 
 
 def definitions(surface: Surface, origin: Floats) -> str:
     """The attributes and quantities, coordinates seen from ``origin`` (3,)."""
     text = "DEFINE EDGE ATTRIBUTE cable INTEGER\n" if surface.cables else ""
+    text += "DEFINE FACET ATTRIBUTE snow REAL\n" if surface.snows.any() else ""
     weights = _weights(surface)
     if not len(weights):
         return text
@@ -45,9 +62,11 @@ def edge_tags(surface: Surface, tags: Any) -> Any:
 
 
 def patch_tags(surface: Surface, tags: Any) -> Any:
-    """The tags (k,) of the faces of patches with their weight and its quantity."""
+    """The tags (k,) of the faces of patches with their weight and its quantity, and their snow."""
     tags, weights = tags.astype(object), _weights(surface).tolist()
     for k, patch in enumerate(surface.patches):
+        if patch.snow:
+            tags[k] += f" snow {patch.snow!r}"
         if patch.weight:
             tags[k] += f" weight {patch.weight!r} self_weight_{1 + weights.index(patch.weight)}"
     return tags
@@ -74,7 +93,7 @@ def cables(
     ends : (e,2) its vertices.
     number : the value of a word in a row.
     """
-    known = dict(re.findall(r"^// cable (\d+) ([^\n]+)$", header, re.M))
+    known = names_in(header, "cable")
     found: dict[tuple[str, float], list[int]] = {}
     for k, rest in enumerate(rows):
         given = re.search(r"\b(?:tension|density)\s+(\S+)", rest, re.I)

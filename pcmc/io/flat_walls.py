@@ -8,7 +8,7 @@ the file has the meshes without them and a text with all walls; the reader puts 
 from __future__ import annotations
 
 import json
-from dataclasses import astuple, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -18,6 +18,7 @@ from ..base.errors import FileError
 from ..surface import Patch, Surface
 from ..surface.geometry import bounding_size
 from .mesh_data import ROUNDING, MeshData, support_of, without_unused
+from .metadata import row_of
 
 KEY = "pcmc walls"
 CHANGED = "walls without height were left out: the surface has changed since they were written"
@@ -33,7 +34,7 @@ def encode_walls(surface: Surface, shown: Surface) -> str:
         "above": np.isin(used, surface.faces[~wall]).tolist(),
         "faces": local.reshape(-1, 3).tolist(),
         "patch": surface.patch_of_face[wall].tolist(),
-        "patches": [astuple(p) for p in surface.patches],
+        "patches": [row_of(p) for p in surface.patches],
         "shown": int(np.count_nonzero(shown.auxiliary[shown.patch_of_face])),
     }
     return json.dumps(values)

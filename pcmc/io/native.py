@@ -23,13 +23,12 @@ import pandas as pd
 
 from ..base.arrays import Bools, Floats
 from ..base.errors import FileError
-from ..base.units import Units
 from ..surface import Cable, Circle, Guide, Line, Plane, Room, Surface
 from .libraries import translated_errors
 from .mesh_data import MeshData, given_support
-from .metadata import metadata_text, parse_metadata
+from .metadata import parse_metadata
 
-VERSION = 4  # since 2 lines, 3 circles, 4 planes, weights, cables, rooms; written as the oldest that will do
+VERSION = 5  # since 2 lines, 3 circles, 4 planes, weights, cables, rooms, 5 snow; the oldest that will do
 FORMAT = "pcmc surface"
 INFLATED = 100  # most bytes for each byte of the file; a flat grid of a million triangles has 7
 ROOM = 64_000_000  # bytes that any file may become
@@ -40,7 +39,7 @@ def write(
     surface: Surface,
     scalars: Mapping[str, Floats],
     certificate: Mapping[str, Any],
-    units: Units,
+    metadata: str,
     **_: Any,
 ) -> None:
     """The archive; the same surface gives the same bytes."""
@@ -48,7 +47,7 @@ def write(
     meta = {
         "format": FORMAT,
         "version": _version(surface),
-        "description": metadata_text(surface, units),
+        "description": metadata,
         "certificate": {k: v for k, v in certificate.items() if k not in tables},
     }
     if surface.rooms:
@@ -120,6 +119,8 @@ def read(path: Path) -> MeshData:
 
 def _version(surface: Surface) -> int:
     """The oldest version of the format that can hold a surface."""
+    if surface.snows.any():
+        return 5
     if surface.rooms or surface.on_planes or surface.cables or surface.weights.any():
         return 4
     return 3 if surface.on_circle else 2 if surface.on_line else 1

@@ -1,6 +1,6 @@
 """The same surface in another unit of length: coordinates, and all that is per length, area or volume.
 
-With the factor f, lengths become f times as large, tensions (force/length) 1/f, pressures and weights
+With the factor f, lengths become f times as large, tensions (force/length) 1/f, pressures, weights and snow
 (force/length²) 1/f², volumes f³. Forces stay, so the shape at rest stays the same.
 """
 
@@ -43,9 +43,8 @@ def scaled(value: Any, factor: float) -> Any:
         case tuple():
             return tuple(scaled(part, factor) for part in value)
         case Patch():
-            area = factor * factor
-            pressure, weight = value.pressure / area, value.weight / area
-            return replace(value, tension=value.tension / factor, pressure=pressure, weight=weight)
+            per_area = {key: getattr(value, key) / factor**2 for key in ("pressure", "weight", "snow")}
+            return replace(value, tension=value.tension / factor, **per_area)
         case Plane() | Line():
             return replace(value, point=_point(value.point, factor))
         case Circle():

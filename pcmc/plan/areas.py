@@ -46,9 +46,10 @@ def patches_of(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
         raise PlanError(problem, what="at", where=missing)
     else:
         owner = _located(areas, mesh, count, centroid)
-    snow = [plan.snow if a.snow is None else a.snow for a in areas]
+    snows = [plan.snow if a.snow is None else a.snow for a in areas]
     patches = [
-        Patch(a.name, a.tension, a.pressure - s, weight=a.weight) for a, s in zip(areas, snow, strict=True)
+        Patch(a.name, a.tension, a.pressure, weight=a.weight, snow=s)
+        for a, s in zip(areas, snows, strict=True)
     ]
     return patches, owner[mesh.region]
 

@@ -113,8 +113,8 @@ class Area:
     tension : α, force/length.
     pressure : p, force/area.
     weight : of the patch, force per area of the patch, against Π's normal; negative for a lift.
-    snow : force per area of the plan; None for that of the plan. It is a change of pressure: a load s on the
-        plan area has the potential s V, so the patch takes the pressure p - s.
+    snow : s, force per area of the plan; None for that of the plan. A load s on the plan area has the
+        potential s V, so it acts as a lower pressure, p - s; ``pressure`` stays that of the air.
     volume : of the room under the patch, between its walls, length³, instead of a pressure, which is then a
         result. A patch with a negative volume hangs below Π.
     at : a point [x, y] inside the patch, or a point in each of its parts. If no patch has one, the

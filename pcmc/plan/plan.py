@@ -52,9 +52,9 @@ class Plan(PlanData):
         at a right angle; "cable": free between ``supports``, with a cable along it; or "free", where the
         tension has nothing to pull against.
     supports : points [x, y] or [x, y, z], such as masts, and curves along which vertices are fixed. A curve
-        on the outline or a hole fixes that part of it; one inside a patch is fixed where it is drawn. The
-        height z of a point on a free edge or a cable is that of the edge there; between such points the
-        edge starts straight.
+        on the outline or a hole fixes that part of it, which carries no cable; one inside a patch is fixed
+        where it is drawn. On a free edge or a cable the height z of a support is that of the edge there;
+        between supports the edge starts straight.
     plane : Π.
     rise : height of the initial surface above the one that the boundary spans, length; by default
         0.3 of the radius of the largest circle without supports. In a project without tensions it is the
@@ -63,8 +63,8 @@ class Plan(PlanData):
     tension : α of all patches, instead of ``patches``, force/length.
     pressure, weight : of all patches, with ``tension``: force per area along the normal, and per area against
         Π's normal.
-    snow : force per area of the plan, on all patches that have none of their own. It is the same as a change
-        of pressure: a load s on the plan area has the potential s V, so a patch takes the pressure p - s.
+    snow : s, force per area of the plan, on all patches that have none of their own. A load s on the plan
+        area has the potential s V, so it acts as a lower pressure, p - s; ``pressure`` stays that of the air.
     cable : tension of the cables along the outline, with ``edge = "cable"``, force. Each stretch between
         supports is a cable: "cable 1", "cable 2", … in order.
     cables : parts of the outline and of holes that are free and carry a cable of their own: CableLines.

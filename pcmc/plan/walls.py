@@ -228,7 +228,8 @@ def _labels(
         alike = [n for s, n in names if s == sheets]
         suffix = "" if number < 0 else f"-{alike.index(number) + 1}"
         value = tension[a.name, b.name]
-        patches.append(Patch(f"wall-{a.name}-{b.name}{suffix}", value, a.pressure - b.pressure, wall=True))
+        pressure, snow = a.pressure - b.pressure, a.snow - b.snow
+        patches.append(Patch(f"wall-{a.name}-{b.name}{suffix}", value, pressure, wall=True, snow=snow))
     return [names.index(kind) for kind in kinds], patches
 
 

@@ -96,8 +96,8 @@ def opened(
     FileError, PlanError, OptionError, SurfaceError : as ``load`` and ``pcmc.read``.
 
     >>> roof = opened("notebooks/roof.toml", start=True)
-    >>> roof.result is None, roof.units.length, roof.certificate.certified
-    (True, 'm', False)
+    >>> roof.result is None, roof.certificate.certified
+    (True, False)
     """
     project = path if isinstance(path, Project) else load(path, units=units)
     if (project.has_file or project.plan is not None) and not start:

@@ -12,7 +12,7 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
-from ..base.files import check_name
+from ..base.files import check_name, check_regular
 from ..base.units import LENGTHS
 
 if TYPE_CHECKING:
@@ -48,8 +48,9 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     [PosixPath('notebooks/roof.toml')]
     """
     path = Path(path)
-    with suppress(OSError, ValueError):  # of TOML, of UTF-8
+    with suppress(OSError, ValueError, RecursionError, PcmcError):  # of TOML, of UTF-8
         if path.suffix.lower() == ".toml":
+            check_regular(path)
             data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
             plan, mesh = data.get("plan"), data.get("mesh")
             name = plan.get("drawing") if isinstance(plan, Mapping) else mesh

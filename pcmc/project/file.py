@@ -153,7 +153,8 @@ def load(path: PathLike, *, units: str = "") -> Project:
     path = Path(path)
     if not is_project(path):
         return Project(path, mesh=mesh_file(path), units=Units(units))
-    project = project_of(path, *read_data(path, units))
+    text, data = read_data(path, units)
+    project = project_of(path, data, text)
     if units and project.units.length not in ("", units):
         text = f"{path}: the project is in {project.units.length}, not in {units}; leave out --units"
         raise OptionError(text, what="units", found=units, expected=project.units.length)
@@ -242,7 +243,7 @@ def in_file(path: Path, kind: type[PcmcError] | None = None) -> Iterator[None]:
 
 
 def project_of(
-    path: Path, text: str, data: Mapping[str, Any], redrawn: Callable[[Plan], Plan] | None = None
+    path: Path, data: Mapping[str, Any], text: str = "", redrawn: Callable[[Plan], Plan] | None = None
 ) -> Project:
     """The project with the given data, which were read from a text. Errors as in ``load``.
 

@@ -284,14 +284,15 @@ def solve_section(method: str) -> Section:
 def target_sections() -> tuple[Section, ...]:
     """[targets] and its tables."""
     from ..design import Parameter, Target  # needed by projects with targets only
-    from ..design.quantities import QUANTITIES
+    from ..design.quantities import MEASURES
     from ..design.targets import KINDS as KINDS_OF_PARAMETER
+    from ..design.targets import SHORT
 
     changing = _of_class(
         Parameter, {"patch": "a name or a list of names"}, choices={"kind": KINDS_OF_PARAMETER}
     )
     varied = "what may change; a name is a patch whose tension may, a list of names several with one tension"
-    wanted = _of_class(Target, {"of": "a name or a point [x, y]"}, {"quantity": tuple(QUANTITIES)})
+    wanted = _of_class(Target, {"of": "a name or a point [x, y]"}, {"quantity": (*MEASURES, *SHORT)})
     return (
         Section(
             "targets",
@@ -328,7 +329,7 @@ def sections() -> tuple[Section, ...]:
     """Every section that a project file may have, with its keys.
 
     >>> [key.name for key in sections()[0].keys]
-    ['units', 'force', 'plan', 'solve', 'remesh', 'targets', 'structure', 'output']
+    ['units', 'force', 'plan', 'mesh', 'solve', 'remesh', 'targets', 'structure', 'output']
     """
     solve = (solve_section(method) for method in METHODS)
     return (*main_sections(), *solve, *target_sections(), _CURVE)

@@ -129,7 +129,7 @@ def _points(number: int, one: Any) -> Floats:
     except (TypeError, ValueError):
         points = np.empty(0)
     if points.ndim not in (1, 2) or points.shape[-1:] != (3,) or not np.isfinite(points).all():
-        validate.refuse(f"mesh.supports: number {number}", one, "a point [x, y, z], or a list of points")
+        validate.refuse("mesh.supports", one, "a point [x, y, z], or a list of points", str(number))
     return points
 
 

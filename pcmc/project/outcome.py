@@ -231,7 +231,7 @@ class Outcome:
     def model(self, structure: Any, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""
         solved = self.shown.surface if self.whole is not None or self.result is None else self.result
-        return cast("StructuralModel", structure.model(solved, anyway))
+        return cast("StructuralModel", structure.model(solved, anyway, units=self.units))
 
     @property
     def mesh_check(self) -> MeshCheck | None:

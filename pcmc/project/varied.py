@@ -24,8 +24,8 @@ from .mesh import mesh_file
 from .shifts import AXES, shifted
 from .start import start_of
 
-QUANTITIES = ("tension", "pressure", "weight")  # of a patch
-LOADS = ("tensions", "pressures", "weights", "cables", "volumes")
+QUANTITIES = ("tension", "pressure", "weight", "snow")  # of a patch
+LOADS = ("tensions", "pressures", "weights", "snows", "cables", "volumes")
 CABLE = "cable "  # before the name of a cable, where a patch has the same
 NUMERIC = ("a number", "a whole number", WALL)  # kinds of keys
 KeyPath = tuple[str | int, ...]
@@ -91,8 +91,8 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
     ----------
     path : of a project (``.toml``), or of a surface, which has no keys.
     values : by the dotted name of a number that the file has or may have, such as ``plan.edge_length``; by
-        ``NAME.tension``, ``NAME.pressure`` and ``NAME.weight`` of a patch or wall, ``NAME.tension`` of a
-        cable, ``NAME.volume`` of a room; or by ``NAME.x``, ``NAME.y`` and ``NAME.z`` of a divider, a hole, a
+        ``NAME.tension``, ``NAME.pressure``, ``NAME.weight`` and ``NAME.snow`` of a patch or wall,
+        ``NAME.tension`` of a cable, ``NAME.volume`` of a room; or by ``NAME.x``, ``NAME.y`` and ``NAME.z`` of a divider, a hole, a
         support or a named point of the plan: all of it is shifted by the value, so 0 leaves it where it is
         drawn. Numbers of the file are replaced, and lines are shifted, before the plan is meshed, the others
         afterwards. Where several things have one name, put what is meant before it: ``cable NAME.tension``,
@@ -189,7 +189,7 @@ def _project(source: _Source, values: Mapping[str, float]) -> Project:
             table[source.keys[name][-1]] = value
         elif not source.is_load(name):
             shifts.setdefault(stem, {})[last] = value
-    return project_of(source.path, source.text, data, partial(shifted, shifts=shifts))
+    return project_of(source.path, data, source.text, partial(shifted, shifts=shifts))
 
 
 def _retensioned(source: _Source, surface: Surface, values: Mapping[str, float]) -> Surface:

@@ -65,6 +65,9 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
         add("tension", name, owner, patch.tension)
         if roof[k]:
             add("pressure", name, owner, patch.pressure)
+        if patch.snow and roof[k]:
+            add("snow", name, owner, patch.snow)
+            add("net pressure", name, owner, patch.net_pressure)
         if patch.weight:
             add("weight", name, owner, patch.weight)
     leaning = certificate.leaning

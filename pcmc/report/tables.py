@@ -13,7 +13,6 @@ from ..base.arrays import Ints
 from ..base.units import Units
 from ..certificate import Certificate
 from ..certificate.reactions import held_lengths
-from ..design.outcome import unit_of
 from ..panels import Panels
 from ..quantities import Figure, dimension_of
 from ..surface import Surface
@@ -82,7 +81,7 @@ def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Ta
 
 
 def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Table:
-    """A row per patch: tension, pressure, weight, area, mean curvature and its error."""
+    """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
     table, length = certificate.patches, units.length
     columns = {
         f"tension, {units.tension}": column(table["tension"]),
@@ -91,6 +90,9 @@ def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Tab
         f"mean curvature, 1/{length}": column(table["mean_H"]),
         "its largest error": [small(x) for x in table["variational_max"].tolist()],
     }
+    if "snow" in table:
+        columns[f"snow, {units.pressure}"] = column(table["snow"])
+        columns[f"net pressure, {units.pressure}"] = column(table["net"])
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
         columns[f"weight, {units.pressure}"] = column(weights)
@@ -185,7 +187,7 @@ def target_table(targets: pd.DataFrame, units: Units) -> Table:
     columns = {
         "wanted": [one(x) for x in targets["wanted"].tolist()],
         "reached": [one(x) for x in targets["value"].tolist()],
-        "unit": [units.behind(unit_of(str(name))).strip() for name in targets.index],
+        "unit": [units.behind(dimension).strip() for dimension in targets["dimension"]],
         "met": ["yes" if met else "no" for met in targets["met"]],
     }
     return _table("Targets", ["quantity"], words, columns)
@@ -193,11 +195,9 @@ def target_table(targets: pd.DataFrame, units: Units) -> Table:
 
 def mesh_table(check: MeshCheck, units: Units) -> Table:
     """Each quantity with its error bar, and its limit on finer and finer meshes."""
-    from ..accuracy.quantities import UNIT_OF  # takes long to import
-
     table = check.table
     words = [[quantity, of] for quantity, of in zip(table["quantity"], table["of"], strict=True)]
-    kinds = [UNIT_OF.get(quantity, quantity) for quantity in table["quantity"]]
+    kinds = map(dimension_of, table["quantity"])
     columns = {
         "on this mesh": [one(x) for x in table["value"].tolist()],
         "error bar": [_bar(x) for x in table["error"].tolist()],

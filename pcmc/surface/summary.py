@@ -14,7 +14,7 @@ def summary(surface: Any) -> str:
     """Of a Surface: size, patches, walls, cables, rooms, supports and heights, a line each."""
     patches = {
         wall: [
-            f"{p.name} (tension {p.tension:g}, pressure {p.pressure:g})"
+            f"{p.name} (tension {p.tension:g}, pressure {p.pressure:g}{f', snow {p.snow:g}' * bool(p.snow)})"
             for p, is_wall in zip(surface.patches, surface.walls.tolist(), strict=True)
             if is_wall == wall
         ]

@@ -128,9 +128,12 @@ class Surface:
 
     @cached_array
     def uncancelled(self) -> Floats:
-        """(e,) the sum of the pressures at each edge that no support holds, force/area."""
+        """(e,) the sum of the net pressures at each edge that no support holds, force/area."""
+        return self._uncancelled(self.net_pressures)
+
+    def _uncancelled(self, pressures: Floats) -> Floats:
         masks = [self.fixed | self.on_plane, *(mask for _, mask in self.on_planes)]
-        return uncancelled_pressures(self.topology, self.pressures[self.patch_of_face], masks)
+        return uncancelled_pressures(self.topology, pressures[self.patch_of_face], masks)
 
     @cached_array
     def origin(self) -> Floats:
@@ -196,8 +199,18 @@ class Surface:
 
     @cached_array
     def pressures(self) -> Floats:
-        """(k,) pressure p of each patch."""
+        """(k,) pressure p of each patch, that of the air: snow is not taken off."""
         return np.array([p.pressure for p in self.patches])
+
+    @cached_array
+    def snows(self) -> Floats:
+        """(k,) snow s on each patch, force per area of the plan."""
+        return np.array([p.snow for p in self.patches])
+
+    @cached_array
+    def net_pressures(self) -> Floats:
+        """(k,) p - s of each patch: the pressure in the energy."""
+        return np.array([p.net_pressure for p in self.patches])
 
     @cached_array
     def weights(self) -> Floats:
@@ -289,15 +302,17 @@ class Surface:
         walls: Iterable[str] = (),
         *,
         weights: Mapping[str, float] | None = None,
+        snows: Mapping[str, float] | None = None,
         cables: Mapping[str, float] | None = None,
         volumes: Mapping[str, float] | None = None,
     ) -> Surface:
-        """The same surface with other tensions, pressures or weights, given by patch name.
+        """The same surface with other tensions, pressures, weights or snow, given by patch name.
 
         ``walls`` names patches that are walls whatever their pressure; ``cables`` gives tensions by the name
         of the cable, ``volumes`` volumes by the name of the room.
         """
-        by_patch: dict[str, Any] = {"tension": tensions, "pressure": pressures, "weight": weights}
+        by_patch: dict[str, Any] = {"tension": tensions, "pressure": pressures}
+        by_patch |= {"weight": weights, "snow": snows}
         for key, given in (by_patch | {"cable": cables, "volume": volumes}).items():
             if not isinstance(given or {}, Mapping):
                 validate.refuse(f"{key}s", given, "a mapping from names to numbers", error=SurfaceError)
@@ -315,17 +330,17 @@ class Surface:
         return summary(self)
 
     def with_snow(self, snow: float, patches: Iterable[str] | None = None) -> Surface:
-        """The same surface under snow, by lower pressures: p - s for p.
+        """The same surface under snow, which acts as a lower pressure, p - s for p.
 
         A load s on the plan area has the potential s ∫ z dA_plan = s V, V the volume over Π; so E changes by
         s V, as it does when the pressure falls by s. This holds where the boundary of the patches is held,
-        lies on Π, or meets other patches: at a free edge V is that of cones to Π's point, whose sides would
-        carry snow, too.
+        lies on Π, or meets other patches under the same snow: at a free edge V is that of cones to Π's point,
+        whose sides would carry snow, too.
 
         Parameters
         ----------
         snow : s, force per area of the plan; Π's normal points up.
-        patches : names of the patches that it lies on; by default all under pressure, or all if none is.
+        patches : names of the patches that it lies on; by default all that are no walls, or all if all are.
 
         Raises
         ------
@@ -337,19 +352,23 @@ class Surface:
         --------
         >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
         >>> roof = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 2.0, 1.0)], fixed=range(3))
-        >>> roof.with_snow(0.25).pressures.tolist()
-        [0.75]
+        >>> snowy = roof.with_snow(0.25)
+        >>> snowy.pressures.tolist(), snowy.snows.tolist(), snowy.net_pressures.tolist()
+        ([1.0], [0.25], [0.75])
         """
         snow = validate.number("snow", snow, error=SurfaceError)
-        pressed = [patch.name for patch in self.patches if not patch.auxiliary]
-        names = list(patches) if patches is not None else pressed or [patch.name for patch in self.patches]
-        given = {name: self.pressures[self.patch_index(name)] - snow for name in names}
-        kept = [patch.name for patch in self.patches if patch.auxiliary]
-        loaded = self.retensioned(pressures=given, walls=set(kept) - set(names))
-        edges = np.flatnonzero(loaded.uncancelled)
-        if snow != 0.0 and len(edges):
-            checks.refuse_snow(snow, names[0], len(edges), self.topology.edges[edges[0]])
-        return loaded
+        every = [patch.name for patch in self.patches]
+        roof = [name for name, wall in zip(every, self.walls.tolist(), strict=True) if not wall]
+        names = list(patches) if patches is not None else roof or every
+        return self.retensioned(snows=dict.fromkeys(names, snow)).with_held_snow()
+
+    def with_held_snow(self) -> Surface:
+        """The surface itself; SurfaceError where its snow ends at a free edge, as in ``with_snow``."""
+        edges = np.flatnonzero(self._uncancelled(self.snows))
+        if len(edges):
+            patch = self.patches[int(np.argmax(np.abs(self.snows)))]
+            checks.refuse_snow(patch.snow, patch.name, len(edges), self.topology.edges[edges[0]])
+        return self
 
     def __copy__(self) -> Surface:
         """The surface itself: it never changes."""

@@ -18,13 +18,19 @@ def with_pressures(
     pressures: Mapping[str, float] | None = None,
     *,
     weights: Mapping[str, float] | None = None,
+    snows: Mapping[str, float] | None = None,
     cables: Mapping[str, float] | None = None,
     volumes: Mapping[str, float] | None = None,
 ) -> Surface:
     """``surface.retensioned``, with the pressures of walls updated to those of their rooms.
 
     A wall's pressure is the difference of its two rooms' pressures. It changes with that difference,
-    unless ``pressures`` names the wall itself.
+    unless ``pressures`` names the wall itself. Its snow is the difference of that over its rooms, in the same
+    way: none where both carry the same.
+
+    Raises
+    ------
+    SurfaceError : an edge under one of the ``snows`` is free; see ``Surface.with_snow``.
 
     >>> from pcmc.plan import Divider, Plan
     >>> hall = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], [Divider([[4, 0], [4, 4]])], edge_length=1.0,
@@ -32,11 +38,22 @@ def with_pressures(
     >>> with_pressures(hall, None, {"west": 1.25}).pressures.tolist()
     [1.25, 1.0, 0.25]
     """
-    changed = surface.retensioned(tensions, pressures, weights=weights, cables=cables, volumes=volumes)
-    named = {surface.patch_index(name) for name in pressures or ()}
-    follow = wall_pressure_changes(surface, changed.pressures - surface.pressures, named)
-    walls = {surface.patches[k].name: float(surface.pressures[k] + follow[k]) for k in np.flatnonzero(follow)}
-    return changed.retensioned(None, walls, walls) if walls else changed
+    changed = surface.retensioned(
+        tensions, pressures, weights=weights, snows=snows, cables=cables, volumes=volumes
+    )
+    walls = _followed(surface, surface.pressures, changed.pressures, pressures)
+    under = _followed(surface, surface.snows, changed.snows, snows)
+    if walls or under:
+        changed = changed.retensioned(None, walls, {**walls, **under}, snows=under)
+    return changed.with_held_snow() if snows else changed
+
+
+def _followed(
+    surface: Surface, old: Floats, new: Floats, given: Mapping[str, float] | None
+) -> dict[str, float]:
+    """The values of walls that follow from those of the patches (k,); by name, without walls in ``given``."""
+    follow = wall_pressure_changes(surface, new - old, {surface.patch_index(name) for name in given or ()})
+    return {surface.patches[k].name: float(old[k] + follow[k]) for k in np.flatnonzero(follow)}
 
 
 def wall_pressure_changes(surface: Surface, change: Floats, named: Collection[int] = ()) -> Floats:

@@ -20,6 +20,8 @@ const KINDS = {
 };
 
 class Page {
+  pending = 0; // requests without an answer yet
+
   async open() {
     const known = new URLSearchParams(location.search).get("session") || sessionStorage.getItem("session");
     // a copy of this tab starts a session of its own
@@ -57,7 +59,7 @@ class Page {
     this.viewer?.setMesh(header, arrays);
     this.panel = new Panel(find("#patches"), header, find("#together"), (final) => this.request(final));
     this.targets = new Targets(find("#targets"), header, (aims) => this.send("meet", aims, true), () => this.act("stop"));
-    if (header.note && opened) this.targets.say(header.note, header.note.startsWith("met") ? "met" : "missed");
+    if (header.note && opened) this.targets.say(header.note, header.note_met ? "met" : "missed");
     find("#together-row").hidden = header.patches.length < 2;
     addSaving(find("#save-project"), find("#saving"), header, () => this.name, (text) => this.notify(text));
     this.next = null;
@@ -89,7 +91,7 @@ class Page {
     }
   }
 
-  // -- requests: one under way, and the newest of those that wait -----------------------------------
+  // -- requests: acts are sent at once, and answered in order; of slider values the newest replace those that wait
 
   request(final) {
     this.next = { act: final ? "settle" : "follow", values: this.panel.values() };
@@ -100,71 +102,71 @@ class Page {
 
   act(name, values = {}) {
     if (["undo", "redo", "reset", "recall", "stabilise", "remesh"].includes(name)) this.targets.say("");
-    this.next = { act: name, values };
-    this.pump(true);
+    this.flush();
+    return this.send(name, values);
   }
 
-  pump(now = false) {
+  /** Send the values that wait, unless older ones are under way; these get as long as an answer last took. */
+  pump() {
     clearTimeout(this.timer);
-    if (!this.next) return;
     const waited = performance.now() - this.since;
-    // a slow surface gets as long as it last took, or a moving slider would never get an answer
     const patience = Math.max(REPLACE_AFTER, 1.5 * (this.lasted || 0));
-    if (this.busy && !now && waited < patience) {
+    if (this.next && this.pending && waited < patience) {
       this.timer = setTimeout(() => this.pump(), patience - waited);
-      return;
+    } else {
+      this.flush();
     }
-    const { act, values } = this.next;
+  }
+
+  flush() {
+    const { next } = this;
     this.next = null;
-    this.send(act, values);
+    if (next) this.send(next.act, next.values);
   }
 
   /** Send a request and show its answer; returns the header. Errors are shown, or thrown if `raise`. */
   async send(act, values, raise = false) {
-    const ticket = {};
+    const began = performance.now();
     let [result, failure] = [null, null];
-    this.busy = ticket;
-    this.since = performance.now();
+    this.pending += 1;
+    this.since = began;
     this.showWork();
     try {
       const answer = await ask(`api/${this.name}/${act}`, values);
       result = answer.header;
-      if (!answer.header.superseded && this.busy === ticket) {
-        if (act === "follow") this.lasted = performance.now() - this.since;
-        await this.show(answer, !["follow", "settle"].includes(act) || Boolean(answer.header.way));
+      if (act === "follow") this.lasted = performance.now() - began;
+      if (!result.superseded && result.number > this.header.number) {
+        await this.show(answer, !["follow", "settle"].includes(act) || Boolean(result.way));
       }
     } catch (error) {
       failure = error;
       if (!raise) this.notify(error.message);
       if (!this.next) this.panel.show(this.header.values, true);
     }
-    if (this.busy === ticket) {
-      this.busy = null;
-      this.showWork();
-      this.pump();
-    }
+    this.pending -= 1;
+    this.showWork();
+    this.pump();
     if (failure && raise) throw failure;
     return result;
   }
 
   showWork() {
-    clearTimeout(this.slow);
     const card = find("#verdict");
-    card.dataset.busy = String(Boolean(this.busy || this.next));
+    card.dataset.busy = String(Boolean(this.pending || this.next));
+    if (this.pending && this.slow) return; // it counts already
+    clearTimeout(this.slow);
+    this.slow = null;
     const work = card.querySelector(".work");
     work.hidden = true;
-    if (!this.busy) {
-      card.classList.remove("working");
-      card.removeAttribute("aria-busy");
-      return;
-    }
-    const ticket = this.busy;
+    card.classList.remove("working");
+    card.removeAttribute("aria-busy");
+    if (!this.pending) return;
     const tell = async () => {
       const seconds = Math.round((performance.now() - this.since) / 1000);
       work.hidden = false;
       work.textContent = `Working… ${seconds} s`;
       const news = await ask(`api/${this.name}/news`).catch(() => null);
-      if (this.busy !== ticket) return;
+      if (!this.slow) return;
       if (news?.header.progress) work.textContent = `Working… ${seconds} s, ${news.header.progress}`;
       this.slow = setTimeout(tell, 1000);
     };

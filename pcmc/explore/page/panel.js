@@ -7,6 +7,7 @@ const ROOM = 2; // times a value beyond the slider's end: where it ends then
 const QUANTITIES = {
   tensions: { label: "Tension α", unit: "tension" },
   pressures: { label: "Pressure p", unit: "pressure" },
+  snows: { label: "Snow s", unit: "pressure" },
   weights: { label: "Weight w", unit: "pressure" },
   cables: { label: "Tension τ", unit: "force" },
   volumes: { label: "Volume V", unit: "volume" },
@@ -141,9 +142,10 @@ export class Panel {
     entry.number.value = digits(value, 6);
     entry.slider.setAttribute("aria-valuetext", digits(value, 6));
     const mine = this.rows.filter((r) => r.index === entry.index);
-    const [alpha, p, w] = ["tensions", "pressures", "weights"].map((k) => mine.find((r) => r.kind === k)?.value);
+    const [alpha, p, s, w] = ["tensions", "pressures", "snows", "weights"]
+      .map((k) => mine.find((r) => r.kind === k)?.value);
     const curved = alpha !== undefined && p !== undefined && w === undefined;
-    entry.target.textContent = entry.group.wall ? "wall" : curved ? `H̄ = p / 2α = ${digits(p / (2 * alpha), 3)}` : "";
+    entry.target.textContent = entry.group.wall ? "wall" : curved ? `H̄ = ${s ? "(p − s)" : "p"} / 2α = ${digits((p - (s ?? 0)) / (2 * alpha), 3)}` : "";
   }
 
   /** Show the values asked for; where the surface shown has others, mark them. */

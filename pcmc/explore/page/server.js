@@ -14,10 +14,12 @@ export function unpack(buffer) {
   return { header, arrays };
 }
 
-async function request(path, options) {
+const token = new URLSearchParams(location.search).get("token") ?? "";
+
+async function request(path, options = {}) {
   let response;
   try {
-    response = await fetch(path, options);
+    response = await fetch(path, { ...options, headers: { "Content-Type": "application/json", "X-Token": token } });
   } catch {
     throw new Error("The program behind this page has stopped. Start it again and reload the page.");
   }
@@ -30,9 +32,7 @@ async function request(path, options) {
 
 /** POST a JSON body; returns the unpacked answer. */
 export async function ask(path, body = {}) {
-  const response = await request(path, {
-    method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body),
-  });
+  const response = await request(path, { method: "POST", body: JSON.stringify(body) });
   return unpack(await response.arrayBuffer());
 }
 

@@ -121,7 +121,7 @@ export class Targets {
     try {
       const header = await this.meet({ targets, vary });
       if (!header || header.superseded) this.say("Stopped.");
-      else this.say(header.message, header.message.startsWith("met") && header.at_rest ? "met" : "missed");
+      else this.say(header.message, header.met ? "met" : "missed");
     } catch (error) {
       this.say(error.message, "missed");
     }

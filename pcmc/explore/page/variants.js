@@ -5,7 +5,7 @@ import { digits } from "./panel.js";
 
 const NAMES = {
   apex: "Apex", area: "Area", volume: "Volume", reaction: "Reaction",
-  tension: "Tension", pressure: "Pressure", weight: "Weight",
+  tension: "Tension", pressure: "Pressure", weight: "Weight", snow: "Snow",
 };
 
 /** The row that begins the rows of a patch, or of all, across the table. */
