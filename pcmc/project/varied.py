@@ -92,11 +92,12 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
     path : of a project (``.toml``), or of a surface, which has no keys.
     values : by the dotted name of a number that the file has or may have, such as ``plan.edge_length``; by
         ``NAME.tension``, ``NAME.pressure``, ``NAME.weight`` and ``NAME.snow`` of a patch or wall,
-        ``NAME.tension`` of a cable, ``NAME.volume`` of a room; or by ``NAME.x``, ``NAME.y`` and ``NAME.z`` of a divider, a hole, a
-        support or a named point of the plan: all of it is shifted by the value, so 0 leaves it where it is
-        drawn. Numbers of the file are replaced, and lines are shifted, before the plan is meshed, the others
-        afterwards. Where several things have one name, put what is meant before it: ``cable NAME.tension``,
-        ``hole NAME.x``. Lines without a name are ``divider 1``, ``wall 1``, ``hole 1``, ``support 1``, …
+        ``NAME.tension`` of a cable, ``NAME.volume`` of a room; or by ``NAME.x``, ``NAME.y`` and ``NAME.z`` of
+        a divider, a hole, a support or a named point of the plan: all of it is shifted by the value, so 0
+        leaves it where it is drawn. Numbers of the file are replaced, and lines are shifted, before the plan
+        is meshed, the others afterwards. Where several things have one name, put what is meant before it:
+        ``cable NAME.tension``, ``hole NAME.x``. Lines without a name are ``divider 1``, ``wall 1``,
+        ``hole 1``, ``support 1``, …
 
     Raises
     ------
