@@ -15,6 +15,7 @@ from .. import io
 from ..base.errors import OptionError, unknown
 from ..energy.rooms import refuse_varied_pressure
 from ..surface import Surface
+from ..surface.renewed import KINDS
 from ..surface.wall_pressures import with_pressures
 from .checking import is_curve
 from .drawn import files_of, is_drawing
@@ -25,7 +26,6 @@ from .shifts import AXES, shifted
 from .start import start_of
 
 QUANTITIES = ("tension", "pressure", "weight", "snow")  # of a patch
-LOADS = ("tensions", "pressures", "weights", "snows", "cables", "volumes")
 CABLE = "cable "  # before the name of a cable, where a patch has the same
 NUMERIC = ("a number", "a whole number", WALL)  # kinds of keys
 KeyPath = tuple[str | int, ...]
@@ -196,7 +196,7 @@ def _project(source: _Source, values: Mapping[str, float]) -> Project:
 def _retensioned(source: _Source, surface: Surface, values: Mapping[str, float]) -> Surface:
     """The surface with other tensions and pressures; numbers of the file and shifts are ignored."""
     known = _names(surface)
-    given: dict[str, dict[str, float]] = {kind: {} for kind in LOADS}
+    given: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
     for name in filter(source.is_load, values):
         if name not in known:
             # no coordinates, and patches have shorter names
