@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,7 +18,6 @@ from ..base.errors import OptionError
 from ..base.files import atomic_writes, suffix_of, writing
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..certificate import Certificate
-from ..certificate.reactions import held_lengths
 from ..certificate.required import certified, warning_mark
 from ..panels import Panels, panels
 from ..surface import Surface, expect_surface
@@ -29,6 +28,7 @@ from .sections import Polyline, section
 from .sheet import FORMATS, Sheet, add_frames, table_sheets
 
 SUFFIXES = (".dxf", ".pdf", ".svg")
+SUPPORT = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
 DECIMALS = {"m": 3, "cm": 1, "mm": 0, "ft": 4, "in": 2}  # about a millimetre or better
 Ends = tuple[tuple[float, float], tuple[float, float]]
 
@@ -152,7 +152,7 @@ def drawing_set(
     ...                [Patch("roof", 1.0)], fixed=range(4))
     >>> drawings = drawing_set(roof, "m", sheet="A3")
     >>> [sheet.title for sheet in drawings.sheets]
-    ['Plan', 'Elevations', 'Sections at heights', 'Sections along lines', 'Setting-out points']
+    ['Plan', 'Elevations', 'Sections at heights', 'Sections along lines', 'Setting-out points', 'Supports']
     >>> drawings.sheets[0].scale
     '1:10'
     """
@@ -178,7 +178,8 @@ def drawing_set(
         schedule = panels(surface, tolerance, mirror_images=mirror_images, **options)
     curves = views.model_curves(surface)
     points = _setting_out(curves)
-    marks = _point_supports(surface)
+    at_points = certificate.supports[certificate.supports["kind"] == "point"]
+    marks = list(zip(at_points["support"], at_points[[*"xyz"]].to_numpy(), strict=True))
     named = [(at, name, "PCMC-SUPPORT") for name, at in marks]
     named += [
         (np.array(at), name, "PCMC-POINT") for name, *at in points[["point", *"xyz"]].to_numpy().tolist()
@@ -197,8 +198,12 @@ def drawing_set(
     sheets += table_sheets("Setting-out points", *_rows(points, decimals), sheet)
     if len(certificate.cables):
         cables = certificate.cables[["cable", "tension", "length"]]
-        named_units = {"tension": f"force, {units.force or 'force'}", "length": f"length, {length}"}
-        sheets += table_sheets("Cables", *_rows(cables.rename(columns=named_units), decimals), sheet)
+        cables = cables.rename(columns={"tension": "force"})
+        sheets += table_sheets("Cables", *_rows(cables, decimals, {"force": units.force}), sheet)
+    if len(certificate.supports):
+        listed = certificate.supports[SUPPORT]
+        forces = dict.fromkeys(SUPPORT[-3:], units.force)
+        sheets += table_sheets("Supports", *_rows(listed, decimals, forces), sheet)
     flat = None
     if schedule is not None:
         sheets += table_sheets("Families of panels", *_rows(_families(schedule), decimals), sheet)
@@ -214,11 +219,6 @@ def drawing_set(
 def check_suffix(path: Path) -> str:
     """The suffix of a drawing's file; another is refused."""
     return suffix_of(path, SUFFIXES, "a drawing")
-
-
-def _point_supports(surface: Surface) -> list[tuple[str, Floats]]:
-    places = surface.vertices[surface.fixed & (held_lengths(surface) == 0.0)]
-    return [(f"S{k}", place) for k, place in enumerate(places, start=1)]
 
 
 def _setting_out(curves: Sequence[views.Curve]) -> pd.DataFrame:
@@ -289,10 +289,12 @@ def _families(schedule: Panels) -> pd.DataFrame:
     return shown.rename(columns={"count": "panels", "mirrored": "turned over"})
 
 
-def _rows(table: pd.DataFrame, decimals: int) -> tuple[list[str], list[list[str]]]:
-    """The head and the rows of a table as texts."""
+def _rows(
+    table: pd.DataFrame, decimals: int, units: Mapping[str, str] | None = None
+) -> tuple[list[str], list[list[str]]]:
+    """The head, with the units that columns have, and the rows of a table as texts."""
     rows = [
         [f"{x:.{decimals}f}" if isinstance(x, float) else str(x) for x in row]
         for row in table.to_numpy(dtype=object).tolist()
     ]
-    return list(map(str, table.columns)), rows
+    return [", ".join(filter(None, (name, (units or {}).get(name)))) for name in table.columns], rows

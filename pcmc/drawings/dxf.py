@@ -84,7 +84,7 @@ def layout_name(title: str, taken: set[str]) -> str:
     >>> [layout_name(title, taken) for title in ("Plan", "Panels 1 to 9 at true size, outside up", "Plan")]
     ['Plan', 'Panels 1 to 9', 'Plan 2']
     """
-    short = re.sub(r'[<>/\\":;?*|,=`\']', " ", title.split(" at true size")[0])[:200].strip()
+    short = re.sub(r'[<>/\\":;?*|,=`\']', " ", re.split(" at true size|:", title)[0])[:200].strip()
     names = (short if k == 1 else f"{short} {k}" for k in range(1, len(taken) + 2))
     name = next(name for name in names if name.lower() not in taken)
     taken.add(name.lower())

@@ -144,7 +144,8 @@ def _add_panel(sheet: Sheet, corners: Floats, k: int, schedule: Panels, labels: 
     radius = abs(first[0] * second[1] - first[1] * second[0]) / lengths.sum()
     number = str(k + 1)
     family = f"F{schedule.panels['family'].iloc[k]}"
-    height = min(12.0, 0.4 * radius, 1.2 * radius / (WIDTH * max(len(number), len(family))))
+    most = 1.2 * radius / (WIDTH * max(len(number), len(family)))
+    height = min(max(12.0, 0.15 * radius), 0.4 * radius, most)
     x, y = map(float, middle)
     sheet.texts.append(Text((x, y + 0.2 * height), number, height, align="C"))
     sheet.texts.append(Text((x, y - 0.9 * height), family, 0.6 * height, align="C"))

@@ -58,13 +58,14 @@ class Curve:
 class View:
     """What is drawn on two axes, in the surface's unit: lines by layer, and texts at points.
 
-    ``points`` are marked on their layer, with their names. ``stations`` are the places along each axis
-    between which the view is dimensioned, ``levels`` the heights that are marked beside it.
+    Texts stand beside their point in a direction (2,). ``points`` are marked on their layer, with names.
+    ``stations`` are the places along each axis between which the view is dimensioned, ``levels`` the heights
+    that are marked beside it.
     """
 
     title: str
     lines: list[Line] = field(default_factory=list)
-    texts: list[tuple[Floats, str]] = field(default_factory=list)
+    texts: list[tuple[Floats, str, Floats]] = field(default_factory=list)
     points: list[tuple[Floats, str, str]] = field(default_factory=list)
     stations: tuple[Floats, Floats] = (np.empty(0), np.empty(0))
     levels: Floats = field(default_factory=lambda: np.empty(0))
@@ -92,9 +93,9 @@ def model_curves(surface: Surface) -> list[Curve]:
     ]
 
 
-def corners(curves: Sequence[Curve]) -> Floats:
-    """(k,3) the corners and ends of rims and wall lines, and their farthest points along the axes."""
-    places = [np.empty((0, 3))]
+def outline(curves: Sequence[Curve], axis: Sequence[float]) -> Floats:
+    """Where the corners and ends of rims and wall lines are along an axis (3,), and how far these reach."""
+    places = []
     for curve in curves:
         if curve.layer in ("PCMC-RIM", "PCMC-WALL"):
             P = curve.points
@@ -103,8 +104,9 @@ def corners(curves: Sequence[Curve]) -> Floats:
             sharp = np.einsum("ij,ij->i", before, after) < CORNER * sizes
             if not curve.closed:
                 sharp[[0, -1]] = True
-            places += [P[sharp], P[P.argmin(axis=0)], P[P.argmax(axis=0)]]
-    return np.concatenate(places)
+            along = P @ np.array(axis)
+            places += [along[sharp], [along.min(), along.max()]]
+    return np.concatenate(places) if places else np.empty(0)
 
 
 def plan(surface: Surface, curves: Sequence[Curve], points: Sequence[tuple[Floats, str, str]]) -> View:
@@ -114,9 +116,13 @@ def plan(surface: Surface, curves: Sequence[Curve], points: Sequence[tuple[Float
     edges = surface.topology.edges[np.unique(surface.topology.edge_of_face[roof])]
     view.lines += [Line(pair, "PCMC-PANEL") for pair in surface.vertices[edges][:, :, :2]]
     view.lines += [Line(c.points[:, :2], c.layer, c.closed) for c in curves]
-    view.texts += [(c.points[len(c.points) // 2, :2], c.name) for c in curves if c.layer == "PCMC-CABLE"]
-    x, y, _ = corners(curves).T
-    view.stations = x, y
+    middle = 0.5 * np.sum(view.box, axis=0)
+    for curve in curves:
+        if curve.layer == "PCMC-CABLE":
+            at = curve.points[len(curve.points) // 2, :2]
+            away = at - middle
+            view.texts.append((at, curve.name, away / (np.linalg.norm(away) or 1.0)))
+    view.stations = outline(curves, (1.0, 0.0, 0.0)), outline(curves, (0.0, 1.0, 0.0))
     return view
 
 
@@ -130,9 +136,9 @@ def elevations(surface: Surface, curves: Sequence[Curve]) -> list[View]:
         axes = np.array([[*right, 0.0], [0.0, 0.0, 1.0]])
         facing = roof & (normal[:, :2] @ np.array(towards) > 0.0)
         edges = topo.edges[np.unique(topo.edge_of_face[facing])]
-        x, z = (corners(curves) @ axes.T).T
-        view = View(title, levels=np.append(z, [X[:, 2].min(), X[:, 2].max()]))
-        view.stations = np.array([x.min(), x.max()]) if len(x) else x, np.empty(0)
+        along, heights = (np.sort(outline(curves, axis)) for axis in axes)
+        view = View(title, stations=(along[[0, -1]] if len(along) else along, np.empty(0)))
+        view.levels = np.append(heights, [X[:, 2].min(), X[:, 2].max()])
         view.lines += [Line(pair, "PCMC-PANEL") for pair in X[edges] @ axes.T]
         view.lines += [Line(c.points @ axes.T, c.layer, c.closed) for c in curves]
         views.append(view)
@@ -148,8 +154,8 @@ def contours(surface: Surface, curves: Sequence[Curve], cuts: Sequence[tuple[flo
     )
     for height, lines in cuts:
         view.lines += [Line(one.points[:, :2], section_layer(surface, one), one.closed) for one in lines]
-        longest = max(lines, key=lambda one: len(one.points))
-        view.texts.append((longest.points[len(longest.points) // 2, :2], f"z = {height:.6g}"))
+        top = max((one.points for one in lines), key=lambda points: float(points[:, 1].max()))
+        view.texts.append((top[top[:, 1].argmax(), :2], f"z = {height:.6g}", np.array([0.0, 1.0])))
     return view
 
 
@@ -228,9 +234,10 @@ def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
     ]
     small: list[Text] = []
     large: list[Text] = []
-    for at, text in view.texts:
-        x, y = (factor * at + shift).tolist()
-        large.append(Text((x, y + SMALL), text, align="C"))
+    marks: list[Text] = []
+    for at, text, way in view.texts:
+        x, y = (factor * at + shift + way * [0.5 * width(text) + 1.0, SMALL]).tolist()
+        large.append(Text((x, y), text, align="C"))
     for at, name, layer in view.points:
         place = factor * at + shift
         half, height = (0.8, TINY) if layer == "PCMC-POINT" else (1.5, SMALL)
@@ -238,10 +245,11 @@ def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
         if layer != "PCMC-POINT":
             square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
             sheet.lines.append(Line(place + half * square, layer, True))
+            marks.append(Text((float(place[0]), float(place[1])), "##", align="C"))  # kept free of names
         x, y = (place + np.array([half + 0.3, half + 0.6 * height])).tolist()
         (small if layer == "PCMC-POINT" else large).append(Text((x, y), name, height, layer))
     sheet.texts += apart(large, sheet.drawn()[1])
-    sheet.texts += apart(small, sheet.drawn()[1], rings=2, needed=False)
+    sheet.texts += apart(small, [*sheet.drawn()[1], *marks], rings=2, needed=False)
 
 
 def _add_dimensions(sheet: Sheet, view: View, factor: float, shift: Floats, decimals: int) -> None:
@@ -249,7 +257,7 @@ def _add_dimensions(sheet: Sheet, view: View, factor: float, shift: Floats, deci
     low, high = (factor * end + shift for end in view.box)
     for axis, stations in enumerate(view.stations):
         places = np.unique((factor * stations + shift[axis]).round(6))
-        chosen = _spaced(places, width(f"{places.max(initial=0.0) / factor:.{decimals}f}") + 2.0)
+        chosen = _spaced(places, width(f"{(places[-1:] - places[:1]).sum() / factor:.{decimals}f}") + 2.0)
         chains = [chosen, chosen[[0, -1]]] if len(chosen) > 2 else [chosen]
         for row, chain in enumerate(chains, start=1):
             feet = np.tile(low, (len(chain), 1))
@@ -270,13 +278,13 @@ def _add_dimensions(sheet: Sheet, view: View, factor: float, shift: Floats, deci
 
 
 def _spaced(places: Floats, least: float) -> Floats:
-    """Those of ascending numbers that are ``least`` apart; the first and the last are among them.
+    """Those of ascending numbers that are ``least`` apart: the last, the first if there is room, and others.
 
     >>> _spaced(np.array([0.0, 1.0, 4.0, 8.5, 10.0]), 2.0).tolist()
     [0.0, 4.0, 10.0]
     """
-    chosen = places[:1].tolist()
-    for place in places[1:-1].tolist():
-        if place - chosen[-1] >= least and places[-1] - place >= least:
+    chosen: list[float] = []
+    for place in places[:-1].tolist():
+        if places[-1] - place >= least and (not chosen or place - chosen[-1] >= least):
             chosen.append(place)
-    return np.array(chosen + places[1:][-1:].tolist())
+    return np.array([*chosen, *places[-1:]])
