@@ -69,10 +69,13 @@ def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
     corners, patch = X[surface.faces], surface.patch_of_face
     vector = area_vectors(corners)
     force = surface.net_pressures[patch, None] * vector
-    force -= (surface.weights[patch] * np.linalg.norm(vector, axis=1))[:, None] * n
+    if surface.weights.any():
+        force -= (surface.weights[patch] * np.linalg.norm(vector, axis=1))[:, None] * n
     about = 0.5 * (X.min(axis=0) + X.max(axis=0))
     arm = corners.mean(axis=1) - about
-    loads = np.array([force.sum(axis=0), np.cross(arm, force).sum(axis=0)])
+    products = arm.T @ force
+    moment = [products[i - 2, i - 1] - products[i - 1, i - 2] for i in range(3)]  # Σ arm × force
+    loads = np.array([force.sum(axis=0), moment])
     rows, arms = supports[[*FORCE]].to_numpy(float), supports[[*"xyz"]].to_numpy(float) - about
     moments = supports[[*MOMENT]].to_numpy(float) + np.cross(arms, rows)
     carried = np.array([rows.sum(axis=0), moments.sum(axis=0)])
