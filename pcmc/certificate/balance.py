@@ -76,18 +76,17 @@ def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
     products = arm.T @ force
     moment = [products[i - 2, i - 1] - products[i - 1, i - 2] for i in range(3)]  # Σ arm × force
     loads = np.array([force.sum(axis=0), moment])
-    rows, arms = supports[[*FORCE]].to_numpy(float), supports[[*"xyz"]].to_numpy(float) - about
-    moments = supports[[*MOMENT]].to_numpy(float) + np.cross(arms, rows)
-    carried = np.array([rows.sum(axis=0), moments.sum(axis=0)])
+    columns = [*FORCE, *MOMENT, *"xyz"]
+    rows, moments, places = np.split(supports[columns].to_numpy(float), 3, axis=1)
+    arms = places - about
+    carried = np.array([rows.sum(axis=0), (moments + np.cross(arms, rows)).sum(axis=0)])
     sizes, away = (np.linalg.norm(part, axis=1) for part in ((force, arm) if force.any() else (rows, arms)))
     scale = np.array([sizes.sum(), sizes @ away])
     parts = np.array([loads, carried, loads + carried])
     shares = np.abs(parts).max(axis=2) / np.where(scale > 0.0, scale, 1.0)
-    columns = [*FORCE, *MOMENT, *"xyz", "force_share", "moment_share"]
-    values = np.column_stack([parts.reshape(3, 6), np.tile(about, (3, 1)), shares])
-    table = pd.DataFrame(values, columns=columns)
-    table.insert(0, "of", ["loads", "supports", "remainder"])
-    return table
+    values = np.column_stack([parts.reshape(3, 6), np.tile(about, (3, 1)), shares]).T
+    columns = ["of", *columns, "force_share", "moment_share"]
+    return pd.DataFrame(dict(zip(columns, [["loads", "supports", "remainder"], *values], strict=True)))
 
 
 def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:
