@@ -50,8 +50,9 @@ def _movable(plan: Plan) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
     for k, divider in enumerate(plan.dividers):
         yield "dividers", k, (divider.name, f"divider {divider.name}", f"divider {k + 1}")
     for k, hole in enumerate(plan.holes):
-        name = hole.name.removeprefix("hole ").strip("'\"")
-        yield "holes", k, (name, f"hole {name}", f"hole {k + 1}")
+        bare = hole.name.removeprefix("hole ")  # without one of its own it is "hole 1"
+        name = bare.strip("'\"")
+        yield "holes", k, (*((name, f"hole {name}") if name != bare else ()), f"hole {k + 1}")
     for k in range(len(plan.supports)):
         yield "supports", k, (f"support {k + 1}",)
 
