@@ -118,7 +118,7 @@ def test_lines_and_points_are_shifted_as_they_are(roof):
     ("name", "message"),
     [
         ("eye.x", "several lines; type divider eye.x or hole eye.x"),
-        ("wal 1.x", "unknown number 'wal 1.x'; did you mean 'wall 1.x'"),
+        ("wal 1.x", "unknown number 'wal 1.x'; did you mean 'divider wall 1.x'"),
         ("wall 1.z", "only its place in plan counts"),
         ("crown.z", "only its place in plan counts"),
     ],
