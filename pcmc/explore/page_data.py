@@ -17,6 +17,8 @@ from ..certificate.certificate import Certificate
 from ..certificate.reactions import reactions, reactions_per_length
 from ..contact.pinching import standing_part
 from ..design import Parameter, Target
+from ..design.quantities import QUANTITIES
+from ..design.targets import NAMED
 from ..energy.curvature import curvature_error, mean_curvature
 from ..energy.functional import patch_areas
 from ..panels.families import families
@@ -60,6 +62,10 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
         "triangles": surface.m,
         "size": surface.size,
         "up": surface.plane.normal,
+        "origin": centre(piece).tolist(),
+        "axes": surface.plane.axes.tolist(),
+        "foot": surface.plane.point,
+        "mirrors": [[p.point, p.normal] for p, _ in piece.on_planes if p.mirror],
         "ground": float(surface.plane.height(centre(surface))),
     }
     curves = topo.curve_edge | on_cables(surface)
@@ -85,7 +91,7 @@ def control_groups(surface: Surface, values: dict[str, dict[str, float]]) -> lis
     for number, (patch, wall) in enumerate(zip(surface.patches, surface.walls.tolist(), strict=True)):
         kinds = [kind for kind in ("tensions", "pressures", "snows", "weights") if patch.name in values[kind]]
         groups.append({"name": patch.name, "patch": number, "wall": wall, "kinds": kinds})
-    for kind in ("cables", "volumes"):
+    for kind in ("cables", "volumes", "points"):
         groups += [{"name": name, "patch": None, "wall": False, "kinds": [kind]} for name in values[kind]]
     return groups
 
@@ -167,6 +173,24 @@ def variant_data(variant: Variant) -> dict[str, Any]:
     verdict = variant.certificate.verdict
     word = verdict.value.partition(": ")[0]
     return {"name": variant.name, "verdict": verdict.name.lower(), "word": word, "measures": variant.measures}
+
+
+def target_choices(surface: Surface) -> list[dict[str, Any]]:
+    """The quantities that targets may have on a surface: the names of what each may be of, and "" for all."""
+    roof = surface.roof.tolist()
+    names = {
+        "patch": [p.name for p, kept in zip(surface.patches, roof, strict=True) if kept],
+        "wall": [p.name for p, kept in zip(surface.patches, roof, strict=True) if not kept],
+        "cable": [cable.name for cable in surface.cables],
+        "room": [room.name for room in surface.rooms],
+    }
+    choices = []
+    for quantity in QUANTITIES:
+        owner = NAMED.get(quantity, "wall" if quantity == "lean" else "patch")
+        if names[owner] and quantity != "height":
+            of = names[owner] if quantity in NAMED else ["", *names[owner]]
+            choices.append({"quantity": quantity, "of": of})
+    return choices
 
 
 def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[str, Any]:

@@ -126,12 +126,13 @@ def project_with(
     assert roof.path is not None
     text = roof.text or project_text(roof.path, refer=True)[0]
     document, data = tomlkit.parse(text), tomllib.loads(text)
-    given, note, dropped = data.get("targets"), "", ""
+    given, note, dropped, found = data.get("targets"), "", "", {}
     kept: Aims = (roof.targets, roof.vary)
     if aims is not None and aims != kept and _meets(surface, aims[0]):
         kept, points = aims, data["plan"].get("points", {})
         entries = [_target(target, points) for target in aims[0]]
-        data["targets"] = {"meet": entries, "vary": [_parameter(p) for p in aims[1]]}
+        found = {"meet": entries, "vary": [_parameter(p) for p in aims[1]]}
+        data.pop("targets", None)  # until a rise that these replace is a tension
         note = f"with its targets: {', '.join(t.label for t in aims[0])}"
     elif not _meets(surface, roof.targets):
         kept = (), ()
@@ -147,7 +148,7 @@ def project_with(
             note = f"with tensions instead of heights that the surface saved does not have ({labels})"
     sought = {(f"{p.kind}s", name) for p in kept[1] for name in p.names}
     left = sought - differences(roof.surface, surface).keys() if kept[0] == roof.targets else set()
-    data = with_values(roof.path, data, surface, left)[0]
+    data = with_values(roof.path, data, surface, left)[0] | ({"targets": found} if found else {})
     if stem and stem != roof.path.stem:
         output = data.get("output", {})
         for key in OUTPUTS & output.keys():
@@ -158,6 +159,12 @@ def project_with(
                 if one
                 else [_renamed(n, roof.path.stem, stem) for n in names]
             )
+    if found and given is None:
+        document["targets"] = tomlkit.table()
+        for key, entries in found.items():
+            document["targets"][key] = tomlkit.array()
+            for entry in entries:
+                document["targets"][key].append(_item(tomlkit, entry))
     _change(tomlkit, document, data)
     if dropped:
         document.add(tomlkit.nl())

@@ -44,6 +44,7 @@ from .page_data import (
     mesh_findings,
     mesh_key,
     outline,
+    target_choices,
     unit_texts,
     variant_data,
 )
@@ -311,6 +312,7 @@ class _Handler(BaseHTTPRequestHandler):
             "note_met": roof.met,
             "project": roof.is_project and explorer.local,
             "file": roof.path.name if roof.path is not None else "",
+            "quantities": target_choices(session.surface),
             "aims": aims_data(*(session.aims or (roof.targets, roof.vary))),
             "watching": explorer.watch is not None,
             "version": explorer.version,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError
 from ..plan import Plan
 from ..surface import Surface
@@ -21,14 +21,16 @@ from .rises import RISES, WHOLE
 SAME = 1e-11  # of the largest value of a kind: a difference that counts as none
 DIGITS = 12  # of the values written
 KEYS = {"tensions": "tension", "pressures": "pressure", "snows": "snow", "weights": "weight"}  # of a patch
+LINES = {"outline", "holes", "dividers", "supports", "cables"}  # of a plan: what may pass through a point
+NO_POINTS = ("axes", "weights", "radius")  # of a curve
 Name = tuple[str, str]  # kind and name of a value, such as ("tensions", "west")
 
 
-def values_of(surface: Surface) -> dict[str, dict[str, float]]:
+def values_of(surface: Surface) -> dict[str, dict[str, Any]]:
     """The values of a surface that can be changed, by kind and name.
 
     The pressures around a room of prescribed volume are results, and a wall's follows from its rooms', as its
-    snow does. Pressures are those of the air: snow is not taken off.
+    snow does. Pressures are those of the air: snow is not taken off. Points are [x, y, z].
     """
     result = (surface.room_signs != 0.0).any(axis=0) | surface.walls
     return {
@@ -40,7 +42,17 @@ def values_of(surface: Surface) -> dict[str, dict[str, float]]:
         "weights": {p.name: p.weight for p in surface.patches if p.weight},
         "cables": {c.name: c.tension for c in surface.cables},
         "volumes": {r.name: r.volume for r in surface.rooms},
+        "points": {
+            f"point {k}": p for k, p in enumerate(surface.vertices[single_points(surface)].tolist(), 1)
+        },
     }
+
+
+def single_points(surface: Surface) -> Ints:
+    """The vertices that are held alone, such as masts: no vertex beside them is."""
+    edges, alone = surface.topology.edges, surface.pinned.copy()
+    alone[edges[surface.held[edges].all(axis=1)]] = False
+    return np.flatnonzero(alone)
 
 
 def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -> dict[Name, float]:
@@ -71,6 +83,8 @@ def _all_values(surface: Surface) -> dict[Name, float]:
         if computed:
             del values["pressures", p.name]
     values |= {("cables", c.name): c.tension for c in surface.cables}
+    for name, place in values_of(surface)["points"].items():
+        values |= {("points", f"{axis} of {name}"): x for axis, x in zip("xyz", place, strict=True)}
     return values | {("volumes", r.name): r.volume for r in surface.rooms}
 
 
@@ -117,16 +131,28 @@ def with_values(
             raise OptionError(f"{path.name} cannot hold the {labels} of the surface shown", what="values")
         tried.append(missing)
         # walls that a project leaves open follow its patches, so they come last
-        _put(data["plan"], project, asked, first or missing, shared=len(tried) == 1)
+        _put(data["plan"], project, start, asked, first or missing, shared=len(tried) == 1)
 
 
 def _put(
-    plan: dict[str, Any], project: Project, asked: Surface, values: Mapping[Name, float], shared: bool
+    plan: dict[str, Any],
+    project: Project,
+    start: Surface,
+    asked: Surface,
+    values: Mapping[Name, float],
+    shared: bool,
 ) -> None:
     """Write values into the table of a plan; if ``shared``, one for all patches where all have the same."""
     given = {kind: {name: v for (k, name), v in values.items() if k == kind} for kind, _ in values}
     sources = None
     for kind, wanted in given.items():
+        if kind == "points":
+            places = values_of(start)["points"], values_of(asked)["points"]
+            for name in {label.partition(" of ")[2] for label in wanted}:
+                old, new = (asked.plane.to_local(np.array([place[name]]))[0] for place in places)
+                for key in LINES & plan.keys():
+                    plan[key] = _with_point(plan[key], old, [_number(x) for x in new.tolist()], key)
+            continue
         if kind == "volumes":
             for name, value in wanted.items():
                 own = plan.get("patches", {}).get(name, {})
@@ -167,6 +193,19 @@ def _put_on_patches(
         if key == "tension":
             _drop(table, RISES)
         table[key] = _number(value)
+
+
+def _with_point(value: Any, old: Floats, new: list[float], key: str = "") -> Any:
+    """Lines of a plan with another point wherever ``old`` is one of theirs; both in the coordinates of Π."""
+    if isinstance(value, Mapping):
+        return {k: v if k in NO_POINTS else _with_point(v, old, new, k) for k, v in value.items()}
+    if not isinstance(value, list):
+        return value
+    if len(value) in (2, 3) and all(isinstance(x, int | float) for x in value):
+        same = np.allclose(value[:2], old[:2], rtol=0.0, atol=SAME * (1.0 + float(np.abs(old).max())))
+        height = len(value) == 3 or (key == "supports" and new[2] != 0.0)
+        return (new if height else new[:2]) if same else value
+    return [_with_point(item, old, new, key) for item in value]
 
 
 def _drop(table: dict[str, Any], keys: Collection[str]) -> None:

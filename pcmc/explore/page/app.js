@@ -7,6 +7,7 @@ import { digits, Panel } from "./panel.js";
 import { addSaving } from "./saving.js";
 import { ask, fetchFile } from "./server.js";
 import { Targets } from "./targets.js";
+import { Tools } from "./tools.js";
 import { Variants } from "./variants.js";
 import { Viewer } from "./viewer.js";
 import { follow } from "./watching.js";
@@ -57,6 +58,7 @@ class Page {
     });
     this.sway(false);
     this.viewer?.setMesh(header, arrays);
+    this.tools?.begin(header);
     this.panel = new Panel(find("#patches"), header, find("#together"), (final) => this.request(final));
     this.targets = new Targets(find("#targets"), header, (aims) => this.send("meet", aims, true), () => this.act("stop"));
     if (header.note && opened) this.targets.say(header.note, header.note_met ? "met" : "missed");
@@ -82,6 +84,8 @@ class Page {
         const unit = this.units?.given ? ` ${this.units.length}` : "";
         find("#scale").textContent = spacing ? `grid ${digits(spacing)}${unit}` : "";
       });
+      this.tools = new Tools(this.viewer, document, (of) => this.targets.add({ quantity: "height", of }).focus(),
+        (name, place, final) => this.panel.movePoint(name, place, final));
     } catch (error) {
       find("#canvas").hidden = true;
       find("#no-graphics").hidden = false;
@@ -204,6 +208,7 @@ class Page {
       this.sway(false);
       this.viewer?.setVertices(arrays.vertices);
     }
+    this.tools?.show(header.values.shown.points);
     if (header.compared !== this.compared) {
       this.compared = header.compared;
       this.choice = header.compared === null ? "patches" : "difference";
@@ -343,9 +348,16 @@ class Page {
       if (this.swaying) this.viewer.setVertices(this.arrays.vertices);
       this.sway(!this.swaying);
     });
-    for (const button of document.querySelectorAll("#views button")) {
+    for (const button of document.querySelectorAll("#views [data-view]")) {
       button.addEventListener("click", () => this.viewer?.camera.look(button.dataset.view));
     }
+    find("#theme").addEventListener("click", () => {
+      const { style } = document.documentElement;
+      const dark = style.colorScheme || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+      style.colorScheme = dark === "dark" ? "light" : "dark";
+      this.viewer?.setOptions({});
+    });
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.viewer?.setOptions({}));
     addEventListener("keydown", (event) => {
       if (!(event.ctrlKey || event.metaKey) || event.target.type === "number") return;
       const key = event.key.toLowerCase();
@@ -375,6 +387,7 @@ function download(body, name) {
 }
 
 const page = new Page();
+window.pcmc = page; // for the console, and for tests
 page.open().catch((error) => {
   find("#verdict .word").textContent = "Cannot open";
   find("#verdict .sentence").textContent = error.message;

@@ -1,7 +1,7 @@
 // The verdict, the numbers of the surface, and the fields that colours show.
 
 import { colourOf, diverging, sequential } from "./colours.js";
-import { element, tableRow, term } from "./elements.js";
+import { capital, element, tableRow, term } from "./elements.js";
 import { familyField, showClasses } from "./families.js";
 import { digits } from "./panel.js";
 
@@ -42,8 +42,6 @@ function drawn({ asked, shown }) {
   const listed = values.slice(0, 3).join(", ") + (values.length > 3 ? ", …" : "");
   return `Shown: the last surface at rest, ${listed}`;
 }
-
-const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** Numbers of the surface shown. */
 export function showFindings(body, findings, units) {
