@@ -99,7 +99,7 @@ def test_all_documents_appear_together_or_none(tmp_path, monkeypatch):
         Path(path).write_text("half")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pcmc.project.documents.write_structure", fail)
+    monkeypatch.setattr("pcmc.project.running.write_structure", fail)
     with refused(FileError, what=str(tmp_path / "roof.inp")):
         project.run(tmp_path / "roof.toml")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["roof.dxf", "roof.toml"]
@@ -136,7 +136,7 @@ UNFINISHED = "[solve]\niterations = 1\n"
     ],
 )
 def test_bad_documents_are_refused_before_the_roof_is_solved(tmp_path, monkeypatch, text, key):
-    monkeypatch.setattr("pcmc.project.running.solve_project", None)
+    monkeypatch.setattr("pcmc.project.solving.solve_project", None)
     (tmp_path / "roof.toml").write_text(text, encoding="utf-8")
     with refused(FileError, what=key) as caught:
         project.run(tmp_path / "roof.toml")
@@ -145,7 +145,7 @@ def test_bad_documents_are_refused_before_the_roof_is_solved(tmp_path, monkeypat
 
 
 def test_a_patch_that_is_not_there_is_refused_before_the_roof_is_solved(tmp_path, monkeypatch):
-    monkeypatch.setattr("pcmc.project.running.solve_project", None)
+    monkeypatch.setattr("pcmc.project.solving.solve_project", None)
     wind = STRUCTURE + "wind = {rof = 1.0}\n"
     (tmp_path / "roof.toml").write_text(UNITS + SMALL + wind + EVERYTHING, encoding="utf-8")
     with refused(pcmc.errors.OptionError, found="rof"):

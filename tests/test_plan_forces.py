@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from force_cases import HALL, MASTS, SAIL, SQUARE, cables
+from refusals import refused
 from volume_cases import cap_height
 
 import pcmc
 from pcmc import Verdict
-from pcmc.base.errors import PlanWarning
+from pcmc.base.errors import PlanError, PlanWarning
 from pcmc.energy.rooms import room_volumes
 from pcmc.plan import Area, CableLine, Divider, Hole, Plan
 
@@ -36,6 +39,28 @@ def test_the_stretch_over_the_first_point_of_the_outline_is_one_cable():
         ends = np.bincount(cable.edges.ravel())
         assert (ends == 1).sum() == 2
         assert surface.fixed[np.flatnonzero(ends == 1)].all()
+
+
+@pytest.mark.parametrize("edge", ["cable", "free"])
+def test_a_support_curve_holds_a_loose_edge_at_its_own_height_and_without_cable(edge):
+    cable = {"cable": 20.0} if edge == "cable" else {}
+    values = {"edge": edge, "tension": 1.0, "pressure": 0.0, **cable}
+    wall, beam = [[0, 10, 5], [10, 10, 5]], [[0, 6, 3], [10, 6, 3]]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PlanWarning)
+        surface = Plan(SQUARE, supports=[wall, beam, [0, 0, 2], [10, 0, 2]], **values).surface()
+    X, held = surface.vertices, surface.fixed
+    for y, height, count in ((10.0, 5.0, 11), (6.0, 3.0, 11), (0.0, 2.0, 2)):
+        there = X[held & (np.abs(X[:, 1] - y) < 1e-9)]
+        np.testing.assert_allclose(there[:, 2], height)
+        assert len(there) == count
+    assert held.sum() == 24
+    slope = X[(X[:, 0] < 1e-9) & (X[:, 1] > 6.0)]
+    np.testing.assert_allclose(slope[:, 2], 3.0 + 0.5 * (slope[:, 1] - 6.0))
+    stretches = [10, 4, 4, 6, 6] if cable else []
+    assert sorted(len(cable.edges) for cable in surface.cables) == sorted(stretches)
+    with refused(PlanError, what="supports", found=5.0):
+        Plan(SQUARE, supports=[wall], tension=1.0).surface()
 
 
 def test_a_flat_sail_is_bounded_by_arcs_of_radius_tension_over_tension():

@@ -15,7 +15,9 @@ from structures import FABRIC, LOADS, model_of, pyramid, square
 import pcmc
 from pcmc import Material, Patch, SelfWeight, Snow, StructuralModel, Surface, Wind, cli
 from pcmc.base.errors import FileError, OptionError, SurfaceError
+from pcmc.base.units import Units
 from pcmc.certificate.balance import load
+from pcmc.energy.functional import patch_areas
 from pcmc.project import Structure
 from pcmc.surface.geometry import face_areas
 
@@ -171,6 +173,9 @@ def test_cables_have_their_tension_and_need_an_area(tmp_path):
         ({"material": 3.0}, "material"),
         ({"thickness": 0.0}, "thickness"),
         ({"thickness": -1.0}, "thickness"),
+        ({"thickness": 1e-320}, "thickness"),
+        ({"thickness": {"roof": 1e-320}}, "thickness"),
+        ({"thickness": 1e300}, "thickness"),
         ({"thickness": None}, "thickness"),
         ({"thickness": {}}, "thickness"),
         ({"thickness": {"rof": 1.0}}, "patch"),
@@ -192,6 +197,11 @@ def test_bad_models_are_refused(given, what):
     ("make", "what"),
     [
         (partial(Material, 0.0), "Material.young"),
+        (partial(Material, 1e-320), "Material.young"),
+        (partial(Material, 1.0, 0.3, 1e300), "Material.density"),
+        (partial(SelfWeight, 1e-320), "SelfWeight.gravity"),
+        (partial(Snow, 1e300), "Snow.load"),
+        (partial(Wind, {"roof": -1e300}), "Wind.pressures"),
         (partial(Material, 1.0, 0.5), "Material.poisson"),
         (partial(Material, 1.0, 0.3, -1.0), "Material.density"),
         (partial(SelfWeight, 0.0), "SelfWeight.gravity"),
@@ -207,6 +217,34 @@ def test_bad_models_are_refused(given, what):
 def test_bad_materials_and_loads_are_refused(make, what):
     with refused(OptionError, what=what):
         make()
+
+
+@pytest.mark.parametrize(
+    ("units", "metres", "newtons", "mass"),
+    [("m kN", 1.0, 1e3, 1e3), ("mm N", 1e-3, 1.0, 1e3), ("ft lbf", 0.3048, 4.4482216152605, 14.5939029)],
+)
+def test_self_weight_is_the_same_force_in_all_units(tmp_path, units, metres, newtons, mass):
+    """A film of 1000 kg/m³, 1 mm thick, on an area of 4 unit squares weighs 9.81 kN per m³ in any units."""
+    surface = pyramid()
+    density = 1000.0 / (mass / metres**3)
+    given = {"loads": [SelfWeight()], "material": Material(1e6, 0.3, density), "thickness": 1e-3 / metres}
+    model = model_of(surface, **given, units=Units(*units.split()))
+    forces = model.nodal_loads(model.steps[1]) - model.nodal_loads(model.steps[0])
+    weight = patch_areas(surface)[0] * metres**2 * 1e-3 * 9810.0
+    assert -forces.sum(axis=0)[2] * newtons == pytest.approx(weight, rel=1e-6)
+    pcmc.write_structure(tmp_path / "roof.inp", model)
+    text = (tmp_path / "roof.inp").read_text()
+    assert f"EALL,GRAV,{9.81 / metres:.12g}," in text
+    assert f"masses in {'slug' if metres == 0.3048 else 't'}, times in s" in text
+    fixed = model_of(surface, **given | {"loads": [SelfWeight(2.0)]}, units=Units(*units.split()))
+    assert fixed.steps[1].gravity == 2.0
+
+
+def test_without_units_the_model_says_that_it_takes_metres():
+    model = model_of(pyramid(), loads=[SelfWeight()])
+    assert model.steps[1].gravity == 9.81
+    assert "as in metres" in model.note
+    assert not model_of(pyramid(), loads=[SelfWeight(9.81)]).note
 
 
 def test_snow_on_walls_alone_names_its_patches():
@@ -289,6 +327,10 @@ def test_a_project_is_solved_and_has_the_values(tmp_path, monkeypatch, capsys):
     found = sections(tmp_path / "roof.inp")
     assert found["*ELASTIC"] == [["1000000", "0.1"]]
     assert ["PATCH_1", "P1", "1.5"] in found["*DLOAD, OP=NEW"]
+    (tmp_path / "small.toml").write_text(f'units = "mm"\nforce = "N"\n{PROJECT}')
+    assert cli.main(["structure", "small.toml", "-o", "small.inp", "--density", "1e-9"]) == 0
+    assert ["EALL", "GRAV", "9810", "-0", "-0", "-1"] in sections(tmp_path / "small.inp")["*DLOAD, OP=NEW"]
+    assert "masses in t" in capsys.readouterr().out
     monkeypatch.setattr("pcmc.project.designed", None)  # what follows is refused before solving
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp", "--wind", "rof=1"]) == 2
     (tmp_path / "roof.toml").write_text(PROJECT.replace("young", "yung"))

@@ -11,10 +11,10 @@ from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.drawings import drawing_set
 from pcmc.energy.functional import patch_areas
-from pcmc.explore.following import values_of
 from pcmc.explore.page_data import control_groups, outline
 from pcmc.meshing.quality import minimum_angle
 from pcmc.plan import Divider, Plan, add_walls, surface_from_labels
+from pcmc.project.values import values_of
 from pcmc.report.tables import patch_table
 from pcmc.surface.colours import SHEETS, patch_colors, rgb
 

@@ -13,10 +13,6 @@ from ..certificate.curve_tables import boundary_table, held_curves
 from ..energy.rooms import closing_volumes, prescribed_volumes, room_pressures
 from ..surface import Surface
 
-UNIT_OF = {"height": "length", "reaction": "force", "thrust": "force", "reaction per length": "tension"}
-UNIT_OF |= {"lowest eigenvalue": "eigenvalue"}
-"""The unit of quantities, as a name of ``Units``; others are named as their units."""
-
 ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open
 RESIDUALS = 10.0  # that a quantity may change with the forces left, relative
 EIGENVALUES = 1e-12  # of the largest eigenvalue: rounding of the lowest one

@@ -45,6 +45,9 @@ LENGTHS = ("m", "mm", "cm", "ft", "in")
 NEWTONS = {"N": 1.0, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605, "kip": 4448.2216152605}
 """The newtons in each unit of force."""
 
+MASSES = {"kg": 1.0, "t": 1e3, "slug": NEWTONS["lbf"] / 0.3048}
+"""The kilograms in each unit of mass."""
+
 FORCES = tuple(NEWTONS)
 """The units of force of a project."""
 
@@ -162,6 +165,19 @@ class Units:
         """
         lengths, reactions = f"lengths in {self.length or 'length'}", f"reactions in {self.force or 'force'}"
         return f"{lengths}, tensions in {self.tension}, pressures in {self.pressure}, {reactions}"
+
+    @property
+    def mass(self) -> str:
+        """The unit of masses: what a unit of force accelerates by a unit of length per s².
+
+        >>> [Units(*pair).mass for pair in (("m", "kN"), ("mm", "N"), ("ft", "lbf"), ("in", "kip"))]
+        ['t', 't', 'slug', '175127 kg']
+        """
+        if not self.force:
+            return "force·s²/" + (self.length or "length")
+        kilograms = NEWTONS[self.force] / length_factor(self.length, "m")
+        near = (name for name, known in MASSES.items() if abs(kilograms - known) < 1e-9 * known)
+        return next(near, f"{kilograms:.6g} kg")
 
     @property
     def energy(self) -> str:

@@ -13,7 +13,7 @@ from ..base.errors import MissingExtra, OptionError
 from ..base.files import suffix_of
 from ..io import FORMATS, READ_ONLY
 from ..plot.figure import check_suffix
-from ..project import check_outputs
+from ..project import check_outputs, files_of
 from . import INTERRUPTED, NOT_CERTIFIED, OK
 from .arguments import DXF, TOML, integer, number, option, values_of
 from .progress import sweeping
@@ -69,7 +69,8 @@ def sweep(
     from ..sweep.store import FAILED
     from ..sweep.table import TABLES
 
-    check_outputs([path for path in (csv, store, plot) if path is not None])
+    inputs = files_of(what) if Path(what).exists() else ()
+    check_outputs([path for path in (csv, store, plot) if path is not None], inputs=inputs)
     if csv is not None and suffix_of(csv, TABLES, "a table") == ".parquet" and not find_spec("pyarrow"):
         raise MissingExtra("pyarrow", "files")
     if plot is not None:

@@ -43,9 +43,9 @@ def to_meshes(surface: Surface) -> list[Any]:
     -------
     list of Mesh : named after their patches, with
 
-        - ``mesh.attributes``: ``tension`` α (force/length), ``pressure`` p (force/area), ``weight``, ``snow``,
-          ``wall``, and on the first mesh ``"pcmc"`` with the plane Π and the lines and circles that vertices
-          slide along;
+        - ``mesh.attributes``: ``tension`` α (force/length), ``pressure`` p (force/area) with ``weight`` and
+          ``snow``, ``wall``, and on the first mesh ``"pcmc"`` with the plane Π and the lines and circles that
+          vertices slide along;
         - at vertices: ``is_support`` (fixed), ``is_sliding`` (on Π), ``guide`` (the number of the line or
           circle in ``attributes["pcmc"]["guides"]``, or None), ``mean_curvature`` H (1/length; None on
           junctions and boundaries), and ``rx``, ``ry``, ``rz``, the force of the support on the surface.
@@ -101,9 +101,10 @@ def from_meshes(
     Parameters
     ----------
     meshes : a Mesh, or a list of them. A mesh's name is the patch's; a mesh must have the attribute
-        ``tension``, and may have ``pressure`` (otherwise 1), ``weight``, ``snow`` and ``wall``. A vertex is fixed if one of
-        ``is_support``, ``is_anchor`` and ``is_fixed`` is true, and slides on Π if ``is_sliding`` is. If no
-        mesh has any of these attributes, the boundary is fixed. Polygons are cut into triangles.
+        ``tension``, and may have ``pressure`` (otherwise 1), ``weight``, ``snow`` and ``wall``. A vertex is
+        fixed if one of ``is_support``, ``is_anchor`` and ``is_fixed`` is true, and slides on Π if
+        ``is_sliding`` is. If no mesh has any of these attributes, the boundary is fixed. Polygons are cut
+        into triangles.
     tensions, pressures : by mesh name, or one number for all, in place of the attributes.
     weld : join vertices at one place, for meshes that do not share keys. The keys then have no meaning.
 

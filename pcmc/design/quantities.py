@@ -30,7 +30,7 @@ from .measurement import Measurement
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Measure:
     """How a quantity is measured, ``of`` as in ``Target``.
 
     Misfits are divided by its usual ``size`` where the value wanted is 0.
@@ -197,18 +197,18 @@ def _faces_of(surface: Surface, of: str | None) -> Bools:
     return np.asarray(_chosen_patches(surface, of)[surface.patch_of_face] != 0.0)
 
 
-QUANTITIES = {
-    "apex": Quantity(_apex, lambda surface: surface.size),
-    "height": Quantity(_height, lambda surface: surface.size),
-    "volume": Quantity(_volume, lambda surface: surface.size**3),
-    "area": Quantity(_area, lambda surface: surface.size**2),
-    "curvature": Quantity(_curvature, lambda surface: 1.0 / surface.size),
-    "pressure": Quantity(_pressure, lambda surface: float(surface.tensions.max()) / surface.size),
-    "lean": Quantity(lean, lambda surface: 90.0),
-    "sag": Quantity(cable_quantities.sag, lambda surface: surface.size),
-    "length": Quantity(cable_quantities.length, lambda surface: surface.size),
-    "force": Quantity(
+MEASURES = {
+    "apex": Measure(_apex, lambda surface: surface.size),
+    "height": Measure(_height, lambda surface: surface.size),
+    "volume": Measure(_volume, lambda surface: surface.size**3),
+    "area": Measure(_area, lambda surface: surface.size**2),
+    "curvature": Measure(_curvature, lambda surface: 1.0 / surface.size),
+    "pressure": Measure(_pressure, lambda surface: float(surface.tensions.max()) / surface.size),
+    "lean": Measure(lean, lambda surface: 90.0),
+    "sag": Measure(cable_quantities.sag, lambda surface: surface.size),
+    "length": Measure(cable_quantities.length, lambda surface: surface.size),
+    "force": Measure(
         cable_quantities.force, lambda surface: max(cable.tension for cable in surface.cables) or 1.0
     ),
-    "reaction": Quantity(_reaction, lambda surface: float(surface.tensions.max())),
+    "reaction per length": Measure(_reaction, lambda surface: float(surface.tensions.max())),
 }

@@ -308,6 +308,7 @@ class Search:
         targets = pd.DataFrame(
             {
                 "value": here.quantities,
+                "dimension": [t.dimension for t in self.targets],
                 "wanted": self.wanted(here.quantities),
                 "misfit": here.r,
                 "met": ~missed,
@@ -319,6 +320,7 @@ class Search:
             {
                 "start": [p.value(self.surface) for p in self.parameters],
                 "value": [p.value(here.result.surface) for p in self.parameters],
+                "dimension": [p.dimension for p in self.parameters],
                 "low": self.limits[:, 0],
                 "high": self.limits[:, 1],
             },

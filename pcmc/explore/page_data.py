@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ..accuracy.mesh_check import MeshCheck, with_bar
-from ..accuracy.quantities import UNIT_OF
 from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
 from ..base.units import NO_UNITS, Units
@@ -23,6 +22,7 @@ from ..energy.curvature import curvature_error, mean_curvature
 from ..energy.functional import patch_areas
 from ..panels.families import families
 from ..project.values import values_of
+from ..quantities import dimension_of
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.geometry import edge_vectors
@@ -219,7 +219,7 @@ def mesh_findings(check: MeshCheck, units: Units = NO_UNITS) -> dict[str, Any]:
     word, _, sentence = check.verdict.value.partition(": ")
     rows = []
     for row in check.table.to_dict(orient="records"):
-        unit = units.behind(UNIT_OF.get(row["quantity"], row["quantity"]))
+        unit = units.behind(dimension_of(row["quantity"]))
         rows.append(
             {
                 "name": " of ".join(filter(None, (row["quantity"], row["of"]))),

@@ -29,9 +29,10 @@ from ..energy.rooms import room_pressures, room_volumes
 from ..meshing.refinement import edges_on_planes
 from ..surface import Surface
 from . import evolver_forces
+from .evolver_forces import SPECIAL
 from .evolver_reading import ROUNDING, read
 from .mesh_data import FREE, SLIDING, given_support
-from .text import format_rows
+from .text import escaped, format_rows
 
 __all__ = ["read", "write"]
 
@@ -61,9 +62,9 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
         snow=SNOW if surface.snows.any() else "",
         origin=" ".join(map(repr, origin.tolist())),
         names="\n".join(
-            [f"// patch {k} {p.name}" for k, p in patches]
+            [f"// patch {k} {escaped(p.name, SPECIAL)}" for k, p in patches]
             + [f"// wall {k}" for k, p in patches if p.wall]
-            + [f"// room {k} {room.name}" for k, room in enumerate(surface.rooms, 1)]
+            + [f"// room {k} {escaped(room.name, SPECIAL)}" for k, room in enumerate(surface.rooms, 1)]
             + evolver_forces.names(surface)
         ),
     )
@@ -92,9 +93,8 @@ def _constraints(surface: Surface, origin: Floats) -> str:
         terms = zip(plane.normal, "xyz", strict=True)
         formula = " + ".join(c if a == 1.0 else f"({a!r})*{c}" for a, c in terms if a != 0.0)
         if number > 1:
-            text += (
-                f"// plane {number} {'mirror' if plane.mirror else 'support'} {plane.name}".rstrip() + "\n"
-            )
+            kind = "mirror" if plane.mirror else "support"
+            text += f"// plane {number} {kind} {escaped(plane.name, SPECIAL)}".rstrip() + "\n"
         offset = -float(plane.height(origin)) or 0  # and not -0.0
         text += f"CONSTRAINT {number}\nFORMULA: {formula} = {offset!r}\n"
         own = np.flatnonzero(mask[tail] & mask[head])

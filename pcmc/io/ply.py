@@ -18,10 +18,9 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
-from ..base.units import Units
 from ..surface import Surface
 from .mesh_data import MeshData, support_of
-from .metadata import metadata_text, parse_metadata
+from .metadata import parse_metadata
 from .polygons import from_polygons
 
 MARK = "comment pcmc "
@@ -34,7 +33,7 @@ TYPES = {
 NAMES = {"u1": "uchar", "i4": "int", "f8": "double"}
 
 
-def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], units: Units, **_: Any) -> None:
+def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], metadata: str, **_: Any) -> None:
     """Little-endian binary."""
     vertex = {c: surface.vertices[:, d].astype("<f8") for d, c in enumerate("xyz")}
     vertex["support"] = support_of(surface).astype("u1")
@@ -48,7 +47,7 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], units: Un
     header = [
         "ply",
         "format binary_little_endian 1.0",
-        f"{MARK}{metadata_text(surface, units)}",
+        f"{MARK}{metadata}",
         f"element vertex {surface.n}",
         *_announced(vertex),
         f"element face {surface.m}",

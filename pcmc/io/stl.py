@@ -7,6 +7,7 @@ coordinates, is written about its middle, which the format has no place for.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from .metadata import Metadata
 from .text import format_rows
 from .trimesh_scene import from_meshes
 
+SPECIAL = re.compile("solid|vertex", re.I)  # readers look for these words, in names too
 FACET = (
     "facet normal %.6g %.6g %.6g\nouter loop\nvertex %.9g %.9g %.9g\nvertex %.9g %.9g %.9g\n"
     "vertex %.9g %.9g %.9g\nendloop\nendfacet\n"
@@ -37,6 +39,10 @@ def write(path: Path, surface: Surface, **_: Any) -> str:
     normal = area_vectors(P)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     lines = np.concatenate([normal, P.reshape(-1, 9)], axis=1)
+    for patch in surface.patches:
+        if word := SPECIAL.search(patch.name):
+            text = f"the patch name {patch.name!r} has the word {word[0]!r} of the format; rename the patch"
+            raise FileError(text, where="patches", found=patch.name)
     with path.open("w", encoding="utf-8", newline="\n") as file:
         for k, patch in enumerate(surface.patches):
             chosen = lines[surface.patch_of_face == k]

@@ -21,6 +21,7 @@ from ..contact.pinching import standing_part
 from ..surface import Surface, expect_surface
 from .flat_walls import encode_walls
 from .formats import FORMATS, Format, format_of
+from .metadata import metadata_text
 from .scaling import as_units, scaled_surface
 
 
@@ -89,19 +90,21 @@ def write(
     shown, walls = surface, None
     if form.separate:
         shown = standing_part(surface).surface
-        if shown.m < surface.m and form.walls:
-            walls = encode_walls(surface, shown)
-        elif shown.m < surface.m:
+        if shown.m < surface.m and form.bare:
             lost.append(f"{surface.m - shown.m} triangles of walls without height")
+        elif shown.m < surface.m:
+            walls = encode_walls(surface, shown)
     content: dict[str, Any] = {"scalars": scalars, "colour": colour, "certificate": _values(certificate)}
-    content |= {"walls": walls, "units": units}
+    text = metadata_text(surface, units, not form.separate, form.own, (shown.n, shown.m))
+    content |= {"walls": walls, "units": units, "metadata": text}
     with writing(path), atomic_write(path) as temporary:
         try:
             note = form.functions.write(temporary, shown, **content)
         except PcmcError as error:
             raise error.in_file(path, FileError, str(path)) from None
     if lost:
-        text = f"{path}: a {path.suffix} file cannot carry {', '.join([*lost, *form.loses])}; left out"
+        lost += ["supports", "tensions", "pressures"] if form.bare else []
+        text = f"{path}: a {path.suffix} file cannot carry {', '.join(lost)}; left out"
         warnings.warn(text, LostWarning, stacklevel=2)
     if note:
         warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
 from ..surface.topology import components
 from .curves import Curve
-from .lines import SNAP, Kind, Line, check_holes, check_line, crossing, inside, lines_at, overlap, point_text
-
-Places = list[tuple[int, float]]  # numbers of lines, and the parameter on each, of one vertex
+from .lines import SNAP, Kind, Line, LineTree, Places, check_holes, check_line, inside, overlap, point_text
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +48,17 @@ class Arrangement:
     chains: tuple[Chain, ...]
     spots: Ints
 
+    def along(self, line: int) -> Sequence[Chain]:
+        """The chains of a line."""
+        return self._by_line.get(line, [])
+
+    @cached_property
+    def _by_line(self) -> dict[int, list[Chain]]:
+        chains: dict[int, list[Chain]] = {}
+        for chain in self.chains:
+            chains.setdefault(chain.line, []).append(chain)
+        return chains
+
 
 def arrange(lines: Sequence[Line], edge_length: float, spots: Floats, stops: Floats) -> Arrangement:
     """Cut the lines at corners and where they meet, and divide them into edges.
@@ -74,17 +84,17 @@ def arrange(lines: Sequence[Line], edge_length: float, spots: Floats, stops: Flo
     for k, line in enumerate(lines):
         ends = [] if line.curve.closed else [0.0, float(len(line.curve.pieces))]
         meetings += [[(k, t)] for t in (*ends, *line.curve.corners.tolist())]
-    meetings += [*_crossings(lines), *_ends(lines, snap)]
-    passing = [lines_at(lines, xy, snap) for xy in spots[:, :2]]
-    contains = inside(lines)
-    for xy, places in zip(spots[:, :2], passing, strict=True):
-        if not places and not contains(xy):
+    tree, contains = LineTree(lines), inside(lines)
+    meetings += [*tree.crossings(), *_ends(lines, tree, contains, snap)]
+    passing = tree.at(spots[:, :2], snap)
+    for xy, places, within in zip(spots[:, :2], passing, contains(spots[:, :2]), strict=True):
+        if not places and not within:
             problem = f"the support or point at {point_text(xy)} is outside the plan or in a hole"
             raise PlanError(problem, what="supports", where=tuple(xy.tolist()))
-    meetings += [*(lines_at(lines, xy, snap) for xy in stops), *passing]
+    meetings += [*tree.at(stops, snap), *passing]
     nodes = _nodes(lines, meetings, snap)
     chains, points = _chains(lines, nodes, edge_length)
-    chains = _inside_plan(lines, chains, points[:, :2], edge_length)
+    chains = _inside_plan(tree, chains, points[:, :2], contains, edge_length)
     vertex = nodes.of_meeting[len(meetings) - len(spots) :]
     alone = np.array([not places for places in passing], dtype=bool)
     vertex[alone] = len(points) + np.arange(alone.sum())
@@ -98,44 +108,34 @@ def arrange(lines: Sequence[Line], edge_length: float, spots: Floats, stops: Flo
 def hole_points(drawn: Arrangement, lines: Sequence[Line]) -> list[tuple[float, float]]:
     """A point inside each hole, as its edges enclose it."""
     holes = [number for number, line in enumerate(lines) if line.kind is Kind.HOLE]
-    rims = [np.concatenate([c.vertices[:-1] for c in drawn.chains if c.line == hole]) for hole in holes]
+    rims = [np.concatenate([chain.vertices[:-1] for chain in drawn.along(hole)]) for hole in holes]
     points = [shapely.Polygon(drawn.points[rim]).representative_point() for rim in rims]
     return [(point.x, point.y) for point in points]
 
 
-def _crossings(lines: Sequence[Line]) -> Iterator[Places]:
-    for j, two in enumerate(lines):
-        for i, one in enumerate(lines[:j]):
-            if one.bounds and two.bounds:
-                continue
-            for part in shapely.get_parts(one.shape.intersection(two.shape)):
-                if part.is_empty:
-                    continue
-                start, end = np.array(part.coords)[[0, -1]]
-                if part.geom_type != "Point":
-                    raise overlap(two, one, f"from {point_text(start)} to {point_text(end)}")
-                s, t = crossing(one, one.nearest(start)[0], two, two.nearest(start)[0])
-                yield [(i, s), (j, t)]
-
-
-def _ends(lines: Sequence[Line], snap: float) -> Iterator[Places]:
+def _ends(
+    lines: Sequence[Line], tree: LineTree, contains: Callable[[Floats], Bools], snap: float
+) -> Iterator[Places]:
     """Dividers end on other lines or outside the plan; supports may end anywhere."""
-    contains = inside(lines)
-    for number, one in enumerate(lines):
-        if one.curve.closed or one.bounds:
-            continue
-        for t in (0.0, float(len(one.curve.pieces))):
-            xy = one.curve.at(t)[0, :2]
-            passing = lines_at(lines, xy, snap, leave_out=number)
-            if one.kind is Kind.DIVIDER and not passing and contains(xy):
-                gaps = [(other.nearest(xy)[1], other) for other in lines if other is not one]
-                gap, other = min(gaps, key=lambda pair: pair[0])
-                problem = (
-                    f"ends at {point_text(xy)} without reaching another line; {other.name} is nearest,"
-                    f" {gap:.3g} away: extend the divider to it"
-                )
-                raise one.error(problem, tuple(xy.tolist()), gap)
-            yield [(number, t), *passing]
+    ends = [
+        (number, t)
+        for number, one in enumerate(lines)
+        for t in (0.0, float(len(one.curve.pieces)))
+        if not (one.curve.closed or one.bounds)
+    ]
+    at = np.array([lines[number].curve.at(t)[0, :2] for number, t in ends]).reshape(-1, 2)
+    found = zip(ends, at, tree.at(at, snap), contains(at), strict=True)
+    for (number, t), xy, places, within in found:
+        one, passing = lines[number], [place for place in places if place[0] != number]
+        if one.kind is Kind.DIVIDER and not passing and within:
+            gaps = [(float(other.nearest(xy[None])[1][0]), other) for other in lines if other is not one]
+            gap, other = min(gaps, key=lambda pair: pair[0])
+            problem = (
+                f"ends at {point_text(xy)} without reaching another line; {other.name} is nearest,"
+                f" {gap:.3g} away: extend the divider to it"
+            )
+            raise one.error(problem, tuple(xy.tolist()), gap)
+        yield [(number, t), *passing]
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +174,9 @@ def _nodes(lines: Sequence[Line], meetings: Sequence[Places], snap: float) -> _N
     of_meeting = np.full(len(meetings), -1)
     if not len(line):
         return _Nodes(line, t, line, of_meeting, np.zeros((0, 3)))
-    where = np.concatenate([lines[i].curve.at(s) for i, s in zip(line, t, strict=True)])
+    where = np.empty((len(line), 3))
+    for number in np.unique(line):
+        where[line == number] = lines[number].curve.at(t[line == number])
     near = cKDTree(where[:, :2]).query_pairs(snap, output_type="ndarray")
     count = np.array([len(places) for places in meetings])
     first = np.cumsum(count) - count
@@ -193,7 +195,7 @@ def _chains(lines: Sequence[Line], nodes: _Nodes, edge_length: float) -> tuple[l
     """Each line's chains from node to node; the points (n,3) of the nodes, and of the chains between."""
     chains: list[Chain] = []
     new, n = [nodes.points], len(nodes.points)
-    given = np.flatnonzero(~np.isnan(nodes.points[:, 2]))
+    given = set(np.flatnonzero(~np.isnan(nodes.points[:, 2])).tolist())
     direct: set[tuple[int, int]] = set()
     for number, one in enumerate(lines):
         curve, divides = one.curve, one.kind is Kind.DIVIDER
@@ -208,9 +210,8 @@ def _chains(lines: Sequence[Line], nodes: _Nodes, edge_length: float) -> tuple[l
             ends = (min(first, last), max(first, last))
             # a second chord between the same nodes needs a point, and so does a divider between given
             # heights: a wall below a single edge would have no room
-            if not len(inner) and (ends in direct or (divides and np.isin(ends, given).all())):
-                inner = curve.between(low, high, curve.length / 1e6)
-                inner = inner[[len(inner) // 2]]
+            if not len(inner) and (ends in direct or (divides and given.issuperset(ends))):
+                inner = curve.middle(low, high)
             if not len(inner):
                 direct.add(ends)
             new.append(curve.at(inner) * known)
@@ -220,27 +221,33 @@ def _chains(lines: Sequence[Line], nodes: _Nodes, edge_length: float) -> tuple[l
 
 
 def _inside_plan(
-    lines: Sequence[Line], chains: list[Chain], points: Floats, edge_length: float
+    tree: LineTree,
+    chains: list[Chain],
+    points: Floats,
+    contains: Callable[[Floats], Bools],
+    edge_length: float,
 ) -> list[Chain]:
     """The chains inside the plan; the parts of lines outside or in holes are left out."""
-    contains = inside(lines)
-    kept = []
-    for chain in chains:
-        one, place = lines[chain.line], len(chain.vertices) // 2
-        if not one.bounds:
-            middle = points[chain.vertices[place - 1 : place + 1]].mean(axis=0)
-            if not contains(middle):
-                continue
-            along = lines_at(lines, middle, SNAP * edge_length, leave_out=chain.line)
-            if along:
-                raise overlap(one, lines[along[0][0]], f"near {point_text(middle)}")
-        kept.append(chain)
-    gone = set(range(len(lines))) - {chain.line for chain in kept}
+    lines = tree.lines
+    kept = np.array([lines[chain.line].bounds for chain in chains])
+    inner = np.flatnonzero(~kept)
+    halves = [(len(chains[k].vertices) // 2, chains[k].vertices) for k in inner]
+    middles = np.array([vertices[half - 1 : half + 1] for half, vertices in halves], dtype=np.int64)
+    middle = points[middles.reshape(-1, 2)].mean(axis=1)
+    kept[inner] = contains(middle)
+    inner, middle = inner[kept[inner]], middle[kept[inner]]
+    for number, xy, places in zip(inner, middle, tree.at(middle, SNAP * edge_length), strict=True):
+        one = chains[number].line
+        along = [other for other, _ in places if other != one]
+        if along:
+            raise overlap(lines[one], lines[along[0]], f"near {point_text(xy)}")
+    chains = [chain for chain, keep in zip(chains, kept, strict=True) if keep]
+    gone = set(range(len(lines))) - {chain.line for chain in chains}
     if gone:
         raise lines[min(gone)].error("is outside the plan or in a hole")
     # lines may cross only because their bends are replaced by straight edges
-    ends = points[np.concatenate([chain.edges for chain in kept])]
-    owner = [chain.line for chain in kept for _ in chain.edges]
+    ends = points[np.concatenate([chain.edges for chain in chains])]
+    owner = [chain.line for chain in chains for _ in chain.edges]
     edges = shapely.linestrings(ends)
     i, j = shapely.STRtree(edges).query(edges, predicate="crosses")
     if len(i):
@@ -250,4 +257,4 @@ def _inside_plan(
             f" {point_text(ends[i[0]].mean(axis=0))}; use a smaller edge_length"
         )
         raise PlanError(problem, what=first, found=second)
-    return kept
+    return chains

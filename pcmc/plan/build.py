@@ -21,17 +21,17 @@ from .areas import patches_of
 from .corners import most_in_corners
 from .draft import Draft, drafted
 from .edges import (
+    HELD,
     NONE,
     STATES,
     check_pressures,
     edge_cables,
     mirror_planes,
     raised_heights,
-    strip_mask,
     usual_cable,
 )
 from .heights import dome, harmonic_heights
-from .lines import SNAP, Kind, Line
+from .lines import SNAP, Kind
 from .parts import BALANCED, PlanData
 from .pieces import to_space
 from .planar import SIDES, PlanarMesh, signed_areas
@@ -119,17 +119,13 @@ def _rise(draft: Draft, patches: Sequence[Patch], held: Bools) -> Floats:
 
 def _supports(draft: Draft) -> tuple[Bools, Bools]:
     """(n,) fixed and sliding vertices."""
-    plan, drawn, edges = draft.plan, draft.drawn, draft.edges
+    drawn, edges = draft.drawn, draft.edges
     fixed, sliding = np.zeros((2, len(draft.mesh.points)), dtype=bool)
-    fixed[edges.vertices("fixed")] = True
+    fixed[edges.vertices("fixed", HELD)] = True
     sliding[edges.vertices("sliding")] = True
     for chain in drawn.chains:
         if draft.lines[chain.line].kind is Kind.SUPPORT:
             fixed[chain.vertices] = True
-    rim = np.unique(edges.ends)
-    for support in draft.supports_on_edge:
-        strip = Line("support", Kind.SUPPORT, support)
-        fixed[strip_mask(strip, drawn.points, rim, SNAP * plan.edge_length)] = True
     fixed[drawn.spots] = True
     return fixed, sliding & ~fixed
 
@@ -169,7 +165,7 @@ def _cables(draft: Draft, held: Bools) -> list[Cable]:
     for k, divider in enumerate(draft.plan.dividers):
         if divider.cable is None:
             continue
-        parts = [chain.edges for chain in draft.drawn.chains if chain.line == first + k]
+        parts = [chain.edges for chain in draft.drawn.along(first + k)]
         named = divider.wall is None and not divider.name.startswith("divider ")
         name = divider.name if named else f"cable {next(numbers)}"
         cables.append(Cable(name, divider.cable, np.concatenate(parts)))
@@ -190,7 +186,7 @@ def _upright_planes(draft: Draft, walls: WallMesh, sides: Sequence[_Sides]) -> l
         if line.curve.closed or np.abs((along - start) @ across).max() > SNAP * draft.plan.edge_length:
             raise line.error("is not straight, so no plane can hold its wall upright; remove upright = true")
         foot, tip = to_space(np.array([[*start, 0.0], [*(start + across), 0.0]]), draft.plan.plane)
-        chains = [c.vertices for c in draft.drawn.chains if c.line == 1 + len(draft.plan.holes) + number]
+        chains = [c.vertices for c in draft.drawn.along(1 + len(draft.plan.holes) + number)]
         own = walls.faces[divider_of_wall[walls.label] == number]
         held = np.zeros(len(draft.mesh.points) + len(walls.vertices), dtype=bool)
         held[np.concatenate([*chains, own.ravel()])] = True
@@ -200,9 +196,8 @@ def _upright_planes(draft: Draft, walls: WallMesh, sides: Sequence[_Sides]) -> l
 
 def _room_of_face(plan: PlanData, patches: Sequence[Patch], patch_of_face: Ints) -> Ints:
     """(m,) the room of prescribed volume below each face, -1 for none."""
-    rooms = [room.patches for room in plan.rooms.values()]
-    number = [next((k for k, names in enumerate(rooms) if patch.name in names), NONE) for patch in patches]
-    return np.array(number, dtype=np.int64)[patch_of_face]
+    room = {name: k for k, room in enumerate(plan.rooms.values()) for name in room.patches}
+    return np.array([room.get(patch.name, NONE) for patch in patches], dtype=np.int64)[patch_of_face]
 
 
 def _walls(draft: Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], list[_Sides]]:
@@ -212,7 +207,7 @@ def _walls(draft: Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], list[_Side
     """
     plan, X = draft.plan, roof.positions
     floor, level = np.zeros(len(X)), np.zeros(len(X), dtype=bool)
-    walled = []
+    walled: list[tuple[Ints, int]] = []
     for chain in draft.drawn.chains:
         number = chain.line - 1 - len(plan.holes)
         if draft.lines[chain.line].kind is not Kind.DIVIDER or plan.dividers[number].wall is None:
@@ -221,51 +216,69 @@ def _walls(draft: Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], list[_Side
             floor[chain.vertices] = roof.base[chain.vertices]
         else:
             level[chain.vertices] = True
-        walled.append((chain.vertices, (number, _sides(draft.mesh.triangles, roof, *chain.vertices[:2]))))
+        walled.append((chain.vertices, number))
     mixed = np.flatnonzero(level & (floor != 0.0))
     if len(mixed):
         place = draft.drawn.points[mixed[0]].round(6).tolist()
         problem = "a wall with a sloped bottom meets one whose bottom is on the plane"
         raise PlanError(f"at {place} {problem}; give both the same bottom", what="bottom", where=place)
-    kinds = sorted(dict.fromkeys(kind for _, kind in walled), key=lambda kind: kind[0])
-    tops = [UpperEdge(v, kinds.index(k), plan.dividers[k[0]].bottom != "sliding") for v, k in walled]
-    patches = []
+    beside = _beside(draft.mesh.triangles, np.array([v[:2] for v, _ in walled]).reshape(-1, 2))
+    kinds: dict[tuple[int, _Sides], list[tuple[Ints, Ints]]] = {}
+    for (vertices, number), faces in zip(walled, beside, strict=True):
+        kinds.setdefault((number, _sides(roof, *faces)), []).append((vertices, faces[faces >= 0]))
+    kinds = dict(sorted(kinds.items(), key=lambda kind: kind[0][0]))
+    alike: dict[int, list[_Sides]] = {}
     for number, sides in kinds:
-        divider, alike = plan.dividers[number], [kind for kind in kinds if kind[0] == number]
-        suffix = f"-{alike.index((number, sides)) + 1}" if len(alike) > 1 else ""
-        tension = _balanced(draft, roof, number) if divider.wall == BALANCED else divider.wall
+        alike.setdefault(number, []).append(sides)
+    faces_at: dict[int, list[Ints]] = {}
+    for (number, _), chains in kinds.items():
+        faces_at.setdefault(number, []).extend(faces for _, faces in chains)
+    radii, tops, patches = _radii(draft.mesh), [], []
+    for label, ((number, sides), chains) in enumerate(kinds.items()):
+        divider = plan.dividers[number]
+        tops += [UpperEdge(vertices, label, divider.bottom != "sliding") for vertices, _ in chains]
+        suffix = f"-{alike[number].index(sides) + 1}" if len(alike[number]) > 1 else ""
+        balanced = divider.wall == BALANCED
+        tension = _balanced(draft, roof, number, faces_at[number], radii) if balanced else divider.wall
         patches.append(Patch(divider.name + suffix, tension, sides.pressure, wall=True, snow=sides.snow))
     walls = build_walls(X, tops, plan.edge_length, plan.plane, roof.fixed, floor)
     return walls, patches, [sides._replace(divider=number) for number, sides in kinds]
 
 
-def _balanced(draft: Draft, roof: _Roof, number: int) -> float:
-    """A tension for the wall of a divider with which all of its junctions balance, if there is one."""
-    line = 1 + len(draft.plan.holes) + number
-    beside = [_beside(draft.mesh.triangles, *c.vertices[:2]) for c in draft.drawn.chains if c.line == line]
+def _balanced(draft: Draft, roof: _Roof, number: int, beside: Sequence[Ints], radii: Floats) -> float:
+    """A tension for the wall of a divider with which all of its junctions balance, if there is one.
+
+    ``beside`` are the triangles at each of its junctions, ``radii`` those of the parts of the plan.
+    """
     net = np.abs(roof.pressure - roof.snow)
     pressure = min(float(net[faces].min(initial=np.inf)) for faces in beside)
-    curve, outline = draft.lines[line].curve, draft.lines[0].curve
-    parts = np.unique(draft.mesh.region[np.concatenate(beside)])
-    width = min(_radius(draft.mesh, int(part)) for part in parts)
-    most = min(most_in_corners(curve, outline, draft.plan.edge_length, pressure), SHARE * pressure * width)
+    line, outline = draft.lines[1 + len(draft.plan.holes) + number], draft.lines[0]
+    width = float(radii[draft.mesh.region[np.concatenate(beside)]].min())
+    most = most_in_corners(line.curve, outline, draft.plan.edge_length, pressure)
     tensions = [roof.tension[faces].tolist() for faces in beside]
     if draft.plan.dividers[number].upright:  # its plane takes the difference
         tensions = [[min(part)] for part in tensions]
-    return balanced_wall(tensions, most or np.inf)
+    return balanced_wall(tensions, min(most, SHARE * pressure * width) or np.inf)
 
 
-def _radius(mesh: PlanarMesh, part: int) -> float:
-    """2 A / L of a part of the plan, with its area A and the length L of its edge: R of a circle, length."""
-    own = mesh.triangles[mesh.region == part]
-    sides, times = np.unique(np.sort(own[:, SIDES].reshape(-1, 2), axis=1), axis=0, return_counts=True)
-    length = segment_lengths(mesh.points, sides[times == 1]).sum()
-    return 2.0 * float(signed_areas(mesh.points, own).sum() / length)
+def _radii(mesh: PlanarMesh) -> Floats:
+    """2 A / L of each part of the plan, with its area A and the length L of its edge: R of a circle."""
+    sides = np.sort(mesh.triangles[:, SIDES].reshape(-1, 2), axis=1)
+    owned = np.column_stack([np.repeat(mesh.region, 3), sides])
+    own, times = np.unique(owned, axis=0, return_counts=True)
+    own = own[times == 1]
+    length = np.bincount(own[:, 0], segment_lengths(mesh.points, own[:, 1:]))
+    return 2.0 * np.bincount(mesh.region, signed_areas(mesh.points, mesh.triangles)) / length
 
 
-def _beside(triangles: Ints, one: int, two: int) -> Ints:
-    """The triangles at the edge between two vertices."""
-    return np.flatnonzero((triangles == one).any(axis=1) & (triangles == two).any(axis=1))
+def _beside(triangles: Ints, edges: Ints) -> Ints:
+    """(e,2) the triangles on the left and on the right of edges (e,2), -1 for none."""
+    n = int(triangles.max()) + 1
+    keys = (triangles * n + np.roll(triangles, -1, axis=1)).ravel()
+    order = np.argsort(keys)
+    wanted = np.stack([edges @ [n, 1], edges @ [1, n]], axis=1)
+    place = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
+    return np.where(keys[place] == wanted, place // 3, NONE)
 
 
 class _Sides(NamedTuple):
@@ -279,13 +292,12 @@ class _Sides(NamedTuple):
     divider: int = NONE
 
 
-def _sides(triangles: Ints, roof: _Roof, one: int, two: int) -> _Sides:
-    """The sides of the edge from vertex ``one`` to ``two``."""
-    ahead = np.roll(triangles, -1, axis=1)
-    left = ((triangles == one) & (ahead == two)).any(axis=1)
-    right = ((triangles == two) & (ahead == one)).any(axis=1)
-    rooms = (int(roof.room[side].max(initial=NONE)) for side in (left, right))
-    pressure, snow = (float(of[left].sum() - of[right].sum()) for of in (roof.pressure, roof.snow))
+def _sides(roof: _Roof, left: int, right: int) -> _Sides:
+    """The sides of an edge, of the triangles there."""
+    there = [face for face in (left, right) if face >= 0]
+    sign = np.array([1.0 if face == left else -1.0 for face in there])
+    rooms = (int(roof.room[face]) if face >= 0 else NONE for face in (left, right))
+    pressure, snow = (float(of[there] @ sign) for of in (roof.pressure, roof.snow))
     return _Sides(pressure, snow, *rooms)
 
 

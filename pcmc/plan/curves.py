@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base import validate
-from ..base.arrays import Floats
+from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError, unknown
 from ..surface import Plane
 from .pieces import Piece
@@ -24,7 +24,8 @@ EDGE_TURN = math.radians(45.0)  # largest turn of a bend along one edge
 LEVEL = 1e-12  # product of slopes beside a joint, up to which a coordinate may turn there
 BESIDE = 0.25  # in parameter: how far beside such a joint its coordinate is compared
 PLATEAU = 1e-12  # of the length: changes of a coordinate up to this are none
-DENSE = 64  # points per curved piece, for lengths and crossings
+DENSE = 64  # points per curved piece, for lengths and crossings; fewer where there are many pieces,
+DENSEST, FEWEST = 4096, 4  # about so many on a curve, and at least so many on each piece
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,18 +44,28 @@ class Curve:
         """(n,d) points at parameters t (n,)."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
         piece = np.clip(np.floor(t).astype(int), 0, len(self.pieces) - 1)
-        points = np.empty((len(t), self.pieces[0].points.shape[1]))
-        for number in np.unique(piece):
+        ends, straight = self._straight
+        s = (t - piece)[:, None]
+        points = (1.0 - s) * ends[piece, 0] + s * ends[piece, 1]
+        for number in np.unique(piece[~straight[piece]]):
             chosen = piece == number
             points[chosen] = self.pieces[number].at(t[chosen] - number)
         return points
 
     @cached_property
+    def _straight(self) -> tuple[Floats, Bools]:
+        """(p,2,d) the first and last control points of the pieces, and (p,) which of these are lines."""
+        ends = np.array([piece.points[[0, -1]] for piece in self.pieces])
+        return ends, np.array([not piece.sweep and len(piece.points) == 2 for piece in self.pieces])
+
+    @cached_property
     def dense(self) -> Floats:
         """(k,) ascending parameters, dense enough to measure lengths by chords."""
-        steps = [DENSE if piece.sweep or len(piece.points) > 2 else 1 for piece in self.pieces]
-        parts = [i + np.arange(count) / count for i, count in enumerate(steps)]
-        return np.append(np.concatenate(parts), float(len(self.pieces)))
+        curved = min(DENSE, max(FEWEST, DENSEST // len(self.pieces)))
+        steps = np.where(self._straight[1], 1, curved)
+        piece = np.repeat(np.arange(len(steps)), steps)
+        place = np.arange(len(piece)) - np.repeat(np.cumsum(steps) - steps, steps)
+        return np.append(piece + place / steps[piece], float(len(self.pieces)))
 
     @cached_property
     def lengths(self) -> Floats:
@@ -71,8 +82,20 @@ class Curve:
     def corners(self) -> Floats:
         """(c,) parameters of the joints where the curve turns by more than 10°; no open ends."""
         joints = np.arange(0 if self.closed else 1, len(self.pieces))
-        cosines = [self.pieces[j - 1].direction(1) @ self.pieces[j].direction(0) for j in joints]
-        return joints[np.arccos(np.clip(np.array(cosines, dtype=float), -1.0, 1.0)) > CORNER].astype(float)
+        starts, ends = self._directions
+        cosines = np.einsum("ij,ij->i", ends[joints - 1], starts[joints])
+        return joints[np.arccos(np.clip(cosines, -1.0, 1.0)) > CORNER].astype(float)
+
+    @cached_property
+    def _directions(self) -> tuple[Floats, Floats]:
+        """(p,d) the unit tangents of the pieces at their starts, and at their ends."""
+        (points, straight), d = self._straight, self.pieces[0].points.shape[1]
+        along = points[:, 1] - points[:, 0]
+        starts = along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
+        ends, curved = starts.copy(), np.flatnonzero(~straight)
+        starts[curved] = np.reshape([self.pieces[k].direction(0) for k in curved], (-1, d))
+        ends[curved] = np.reshape([self.pieces[k].direction(1) for k in curved], (-1, d))
+        return starts, ends
 
     @cached_property
     def extremes(self) -> Floats:
@@ -82,13 +105,10 @@ class Curve:
         [0.0, 0.25, 0.5, 0.75]
         """
         inside = [number + piece.extremes() for number, piece in enumerate(self.pieces)]
-        curved = np.array([piece.sweep != 0.0 or len(piece.points) > 2 for piece in self.pieces])
+        curved = ~self._straight[1]
         joints = np.arange(0 if self.closed else 1, len(self.pieces))
         joints = joints[curved[joints - 1] | curved[joints]]
-        ends, starts = (
-            np.reshape([self.pieces[j].direction(end)[:2] for j in js], (-1, 2))
-            for js, end in ((joints - 1, 1), (joints, 0))
-        )
+        starts, ends = self._directions[0][joints, :2], self._directions[1][joints - 1, :2]
         sides = np.stack([(joints - BESIDE) % len(self.pieces), joints, joints + BESIDE])
         before, here, after = (self.at(t)[:, :2] for t in sides)
         low = np.minimum(np.sign(here - before) * (here - after), np.sign(here - after) * (here - before))
@@ -98,6 +118,11 @@ class Curve:
     def parameter(self, length: Floats) -> Floats:
         """(n,) parameters at lengths (n,) along the curve."""
         return np.interp(length, self.lengths, self.dense)
+
+    def samples(self, spacing: float) -> Floats:
+        """(n,d) points along the whole curve, no farther apart than ``spacing``, its joints among them."""
+        even = self.parameter(np.linspace(0.0, self.length, 2 + int(self.length / spacing)))
+        return self.at(np.union1d(even, self.dense))
 
     def between(self, start: float, end: float, edge_length: float) -> Floats:
         """(k,) parameters strictly between two others, at about equal lengths near ``edge_length``.
@@ -109,11 +134,12 @@ class Curve:
         >>> arc([1, 0], [0, 1], [-1, 0]).between(0.0, 1.0, 0.65).round(12).tolist()  # not 5 equal edges
         [0.25, 0.5, 0.75]
         """
-        last, total = float(len(self.pieces)), self.length
+        total = self.length
         low, high = self._lengths_at(np.array([start, end]))
-        extremes = np.concatenate([self.extremes, self.extremes + last])
+        extremes = self._twice[0]
         stops = [low]
-        for length in self._lengths_at(extremes[extremes < end]).tolist():
+        inside = slice(*np.searchsorted(extremes, [start, end]))
+        for length in self._lengths_at(extremes[inside]).tolist():
             if min(length - stops[-1], high - length) >= NEAR * edge_length:
                 stops.append(length)
         inner = []
@@ -124,6 +150,20 @@ class Curve:
         lengths = np.concatenate(inner)[1:]
         return self.parameter(np.where(lengths > total, lengths - total, lengths))
 
+    def middle(self, start: float, end: float) -> Floats:
+        """(1,) the parameter half of the way from one to another, as in ``between``."""
+        half = self._lengths_at(np.array([start, end])).mean()
+        return self.parameter(np.array([half % self.length]))
+
+    @cached_property
+    def _twice(self) -> tuple[Floats, Floats]:
+        """Of a curve run twice: the extremes, and the lengths up to the dense parameters."""
+        extremes, lengths = self.extremes, self.lengths[:-1]
+        return (
+            np.concatenate([extremes, extremes + float(len(self.pieces))]),
+            np.concatenate([lengths, lengths + self.length]),
+        )
+
     def _lengths_at(self, t: Floats) -> Floats:
         """(n,) the length along the curve up to parameters t, which may go around a closed curve twice."""
         around = t > len(self.pieces)
@@ -131,10 +171,11 @@ class Curve:
 
     def _turning(self, low: float, high: float) -> float:
         """The angle through which the smooth pieces turn between two lengths along the curve."""
-        total = self.length
-        inner = np.concatenate([self.lengths[:-1], self.lengths[:-1] + total])
-        inner = inner[(inner > low) & (inner < high)]
-        where = np.concatenate([[low], inner, [high]])
+        total, inner = self.length, self._twice[1]
+        first, last = np.searchsorted(inner, low, side="right"), np.searchsorted(inner, high)
+        if last == first:
+            return 0.0
+        where = np.concatenate([[low], inner[first:last], [high]])
         points = self.at(self.parameter(np.where(where > total, where - total, where)))
         steps = np.diff(points, axis=0)
         length = np.linalg.norm(steps, axis=1)

@@ -13,7 +13,7 @@ from ..surface.topology import components
 from .arrangement import Arrangement, arrange, hole_points
 from .curves import Curve
 from .edges import Boundary, boundary, check_lines
-from .lines import SNAP, Kind, Line
+from .lines import SNAP, Kind, Line, LineTree
 from .parts import PlanData
 from .pieces import to_local
 from .planar import PlanarMesh, triangulate
@@ -59,7 +59,7 @@ def drafted(plan: PlanData) -> Draft:
     except SurfaceError as error:
         problem = f"lines of the plan are too close to each other for edges of length {plan.edge_length:g}"
         raise PlanError(f"{problem}: {error}", what="edge_length", found=plan.edge_length) from None
-    return Draft(plan, lines, on_edge, drawn, mesh, boundary(plan, lines, drawn))
+    return Draft(plan, lines, on_edge, drawn, mesh, boundary(plan, lines, on_edge, drawn))
 
 
 def part_count(plan: PlanData) -> int:
@@ -130,13 +130,13 @@ def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:
     """The lines to draw, in the coordinates of Π, and the supports that lie on the boundary."""
     lines = [Line("the outline", Kind.OUTLINE, plan.outline.local(plan.plane))]
     lines += [Line(h.name, Kind.HOLE, h.curve.local(plan.plane)) for h in plan.holes]
-    boundary = list(lines)
+    edges = LineTree(lines)
     lines += [Line(f"divider {d.name!r}", Kind.DIVIDER, d.curve.local(plan.plane)) for d in plan.dividers]
     on_edge, snap = [], SNAP * plan.edge_length
     for number, support in enumerate(plan.supports, start=1):
         if isinstance(support, Curve):
             local = support.local(plan.plane)
-            if all(any(b.nearest(xy)[1] <= snap for b in boundary) for xy in local.at(local.dense)[:, :2]):
+            if all(edges.at(local.samples(0.5 * plan.edge_length)[:, :2], snap)):
                 on_edge.append(local)
             else:
                 lines.append(Line(f"support {number}", Kind.SUPPORT, local))

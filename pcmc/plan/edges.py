@@ -14,12 +14,12 @@ from ..base.errors import PlanError
 from ..surface import Cable, Patch, Plane
 from .arrangement import Arrangement
 from .curves import Curve
-from .lines import SNAP, Kind, Line, point_text
+from .lines import SNAP, Kind, Line, LineTree, point_text
 from .parts import EDGES, PlanData
 from .pieces import to_local, to_space
 
-MIRROR = "mirror"
-STATES = (*EDGES, MIRROR)  # of an edge of the boundary
+MIRROR, HELD = "mirror", "held"
+STATES = (*EDGES, MIRROR, HELD)  # of an edge of the boundary; held is a free one along a support
 ON_MIRROR = 1e-9  # of the plan's size: a boundary this near to a mirror is on it
 NONE = -1  # the cable of an edge without one
 
@@ -49,8 +49,8 @@ class Boundary:
         return np.unique(self.ends[chosen])
 
 
-def boundary(plan: PlanData, lines: Sequence[Line], drawn: Arrangement) -> Boundary:
-    """The boundary of a plan cut into edges.
+def boundary(plan: PlanData, lines: Sequence[Line], on_edge: Sequence[Curve], drawn: Arrangement) -> Boundary:
+    """The boundary of a plan cut into edges; those along the supports ``on_edge`` are fixed.
 
     Raises
     ------
@@ -75,6 +75,10 @@ def boundary(plan: PlanData, lines: Sequence[Line], drawn: Arrangement) -> Bound
             raise PlanError(problem, what=name)
         state[along], cable[along] = STATES.index("cable"), len(cables)
         cables.append((part.tension, part.name))
+    for support in on_edge:  # a held stretch needs no cable
+        along = _along(support, drawn, ends, middle, SNAP * plan.edge_length)
+        loose = along & np.isin(state, [STATES.index("free"), STATES.index("cable")])
+        state[along & ~loose], state[loose], cable[along] = STATES.index("fixed"), STATES.index(HELD), NONE
     for number, one in enumerate(plan.mirrors, start=1):
         on = np.abs(mirror_distance(one, plan.plane, drawn.points)) <= ON_MIRROR * _size(drawn.points)
         along = on[ends].all(axis=1)
@@ -87,11 +91,11 @@ def boundary(plan: PlanData, lines: Sequence[Line], drawn: Arrangement) -> Bound
 
 def check_lines(plan: PlanData, lines: Sequence[Line]) -> None:
     """Refuse a cable that leaves the boundary, and a mirror that the plan crosses."""
-    edges = [line for line in lines if line.bounds]
+    edges = LineTree([line for line in lines if line.bounds])
     for number, part in enumerate(plan.cables, start=1):
-        local = part.curve.local(plan.plane)
-        for xy in local.at(local.dense)[:, :2]:
-            if all(edge.nearest(xy)[1] > SNAP * plan.edge_length for edge in edges):
+        points = part.curve.local(plan.plane).samples(0.5 * plan.edge_length)[:, :2]
+        for xy, places in zip(points, edges.at(points, SNAP * plan.edge_length), strict=True):
+            if not places:
                 name = f"cable {part.name!r}" if part.name else f"cable {number}"
                 problem = (
                     f"{name} is at {point_text(xy)} on no edge of the outline or of a hole; draw it along"
@@ -150,31 +154,39 @@ def usual_cable(plan: PlanData) -> float:
 
 
 def raised_heights(plan: PlanData, edges: Boundary, drawn: Arrangement, held: Bools) -> Floats:
-    """(k,) the heights of the drawn points, with those of points given as supports; NaN where unknown.
+    """(k,) the heights of the drawn points, with those of the supports; NaN where unknown.
 
-    The edge of such a point changes its height in proportion to the length from one held vertex to the next.
+    Between the supports an edge changes its height in proportion to the length from one to the next.
     """
     heights = drawn.heights.copy()
     on_mirror = edges.vertices(MIRROR)
-    kept = np.setdiff1d(on_mirror, edges.vertices(*EDGES))
-    spots = [p for p in plan.supports if not isinstance(p, Curve)]
+    kept = np.setdiff1d(on_mirror, edges.vertices(*EDGES, HELD))
     change = np.zeros(len(heights))
-    size = _size(drawn.points)
-    loose = np.setdiff1d(np.unique(edges.ends), edges.vertices("fixed", "sliding"))
-    for vertex, spot in zip(drawn.spots, spots, strict=True):
-        if len(spot) < 3:
+    size, rim = _size(drawn.points), np.unique(edges.ends)
+    loose = np.setdiff1d(rim, edges.vertices("fixed", "sliding"))
+    spots = iter(drawn.spots.tolist())
+    for support in plan.supports:
+        if isinstance(support, Curve):
+            strip = Line("support", Kind.SUPPORT, support.local(plan.plane))
+            t, away = strip.nearest(drawn.points[rim])
+            on = away <= SNAP * plan.edge_length
+            vertices, given = rim[on], strip.curve.at(t[on])[:, 2]
+            own = support.pieces[0].points.shape[1] == 3
+        else:
+            vertices, own = np.array([next(spots)]), len(support) == 3
+            given = to_local(np.array([support]), plan.plane)[:, 2]
+        if not own:
             continue
-        height = float(to_local(np.array([spot]), plan.plane)[0, 2])
-        if np.isnan(heights[vertex]):
-            heights[vertex] = height
-        change[vertex] = height - heights[vertex]
-        if abs(change[vertex]) > ON_MIRROR * size and vertex not in loose:
-            xy = drawn.points[vertex]
-            problem = (
-                f"the support at {point_text(xy)} is at height {height:g}, but the edge or line there at"
-            )
-            problem += f" {heights[vertex]:g}; only on a free edge or a cable a support has its own height"
-            raise PlanError(problem, what="supports", where=tuple(xy.tolist()), found=height)
+        unknown = np.isnan(heights[vertices])
+        heights[vertices[unknown]] = given[unknown]
+        steps = given - heights[vertices]
+        wrong = np.flatnonzero((np.abs(steps) > ON_MIRROR * size) & ~np.isin(vertices, loose))
+        if len(wrong):
+            xy, height, there = (a[wrong[0]] for a in (drawn.points[vertices], given, heights[vertices]))
+            problem = f"the support at {point_text(xy)} is at height {height:g}, but the edge or line there"
+            problem += f" at {there:g}; only on a free edge or a cable a support has its own height"
+            raise PlanError(problem, what="supports", where=tuple(xy.tolist()), found=float(height))
+        change[vertices] = steps
     if change.any():
         for number in np.unique(edges.line):
             ring = edges.ends[edges.line == number]
@@ -206,9 +218,7 @@ def check_pressures(edges: Boundary, triangles: Ints, patch: Ints, patches: Sequ
 
 def strip_mask(strip: Line, points: Floats, among: Ints, snap: float) -> Ints:
     """Those of the points ``among`` that lie on a line."""
-    reach = snap + 1e-3 * strip.reach[-1]  # of the chords of the dense polyline
-    close = among[shapely.distance(strip.shape, shapely.points(points[among])) <= reach]
-    return np.array([v for v in close if strip.nearest(points[v])[1] <= snap], dtype=np.int64)
+    return among[strip.nearest(points[among])[1] <= snap]
 
 
 def _along(curve: Curve, drawn: Arrangement, ends: Ints, middle: Floats, snap: float) -> Bools:

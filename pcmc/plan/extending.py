@@ -29,9 +29,9 @@ def extended(
         steps = np.zeros((2, 3))
         for end in () if curve.closed else (0, 1):
             point = curve.at([float(end * len(curve.pieces))])[0, :2]
-            near = [line for key, line in lines.items() if key != name and line.reach[-1] > 0.0]
-            found = [(line, *line.nearest(point)) for line in (*others, *near)]
-            line, t, gap = min(found, key=lambda entry: entry[2])
+            near = [line for key, line in lines.items() if key != name and np.ptp(line.xy, axis=0).any()]
+            found = [(line, *line.nearest(point[None])) for line in (*others, *near)]
+            line, t, gap = min(((line, t[0], gap[0]) for line, t, gap in found), key=lambda entry: entry[2])
             if 1e-9 * tolerance < gap <= tolerance:
                 steps[end, :2] = line.curve.at([t])[0, :2] - point
                 largest, moved = max(largest, gap), moved + 1

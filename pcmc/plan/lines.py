@@ -11,12 +11,18 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..base.arrays import Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
 from ..surface.geometry import cross_2d
 from .curves import Curve
 
 SNAP = 0.01  # of the edge length: lines nearer to each other than this meet
+SAG = 1e-3  # of a curve's length: no curve is farther from the chords between its dense points
+BLOCK = 64  # chords of a line that are looked up at once
+TINY = 1e-300  # no chord without length divides by zero
+MOST_CROSSINGS = 20_000  # of lines
+
+Places = list[tuple[int, float]]  # numbers of lines, and the parameter on each, of one vertex
 
 
 class Kind(IntEnum):
@@ -50,31 +56,121 @@ class Line:
         return xy
 
     @cached_property
-    def reach(self) -> Floats:
-        """(k,) the length of that polyline up to each of its points."""
-        return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.xy, axis=0), axis=1))])
+    def corners(self) -> Floats:
+        """(c,2) the points where the line turns."""
+        return self.curve.at(self.curve.corners)[:, :2]
 
     @cached_property
     def shape(self) -> Any:
         """The polyline as a shapely LineString."""
-        if self.reach[-1] == 0.0:
+        if not np.ptp(self.xy, axis=0).any():
             raise self.error("has no length in plan")
         return shapely.LineString(self.xy)
+
+    @cached_property
+    def chords(self) -> Any:
+        """(k-1,) the segments of the polyline."""
+        return shapely.linestrings(np.stack([self.xy[:-1], self.xy[1:]], axis=1))
+
+    @cached_property
+    def tree(self) -> shapely.STRtree:
+        """Of the chords."""
+        return shapely.STRtree(self.chords)
+
+    @cached_property
+    def straight(self) -> bool:
+        """Whether the chords are the line itself."""
+        return len(self.xy) == len(self.curve.pieces) + 1
+
+    @cached_property
+    def sag(self) -> float:
+        """The line is nowhere farther from its chords than this, length."""
+        return 0.0 if self.straight else SAG * self.shape.length
 
     def error(self, problem: str, where: object = None, found: object = None) -> PlanError:
         """The error about this line: its name, and what is wrong with it."""
         return PlanError(f"{self.name} {problem}", what=self.name, where=where, found=found)
 
-    def nearest(self, xy: Floats) -> tuple[float, float]:
-        """The parameter of the curve's point nearest to xy, and its distance."""
-        t = float(np.interp(self.shape.project(shapely.Point(xy)), self.reach, self.curve.dense))
-        width, last = 2.0 / 64.0, float(len(self.curve.pieces))
-        for _ in range(8):  # each round narrows the bracket 16 times
-            trial = np.clip(t + width * np.linspace(-1.0, 1.0, 33), 0.0, last)
-            distance = np.linalg.norm(self.curve.at(trial)[:, :2] - xy, axis=1)
-            best = int(np.argmin(distance))
-            t, width = float(trial[best]), width / 16.0
-        return t, float(distance[best])
+    def nearest(self, xy: Floats) -> tuple[Floats, Floats]:
+        """(n,) parameters of the curve's points nearest to points (n,2), and (n,) their distances."""
+        return self.nearest_to(xy, self.tree.nearest(shapely.points(xy)))
+
+    def nearest_to(self, xy: Floats, chord: Ints) -> tuple[Floats, Floats]:
+        """As ``nearest``, where the nearest chords (n,) are known."""
+        start, along = self.xy[chord], self.xy[chord + 1] - self.xy[chord]
+        share = np.einsum("ij,ij->i", xy - start, along) / np.maximum((along**2).sum(axis=1), TINY)
+        low, high = self.curve.dense[chord], self.curve.dense[chord + 1]
+        t = low + np.clip(share, 0.0, 1.0) * (high - low)
+        trials, last = np.linspace(-1.0, 1.0, 33), float(len(self.curve.pieces))
+        for width in () if self.straight else 2.0 / 64.0 / 16.0 ** np.arange(8):
+            trial = np.clip(t[:, None] + width * trials, 0.0, last)  # narrows the bracket 16 times
+            at = self.curve.at(trial.ravel())[:, :2].reshape(*trial.shape, 2)
+            best = np.argmin(np.linalg.norm(at - xy[:, None], axis=2), axis=1)
+            t = trial[np.arange(len(t)), best]
+        return t, np.linalg.norm(self.curve.at(t)[:, :2] - xy, axis=1)
+
+
+class LineTree:
+    """Which lines pass near points, and where lines cross: a tree of the chords of all lines."""
+
+    def __init__(self, lines: Sequence[Line]) -> None:
+        self.lines = lines
+        count = [len(line.chords) for line in lines]
+        self.owner = np.repeat(np.arange(len(lines)), count)
+        self.chord = np.arange(len(self.owner)) - np.repeat(np.cumsum(count) - count, count)
+        self.chords = np.concatenate([line.chords for line in lines])
+        self.tree = shapely.STRtree(self.chords)
+        self.sag = max(line.sag for line in lines)
+
+    def at(self, xy: Floats, snap: float) -> list[Places]:
+        """For each point (n,2) the lines that pass through it, to ``snap``, with their parameters there."""
+        points = shapely.points(xy)
+        point, chord = self.tree.query(points, predicate="dwithin", distance=snap + self.sag)
+        order = np.lexsort((shapely.distance(points[point], self.chords[chord]), self.owner[chord], point))
+        point, chord = point[order], chord[order]
+        owner = self.owner[chord]
+        first = np.ones(len(point), dtype=bool)  # the nearest chord of each line
+        first[1:] = (np.diff(point) != 0) | (np.diff(owner) != 0)
+        point, owner, chord = point[first], owner[first], self.chord[chord[first]]
+        passing: list[Places] = [[] for _ in xy]
+        t, distance = np.empty((2, len(point)))
+        for number in np.unique(owner):
+            own = owner == number
+            t[own], distance[own] = self.lines[number].nearest_to(xy[point[own]], chord[own])
+        for k in np.flatnonzero(distance <= snap):
+            passing[point[k]].append((int(owner[k]), float(t[k])))
+        return passing
+
+    def crossings(self) -> list[Places]:
+        """The places where two lines cross that are not both of the boundary."""
+        inner = np.flatnonzero([not line.bounds for line in self.lines])
+        own = np.flatnonzero(np.isin(self.owner, inner))
+        one, two = self.tree.query(self.chords[own], predicate="intersects")
+        one = own[one]
+        earlier = self.owner[two] < self.owner[one]
+        once = earlier | np.isin(self.owner[two], inner, invert=True)
+        pairs = np.stack([two, one], axis=1)[once & (self.owner[two] != self.owner[one])]
+        pairs = np.where((self.owner[pairs[:, 0]] > self.owner[pairs[:, 1]])[:, None], pairs[:, ::-1], pairs)
+        if len(pairs) > MOST_CROSSINGS:
+            problem = f"the lines of the plan cross at {len(pairs)} places; at most {MOST_CROSSINGS} are"
+            raise PlanError(f"{problem} allowed: draw fewer dividers", what="dividers", found=len(pairs))
+        pairs = pairs[np.lexsort(self.owner[pairs].T)]
+        parts = shapely.intersection(self.chords[pairs[:, 0]], self.chords[pairs[:, 1]])
+        places = []
+        for (first, second), part in zip(pairs.tolist(), parts, strict=True):
+            i, j = self.owner[[first, second]].tolist()
+            start, end = np.array(part.coords)[[0, -1]]
+            if part.geom_type != "Point":
+                where = f"from {point_text(start)} to {point_text(end)}"
+                raise overlap(self.lines[j], self.lines[i], where)
+            s, t = (
+                float(self.lines[k].nearest_to(start[None], self.chord[[chord]])[0][0])
+                for k, chord in ((i, first), (j, second))
+            )
+            if not (self.lines[i].straight and self.lines[j].straight):
+                s, t = crossing(self.lines[i], s, self.lines[j], t)
+            places.append([(i, s), (j, t)])
+        return places
 
 
 def point_text(xy: Floats) -> str:
@@ -94,37 +190,45 @@ def check_line(one: Line) -> None:
         ends = f"it starts at {point_text(one.xy[0])} and ends at {point_text(one.xy[-1])}"
         raise one.error(f"is open: {ends}, {gap:.3g} apart; close it", found=gap)
     if not one.shape.is_simple:
-        pieces = shapely.get_parts(shapely.node(one.shape))
-        joints = np.concatenate([np.array(p.coords)[[0, -1]] for p in pieces])
-        places, count = np.unique(joints.round(9), axis=0, return_counts=True)
-        place = places[np.argmax(count)]
+        place = _self_crossing(one)
         raise one.error(f"crosses itself at {point_text(place)}", tuple(place.tolist()))
+
+
+def _self_crossing(one: Line) -> Floats:
+    """A point at which a line crosses itself. Few chords at a time, as loops may cross without number."""
+    count = len(one.chords)
+    for begin in range(0, count, BLOCK):
+        i, j = one.tree.query(one.chords[begin : begin + BLOCK], predicate="intersects")
+        i += begin
+        i, j = i[i < j], j[i < j]
+        parts = shapely.intersection(one.chords[i], one.chords[j])
+        joined = (j - i == 1) | (one.curve.closed & (j - i == count - 1))
+        found = parts[~joined | (shapely.length(parts) > 0.0)]
+        if len(found):
+            return np.array(found[0].coords)[0]
+    return one.xy[0]
 
 
 def check_holes(lines: Sequence[Line]) -> None:
     """Holes lie inside the outline and apart from each other."""
     outline = shapely.Polygon(lines[0].xy)
-    holes = [(one, shapely.Polygon(one.xy)) for one in lines if one.kind is Kind.HOLE]
-    for place, (one, area) in enumerate(holes):
-        if not outline.contains_properly(area):
-            where = "crosses or touches" if outline.intersects(area) else "lies outside"
-            raise one.error(f"{where} the outline; a hole must be inside the outline")
-        for other, other_area in holes[:place]:
-            if area.intersects(other_area):
-                problem = f"and {one.name} touch or overlap; join them into one"
-                raise other.error(problem, found=one.name)
+    shapely.prepare(outline)
+    holes = [one for one in lines if one.kind is Kind.HOLE]
+    areas = np.array([shapely.Polygon(one.xy) for one in holes], dtype=object)
+    for place in np.flatnonzero(~shapely.contains_properly(outline, areas)):
+        where = "crosses or touches" if outline.intersects(areas[place]) else "lies outside"
+        raise holes[place].error(f"{where} the outline; a hole must be inside the outline")
+    i, j = shapely.STRtree(areas).query(areas, predicate="intersects")
+    for first, second in zip(i[i < j], j[i < j], strict=True):
+        problem = f"and {holes[second].name} touch or overlap; join them into one"
+        raise holes[first].error(problem, found=holes[second].name)
 
 
-def inside(lines: Sequence[Line]) -> Callable[[Floats], bool]:
-    """A function that tests whether a point is inside the outline and outside all holes."""
+def inside(lines: Sequence[Line]) -> Callable[[Floats], Bools]:
+    """A function that tests which points (n,2) are inside the outline and outside all holes."""
     area = shapely.Polygon(lines[0].xy, [one.xy for one in lines if one.kind is Kind.HOLE])
-    return lambda xy: bool(shapely.contains_xy(area, *xy))
-
-
-def lines_at(lines: Sequence[Line], xy: Floats, snap: float, leave_out: int = -1) -> list[tuple[int, float]]:
-    """Lines that pass through a point, with their parameter there."""
-    near = [(number, *one.nearest(xy)) for number, one in enumerate(lines) if number != leave_out]
-    return [(number, t) for number, t, distance in near if distance <= snap]
+    shapely.prepare(area)
+    return lambda xy: np.asarray(shapely.contains_xy(area, xy))
 
 
 def crossing(one: Line, s: float, two: Line, t: float) -> tuple[float, float]:

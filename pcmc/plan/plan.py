@@ -52,9 +52,9 @@ class Plan(PlanData):
         at a right angle; "cable": free between ``supports``, with a cable along it; or "free", where the
         tension has nothing to pull against.
     supports : points [x, y] or [x, y, z], such as masts, and curves along which vertices are fixed. A curve
-        on the outline or a hole fixes that part of it; one inside a patch is fixed where it is drawn. The
-        height z of a point on a free edge or a cable is that of the edge there; between such points the
-        edge starts straight.
+        on the outline or a hole fixes that part of it, which carries no cable; one inside a patch is fixed
+        where it is drawn. On a free edge or a cable the height z of a support is that of the edge there;
+        between supports the edge starts straight.
     plane : Π.
     rise : height of the initial surface above the one that the boundary spans, length; by default
         0.3 of the radius of the largest circle without supports. In a project without tensions it is the

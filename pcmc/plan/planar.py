@@ -20,6 +20,7 @@ CROWDED = 0.6  # of the edge length: free points nearer to another point are rem
 GOOD_ANGLE = 30.0  # degrees; sharper triangles get more points
 ROUNDS = 12  # of relaxation
 OUTSIDE = -1
+SLACK = 1e-9  # of the size of a mesh: a point so far beside a triangle is at it
 SIDES = [[1, 2], [2, 0], [0, 1]]  # corners of a triangle
 
 
@@ -102,14 +103,22 @@ def signed_areas(points: Floats, triangles: Ints) -> Floats:
 
 
 def locate(mesh: PlanarMesh, points: Floats) -> Ints:
-    """(p,) a triangle that contains each of a few points (p,2), or -1."""
+    """(p,) a triangle that contains each of points (p,2), the first of several, or -1."""
     triangle = np.full(len(points), OUTSIDE)
+    if not len(points):
+        return triangle
     corner = mesh.points[mesh.triangles]
     side = corner[:, [1, 2, 0]] - corner
-    slack = -1e-12 * np.einsum("tij,tij->t", side, side).max(initial=0.0)
-    for place, point in enumerate(points):
-        hit = np.flatnonzero((cross_2d(side, point - corner) >= slack).all(axis=1))
-        triangle[place] = hit[0] if len(hit) else OUTSIDE
+    slack = 1e-12 * np.einsum("tij,tij->t", side, side).max(initial=0.0)
+    order = np.argsort(points[:, 0])
+    x = corner[..., 0]  # only the triangles above and below a point are tried
+    low, high = x.min(axis=1) - SLACK * np.ptp(x), x.max(axis=1) + SLACK * np.ptp(x)
+    first = np.searchsorted(points[order, 0], low)
+    count = np.searchsorted(points[order, 0], high, side="right") - first
+    tried = np.repeat(np.arange(len(corner)), count)
+    place = order[np.arange(len(tried)) + np.repeat(first - np.cumsum(count) + count, count)]
+    hit = (cross_2d(side[tried], points[place][:, None] - corner[tried]) >= -slack).all(axis=1)
+    triangle[place[hit][::-1]] = tried[hit][::-1]
     return triangle
 
 

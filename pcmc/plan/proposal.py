@@ -15,6 +15,7 @@ from ..surface.wall_tensions import balanced_wall
 from .corners import most_in_corners
 from .curves import Curve
 from .drawing import Drawing, Label
+from .lines import Kind, Line
 from .parts import Area, Divider, Hole, PlanData, check_keys
 
 TRIANGLES = 1500  # of a first roof, about
@@ -129,11 +130,12 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     areas = _areas(parts, drawing, values.pop("patches", {}), values.pop("tension", None))
     tensions = [area["tension"] for area in areas]
     edge_length = values.setdefault("edge_length", edge_length_for(parts, drawing))
+    outline = Line("the outline", Kind.OUTLINE, drawing.outline)
     dividers = _changed(drawing.dividers, values.pop("dividers", []), "divider", Divider)
     for entry in dividers:
         if isinstance(entry, dict) and entry.get("name") in drawing.dividers:
             entry.setdefault("bottom", "held" if drawing.flat else "sloped")
-            most = most_in_corners(entry["curve"], drawing.outline, edge_length)
+            most = most_in_corners(entry["curve"], outline, edge_length)
             entry.setdefault("wall", wall_tension(entry["curve"], parts, tensions, most))
     patches: dict[str, dict[str, Any]] = {}
     for area in areas:

@@ -145,7 +145,7 @@ def _reshaped(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, Res
         if result.certificate.certified:
             typed = [] if sail is None else sail_lines(plan, sail, project.rises)
             rings = ring_lines(masts, share, drawn=project.drawing is not None)
-            return changed, Reshaping(typed, rings), Outcome(result, ())
+            return changed, Reshaping(typed, rings), Outcome(result)
     return plan, Reshaping(), outcome
 
 
@@ -162,7 +162,7 @@ def _tried(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, bool]:
             result = solve(_coarse(plan, outcome).surface(), project.method, **project.options)
         except PcmcError:  # too coarse for this plan
             break
-        outcome = Outcome(result, ())
+        outcome = Outcome(result)
         if outcome.certificate.certified:
             return plan, True
         if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command

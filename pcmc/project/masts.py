@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
 from ..plan import Divider, Hole, Plan
@@ -52,14 +53,17 @@ def point_masts(plan: Plan) -> list[Mast]:
     parts: Sequence[Hole | Divider] = (*plan.holes, *plan.dividers)
     curves += [plan.outline, *(part.curve for part in parts)]
     lines = [Line("line", Kind.SUPPORT, curve.local(plan.plane)) for curve in curves]
-    spots = {k: _on_plane(plan, s) for k, s in enumerate(plan.supports) if not isinstance(s, Curve)}
-    masts = []
-    for number, spot in spots.items():
-        to_lines = min(line.nearest(spot[:2])[1] for line in lines)
-        to_spots = [float(np.linalg.norm((spot - other)[:2])) for k, other in spots.items() if k != number]
-        if to_lines > SNAP * plan.edge_length:
-            masts.append(Mast(number, spot, min([to_lines, *to_spots])))
-    return masts
+    numbers = [k for k, support in enumerate(plan.supports) if not isinstance(support, Curve)]
+    if not numbers:
+        return []
+    spots = np.array([_on_plane(plan, plan.supports[k]) for k in numbers])
+    room = np.min([line.nearest(spots[:, :2])[1] for line in lines], axis=0)
+    inside = room > SNAP * plan.edge_length
+    if len(spots) > 1:
+        near, _ = cKDTree(spots[:, :2]).query(spots[:, :2], k=[2])
+        room = np.minimum(room, np.ravel(near))
+    found = zip(numbers, spots, room.tolist(), inside, strict=True)
+    return [Mast(number, spot, space) for number, spot, space, free in found if free]
 
 
 def _on_plane(plan: Plan, spot: Floats) -> Floats:

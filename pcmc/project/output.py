@@ -45,10 +45,11 @@ def fields(surface: Surface, certificate: Certificate) -> dict[str, Floats]:
     }
 
 
-def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
+def write_all(works: Works, progress: OnStep | None = None, *, losses: bool = False) -> list[Path]:
     """Write files, each by its own function of a path; all of them appear together, or none.
 
-    The functions write to temporary files; errors and warnings name the final ones.
+    The functions write to temporary files; errors and warnings name the final ones. ``losses`` warns of what
+    a format cannot hold.
     """
     report = progress or ignore
     paths = [path for path, _ in works]
@@ -57,7 +58,7 @@ def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
         for (path, write), temporary in zip(works, temporaries, strict=True):
             report(f"writing {path.name}")
             try:
-                with writing(temporary), defer_interrupts(), _final_name_in_warnings(temporary, path):
+                with writing(temporary), defer_interrupts(), _final_name_in_warnings(temporary, path, losses):
                     write(temporary)
             except PcmcError as error:
                 text = str(error).replace(f"{temporary}: ", "")
@@ -66,13 +67,13 @@ def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
 
 
 @contextmanager
-def _final_name_in_warnings(temporary: Path, path: Path) -> Iterator[None]:
-    """Warnings name the final file. Losses due to the format are not shown: nobody asked for more."""
+def _final_name_in_warnings(temporary: Path, path: Path, losses: bool) -> Iterator[None]:
+    """Warnings name the final file. Losses due to the format are shown only if asked for."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FileWarning)
         yield
     for warning in caught:
-        if not issubclass(warning.category, LostWarning):
+        if losses or not issubclass(warning.category, LostWarning):
             text = str(warning.message).replace(str(temporary), str(path))
             warnings.warn(text, warning.category, stacklevel=4)
 
@@ -152,9 +153,12 @@ def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> N
         check_suffix(picture)
 
 
-def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
-    """Refuse, before any work, paths that cannot be written; the folder ``made`` may be missing."""
-    seen = set()
+def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: Iterable[Path] = ()) -> None:
+    """Refuse, before any work, paths that cannot be written, and those of a command's own ``inputs``.
+
+    The folder ``made`` may be missing. A link to an input, and another way to write its path, is the input.
+    """
+    seen, read = set(), [path for path in inputs if path.exists()]
     if made is not None and made.exists() and not made.is_dir():
         raise FileError(f"{made} is a file; the output needs a folder", what=str(made))
     for path in paths:
@@ -169,6 +173,8 @@ def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
         problem = None
         if is_folder:
             problem = "is a folder; give the name of a file"
+        elif path.exists() and any(path.samefile(one) for one in read):
+            problem = "is read here, and is not written over; name another file"
         elif place in seen:
             problem = "is named twice; name two files for the output"
         elif folder != made and not folder.is_dir():

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import cast
 
 from ..base.errors import OptionError
+from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..solvers.result import Result
 from ..structure import Material, SelfWeight, Snow, StructuralModel, Wind
@@ -25,8 +26,8 @@ class Structure:
     young : Young's modulus, force per area.
     thickness : of all patches, length, or a table with one for each patch.
     poisson : Poisson's ratio.
-    density : mass per volume; with kN and m, tonnes per m³. Above 0, self-weight is a load.
-    gravity : length/time².
+    density : mass per volume, as of ``Material``: t/m³ with kN and m. Above 0, self-weight is a load.
+    gravity : length/s²; by default 9.81 m/s² in the unit of length.
     snow : load per plan area, besides the snow that the form was found under; 0 for none.
     wind : pressures by patch, above 0 for suction on a roof.
     cable_area : of the cables' sections, length², or a table with one for each cable.
@@ -36,7 +37,7 @@ class Structure:
     thickness: float | Mapping[str, float] | None = None
     poisson: float = 0.3
     density: float = 0.0
-    gravity: float = 9.81
+    gravity: float | None = None
     snow: float = 0.0
     wind: Mapping[str, float] = field(default_factory=dict)
     cable_area: float | Mapping[str, float] | None = None
@@ -73,9 +74,13 @@ class Structure:
         checked_areas(self.cable_area, surface)
 
     def model(
-        self, surface: Surface | Result, anyway: bool = False, certificate: Certificate | None = None
+        self,
+        surface: Surface | Result,
+        anyway: bool = False,
+        certificate: Certificate | None = None,
+        units: Units = NO_UNITS,
     ) -> StructuralModel:
-        """The structural model of a surface at rest, with the certificate that is known of it.
+        """The structural model of a surface at rest, with its units and the certificate if that is known.
 
         Errors as in ``pcmc.StructuralModel``.
         """
@@ -88,4 +93,5 @@ class Structure:
             anyway=anyway,
             cable_area=self.cable_area,
             certificate=certificate,
+            units=units,
         )

@@ -15,7 +15,8 @@ from ..energy.rooms import refuse_varied_pressure
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 from .drawn import files_of, is_drawing
-from .file import PathLike, Project, in_file, project_of, read_data, surface_of
+from .file import PathLike, Project, in_file, is_project, load, project_of, read_data
+from .start import surface_of
 
 QUANTITIES = ("tension", "pressure", "weight", "snow")  # of a patch
 LOADS = ("tensions", "pressures", "weights", "snows", "cables", "volumes")
@@ -140,11 +141,6 @@ def digest(path: PathLike) -> str:
     return sha.hexdigest()
 
 
-def is_project(path: PathLike) -> bool:
-    """Whether a file is a project or the drawing of one; all others hold a surface."""
-    return Path(path).suffix.lower() == ".toml" or is_drawing(Path(path))
-
-
 def _unknown_number(path: Path, name: str, known: Iterable[str]) -> OptionError:
     names = tuple(dict.fromkeys(known))
     return OptionError(f"{path}: {unknown('number', name, names)}", what=name, expected=names)
@@ -157,15 +153,15 @@ def _data(path: Path) -> dict[str, Any]:
 def _project(path: Path, values: Mapping[str, float]) -> Project:
     """The project with other numbers; names that are not in the file are ignored."""
     if not is_project(path):
-        return Project(path)
-    data: Any = _data(path)
+        return load(path)
+    text, data = read_data(path)
     for name, place in numbers(data).items():
         if name in values:
-            table = data
+            table: Any = data
             for step in place[:-1]:
                 table = table[step]
             table[place[-1]] = values[name]
-    return project_of(path, data)
+    return project_of(path, data, text)
 
 
 def _retensioned(path: Path, surface: Surface, values: Mapping[str, float]) -> Surface:

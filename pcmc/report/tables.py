@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,9 +12,9 @@ import pandas as pd
 from ..base.arrays import Ints
 from ..base.units import Units
 from ..certificate import Certificate
-from ..certificate.reactions import held_lengths, reactions_per_length
-from ..design.outcome import unit_of
+from ..certificate.reactions import held_lengths
 from ..panels import Panels
+from ..quantities import Figure, dimension_of
 from ..surface import Surface
 
 if TYPE_CHECKING:
@@ -53,28 +53,29 @@ def one(value: float) -> str:
     return column([value])[0]
 
 
-def key_figures(surface: Surface, certificate: Certificate, units: Units) -> Table:
+LISTED = {
+    ("apex", "roof"): "highest point above the plane",
+    ("area", "roof"): "area of the roof",
+    ("area", "wall"): "area of walls",
+    ("volume", "roof"): "volume below it",
+    ("load", "roof"): "pressure, snow and weight, upwards",
+    ("reaction", "roof"): "all reactions, upwards",
+    ("reaction per length", "roof"): "largest reaction per length",
+}
+"""The key figures of a report; those of several walls are added."""
+
+
+def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Table:
     """Size, height, areas, volume, load, and the largest reaction per length."""
-    X, length = surface.vertices, units.length
-    width, depth, _ = np.ptp(X, axis=0).tolist()
-    heights = surface.plane.height(X)
-    area, roof = certificate.patches["area"].to_numpy(), surface.roof
-    per_length = np.linalg.norm(reactions_per_length(surface, certificate.reactions), axis=1)
-    rows = [
-        ["size in the plan", f"{one(width)} × {one(depth)} {length}"],
-        ["highest point above the plane", f"{one(float(heights.max()))} {length}"],
-        ["area of the roof", f"{one(float(area[roof].sum()))} {units.area}"],
-    ]
-    if not roof.all():
-        rows.append(["area of walls", f"{one(float(area[~roof].sum()))} {units.area}"])
-    force = units.force or "force"
-    rows += [
-        ["volume below it", f"{one(certificate.volume)} {units.volume}"],
-        ["pressure and weight, upwards", f"{one(certificate.load)} {force}"],
-        ["all reactions, upwards", f"{one(certificate.support)} {force}"],
-    ]
-    if np.isfinite(per_length).any():
-        rows.append(["largest reaction per length", f"{one(float(np.nanmax(per_length)))} {units.tension}"])
+    width, depth, _ = np.ptp(surface.vertices, axis=0).tolist()
+    rows = [["size in the plan", f"{one(width)} × {one(depth)} {units.length}"]]
+    for (quantity, owner), label in LISTED.items():
+        values = [
+            f.value for f in figures if (f.quantity, f.owner) == (quantity, owner) and f.value is not None
+        ]
+        if values:
+            unit = units.behind(dimension_of(quantity)).strip()
+            rows.append([label, f"{one(sum(values))} {unit}"])
     rows.append(["mesh", f"{surface.m} triangles, {surface.n} vertices"])
     return Table("Key figures", [], rows)
 
@@ -186,7 +187,7 @@ def target_table(targets: pd.DataFrame, units: Units) -> Table:
     columns = {
         "wanted": [one(x) for x in targets["wanted"].tolist()],
         "reached": [one(x) for x in targets["value"].tolist()],
-        "unit": [units.behind(unit_of(str(name))).strip() for name in targets.index],
+        "unit": [units.behind(dimension).strip() for dimension in targets["dimension"]],
         "met": ["yes" if met else "no" for met in targets["met"]],
     }
     return _table("Targets", ["quantity"], words, columns)
@@ -194,11 +195,9 @@ def target_table(targets: pd.DataFrame, units: Units) -> Table:
 
 def mesh_table(check: MeshCheck, units: Units) -> Table:
     """Each quantity with its error bar, and its limit on finer and finer meshes."""
-    from ..accuracy.quantities import UNIT_OF  # takes long to import
-
     table = check.table
     words = [[quantity, of] for quantity, of in zip(table["quantity"], table["of"], strict=True)]
-    kinds = [UNIT_OF.get(quantity, quantity) for quantity in table["quantity"]]
+    kinds = map(dimension_of, table["quantity"])
     columns = {
         "on this mesh": [one(x) for x in table["value"].tolist()],
         "error bar": [_bar(x) for x in table["error"].tolist()],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from ..surface import Surface
 from ..surface.geometry import segment_lengths
 
 POINTS = 8  # integration points of a B31 element
+THINNEST = 1e-9  # a thickness, in the size of the surface: thinner ones overflow the stresses
 
 
 def short(value: float) -> str:
@@ -27,14 +29,15 @@ def short(value: float) -> str:
 def checked_areas(given: object, surface: Surface) -> tuple[float, ...]:
     """The area of each cable's section, from one number or one by name."""
     names = [cable.name for cable in surface.cables]
+    limits: dict[str, Any] = {"least": (THINNEST * surface.size) ** 2, "most": surface.size**2}
     if given is None and names:
         hint = "give the area of the cables' sections"
         validate.refuse("cable_area", None, "a finite number > 0", names[0], hint)
     if isinstance(given, Mapping):
         for name in given:
             validate.choice("cable", name, names)
-        return tuple(validate.number("cable_area", given.get(name), above=0.0, where=name) for name in names)
-    return tuple(validate.number("cable_area", given, above=0.0, where=name) for name in names)
+        return tuple(validate.number("cable_area", given.get(name), where=name, **limits) for name in names)
+    return tuple(validate.number("cable_area", given, where=name, **limits) for name in names)
 
 
 def directions(surface: Surface, edges: Ints) -> Floats:

@@ -70,6 +70,7 @@ def _sections(model: StructuralModel) -> Iterator[str]:
     surface, nodes = model.standing, np.flatnonzero(model.nodes)
     verdict = model.verdict if model.certified else f"NOT CERTIFIED: {model.verdict}"
     yield f"*HEADING\npcmc structural model, {verdict}\n"
+    yield f"** {model.note}\n" if model.note else ""
     yield "".join(f"** PATCH_{k}: {_line(patch.name)}\n" for k, patch in enumerate(surface.patches, 1))
     yield "".join(f"** step {k}: {_line(step.name)}\n" for k, step in enumerate(model.steps, 1))
     yield "*NODE, NSET=NALL\n"

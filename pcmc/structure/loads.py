@@ -9,8 +9,21 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
+from ..base.units import length_factor
 from ..surface import Surface
+from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, vertex_sums
+
+GRAVITY = 9.81  # m/s²
+
+
+def standard_gravity(length: str) -> float:
+    """9.81 m/s² in a unit of length per s²; without a unit, in metres.
+
+    >>> standard_gravity("mm"), round(standard_gravity("ft"), 3), standard_gravity("")
+    (9810.0, 32.185, 9.81)
+    """
+    return GRAVITY * (length_factor("m", length) if length else 1.0)
 
 
 @dataclass(frozen=True)
@@ -19,15 +32,20 @@ class SelfWeight:
 
     Parameters
     ----------
-    gravity : g > 0, length/time²; 9.81 in metres and seconds.
+    gravity : g > 0, length/time²; by default 9.81 m/s² in the model's unit of length, and seconds.
     name : of its step.
     """
 
-    gravity: float = 9.81
+    gravity: float | None = None
     name: str = "self-weight"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gravity", validate.positive("SelfWeight.gravity", self.gravity))
+        if self.gravity is not None:
+            object.__setattr__(
+                self,
+                "gravity",
+                validate.number("SelfWeight.gravity", self.gravity, least=SMALLEST, most=LARGEST),
+            )
         _check_name(self.name)
 
 
@@ -49,7 +67,9 @@ class Snow:
     name: str = "snow"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "load", validate.number("Snow.load", self.load))
+        object.__setattr__(
+            self, "load", validate.number("Snow.load", self.load, least=-LARGEST, most=LARGEST)
+        )
         if isinstance(self.patches, str) or not isinstance(self.patches, Sequence):
             validate.refuse("Snow.patches", self.patches, "a sequence of patch names")
         object.__setattr__(self, "patches", tuple(self.patches))
@@ -76,7 +96,7 @@ class Wind:
                 "Wind.pressures", self.pressures, "pressures by patch name, such as {'roof': 0.5}"
             )
         checked = {
-            zone: validate.number("Wind.pressures", value, where=str(zone))
+            zone: validate.number("Wind.pressures", value, least=-LARGEST, most=LARGEST, where=str(zone))
             for zone, value in self.pressures.items()
         }
         object.__setattr__(self, "pressures", checked)
@@ -104,8 +124,12 @@ class Step:
     gravity: float = 0.0
 
 
-def load_steps(surface: Surface, loads: Sequence[Load | Sequence[Load]]) -> tuple[Step, ...]:
+def load_steps(
+    surface: Surface, loads: Sequence[Load | Sequence[Load]], gravity: float = GRAVITY
+) -> tuple[Step, ...]:
     """The form-finding load first, then a step for each load; loads in one tuple act together.
+
+    ``gravity`` is that of self-weight where it has none of its own, length/time².
 
     >>> from pcmc import Patch
     >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
@@ -121,17 +145,17 @@ def load_steps(surface: Surface, loads: Sequence[Load | Sequence[Load]]) -> tupl
         together = entry if isinstance(entry, tuple) else (entry,)
         step = replace(permanent, name=" and ".join(load.name for load in together))
         for load in together:
-            step = _added(step, load, surface)
+            step = _added(step, load, surface, gravity)
             if isinstance(load, SelfWeight):
-                permanent = replace(permanent, gravity=load.gravity)
+                permanent = replace(permanent, gravity=step.gravity)
         steps.append(step)
     return tuple(steps)
 
 
-def _added(step: Step, load: Load, surface: Surface) -> Step:
+def _added(step: Step, load: Load, surface: Surface, gravity: float) -> Step:
     """The step with one more load."""
     if isinstance(load, SelfWeight):
-        return replace(step, gravity=load.gravity)
+        return replace(step, gravity=gravity if load.gravity is None else load.gravity)
     if isinstance(load, Snow):
         return replace(step, forces=step.forces + _snow(surface, load))
     pressures = step.pressures.copy()

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array
+from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..certificate.required import certified
 from ..contact.pinching import standing_faces, standing_part
@@ -18,9 +19,10 @@ from ..energy.functional import apply_supports
 from ..energy.weight import effective_tensions
 from ..solvers.result import Result
 from ..surface import Surface, expect_surface
+from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
-from .cables import checked_areas
-from .loads import Load, SelfWeight, Step, check_loads, load_steps
+from .cables import THINNEST, checked_areas
+from .loads import GRAVITY, Load, SelfWeight, Step, check_loads, load_steps, standard_gravity
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,8 @@ class Material:
     ----------
     young : E > 0, force per area.
     poisson : ν, 0 ≤ ν < 0.5.
-    density : ρ ≥ 0, mass per volume, in a unit of mass that fits the others: with kN and m, tonnes per m³.
+    density : ρ ≥ 0, mass per volume, in the mass that a unit of force accelerates by a unit of length per
+        s²: t/m³ with kN and m, t/mm³ with N and mm, slug/ft³ with lbf and ft.
 
     >>> Material(young=1e6)
     Material(young=1000000.0, poisson=0.3, density=0.0)
@@ -42,10 +45,11 @@ class Material:
     density: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "young", validate.positive("Material.young", self.young))
+        young = validate.number("Material.young", self.young, least=SMALLEST, most=LARGEST)
+        object.__setattr__(self, "young", young)
         poisson = validate.number("Material.poisson", self.poisson, least=0.0, below=0.5)
         object.__setattr__(self, "poisson", poisson)
-        density = validate.number("Material.density", self.density, least=0.0)
+        density = validate.number("Material.density", self.density, least=0.0, most=LARGEST)
         object.__setattr__(self, "density", density)
 
 
@@ -66,6 +70,8 @@ class StructuralModel:
     cable_area : length², of the sections of the surface's cables, or one for each, by name.
     cable_material : of the cables; by default that of the patches.
     certificate : of the surface, where it is known; by default it is computed.
+    units : of the surface's numbers: for the file's heading, and for the gravity of ``SelfWeight`` where it
+        is not given. Without a unit of length that takes metres.
 
     Raises
     ------
@@ -92,6 +98,7 @@ class StructuralModel:
     cable_area: float | Mapping[str, float] | None = None
     cable_material: Material | None = None
     certificate: Certificate | None = field(default=None, repr=False)
+    units: Units = NO_UNITS
     verdict: str = field(init=False, repr=False)
     certified: bool = field(init=False, repr=False)
 
@@ -123,6 +130,16 @@ class StructuralModel:
 
     def _single_loads(self) -> list[Load]:
         return [load for entry in self.loads for load in (entry if isinstance(entry, tuple) else (entry,))]
+
+    @property
+    def note(self) -> str:
+        """The units of the file's numbers in a line, or what was assumed as they are not known."""
+        assumed = [load for load in self._single_loads() if isinstance(load, SelfWeight) and not load.gravity]
+        if not self.units and assumed:
+            return (
+                f"no unit of length is given: gravity is {GRAVITY}, as in metres; give the units or gravity"
+            )
+        return f"{self.units.sentence}, masses in {self.units.mass}, times in s" if self.units else ""
 
     @cached_array
     def thicknesses(self) -> Floats:
@@ -210,7 +227,7 @@ class StructuralModel:
     @cached_property
     def steps(self) -> tuple[Step, ...]:
         """The steps of the analysis, the form-finding load first."""
-        return load_steps(self.standing, self.loads)
+        return load_steps(self.standing, self.loads, standard_gravity(self.units.length))
 
     def nodal_loads(self, step: Step, displacements: Floats | None = None) -> Floats:
         """(n,3) the loads of a step as forces on the vertices, a third of each triangle's at its corners.
@@ -237,12 +254,13 @@ class StructuralModel:
 
 
 def checked_thickness(given: object, surface: Surface) -> float | dict[str, float]:
-    """A number > 0, or one for each patch of the surface."""
+    """A number > 0, or one for each patch of the surface, between 1e-9 of its size and its size."""
+    limits: dict[str, Any] = {"least": THINNEST * surface.size, "most": surface.size}
     if not isinstance(given, Mapping):
-        return validate.positive("thickness", given)
+        return validate.number("thickness", given, **limits)
     for name in given:
         surface.patch_index(name)
     return {
-        patch.name: validate.number("thickness", given.get(patch.name), above=0.0, where=patch.name)
+        patch.name: validate.number("thickness", given.get(patch.name), where=patch.name, **limits)
         for patch in surface.patches
     }

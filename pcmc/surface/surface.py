@@ -357,8 +357,9 @@ class Surface:
         ([1.0], [0.25], [0.75])
         """
         snow = validate.number("snow", snow, error=SurfaceError)
-        pressed = [patch.name for patch in self.patches if not patch.auxiliary]
-        names = list(patches) if patches is not None else pressed or [patch.name for patch in self.patches]
+        every = [patch.name for patch in self.patches]
+        roof = [name for name, wall in zip(every, self.walls.tolist(), strict=True) if not wall]
+        names = list(patches) if patches is not None else roof or every
         return self.retensioned(snows=dict.fromkeys(names, snow)).with_held_snow()
 
     def with_held_snow(self) -> Surface:

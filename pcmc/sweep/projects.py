@@ -6,18 +6,16 @@ import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from .. import io
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError
 from ..solvers import find_method
 from .grid import Sweep
 from .short_table import with_units
-from .solving import mesh_columns, row
+from .solving import row
 
 
 def project_sweep(
@@ -71,8 +69,8 @@ def column_labels(path: str | os.PathLike[str], names: Iterable[str]) -> dict[st
     """The names of columns with the units of a project or a surface; see ``with_units``."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the sweep showed them
-        project, surface = projects.varied(path, {})
-        units = project.units if project.plan is not None else io.read_bare(path)[1].units
+        start = projects.start_of(projects.load(path))
+        units, surface = start.units, start.surface
     cables = {name for cable in surface.cables for name in (cable.name, f"cable {cable.name}")}
     return with_units(names, units, cables)
 
@@ -115,7 +113,9 @@ def solve_project(
     if method not in (None, design.method):
         design = replace(design, method=method, options={})
     outcome = projects.solve_project(replace(design, search=search), start)
-    answer = row(outcome.result, ("project", "project_digest", "method", "mesh_check", "search", *values))
+    answer = row(outcome.solved, ("project", "project_digest", "method", "mesh_check", "search", *values))
     if mesh_check or design.mesh_check:
-        answer |= mesh_columns(outcome.result, partial(projects.check_project_mesh, design))
+        check = outcome.check_mesh() if outcome.certificate.index is not None else None
+        failed = {"mesh_verdict": "not checked", "mesh_detail": outcome.mesh_failure}
+        answer |= check.numbers() if check else failed if outcome.mesh_failure else {}
     return answer if outcome.design is None else answer | {"targets_met": outcome.design.met}
