@@ -216,4 +216,4 @@ def test_a_wall_nearby_does_not_hide_a_difference(hall_roof):
 
 
 def test_names_of_downloads_are_those_of_files():
-    assert Roof(CAP, "a/b", Units("m")).name == "a-b"
+    assert Roof.of(CAP, "a/b", Units("m")).name == "a-b"

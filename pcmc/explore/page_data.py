@@ -16,7 +16,7 @@ from ..certificate.certificate import Certificate
 from ..certificate.reactions import reactions, reactions_per_length
 from ..contact.pinching import standing_part
 from ..design import Parameter, Target
-from ..design.quantities import QUANTITIES
+from ..design.quantities import MEASURES
 from ..design.targets import NAMED
 from ..energy.curvature import curvature_error, mean_curvature
 from ..energy.functional import patch_areas
@@ -185,7 +185,7 @@ def target_choices(surface: Surface) -> list[dict[str, Any]]:
         "room": [room.name for room in surface.rooms],
     }
     choices = []
-    for quantity in QUANTITIES:
+    for quantity in MEASURES:
         owner = NAMED.get(quantity, "wall" if quantity == "lean" else "patch")
         if names[owner] and quantity != "height":
             of = names[owner] if quantity in NAMED else ["", *names[owner]]

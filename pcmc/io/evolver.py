@@ -39,14 +39,14 @@ __all__ = ["read", "write"]
 HEADER = """\
 // Piecewise constant-mean-curvature surface, written by pcmc.
 // total_energy is E = sum tension * area - sum pressure * volume, volumes seen from the origin.
-{snow}// origin {origin}
+// Pressures are net: those of the air less the snow, an attribute of faces.
+// origin {origin}
 {names}
 SPACE_DIMENSION 3
 SYMMETRIC_CONTENT
 DEFINE FACET ATTRIBUTE patch INTEGER
 
 """
-SNOW = "// The pressures of bodies are net: those of the air less the snow, an attribute of the faces.\n"
 
 
 def write(path: Path, surface: Surface, **_: Any) -> None:
@@ -59,7 +59,6 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
     X = surface.vertices - origin
     sides = ((surface.topology.edge_of_face + 1) * surface.topology.sense)[:, [2, 0, 1]]
     header = HEADER.format(
-        snow=SNOW if surface.snows.any() else "",
         origin=" ".join(map(repr, origin.tolist())),
         names="\n".join(
             [f"// patch {k} {escaped(p.name, SPECIAL)}" for k, p in patches]

@@ -15,13 +15,14 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError
 from ..plan import Plan
 from ..surface import Surface
+from ..surface.renewed import KINDS, all_values
 from .file import Project, project_of
 from .rises import RISES, WHOLE
 from .start import surface_of
 
 SAME = 1e-11  # of the largest value of a kind: a difference that counts as none
 DIGITS = 12  # of the values written
-KEYS = {"tensions": "tension", "pressures": "pressure", "snows": "snow", "weights": "weight"}  # of a patch
+KEYS = {kind: field for kind, (parts, field) in KINDS.items() if parts == "patches"}
 LINES = {"outline", "holes", "dividers", "supports", "cables"}  # of a plan: what may pass through a point
 NO_POINTS = ("axes", "weights", "radius")  # of a curve
 Name = tuple[str, str]  # kind and name of a value, such as ("tensions", "west")
@@ -34,18 +35,14 @@ def values_of(surface: Surface) -> dict[str, dict[str, Any]]:
     snow does. Pressures are those of the air: snow is not taken off. Points are [x, y, z].
     """
     result = (surface.room_signs != 0.0).any(axis=0) | surface.walls
+    free = {p.name for p, r in zip(surface.patches, result.tolist(), strict=True) if not r}
+    points = surface.vertices[single_points(surface)].tolist()
     return {
-        "tensions": {p.name: p.tension for p in surface.patches},
-        "pressures": {
-            p.name: p.pressure for p, r in zip(surface.patches, result.tolist(), strict=True) if not r
-        },
+        **(values := all_values(surface)),
+        "pressures": {name: p for name, p in values["pressures"].items() if name in free},
         "snows": {p.name: p.snow for p in surface.patches if p.snow and not p.wall},
-        "weights": {p.name: p.weight for p in surface.patches if p.weight},
-        "cables": {c.name: c.tension for c in surface.cables},
-        "volumes": {r.name: r.volume for r in surface.rooms},
-        "points": {
-            f"point {k}": p for k, p in enumerate(surface.vertices[single_points(surface)].tolist(), 1)
-        },
+        "weights": {name: w for name, w in values["weights"].items() if w},
+        "points": {f"point {k}": place for k, place in enumerate(points, 1)},
     }
 
 
@@ -63,7 +60,7 @@ def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -
     ------
     OptionError : for surfaces whose patches, cables or rooms are not the same.
     """
-    ours, theirs = _all_values(surface), _all_values(asked)
+    ours, theirs = _by_name(surface), _by_name(asked)
     if ours.keys() != theirs.keys():
         names = sorted({name for _, name in ours.keys() ^ theirs.keys()})
         text = f"the project makes other parts than the surface has: {', '.join(names[:5])}"
@@ -76,17 +73,16 @@ def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -
     }
 
 
-def _all_values(surface: Surface) -> dict[Name, float]:
+def _by_name(surface: Surface) -> dict[Name, float]:
     """Every value by kind and name, also the pressures of walls; not the pressures that are results."""
     result = (surface.room_signs != 0.0).any(axis=0)
-    values = {(kind, p.name): getattr(p, key) for kind, key in KEYS.items() for p in surface.patches}
+    values = {(kind, name): v for kind, named in all_values(surface).items() for name, v in named.items()}
     for p, computed in zip(surface.patches, result.tolist(), strict=True):
         if computed:
             del values["pressures", p.name]
-    values |= {("cables", c.name): c.tension for c in surface.cables}
     for name, place in values_of(surface)["points"].items():
         values |= {("points", f"{axis} of {name}"): x for axis, x in zip("xyz", place, strict=True)}
-    return values | {("volumes", r.name): r.volume for r in surface.rooms}
+    return values
 
 
 def with_values(
@@ -132,7 +128,10 @@ def with_values(
             raise OptionError(f"{path.name} cannot hold the {labels} of the surface shown", what="values")
         tried.append(missing)
         # walls that a project leaves open follow its patches, so they come last
-        _put(data["plan"], project, start, asked, first or missing, shared=len(tried) == 1)
+        if project.mesh is not None:
+            _put_on_mesh(data, missing)
+        else:
+            _put(data["plan"], project, start, asked, first or missing, shared=len(tried) == 1)
 
 
 def _put(
@@ -167,6 +166,15 @@ def _put(
             wanted = {name: value for name, value in wanted.items() if name not in walls}
         if kind != "cables" and wanted:
             _put_on_patches(plan, asked, kind, wanted, shared)
+
+
+def _put_on_mesh(data: dict[str, Any], values: Mapping[Name, float]) -> None:
+    """Write values of patches into the table of a mesh; it holds no others."""
+    mesh = data["mesh"] = {"file": data["mesh"]} if isinstance(data["mesh"], str) else data["mesh"]
+    for (kind, name), value in values.items():
+        if kind in KEYS:
+            mesh.setdefault("patches", {}).setdefault(name, {})[KEYS[kind]] = _number(value)
+            _drop(mesh, RISES if kind == "tensions" else ())
 
 
 def _put_on_patches(
@@ -268,7 +276,7 @@ def _put_on_lines(
     wanted: Mapping[str, float],
 ) -> None:
     """Tensions of walls and cables, in the lines of the plan that carry them."""
-    values = _all_values(asked)
+    values = _by_name(asked)
     for name, value in wanted.items():
         source = sources.get((kind, name))
         if source is None:

@@ -13,13 +13,13 @@ from .. import io
 from ..base.errors import OptionError, unknown
 from ..energy.rooms import refuse_varied_pressure
 from ..surface import Surface
+from ..surface.renewed import KINDS
 from ..surface.wall_pressures import with_pressures
 from .drawn import files_of, is_drawing
 from .file import PathLike, Project, in_file, is_project, load, project_of, read_data
 from .start import surface_of
 
 QUANTITIES = ("tension", "pressure", "weight", "snow")  # of a patch
-LOADS = ("tensions", "pressures", "weights", "snows", "cables", "volumes")
 CABLE = "cable "  # before the name of a cable, where a patch has the same
 KeyPath = tuple[str | int, ...]
 
@@ -167,7 +167,7 @@ def _project(path: Path, values: Mapping[str, float]) -> Project:
 def _retensioned(path: Path, surface: Surface, values: Mapping[str, float]) -> Surface:
     """The surface with other tensions and pressures; names that are in the file are ignored."""
     keys, known = numbers(_data(path)), _names(surface)
-    given: dict[str, dict[str, float]] = {kind: {} for kind in LOADS}
+    given: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
     for name in values.keys() - keys.keys():
         if name not in known:
             raise _unknown_number(path, name, known)
