@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..certificate.cables import cable_ends
 from ..certificate.reactions import support_forces
@@ -42,12 +42,16 @@ class Measure:
 
 def _apex(surface: Surface, of: str | None) -> Measurement:
     """Greatest height over Π: that of the highest vertex, for triangles are flat."""
-    height = surface.plane.height(surface.vertices)
-    vertices = np.unique(surface.faces[_faces_of(surface, of)])
-    top = vertices[height[vertices].argmax()]
+    top = int(vertices_up(surface, of)[-1])
     slope = np.zeros_like(surface.vertices)
     slope[top] = surface.plane.normal
-    return Measurement(float(height[top]), slope)
+    return Measurement(float(surface.plane.height(surface.vertices[top])), slope)
+
+
+def vertices_up(surface: Surface, of: str | None) -> Ints:
+    """The vertices of a patch, or of all under pressure, from the lowest over Π to the highest."""
+    vertices = np.unique(surface.faces[_faces_of(surface, of)])
+    return vertices[np.argsort(surface.plane.height(surface.vertices[vertices]))]
 
 
 def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
