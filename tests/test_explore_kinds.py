@@ -109,7 +109,7 @@ TARGETS = {  # a quantity, what it is of, and the factor by which it is to chang
     "patches": ("area", "west", 1.01),
     "one tension": ("volume", None, 1.05),
     "rise": ("apex", None, 0.9),
-    "drawing": ("reaction", "south", 1.05),
+    "drawing": ("reaction per length", "south", 1.05),
     "sail": ("sag", "cable 1", 0.95),
     "half": ("height", None, 1.1),
 }

@@ -177,7 +177,7 @@ def test_the_page_follows_the_file_and_survives_a_broken_save(tmp_path):
         until(lambda: news()["version"] == 1, "the new roof")
         assert news()["problem"] == ""
         renewed, _ = client.ask("/api/open", {"session": name})
-        rows = {(r["quantity"], r["of"]): r["value"] for r in renewed["measures"]}
+        rows = {(r["quantity"], r["of"]): r["value"] for r in renewed["figures"]}
         assert rows["apex", "west"] == pytest.approx(1.5, rel=1e-6)
         assert renewed["mesh"] != kept["mesh"]
         assert renewed["undo"] == 1

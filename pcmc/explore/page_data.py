@@ -19,7 +19,6 @@ from ..design import Parameter, Target
 from ..design.quantities import MEASURES
 from ..design.targets import NAMED
 from ..energy.curvature import curvature_error, mean_curvature
-from ..energy.functional import patch_areas
 from ..panels.families import families
 from ..project.values import values_of
 from ..quantities import dimension_of
@@ -56,7 +55,7 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
             )
         ],
         "controls": groups,
-        "whole": whole is not None,
+        "whole": 1 if whole is None else round(whole.surface.m / piece.m),
         "mesh": mesh_key(piece, centre(piece)),
         "vertices": surface.n,
         "triangles": surface.m,
@@ -172,7 +171,7 @@ def variant_data(variant: Variant) -> dict[str, Any]:
     """A variant for the page's table."""
     verdict = variant.certificate.verdict
     word = verdict.value.partition(": ")[0]
-    return {"name": variant.name, "verdict": verdict.name.lower(), "word": word, "measures": variant.measures}
+    return {"name": variant.name, "verdict": verdict.name.lower(), "word": word, "figures": variant.figures}
 
 
 def target_choices(surface: Surface) -> list[dict[str, Any]]:
@@ -189,7 +188,7 @@ def target_choices(surface: Surface) -> list[dict[str, Any]]:
         owner = NAMED.get(quantity, "wall" if quantity == "lean" else "patch")
         if names[owner] and quantity != "height":
             of = names[owner] if quantity in NAMED else ["", *names[owner]]
-            choices.append({"quantity": quantity, "of": of})
+            choices.append({"quantity": quantity, "of": of, "dimension": dimension_of(quantity)})
     return choices
 
 
@@ -201,17 +200,11 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
     }
 
 
-def findings(surface: Surface, certificate: Certificate) -> dict[str, Any]:
-    """Numbers of the surface and its certificate, for the page's table."""
-    height = surface.plane.height(surface.vertices)
-    roof = surface.roof
-    return {
-        **certificate.numbers(),
-        "height": float(height.max()),
-        "area": float(patch_areas(surface)[roof].sum()),
-        "mirrored": list(certificate.symmetric_in),
-        "rooms": certificate.rooms.to_dict(orient="records"),
-    }
+def findings(certificate: Certificate) -> dict[str, Any]:
+    """Numbers and tables of a certificate, for the page."""
+    tables = {"rooms": certificate.rooms, "supports": certificate.supports, "balance": certificate.balance}
+    records = {name: table.to_dict(orient="records") for name, table in tables.items()}
+    return {**certificate.numbers(), "mirrored": list(certificate.symmetric_in), **records}
 
 
 def mesh_findings(check: MeshCheck, units: Units = NO_UNITS) -> dict[str, Any]:

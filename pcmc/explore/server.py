@@ -51,7 +51,7 @@ from .page_data import (
 from .requests import RequestError
 from .roof import Roof, signature
 from .session import Session, State, solved_start
-from .variants import measures
+from .variants import figures_data
 from .watching import Watch
 
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
@@ -362,8 +362,8 @@ class _Handler(BaseHTTPRequestHandler):
                 "values": {"asked": values_of(state.wanted), "shown": values_of(state.surface)},
                 "verdict": _verdict(state.failure or state.certificate),
                 "at_rest": state.failure is None,
-                "findings": findings(state.surface, state.certificate),
-                "measures": measures(state.surface, state.certificate),
+                "findings": findings(state.certificate),
+                "figures": figures_data(state.surface, state.certificate),
                 "undo": state.undo,
                 "redo": state.redo,
                 "message": state.message,

@@ -1,7 +1,7 @@
 // The page: it sends one request at a time to the server and shows the answers.
 
 import {
-  arrowsOf, COLOURS, fieldOf, showCheck, showFindings, showLegend, showPatches, showVerdict,
+  arrowsOf, COLOURS, fieldOf, showCheck, showFindings, showLegend, showParts, showSupports, showVerdict,
 } from "./findings.js";
 import { digits, Panel } from "./panel.js";
 import { addSaving } from "./saving.js";
@@ -49,9 +49,9 @@ class Page {
     find("#units").textContent = this.units.given
       ? `Tension in ${this.units.tension}, pressure in ${this.units.pressure}.`
       : "Any consistent units. With metres and kilonewtons: tension kN/m, pressure kN/m², curvature 1/m.";
-    if (header.whole) {
-      find("#units").textContent += " The surface is a piece between mirror planes: the picture shows the whole, the numbers are those of the piece.";
-    }
+    const piece = { 1: "", 2: "the half", 4: "the quarter" }[header.whole] ?? "the piece";
+    find("#piece").hidden = !piece;
+    find("#piece").textContent = `All numbers are of ${piece} between the mirror planes; the picture shows the whole.`;
     this.underPressure = new Uint8Array(header.vertices);
     arrays.sheet_patch.forEach((p, i) => {
       if (!header.patches[p].wall) this.underPressure[arrays.sheet_vertex[i]] = 1;
@@ -192,8 +192,9 @@ class Page {
     this.header = header;
     this.arrays = { ...arrays, underPressure: this.underPressure };
     showVerdict(find("#verdict"), header);
-    showFindings(find("#findings tbody"), header.findings, this.units);
-    showPatches(find("#by-patch"), header.measures, this.units);
+    showFindings(find("#findings tbody"), header.findings, header.figures, this.units);
+    showParts(find("#parts"), header.figures, this.units);
+    showSupports(find("#supports"), header.findings, this.units);
     this.variants.show(header, this.units);
     find("#check-result").hidden = true; // it was about the last surface
     find("#check").disabled = !header.at_rest;

@@ -3,11 +3,7 @@
 import { button, capital, element, input, select } from "./elements.js";
 import { digits } from "./panel.js";
 
-const UNITS = {
-  apex: "length", area: "area", volume: "volume", reaction: "tension", height: "length", curvature: "curvature",
-  pressure: "pressure", lean: "angle", sag: "length", length: "length", force: "force",
-};
-const WORDS = { reaction: "Largest reaction", pressure: "Pressure of a room", length: "Length of a cable", force: "Force in a cable" };
+const WORDS = { "reaction per length": "Largest reaction", pressure: "Pressure of a room", length: "Length of a cable", force: "Force in a cable" };
 const LIMITS = [["value", "="], ["at_most", "at most"], ["at_least", "at least"]];
 
 export class Targets {
@@ -75,12 +71,12 @@ export class Targets {
       row.remove();
     }, "Remove this target");
     const choose = () => {
-      const { of: names } = this.choices.find((one) => one.quantity === quantity.value) ?? { of: [] };
+      const { of: names, dimension } = this.choices.find((one) => one.quantity === quantity.value)
+        ?? { of: [], dimension: "length" };
       const before = of.value;
       of.replaceChildren(...names.map((name) => new Option(name || "all", `=${name}`)));
       if (names.includes(before.slice(1))) of.value = before;
-      const kind = UNITS[point ? "height" : quantity.value];
-      unit.textContent = this.units.given ? this.units[kind] ?? "" : "";
+      unit.textContent = this.units.given ? this.units[dimension] ?? "" : "";
     };
     if (!point) {
       quantity.value = target.quantity;
