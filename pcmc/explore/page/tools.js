@@ -107,7 +107,7 @@ export class Tools {
     const normal = this.axes[Number(axis)];
     const across = viewer.camera.corners().map((corner) => dot(normal, corner));
     const [low, high] = [Math.min(...across), Math.max(...across)];
-    const offset = low + (high - low) * (place.value / STEPS);
+    const offset = low + (high - low) * (place.value / STEPS + 1e-4); // beside a wall in the middle
     const shown = this.local(normal.map((x) => offset * x))[Number(axis)];
     place.setAttribute("aria-valuetext", `${digits(shown)}${this.unit}`);
     place.title = `${"xyz"[Number(axis)]} = ${digits(shown)}${this.unit}`;
