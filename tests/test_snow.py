@@ -222,6 +222,7 @@ def test_the_search_raises_what_is_net_of_the_snow(tension, word):
         assert found.surface.patches == snowy.patches
     else:
         assert found.fold.value == other.fold.value == pytest.approx(0.8, rel=0.1)
+        assert "the net pressure is 1.2" in str(pcmc.solve(snowy).proofs[0])
 
 
 def test_a_branch_in_the_snow_keeps_the_wall_between_the_rooms():

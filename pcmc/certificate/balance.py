@@ -111,6 +111,11 @@ def load_is_given(surface: Surface) -> bool:
     return not (surface.rooms or surface.weights.any() or free.any())
 
 
+def load_name(surface: Surface) -> str:
+    """What sentences call the load: "pressure", or "net pressure" where snow is taken off."""
+    return "net pressure" if surface.snows.any() else "pressure"
+
+
 def load(surface: Surface) -> float:
     """Σ (p - s) A_T ν_T · n - Σ w A_T: the force of pressure, snow and weight along Π's normal n."""
     vector = area_vectors(surface.vertices[surface.faces])

@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..certificate.balance import coarseness, load_is_given, load_ratio
+from ..certificate.balance import coarseness, load_is_given, load_name, load_ratio
 from ..certificate.proof import Overload
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
@@ -218,7 +218,7 @@ class Search:
         """
         surface = self.with_unknowns(start, x)
         if load_is_given(surface) and load_ratio(surface) > 1.0 + coarseness(surface):
-            self.failed = Overload(load_ratio(surface))
+            self.failed = Overload(load_ratio(surface), load_name(surface))
             self.record(x, OVERLOADED)
             return None
         result = solve(surface, "newton", **{**quality, **self.options})
