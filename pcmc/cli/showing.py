@@ -71,7 +71,7 @@ def convert(
     roof = _shown(file, loads, whole, start=start, use_cache=cache, units=units)
     if roof is None:
         return NOT_CERTIFIED
-    projects.write_all(projects.surface_files(roof, [output], colour), losses=roof.result is None)
+    projects.write_all(projects.surface_files(roof, [output], colour))
     print(f"written: {output}")
     return OK
 

@@ -13,8 +13,7 @@ from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
-from ..certificate.reactions import reactions, reactions_per_length
-from ..contact.pinching import standing_part
+from ..certificate.reactions import support_forces
 from ..design import Parameter, Target
 from ..design.quantities import MEASURES
 from ..design.targets import NAMED
@@ -136,12 +135,13 @@ def fields(state: State, origin: Floats) -> Arrays:
     """Vertices relative to the origin, and the values that colours may show."""
     surface, certificate, whole = state.surface, state.certificate, whole_of(state.surface)
     drawn = surface if whole is None else whole.surface
-    forces = certificate.reactions if whole is None else reactions(standing_part(drawn).surface)
+    acting = support_forces(drawn, certificate.reactions if whole is None else None)
     arrays: Arrays = {
         "vertices": drawn.vertices - origin,
         "curvature": mean_curvature(drawn, "variational"),
         "error": curvature_error(drawn, "cotangent"),
-        "reactions": reactions_per_length(drawn, forces),
+        "reactions": acting.per_length,
+        "points": acting.points,
     }
     if len(certificate.modes) and whole is None:
         arrays["mode"] = certificate.modes[0] / (np.abs(certificate.modes[0]).max() or 1.0)
