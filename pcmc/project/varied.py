@@ -117,11 +117,12 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
 def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
     """Refuse every name and value that ``varied`` refuses; the file is read once.
 
-    The plan is meshed once for the names of patches, cables and rooms, and not at all without them.
+    A plan is meshed once for the names of patches, cables and rooms, and not at all without them.
     """
     source = _source(path)
-    project, surface = _project(source, {}), None
-    sought = _sought(project)
+    project = _project(source, {})
+    start = start_of(project) if project.mesh is not None else None
+    sought = _sought(project if start is None else start.project)
     for name, given in values.items():
         if name in sought:
             text = f"{path}: {name}: the {sought[name]} is found by the search for the targets, so the roof"
@@ -132,8 +133,8 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
                 text = f"{path}: {name} must be a finite number, found {value!r}"
                 raise OptionError(text, what=name, found=value)
             if source.is_load(name):
-                surface = start_of(project).surface if surface is None else surface
-                _retensioned(source, surface, {name: value})
+                start = start or start_of(project)
+                _retensioned(source, start.surface, {name: value})
             else:
                 _project(source, {name: value})
 
@@ -145,9 +146,10 @@ def _sought(project: Project) -> dict[str, str]:
         for one in parameter.names:
             bare = one.removeprefix(CABLE) if parameter.kind == "cable" else one
             kind = "tension" if parameter.kind == "cable" else parameter.kind
-            names = [f"{bare}.{kind}", f"{CABLE}{bare}.{kind}", f"plan.patches.{bare}.{kind}"]
-            if project.plan is not None and not project.plan.patches:
-                names.append(f"plan.{kind}")
+            table = "mesh" if project.plan is None else "plan"
+            names = [f"{bare}.{kind}", f"{CABLE}{bare}.{kind}", f"{table}.patches.{bare}.{kind}"]
+            if project.plan is None or not project.plan.patches:
+                names.append(f"{table}.{kind}")
             sought |= dict.fromkeys(names, parameter.label)
     return sought
 
