@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..base import validate
 from ..base.arrays import Floats
@@ -20,18 +20,10 @@ from .layers import Layer, layer_of, left_out, listed, understood
 from .paths import JoinedPath, join_strokes
 from .pieces import Piece
 from .strokes import Stroke, Strokes, read_strokes
+from .texts import Label, heights_of, labels_of, point_text
 
 GAP = 1e-3  # of the diagonal of the outline: gaps up to this are closed
 FLAT = 1e-9  # of that diagonal: heights nearer to each other than this are one
-
-
-@dataclass(frozen=True)
-class Label:
-    """The name of a part of the plan, a point (x, y) inside it, and its tension, if the drawing has one."""
-
-    name: str
-    point: tuple[float, float]
-    tension: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +154,8 @@ class _Sorted:
         supports = self._supports()
         masts = self._masts(holes)
         dividers = self._dividers([outline, *holes.values()])
-        heights, labels = self._heights(), self._labels()
+        heights = heights_of(self.strokes_of("height"), self.content.unit, self.units)
+        labels = labels_of(self.layers_of("patch"))
         self._note_rest()
         width = float(np.ptp(outline.at(outline.dense), axis=0)[:2].max())
         if note := size_note(width, self.units, self.content.unit):
@@ -214,14 +207,16 @@ class _Sorted:
         open_paths = [path for path in paths if not path.curve.closed]
         if open_paths and len(open_paths) < len(paths):
             stray = open_paths[0]
-            ends = f"from {_text(stray.ends[0])} to {_text(stray.ends[1])}"
+            ends = f"from {point_text(stray.ends[0])} to {point_text(stray.ends[1])}"
             text = f"{where}: {listed(stray.labels)} {ends} is no part of the closed curve there; delete it,"
             text += " or put it on the layer of what it is"
             raise PlanError(text, what=where, where=_plain(stray.ends[0]))
         for path in open_paths:
             for end, count in zip(path.ends, path.strokes_at_ends, strict=True):
                 if count > 2:
-                    text = f"{where}: {count} curves meet at {_text(end)} ({listed(path.labels)}); a closed"
+                    text = (
+                        f"{where}: {count} curves meet at {point_text(end)} ({listed(path.labels)}); a closed"
+                    )
                     raise PlanError(f"{text} edge has two at each point", what=where, where=_plain(end))
         if open_paths:
             raise self._gap_error(where, open_paths)
@@ -230,11 +225,13 @@ class _Sorted:
     def _gap_error(self, where: str, paths: Sequence[JoinedPath]) -> PlanError:
         """The error for an open loop: the smallest gap between two of its ends."""
         ends = [(path, k, point) for path in paths for k, point in enumerate(path.ends)]
-        pairs = [(a, b) for i, a in enumerate(ends) for b in ends[i + 1 :]]
-        one, two = min(pairs, key=lambda pair: float(np.linalg.norm(pair[0][2] - pair[1][2])))
-        gap = float(np.linalg.norm(one[2] - two[2]))
+        points = np.array([point for *_, point in ends])
+        apart, nearest = cKDTree(points).query(points, k=[2])
+        first = int(np.argmin(apart))
+        one, two = (ends[k] for k in sorted((first, int(nearest[first, 0]))))
+        gap = float(apart[first, 0])
         first, second = (end[0].labels[-1 if end[1] else 0] for end in (one, two))
-        between = f"between {first} at {_text(one[2])} and {second} at {_text(two[2])}"
+        between = f"between {first} at {point_text(one[2])} and {second} at {point_text(two[2])}"
         allow = f"draw what is missing, or close it with gap = {_upwards(gap):g}"
         text = f"{where} is not closed: a gap of {gap:.3g} {between}; {allow}"
         return PlanError(text, what=where, where=(_plain(one[2]), _plain(two[2])), found=gap)
@@ -244,7 +241,7 @@ class _Sorted:
         strokes = [stroke for _, of_layer in layers for stroke in of_layer if stroke.curve is not None]
         paths = self._closed(layers[0][0], strokes)
         if len(paths) > 1:
-            ends = ", ".join(f"{listed(path.labels)} at {_text(path.ends[0])}" for path in paths[:3])
+            ends = ", ".join(f"{listed(path.labels)} at {point_text(path.ends[0])}" for path in paths[:3])
             text = (
                 f"layer {strokes[0].layer!r} has {len(paths)} closed curves ({ends}); a roof has one outline"
             )
@@ -300,7 +297,7 @@ class _Sorted:
                 foot, top = sorted(path.ends, key=lambda point: float(point[2]))
                 if np.linalg.norm((top - foot)[:2]) > self.gap:
                     where = f"layer {strokes[0].layer!r}"
-                    text = f"{where}: {listed(path.labels)} from {_text(foot)} to {_text(top)} is neither"
+                    text = f"{where}: {listed(path.labels)} from {point_text(foot)} to {point_text(top)} is neither"
                     text += (
                         " vertical nor a closed ring; draw a mast as a vertical line, or its top as a point"
                     )
@@ -313,44 +310,6 @@ class _Sorted:
             )
             self.notes.append(f"layer 'mast': {text}")
         return tops
-
-    def _heights(self) -> Floats:
-        """Points of layers "height"; a text that is a number gives the height where it stands."""
-        points = []
-        for stroke in self.strokes_of("height"):
-            if stroke.point is None:
-                continue
-            x, y, z = stroke.point.tolist()
-            if stroke.text:
-                number = re.search(r"[-+]?\d+(?:[.,]\d+)?", stroke.text)
-                if number is None:
-                    where = f"layer {stroke.layer!r}"
-                    text = f"{where}, {stroke.label} at {_text(stroke.point)}: {stroke.text!r} has no number"
-                    raise PlanError(f"{text}; write the height, such as 4.5", what=where, found=stroke.text)
-                z = float(number[0].replace(",", "."))
-            points.append([x, y, z])
-        return np.array(points, dtype=float).reshape(-1, 3)
-
-    def _labels(self) -> list[Label]:
-        """The names of parts: of the layer, or texts such as "nave" and "nave = 4"."""
-        labels = []
-        for layer, strokes in self.layers_of("patch"):
-            for stroke in strokes:
-                if stroke.point is None:
-                    continue
-                text = stroke.text or layer.name
-                match = re.fullmatch(r"(.*?)\s*=\s*(\d+(?:\.\d+)?)", text)
-                name, tension = (match[1], float(match[2])) if match else (text, None)
-                if layer.name and match and not name:
-                    name = layer.name
-                if not name:
-                    where = f"layer {stroke.layer!r}"
-                    problem = f"{where}, {stroke.label} at {_text(stroke.point)}: this patch has no name"
-                    raise PlanError(
-                        f"{problem}; write it as a text, or name the layer 'patch NAME'", what=where
-                    )
-                labels.append(Label(name, (float(stroke.point[0]), float(stroke.point[1])), tension))
-        return labels
 
     def _note_rest(self) -> None:
         """Note layers that mean nothing here, entities of other kinds, and hidden ones."""
@@ -388,12 +347,6 @@ def _projected(curve: Curve) -> Curve:
 def _plain(point: Floats) -> tuple[float, ...]:
     """A point as plain numbers."""
     return tuple(point.tolist())
-
-
-def _text(point: Floats) -> str:
-    """A point, for messages; its height where that is not 0."""
-    shown = point if point[2] else point[:2]
-    return f"({', '.join(f'{value:.6g}' for value in shown)})"
 
 
 def _upwards(length: float) -> float:

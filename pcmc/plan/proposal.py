@@ -14,9 +14,10 @@ from ..base.errors import OptionError, PlanError, unknown
 from ..surface.wall_tensions import balanced_wall
 from .corners import most_in_corners
 from .curves import Curve
-from .drawing import Drawing, Label
+from .drawing import Drawing
 from .lines import Kind, Line
 from .parts import Area, Divider, Hole, PlanData, check_keys
+from .texts import Label
 
 TRIANGLES = 1500  # of a first roof, about
 FINEST = 6000  # triangles at most, where a part is small
