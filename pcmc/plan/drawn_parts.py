@@ -17,6 +17,7 @@ from .curves import Curve, polyline
 from .layers import Layer, layer_of, left_out, listed, understood
 from .parts import hole_label
 from .paths import JoinedPath, join_strokes
+from .pieces import two_digits
 from .strokes import Stroke, Strokes
 from .texts import point_text
 
@@ -124,7 +125,7 @@ class DrawnParts:
         gap = float(apart[first, 0])
         first, second = (end[0].labels[-1 if end[1] else 0] for end in (one, two))
         between = f"between {first} at {point_text(one[2])} and {second} at {point_text(two[2])}"
-        allow = f"draw what is missing, or close it with gap = {_upwards(gap):g}"
+        allow = f"draw what is missing, or close it with gap = {two_digits(gap):g}"
         text = f"{where} is not closed: a gap of {gap:.3g} {between}; {allow}"
         return PlanError(text, what=where, where=(_plain(one[2]), _plain(two[2])), found=gap)
 
@@ -320,9 +321,3 @@ def _names(layer: Layer, role: str, count: int, taken: Mapping[str, object]) -> 
 def _plain(point: Floats) -> tuple[float, ...]:
     """A point as plain numbers."""
     return tuple(point.tolist())
-
-
-def _upwards(length: float) -> float:
-    """The length rounded up to two digits."""
-    step = 10.0 ** (math.floor(math.log10(length)) - 1)
-    return math.ceil(length / step + 1e-9) * step

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -147,3 +148,13 @@ def _first_step(control: Floats) -> Floats:
     steps = control[1:] - control[0]
     moved = np.flatnonzero((steps != 0.0).any(axis=1))
     return steps[moved[0]] if len(moved) else steps[0]
+
+
+def two_digits(value: float, rounded: Callable[[float], int] = math.ceil) -> float:
+    """A number > 0 rounded up to two digits, or down with ``math.floor``.
+
+    >>> two_digits(0.3001), two_digits(0.3001, math.floor)
+    (0.31, 0.3)
+    """
+    step = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return float(f"{rounded(value / step + (1e-9 if rounded is math.ceil else 0.0)) * step:.2g}")
