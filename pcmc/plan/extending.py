@@ -53,11 +53,9 @@ def extended(
         for name, both in zip(names, steps.reshape(-1, 2, 2), strict=True):
             result[name] = _with_ends(curves[name], np.pad(both, ((0, 0), (0, 1))))
     lengths = np.linalg.norm(steps, axis=1)
-    moved, most = np.count_nonzero(lengths), lengths.max()
-    return (
-        result,
-        f"{moved} ends of {what} moved by up to {most:.3g} to the lines that they meet" if moved else "",
-    )
+    moved = np.count_nonzero(lengths)
+    note = f"{moved} end{'s' if moved > 1 else ''} of {what} moved by up to {lengths.max():.3g} to the lines"
+    return result, f"{note} that they meet" if moved else ""
 
 
 def _extent(curve: Curve) -> bool:
