@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from pcmc import Patch, Plane, Surface
+from pcmc import Cable, Circle, Line, Patch, Plane, Surface
+from pcmc.surface import Room
 
 
 def tent(names=("west side", "east", "wall"), pressures=(1.0, 0.5, 0.5), tilted=True) -> Surface:
@@ -35,4 +36,31 @@ def tent(names=("west side", "east", "wall"), pressures=(1.0, 0.5, 0.5), tilted=
         fixed=[0, 1, 6, 7, 8, 9],
         on_plane=[4, 5],
         plane=plane,
+    )
+
+
+def everything(names=("west", "east"), more=("ridge", "hall", "mirror 1")) -> Surface:
+    """Half a roof with all that a surface may have besides walls, and names for its patches and other parts.
+
+    West carries weight, east snow; a cable runs between them, and a room is below both. The left edge is
+    fixed; the right one slides on a mirror plane, the lower one along a line, the upper one along a circle.
+    """
+    x, y = (part.ravel() for part in np.meshgrid(np.arange(7.0), np.arange(5.0), indexing="ij"))
+    X = np.column_stack([x, 0.25 * y * np.sqrt(25.0 - (x - 3.0) ** 2), 0.1 * x * y * (4.0 - y)])
+    a = (5 * np.arange(6)[:, None] + np.arange(4)).ravel()
+    F = np.concatenate([np.stack([a, a + 5, a + 6], axis=1), np.stack([a, a + 6, a + 1], axis=1)])
+    inner = (x > 0.0) & (x < 6.0)
+    ridge = np.flatnonzero(x == 3.0)
+    line, arc = Line((0, 0, 0), (1, 0, 0)), Circle((3, 0, 0), (0, 0, 1), 5)
+    return Surface(
+        X,
+        F,
+        (np.tile(a, 2) >= 15).astype(int),
+        [Patch(names[0], 3.0, weight=0.02), Patch(names[1], 2.5, 1.1, snow=0.125)],
+        fixed=(x == 0.0) | ((x == 6.0) & (y == 4.0)),
+        on_plane=(x == 6.0) & (y == 0.0),
+        on_line={line: inner & (y == 0.0), arc: inner & (y == 4.0)},
+        on_planes={Plane((6, 0, 0), (1, 0, 0), more[2], mirror=True): x == 6.0},
+        cables=[Cable.along(more[0], 0.5, ridge)],
+        rooms=[Room(more[1], dict.fromkeys(names, 1), 7.0)],
     )

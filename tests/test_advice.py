@@ -145,14 +145,14 @@ def test_targets_met_on_the_first_mesh_are_told_with_their_tensions(tmp_path):
 
 
 def test_a_finer_mesh_that_is_not_at_rest_says_what_it_reaches(tmp_path, monkeypatch):
-    from pcmc.project import running
+    from pcmc.project import solving
 
     def again(project, surface, report):
-        return running._solve_or_meet(
+        return solving._solve_or_meet(
             replace(project, targets=(), options={"iterations": 1, "levels": 0}), surface, report
         )
 
-    monkeypatch.setattr(running, "_again", again)
+    monkeypatch.setattr(solving, "_again", again)
     outcome = outcome_of(tmp_path, REMESHED)
     assert not outcome.good
     (note,) = outcome.notes

@@ -86,7 +86,7 @@ def test_supports_on_lines_are_no_point_masts():
 def test_for_a_drawing_the_ring_is_drawn(tmp_path, monkeypatch):
     file = drawing(tmp_path, ("line", "mast", (4, 3, 0), (4, 3, 2.5)))
     loaded = project.load(file)
-    monkeypatch.setattr("pcmc.project.running.solve", stalled)
+    monkeypatch.setattr("pcmc.project.solving.solve", stalled)
     heading, *lines = project.run_project(loaded, use_cache=False).advice
     assert heading.endswith("draw in hall.dxf, which was tried and comes to rest:")
     radius, x, y, z = map(

@@ -1,7 +1,6 @@
 """Cables: energy and derivatives, motion space, closed forms, balance, meshes and files that carry them."""
 
 import dataclasses
-import warnings
 from itertools import pairwise
 
 import numpy as np
@@ -16,7 +15,7 @@ import pcmc
 from generators import hypar_roof, hypar_roof_edge
 from generators.grid import grid_faces
 from pcmc import Cable, Direction, Parameter, Patch, Plane, Surface, Target, Verdict, solve
-from pcmc.base.errors import LostWarning, OptionError, SurfaceError
+from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate.balance import load_ratio, unbalanced
 from pcmc.design.targets import measure
 from pcmc.energy.functional import energy_and_gradient, energy_at, hessian
@@ -314,14 +313,6 @@ def test_dumps_of_the_reference_program_are_read(tmp_path):
     again = pcmc.read(tmp_path / "net.dmp")
     assert [c.tension for c in again.cables] == [2.0, 1.0, 0.5]
     assert again.weights.tolist() == [0.7, -0.3]
-
-
-def test_other_formats_say_that_they_lose_cables(tmp_path):
-    with pytest.warns(LostWarning, match="cables"):
-        pcmc.write(tmp_path / "net.obj", net())
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        assert pcmc.read(tmp_path / "net.obj").weights.tolist() == [0.7, -0.3]
 
 
 def test_the_certificate_of_cables_is_written(tmp_path, roof):

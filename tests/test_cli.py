@@ -18,7 +18,7 @@ from generators import two_squares
 from pcmc import cli
 from pcmc.base.units import NO_UNITS
 from pcmc.io import load
-from pcmc.project import running
+from pcmc.project import solving
 
 COMMANDS = [
     "solve",
@@ -134,9 +134,9 @@ def test_convert_and_plot(solved, capsys):
 def test_tensions_that_cannot_balance_are_told_before_solving(folder, capsys, monkeypatch):
     pcmc.write("two.pcmc", two_squares(4, alpha_aux=1.0))
     said = []
-    solve_project = running.solve_project
+    solve_project = solving.solve_project
     monkeypatch.setattr(
-        running, "solve_project", lambda *given: said.append(capsys.readouterr().err) or solve_project(*given)
+        solving, "solve_project", lambda *given: said.append(capsys.readouterr().err) or solve_project(*given)
     )
     assert cli.main(["solve", "two.pcmc", "--tension", "left=4"]) == 1
     assert "note: the tensions at the junction left | right | wall cannot balance: 4 > " in said[0]
@@ -259,7 +259,7 @@ def test_an_error_of_the_system_names_the_file(folder, monkeypatch, capsys):
     def broken(*_, **__):
         raise OSError(28, "No space left on device", "roof.pcmc")
 
-    monkeypatch.setattr("pcmc.project.running.solve", broken)
+    monkeypatch.setattr("pcmc.project.solving.solve", broken)
     assert cli.main(["solve", "roof.toml"]) == 2
     assert capsys.readouterr().err == "pcmc: error: roof.pcmc: No space left on device\n"
 
@@ -307,6 +307,6 @@ def test_a_mistake_of_our_own_is_not_hidden(folder, monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError
 
-    monkeypatch.setattr("pcmc.project.running.solve", broken)
+    monkeypatch.setattr("pcmc.project.solving.solve", broken)
     with pytest.raises(ZeroDivisionError):
         cli.main(["solve", "roof.toml"])

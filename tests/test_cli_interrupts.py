@@ -33,7 +33,7 @@ def test_interrupted_is_130(folder, monkeypatch, capsys):
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("pcmc.project.running.solve", stop)
+    monkeypatch.setattr("pcmc.project.solving.solve", stop)
     assert cli.main(["solve", "roof.toml"]) == 130
     assert capsys.readouterr().err.strip().endswith("pcmc: stopped")
     assert [p.name for p in folder.iterdir()] == ["roof.toml"]
@@ -103,7 +103,7 @@ def test_ctrl_c_while_solving_is_130_and_writes_nothing(folder, monkeypatch, cap
 
         return report
 
-    monkeypatch.setattr("pcmc.project.running.reporter", pressed)
+    monkeypatch.setattr("pcmc.project.solving.reporter", pressed)
     assert cli.main(command) == 130
     assert capsys.readouterr() == ("", "pcmc: stopped\n")
     assert [p.name for p in folder.iterdir()] == ["roof.toml"]

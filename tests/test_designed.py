@@ -15,10 +15,11 @@ from small_project import SMALL
 import pcmc
 from pcmc import cli, explore
 from pcmc.base.units import Units
-from pcmc.design.outcome import UNIT_OF
-from pcmc.design.quantities import QUANTITIES
+from pcmc.design.quantities import MEASURES
+from pcmc.design.targets import KINDS, SHORT
 from pcmc.explore.page_data import unit_texts
-from pcmc.project import build, cached_files, clear_cache, designed, load, run, running
+from pcmc.project import build, cached_files, clear_cache, designed, load, run, solving
+from pcmc.quantities import QUANTITIES, dimension_of
 
 GOAL = """
 [targets]
@@ -44,8 +45,8 @@ def folder(tmp_path, monkeypatch):
 def solves(monkeypatch):
     """The list that every project solved from its start is added to."""
     solved = []
-    solve = running.solve_project
-    monkeypatch.setattr(running, "solve_project", lambda *given: solved.append(given) or solve(*given))
+    solve = solving.solve_project
+    monkeypatch.setattr(solving, "solve_project", lambda *given: solved.append(given) or solve(*given))
     return solved
 
 
@@ -195,10 +196,11 @@ def test_targets_are_shown_in_their_units(folder, capsys):
 def test_every_quantity_of_a_target_has_a_unit():
     page = Path(explore.__file__).with_name("page") / "targets.js"
     kinds = dict(re.findall(r"(\w+): \"(\w+)\"", page.read_text(encoding="utf-8").partition("};")[0]))
-    assert kinds == {quantity: UNIT_OF.get(quantity, quantity) for quantity in QUANTITIES}
+    assert kinds == {quantity: dimension_of(SHORT.get(quantity, quantity)) for quantity in kinds}
     assert set(kinds.values()) <= set(unit_texts(Units("m", "kN")))
-    for quantity in {*QUANTITIES, "tension", "pressure"}:
-        assert getattr(Units("m", "kN"), UNIT_OF.get(quantity, quantity))
+    assert set(MEASURES) <= set(QUANTITIES)
+    for quantity in {*QUANTITIES, *KINDS}:
+        assert getattr(Units("m", "kN"), dimension_of(quantity))
 
 
 def test_the_start_shape_has_a_flag_of_its_own(folder, capsys):

@@ -1,15 +1,18 @@
 """What is written is read back, as far as the format goes, and nothing half-written stays."""
 
 import sys
+import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from refusals import refused
 from scipy.spatial import cKDTree
-from tents import tent
+from tents import everything, tent
 
 import pcmc
-from pcmc.base.errors import FileError, FileWarning, MissingExtra, OptionError, SurfaceError
+from pcmc.base.errors import FileError, FileWarning, LostWarning, MissingExtra, OptionError, SurfaceError
+from pcmc.base.units import Units
 from pcmc.io import FORMATS, load
 
 READ = [suffix for suffix, form in FORMATS.items() if form.reads]
@@ -57,6 +60,77 @@ def test_round_trip(tmp_path, suffix, names):
     np.testing.assert_array_equal(again.fixed[place], surface.fixed)
     np.testing.assert_array_equal(again.on_plane[place], surface.on_plane)
     assert pcmc.energy(again) == pytest.approx(pcmc.energy(surface), rel=tolerance or 1e-14)
+
+
+ODD = "\\ * {%41} solid /* #1 $x$ 'q' \" a::b // 屋根\\"
+NAMED = {
+    "plain": (("west", "east"), ("ridge", "hall", "mirror 1")),
+    "odd": ((ODD, "{a}"), (ODD, ODD, ODD)),
+    "special": (("world", "fixed"), ("PCMC-RIM", "VERTICES", "read")),
+    "case": (("East", "east"), ("EAST", "east", "East")),
+}
+
+
+@pytest.mark.parametrize("named", NAMED)
+@pytest.mark.parametrize("suffix", READ)
+def test_a_surface_read_back_equals_the_one_written(tmp_path, suffix, named):
+    """Forces, cables, rooms, guides, mirrors, units and names; or the format says what it loses."""
+    surface, path = everything(*NAMED[named]), tmp_path / f"a{suffix}"
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        if suffix in NAMES_ONLY and named == "odd":
+            with refused(FileError, what=str(path), where="patches", found=ODD):
+                pcmc.write(path, surface)
+            return
+        pcmc.write(path, surface, units=Units("m", "kN"))
+        again = pcmc.read(path)
+    lost = "".join(str(w.message) for w in caught if issubclass(w.category, LostWarning))
+    assert len(caught) == bool(lost)
+    place = matched(again.vertices, surface.vertices, surface.size * (1e-7 if suffix in SINGLE else 0.0))
+    assert {p.name for p in again.patches} == {p.name for p in surface.patches}
+    if suffix in NAMES_ONLY:
+        words = ("weights", "snow", "lines or circles", "cables", "rooms", "planes", "unit m", "supports")
+        assert all(word in lost for word in words)
+        return
+    assert ("its unit m" in lost) == (load(path).units == Units())
+    assert not lost or suffix in (".fe", ".dmp")
+    assert set(again.patches) == set(surface.patches)
+    assert [(c.name, c.tension) for c in again.cables] == [(c.name, c.tension) for c in surface.cables]
+    ends = np.sort(place[surface.cables[0].edges], axis=1)
+    assert {tuple(e) for e in again.cables[0].edges.tolist()} == {tuple(e) for e in ends.tolist()}
+    ((room, volume),) = ((dict(room.patches), room.volume) for room in again.rooms)
+    assert (room, volume, again.rooms[0].name) == (dict.fromkeys(NAMED[named][0], 1), 7.0, NAMED[named][1][1])
+    ((plane, mask),) = again.on_planes
+    assert (plane.name, plane.mirror) == (NAMED[named][1][2], True)
+    np.testing.assert_array_equal(mask[place], surface.on_planes[0][1])
+    if "lines" not in lost:
+        for (guide, along), (same, before) in zip(again.on_line, surface.on_line, strict=True):
+            assert guide == same
+            np.testing.assert_array_equal(along[place], before)
+        for given, before in zip(
+            *(x.given_supports.fixed_and_sliding() for x in (again, surface)), strict=True
+        ):
+            np.testing.assert_array_equal(given[place], before)
+    assert pcmc.energy(again) == pytest.approx(pcmc.energy(surface), rel=1e-6 if suffix in SINGLE else 1e-13)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".3dm", ".ifc"])
+def test_parts_that_no_longer_fit_their_mesh_are_left_out_with_a_note(tmp_path, suffix, monkeypatch):
+    """As where another program moved the roof, but not what pcmc wrote about it."""
+    surface, path = everything(), tmp_path / f"a{suffix}"
+    pcmc.write(path, surface)
+    reader = FORMATS[suffix].functions.read
+
+    def moved(path):
+        data = reader(path)
+        return replace(data, vertices=data.vertices + np.array([0.0, 0.0, 0.1]))
+
+    monkeypatch.setattr(FORMATS[suffix].functions, "read", moved)
+    wrong = "cable 'ridge' was left out, what slides along a line is fixed, what slides on a plane is fixed"
+    with pytest.warns(FileWarning, match=wrong):
+        again = pcmc.read(path, plane=pcmc.Plane((0, 0, 0.1)))
+    assert not any((again.cables, again.on_line, again.on_planes))
+    assert again.held.sum() == surface.held.sum()
 
 
 @pytest.mark.parametrize("suffix", [s for s in FORMATS if s != ".3dm"])  # it has the time in it
@@ -201,6 +275,12 @@ def test_paths_that_cannot_be(tmp_path):
             pcmc.write(path, tent())
     with refused(FileError, what="scalars", where="h", found=(3,)):
         pcmc.write(tmp_path / "a.ply", tent(), scalars={"h": np.zeros(3)})
+    for wrong in ("abc", [1.0], 3):
+        with refused(OptionError, what="scalars", found=wrong):
+            pcmc.write(tmp_path / "a.ply", tent(), scalars=wrong)
+    for named in ({"h": "abc"}, {"a\nb": np.zeros(10)}, {3: np.zeros(10)}):
+        with refused(OptionError, what="scalars"):
+            pcmc.write(tmp_path / "a.ply", tent(), scalars=named)
     for suffix in (".ply", ".vtp"):
         with refused(FileError, where="support", found="support"):
             pcmc.write(tmp_path / f"a{suffix}", tent(), scalars={"support": np.zeros(10)})

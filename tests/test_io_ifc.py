@@ -184,7 +184,7 @@ def test_other_files_are_refused(tmp_path):
         ("IFCTEXT('22", "IFCTEXT('72"),
         ('"counts"', '"count"'),
         ("IFCTRIANGULATEDFACESET(", "IFCPOLYGONALFACESET("),
-        ("#29,(#45,", "#29,(#99999,"),
+        ("#30,(#46,", "#30,(#99999,"),
     ],
 )
 def test_damaged_files_are_refused_in_one_line(tmp_path, old, new):

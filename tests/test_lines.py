@@ -13,7 +13,7 @@ from test_linearise import slope
 import pcmc
 from generators import two_squares
 from pcmc import Line, Patch, Surface, certify, solve
-from pcmc.base.errors import LostWarning, OptionError, SurfaceError
+from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.energy.functional import apply_supports, energy_and_gradient, energy_at, hessian
 from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.meshing.local_refinement import refine_near
@@ -125,9 +125,11 @@ def test_finer_meshes_slide_too():
 
 def test_files_and_copies_keep_the_lines(tmp_path):
     surface = squares(4)
-    pcmc.write(tmp_path / "a.pcmc", surface)
+    for suffix in (".pcmc", ".obj"):
+        pcmc.write(tmp_path / f"a{suffix}", surface)
     for again in (
         pcmc.read(tmp_path / "a.pcmc"),
+        pcmc.read(tmp_path / "a.obj"),
         copy.deepcopy(surface),
         pickle.loads(pickle.dumps(surface)),
     ):
@@ -135,9 +137,6 @@ def test_files_and_copies_keep_the_lines(tmp_path):
             assert line == same
             np.testing.assert_array_equal(along, before)
             assert not along.flags.writeable
-    with pytest.warns(LostWarning, match="lines or circles that vertices slide along"):
-        pcmc.write(tmp_path / "a.obj", surface)
-    assert not pcmc.read(tmp_path / "a.obj").on_line
 
 
 def test_what_it_refuses():

@@ -11,7 +11,7 @@ from refusals import refused
 import pcmc
 from generators import schwarz_p, spherical_cap
 from pcmc import Patch, Plane, Surface
-from pcmc.base.errors import LostWarning, SurfaceError
+from pcmc.base.errors import SurfaceError
 from pcmc.certificate.balance import unheld
 from pcmc.energy.flat_pieces import flat_pieces
 from pcmc.energy.functional import (
@@ -269,7 +269,7 @@ def test_refining_and_remeshing_keep_the_planes():
         assert finer.fixed.sum() == 4
 
 
-@pytest.mark.parametrize("suffix", [".pcmc", ".fe"])
+@pytest.mark.parametrize("suffix", [".pcmc", ".fe", ".obj", ".ply"])
 def test_files_keep_the_planes(tmp_path, suffix):
     for surface in (corner_roof(), tube(3, 7), schwarz_p(2)):
         pcmc.write(tmp_path / f"a{suffix}", surface)
@@ -281,11 +281,6 @@ def test_files_keep_the_planes(tmp_path, suffix):
             np.testing.assert_array_equal(mask, same)
             assert (plane.name, plane.mirror) == (other.name, other.mirror)
             assert np.abs(plane.height(surface.vertices[mask])).max() < 1e-12
-
-
-def test_files_without_planes_say_so(tmp_path):
-    with pytest.warns(LostWarning, match="mirror planes"):
-        pcmc.write(tmp_path / "a.obj", corner_roof())
 
 
 def test_copies_keep_the_planes():

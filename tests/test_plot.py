@@ -11,7 +11,7 @@ from refusals import refused
 from tents import tent
 
 import pcmc
-from generators import two_squares
+from generators import double_bubble, two_squares
 from pcmc import plot
 from pcmc.base.errors import FileError, MissingExtra, OptionError
 from pcmc.explore.page_data import fields as page_fields
@@ -117,6 +117,17 @@ def test_legend_names_what_is_seen(monkeypatch):
         ([], []),
     ]
     assert shown[1][1] == {"fixed": FIXED_DOT, "sliding": SLIDING_DOT}
+
+
+def test_names_are_drawn_as_written_and_not_as_mathematics():
+    """Between two signs $ matplotlib reads mathematics: another name, or an error."""
+    pictures = []
+    for name in ("$x$", "$\\frac{$", "x"):
+        surface = tent(names=(name, "50 $", "a" * 100))
+        pictures.append(plot.draw(surface, legend=True, width=600))
+    assert pictures[0].shape != pictures[2].shape or (pictures[0] != pictures[2]).any()
+    roof, titles = two_squares(3), ["$x$", "$\\frac{$"]
+    assert plot.panel([roof, roof], titles=titles, width=600).any()
 
 
 def test_no_text_of_a_full_panel_lies_on_another(monkeypatch):
@@ -293,7 +304,7 @@ BAD = [
         {"what": "views", "found": 1, "expected": "2, one per surface"},
     ),
     (
-        lambda s: plot.reactions(pcmc.Surface(s.vertices, s.faces, s.patch_of_face, s.patches, fixed=[0])),
+        lambda s: plot.reactions(double_bubble()),
         {"what": "surface"},
     ),
     (lambda s: plot.vectors(s, np.zeros(10)), {"what": "field", "found": (10,)}),

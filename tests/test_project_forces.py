@@ -97,6 +97,20 @@ def test_a_bubble_room_by_its_volume_from_toml(folder, capsys):
     capsys.readouterr()
 
 
+def test_a_project_says_what_its_files_lose_once_each_and_not_what_nobody_asked_for(folder):
+    (folder / "lost.toml").write_text(
+        SAIL_TOML.replace('"sail.3dm"', '"sail.stl", "sail.obj"'), encoding="utf-8"
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run("lost.toml")
+    losses = sorted(str(w.message) for w in caught if issubclass(w.category, LostWarning))
+    assert losses == [
+        "sail.fe: a .fe file cannot carry its unit m; left out",
+        "sail.stl: a .stl file cannot carry cables, its unit m, supports, tensions, pressures; left out",
+    ]
+
+
 def test_half_of_a_roof_is_written_whole(folder, capsys):
     (folder / "half.toml").write_text(HALF_TOML, encoding="utf-8")
     outcome = run("half.toml")
@@ -153,11 +167,10 @@ def test_a_format_carries_the_forces_or_says_in_one_line_what_it_leaves_out(suff
     assert "\n" not in said
     words = {"cables": "cables", "rooms": "volumes of rooms", "on_planes": "mirror planes"}
     for field, word in words.items():
-        assert (word in said) != (
-            back is not None and len(getattr(back, field)) == len(getattr(surface, field))
-        )
-    if back is not None:
-        assert ("weights" in said) != (back.weights.tolist() == surface.weights.tolist())
+        assert (word in said) != (back is None or len(getattr(back, field)) == len(getattr(surface, field)))
+    if back is None:
+        return
+    assert ("weights" in said) != (back.weights.tolist() == surface.weights.tolist())
     if not losses:
         assert back.cables[0].tension == 0.5
         assert [room.volume for room in back.rooms] == [8.0, 8.0]

@@ -10,11 +10,12 @@ from volume_cases import cap, cap_height, raised
 import generators
 import pcmc
 from pcmc import cli, explore
-from pcmc.accuracy.quantities import UNIT_OF, given_volume
+from pcmc.accuracy.quantities import given_volume
 from pcmc.base.errors import OptionError
 from pcmc.base.units import Units, as_units
 from pcmc.explore.page_data import mesh_findings
 from pcmc.explore.session import Session, solved_start
+from pcmc.quantities import dimension_of
 from pcmc.report.tables import mesh_table, target_table
 
 METRES = Units("m", "kN")
@@ -73,7 +74,7 @@ def test_without_units_the_mesh_check_has_no_column_for_them(bubbles):
 
 def test_every_quantity_of_a_mesh_check_has_a_unit(bubbles):
     for quantity in bubbles.table.quantity:
-        assert METRES.behind(UNIT_OF.get(quantity, quantity)).strip()
+        assert METRES.behind(dimension_of(quantity)).strip()
 
 
 def test_a_missed_target_has_units(folder, capsys):

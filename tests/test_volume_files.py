@@ -7,7 +7,6 @@ from volume_cases import cap, cylinder, raised
 import generators
 import pcmc
 from pcmc import Line, Patch, Room, Surface
-from pcmc.base.errors import LostWarning
 from pcmc.energy.rooms import prescribed_volumes, room_pressures, room_volumes, with_room_pressures
 from pcmc.meshing.local_refinement import refine_faces
 from pcmc.meshing.refinement import refine
@@ -55,8 +54,6 @@ def test_files_carry_rooms(suffix, tmp_path):
     assert again.rooms == bubbles.rooms
     np.testing.assert_allclose(again.pressures, bubbles.pressures, atol=1e-14)
     assert again.walls.tolist() == bubbles.walls.tolist()
-    with pytest.warns(LostWarning, match="volumes of rooms"):
-        pcmc.write(tmp_path / "bubbles.obj", bubbles)
 
 
 @pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")

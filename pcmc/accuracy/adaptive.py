@@ -30,6 +30,7 @@ from ..meshing.curve_projection import onto_held_curves
 from ..meshing.refinement import Projection
 from ..meshing.remeshing import remesh
 from ..meshing.sizes import limit_growth, triangles_for
+from ..quantities import dimension_of
 from ..solvers import solve
 from ..solvers.result import Result, Status
 from ..surface import Surface
@@ -37,7 +38,6 @@ from ..surface.geometry import face_areas
 from .estimator import Goal, error_shares, evenness
 from .goals import Accuracy, accuracies, check_places, goals_in
 from .mesh_check import BOUNDARIES, MeshCheck, check_mesh, vertex_numbers, with_bar
-from .quantities import UNIT_OF
 
 TRIANGLES = 50_000  # of the mesh returned, by default at most
 ROUNDS = 12
@@ -114,7 +114,7 @@ class AccurateResult:
         """A sentence, and each quantity with its bar on this mesh and in the limit."""
         parts = ["; ".join(filter(None, (self.status.value, self.detail))) + f" ({self.surface.m} triangles)"]
         for row in self.values.to_dict("records"):
-            unit = units.behind(UNIT_OF.get(row["quantity"], row["quantity"]))
+            unit = units.behind(dimension_of(row["quantity"]))
             on_mesh = with_bar(row["value"], row["error"], unit)
             limit = with_bar(row["limit"], row["limit_error"], unit)
             wanted = f"wanted ± {row['accuracy']:g}{unit}"

@@ -19,12 +19,13 @@ from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
 from ..meshing.held_curves import curve_doubt, held_corners, smooth_midpoints
 from ..meshing.refinement import Projection, refine
+from ..quantities import dimension_of
 from ..solvers import solve
 from ..solvers.result import Callback, Result, Status
 from ..surface import Surface
 from .extrapolation import extrapolate
 from .persistence import MeshVerdict, compared, lost, shape_order
-from .quantities import UNIT_OF, Key, Reading, readings
+from .quantities import Key, Reading, readings
 
 MOST = 4_000_000  # triangles of the finest mesh, by default
 STEPS = 60  # of the solver on each finer mesh: it starts near
@@ -262,7 +263,7 @@ def _of(one: dict[Key, Reading], key: Key, name: str) -> float:
 
 def _text_table(table: pd.DataFrame, units: Units) -> str:
     """Lines with as many digits as the bars let stand."""
-    kinds = [UNIT_OF.get(quantity, quantity) for quantity in table.quantity]
+    kinds = list(map(dimension_of, table.quantity))
     lines = pd.DataFrame(
         {
             "quantity": table.quantity,

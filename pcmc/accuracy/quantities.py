@@ -9,13 +9,9 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..certificate import Certificate
-from ..certificate.curve_tables import boundary_table, held_curves
+from ..certificate.supports import held_curves
 from ..energy.rooms import closing_volumes, prescribed_volumes, room_pressures
 from ..surface import Surface
-
-UNIT_OF = {"height": "length", "reaction": "force", "thrust": "force", "reaction per length": "tension"}
-UNIT_OF |= {"lowest eigenvalue": "eigenvalue"}
-"""The unit of quantities, as a name of ``Units``; others are named as their units."""
 
 ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open
 RESIDUALS = 10.0  # that a quantity may change with the forces left, relative
@@ -115,11 +111,8 @@ def _boundaries(
 
     Of several curves of one name, each is named with its place.
     """
-    table = boundary_table(surface, certificate.reactions)
-    if not len(table):
-        return
     curves = held_curves(surface)
-    table = table.iloc[: len(curves)]  # without the pulls across mirror planes
+    table = certificate.boundaries.iloc[: len(curves)]  # the first of the supports
     names = table["boundary"].astype(str).tolist()
     middles = table[["middle_x", "middle_y", "middle_z"]].to_numpy()
     pulls = table[["reaction_x", "reaction_y", "reaction_z"]].to_numpy()

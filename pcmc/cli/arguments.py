@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,12 +13,12 @@ import typer
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError, OptionError, unknown
-from ..base.units import Units
+from ..base.units import LENGTHS
 from ..energy.rooms import refuse_varied_pressure
-from ..io import FORMATS, READ_ONLY, read_bare
-from ..io.mesh_data import MeshData
+from ..io import FORMATS, READ_ONLY
+from ..project import Outcome, Project
 from ..project.output import OnStep
-from ..surface import Surface, mirrored
+from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 
 TOML, DXF = ".toml", ".dxf"
@@ -57,13 +57,17 @@ CACHE = "Keep a project's roof and take it from there the next time; --no-cache 
 Cache = Annotated[bool, typer.Option("--cache/--no-cache", help=CACHE)]
 WHOLE = "Unfold a surface at its mirror planes: the whole roof instead of its piece."
 Whole = Annotated[bool, typer.Option("--whole", help=WHOLE)]
+UNITS = (
+    f"Unit of the lengths: {', '.join(LENGTHS)}. A file in another one is converted; by default the file's."
+)
+FileUnits = Annotated[str, option("NAME", UNITS, "--units")]
 MANY_FILES = option("FILE", "File to write; may be repeated.", "-o", "--output")
 
 
 def number(text: str | float) -> float:
     """The number in an option. The error shows the text, which typer's own parser does not."""
     try:
-        return float(text)
+        return validate.parsed(str(text))
     except ValueError:
         raise typer.BadParameter(f"expected a number, found {text!r}") from None
 
@@ -71,6 +75,7 @@ def number(text: str | float) -> float:
 def integer(text: str | int) -> int:
     """The whole number in an option; see ``number``."""
     try:
+        validate.parsed(str(text))  # which refuses 1_000
         return int(text)
     except ValueError:
         raise typer.BadParameter(f"expected a whole number, found {text!r}") from None
@@ -108,78 +113,30 @@ class Loads:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Given:
-    """The surface that a command is given.
-
-    Attributes
-    ----------
-    surface : the surface in a file, the designed roof of a project, or its start shape.
-    units : of its numbers.
-    outcome : how the roof of a project was reached; None for a file and for a start shape.
-    data : everything in a file; None for a project, and where its tensions or other loads are changed.
-    project : None for a file.
-    """
-
-    surface: Surface
-    units: Units
-    outcome: projects.Outcome | None = None
-    data: MeshData | None = None
-    project: projects.Project | None = None
-
-    @property
-    def missed(self) -> bool:
-        """Whether the roof of a project is certified, but misses a target or its accuracy."""
-        return self.outcome is not None and self.outcome.certificate.certified and not self.outcome.good
-
-    @property
-    def documents(self) -> projects.Documents:
-        """What the project says about its documents."""
-        return projects.Documents() if self.project is None else self.project.documents
+def load(file: Path, units: str = "") -> Project:
+    """The project in a file, which may be a mesh or a drawing alone."""
+    check_input(file)
+    return projects.load(file, units=units)
 
 
-def to_build(file: Path, say: OnStep, *, anyway: bool, cache: bool, whole: bool) -> Given:
-    """As ``given``, for what is built: a roof that misses its targets is refused, unless ``anyway``.
+def opened(file: Path, say: OnStep, loads: Loads | None = None, *, units: str = "", **how: Any) -> Outcome:
+    """The roof in a file, with the loads of the command line; ``how`` as of ``pcmc.project.opened``."""
+    return projects.opened(load(file, units), say, changed=loads.of if loads else None, **how)
+
+
+def to_build(project: Project, say: OnStep, *, anyway: bool, cache: bool, whole: bool) -> Outcome:
+    """The roof of a project, for what is built: one that misses its targets is refused, unless ``anyway``.
 
     With ``whole``, or where its project asks for it, the roof is unfolded at its mirror planes.
     """
-    shown = given(file, say, cache=cache)
-    refuse_missed(file, shown, anyway)
-    if whole or (shown.project is not None and shown.project.whole):
-        return replace(shown, surface=mirrored(shown.surface))
-    return shown
-
-
-def refuse_missed(file: Path, shown: Given, anyway: bool) -> None:
-    """Refuse a roof that is certified, but not the one that its project asks for."""
-    if shown.missed and not anyway:
+    roof, file = projects.opened(project, say, use_cache=cache), project.path
+    if whole:
+        roof = roof.unfolded()
+    if roof.certified and not roof.good and not anyway:
         hint = f"pcmc solve {file} shows them, --anyway accepts the roof"
         text = f"{file}: the roof misses its targets or its accuracy; {hint}"
         raise FileError(text, what=str(file))
-
-
-def given(
-    file: Path,
-    say: OnStep,
-    loads: Loads | None = None,
-    *,
-    start: bool = False,
-    cache: bool = True,
-) -> Given:
-    """The surface in a file, or the designed roof of a project; with ``start`` its start shape."""
-    check_input(file)
-    changed = loads.of if loads else None
-    if not projects.is_project(file):
-        surface, data = read_bare(file)
-        if changed is None:
-            return Given(surface, data.units, data=data)
-        return Given(changed(surface), data.units)
-    project = projects.load(file)
-    if start:
-        surface = projects.surface_of(project)
-        return Given(surface if changed is None else changed(surface), project.units, project=project)
-    outcome = projects.designed(project, say, changed=changed, use_cache=cache)
-    return Given(outcome.surface, outcome.units, outcome, project=project)
+    return roof
 
 
 def check_input(file: Path) -> None:
@@ -195,7 +152,7 @@ def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, f
     for text in given or ():
         name, sign, value = text.rpartition("=")
         try:
-            amount = float(value)
+            amount = validate.parsed(value)
         except ValueError:
             amount = math.nan
         if (sign and not name) or math.isnan(amount):
@@ -233,7 +190,7 @@ def _value(text: str) -> Any:
 def view_of(text: str) -> Any:
     """The name of a view, or (azimuth, elevation)."""
     try:
-        azimuth, elevation = (float(part) for part in text.split(","))
+        azimuth, elevation = map(validate.parsed, text.split(","))
     except ValueError:
         return text
     return azimuth, elevation

@@ -10,19 +10,17 @@ from typing import Annotated, Any
 import typer
 
 from .. import project as projects
-from ..accuracy import check_mesh
 from ..base import validate
-from ..base.errors import FileError
+from ..base.errors import FileError, OptionError
 from ..base.units import Units
-from ..drawings import drawing_set
+from ..certificate.required import require_certified
 from ..drawings.drawing_set import check_suffix as check_drawing
 from ..io import FORMATS, write
-from ..panels import Panels, fewer_families, panels
+from ..panels import Panels, fewer_families
 from ..panels.schedule import MIRROR_IMAGES
-from ..report import roof_report
 from ..report.document import check_suffix as check_report
 from . import NOT_CERTIFIED, OK, arguments, checking
-from .arguments import MANY_FILES, Cache, Input, ViewName, Whole, number, option
+from .arguments import MANY_FILES, Cache, FileUnits, Input, ViewName, Whole, number, option
 from .checking import CHECKED
 from .progress import working
 
@@ -37,7 +35,6 @@ SHEET = "Format of the sheets: A4, A3, A2, A1 or A0; by default the project's, o
 FORCE = "Unit of the forces: N, kN, MN, lbf or kip; by default the file's."
 DATE = "Date to print; by default the project's. No clock is read."
 REPORTED = "Report on a surface that is not certified; every page is marked."
-UNITS = "Unit of the lengths: m, cm, mm, ft or in; by default the file's."
 TRUE_SIZE = "Draw every panel at true size; needs --tolerance."
 Anyway = Annotated[bool, typer.Option("--anyway", help=ANYWAY)]
 
@@ -75,14 +72,16 @@ def panels_(
         validate.positive("--change", change)
     projects.check_names([], picture)
     projects.check_picture([seen], "patches")
-    projects.check_outputs([path for one in files for path in _paths(one)] + ([picture] if picture else []))
+    outputs = [path for one in files for path in _paths(one)] + ([picture] if picture else [])
+    projects.check_outputs(outputs, inputs=projects.files_of(file))
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": anyway}
     with working() as say:
-        shown = arguments.to_build(file, say, anyway=anyway, cache=cache, whole=whole)
-        surface = shown.surface
+        project = arguments.load(file)
+        roof = arguments.to_build(project, say, anyway=anyway, cache=cache, whole=whole)
+        surface = roof.shown.surface
         say("sorting panels")
         if change is None:
-            schedule = panels(surface, tolerance, **options)
+            schedule = roof.panels(tolerance, **options)
         else:
 
             def callback(made: int, count: int) -> None:
@@ -90,7 +89,7 @@ def panels_(
 
             fewer = fewer_families(surface, tolerance, change, callback=callback, **options)
             schedule = fewer.after
-        works = [work for path in files for work in _works(path, schedule, shown.units)]
+        works = [work for path in files for work in _works(path, schedule, roof.units)]
         if picture is not None:
             works.append((picture, partial(_paint, schedule, seen)))
         written = projects.write_all(works, say)
@@ -99,13 +98,13 @@ def panels_(
         print(f"\n{fewer}")
     if written:
         print(f"written: {', '.join(map(str, written))}")
-    return OK if schedule.certificate.certified and not shown.missed else NOT_CERTIFIED
+    return OK if schedule.certificate.certified and roof.good else NOT_CERTIFIED
 
 
 def draw_(
     file: Input,
     output: Annotated[list[Path], MANY_FILES],
-    units: Annotated[str | None, option("NAME", UNITS)] = None,
+    units: FileUnits = "",
     sheet: Annotated[str | None, option("NAME", SHEET)] = None,
     scale: Annotated[
         int | None, option("NUMBER", "1 to this; by default it fits.", parser=arguments.integer)
@@ -129,35 +128,27 @@ def draw_(
     """
     for path in output:
         check_drawing(path)
-    projects.check_outputs(output)
+    projects.check_outputs(output, inputs=projects.files_of(file))
     heights = None if height is None else [number(text) for text in height]
     lines = None if line is None else [_ends(text) for text in line]
     with working() as say:
-        shown = arguments.to_build(file, say, anyway=anyway, cache=cache, whole=whole)
+        project = arguments.load(file, units)
+        roof = arguments.to_build(project, say, anyway=anyway, cache=cache, whole=whole)
         say("drawing")
-        drawings = drawing_set(
-            shown.surface,
-            units or shown.units.length,
-            sheet=sheet or shown.documents.sheet,
-            scale=scale,
-            heights=heights,
-            lines=lines,
-            tolerance=shown.documents.tolerance if tolerance is None else tolerance,
-            panel_sheets=panel_sheets,
-            name=file.stem,
-            anyway=anyway,
-        )
+        documents = _chosen(roof.documents, sheet=sheet, tolerance=tolerance)
+        documents = replace(documents, panel_sheets=panel_sheets)
+        drawings = roof.drawing_set(documents, anyway=anyway, scale=scale, heights=heights, lines=lines)
         written = projects.write_all(drawings.files(*output), say)
     sheets = f"{len(drawings.sheets)} sheets {drawings.sheets[0].format}"
     print(f"{sheets}; written: {', '.join(map(str, written))}")
-    return OK if drawings.certificate.certified and not shown.missed else NOT_CERTIFIED
+    return OK if roof.good else NOT_CERTIFIED
 
 
 def report_(
     file: Input,
     output: Annotated[Path, option("PDF", "File to write, .pdf.", "-o", "--output")],
-    units: Annotated[str | None, option("NAME", UNITS)] = None,
-    force: Annotated[str | None, option("NAME", FORCE)] = None,
+    units: FileUnits = "",
+    force: Annotated[str, option("NAME", FORCE)] = "",
     tolerance: Annotated[float | None, option("LENGTH", TOLERANCE, parser=number)] = None,
     date: Annotated[str | None, option("TEXT", DATE)] = None,
     mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
@@ -173,41 +164,42 @@ def report_(
       pcmc report roof.pcmc --units m --force kN --tolerance 0.005 -o roof.pdf
     """
     check_report(output)
-    projects.check_outputs([output])
+    projects.check_outputs([output], inputs=projects.files_of(file))
     with working() as say:
-        shown = arguments.to_build(file, say, anyway=anyway, cache=cache, whole=whole)
+        project = arguments.load(file, units)
+        _expect_force(project, force)
+        roof = arguments.to_build(project, say, anyway=anyway, cache=cache, whole=whole)
         say("certifying")
-        outcome, project, documents = shown.outcome, shown.project, shown.documents
-        report = roof_report(
-            shown.surface,
-            Units(units or shown.units.length, force or shown.units.force),
-            name=file.stem,
-            tolerance=documents.tolerance if tolerance is None else tolerance,
-            targets=None if outcome is None or outcome.design is None else outcome.design.targets,
-            files={file.name: "surface" if outcome is None else "project"},
-            date=documents.date if date is None else date,
-            anyway=anyway,
-        )
-    if project is None or outcome is None or report.surface is not outcome.surface:
-        check = checking.mesh_check(
-            report.surface, report.certificate, mesh_check, lambda say: check_mesh(report.surface)
-        )
-    else:
-        wanted = project.mesh_check if mesh_check is None else mesh_check
-        run = partial(projects.check_of, project, outcome)
-        check = checking.mesh_check(report.surface, report.certificate, wanted, run)
+        roof = replace(roof, units=Units(roof.units.length, force or roof.units.force))
+        require_certified(roof.shown.certificate, anyway)
+    checking.mesh_check(roof, mesh_check)
+    documents = _chosen(roof.documents, tolerance=tolerance, date=date)
     with working() as say:
         say("laying out the pages")
-        report = replace(report, mesh_check=check)
+        listed = {file.name: "project" if roof.result is not None else "surface"}
+        report = roof.report(documents, files=listed, anyway=anyway)
         projects.write_all([(output, report.write)], say)
     print(f"written: {output}")
-    return OK if report.certificate.certified and not shown.missed else NOT_CERTIFIED
+    return OK if roof.good else NOT_CERTIFIED
+
+
+def _expect_force(project: projects.Project, force: str) -> None:
+    """Refuse another unit of force than the project has."""
+    own = project.units.force
+    if force and own and force != own:
+        text = f"--force: the forces of {project.path.name} are in {own}, not in {force}; leave out --force"
+        raise OptionError(text, what="--force", found=force, expected=own)
+
+
+def _chosen(documents: projects.Documents, **given: Any) -> projects.Documents:
+    """What a project says about its documents, with what the command line says instead."""
+    return replace(documents, **{name: value for name, value in given.items() if value is not None})
 
 
 def _ends(text: str) -> Any:
     """Two points from X,Y,X,Y."""
     try:
-        a, b, c, d = (float(part) for part in text.split(","))
+        a, b, c, d = map(validate.parsed, text.split(","))
     except ValueError:
         validate.refuse("--line", text, "four numbers X,Y,X,Y")
     return (a, b), (c, d)

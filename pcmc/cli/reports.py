@@ -16,7 +16,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
     """Print how the solver ended, the targets and parameters, the verdict, and the files written."""
     before = "solved before (--no-cache solves it again)"
     detail = _advised(outcome.certificate.detail, outcome)
-    message = _advised(outcome.result.message, outcome)
+    message = _advised(outcome.solved.message, outcome)
     if verdict and detail:
         message = message.removesuffix(f"; {detail}")  # it follows the verdict
     print(f"{outcome.surface.m} triangles; {before if outcome.cached else message}")
@@ -25,7 +25,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
     if outcome.design is not None:
         print(f"targets {outcome.design.text(outcome.units)}")
         if outcome.design.met:  # otherwise the message has the values
-            tables = (outcome.design.targets["value"], outcome.design.parameters["value"])
+            tables = (outcome.design.targets, outcome.design.parameters)
             print(", with ".join(values_text(table, outcome.units) for table in tables))
     for note in outcome.notes:
         print(note)

@@ -11,15 +11,14 @@ import typer
 
 from .. import project as projects
 from ..base.errors import OptionError, unknown
-from ..base.interrupts import defer_interrupts
-from ..io import write
-from ..surface import Surface, mirrored, unfolded
+from ..project import Outcome
+from ..surface import Surface
 from . import NOT_CERTIFIED, OK, arguments
 from .arguments import (
     Cables,
     Cache,
     Colour,
-    Given,
+    FileUnits,
     Input,
     Loads,
     Pressures,
@@ -49,6 +48,7 @@ def convert(
     volume: Volumes = None,
     start: Start = False,
     cache: Cache = True,
+    units: FileUnits = "",
     colour: Annotated[
         str,
         option(
@@ -66,38 +66,27 @@ def convert(
       pcmc convert roof.pcmc roof.glb --colour error
     """
     projects.check_names([output])
-    projects.check_outputs([output])
-    shown = _shown(file, Loads(tension, pressure, weight, cable, volume, snow), start, cache)
-    if shown is None:
+    projects.check_outputs([output], inputs=projects.files_of(file))
+    loads = Loads(tension, pressure, weight, cable, volume, snow)
+    roof = _shown(file, loads, whole, start=start, use_cache=cache, units=units)
+    if roof is None:
         return NOT_CERTIFIED
-    data: dict[str, Any] = {"units": shown.units, "colour": colour}
-    if whole:
-        unfold = unfolded(shown.surface)
-        scalars = {} if shown.data is None else shown.data.scalars
-        place = {shown.surface.m: unfold.face, shown.surface.n: unfold.vertex}
-        with defer_interrupts():
-            carried = {name: values[place[len(values)]] for name, values in scalars.items()}
-            write(output, unfold.surface, scalars=carried, **data)
-    elif shown.outcome is not None:
-        projects.write_all(projects.surface_files(shown.outcome, [output], colour))
-    else:
-        if shown.data is not None:
-            data |= {"scalars": shown.data.scalars, "certificate": shown.data.certificate or None}
-        with defer_interrupts():
-            write(output, shown.surface, **data)
+    projects.write_all(projects.surface_files(roof, [output], colour))
     print(f"written: {output}")
     return OK
 
 
-def _shown(file: Path, loads: Loads, start: bool, cache: bool) -> Given | None:
+def _shown(file: Path, loads: Loads, whole: bool, **how: Any) -> Outcome | None:
     """What is to be written or drawn. Print how the design of a project ended; None if it is not good."""
     with working() as say:
-        shown = arguments.given(file, say, loads, start=start, cache=cache)
-    if shown.outcome is None:
-        return shown
-    report(shown.outcome)
-    if shown.outcome.good:
-        return shown
+        roof = arguments.opened(file, say, loads, **how)
+    if whole:
+        roof = roof.unfolded()
+    if roof.result is None:
+        return roof
+    report(roof)
+    if roof.good:
+        return roof
     print(f"nothing written (pcmc explore {file} shows this roof, --start the start shape)")
     return None
 
@@ -128,12 +117,12 @@ def plot(
     projects.check_names([], picture)
     seen = arguments.view_of(view)
     projects.check_picture([seen], colour)
-    projects.check_outputs([picture])
-    shown = _shown(file, Loads(tension, pressure, weight, cable, volume, snow), start, cache)
-    if shown is None:
+    projects.check_outputs([picture], inputs=projects.files_of(file))
+    loads = Loads(tension, pressure, weight, cable, volume, snow)
+    roof = _shown(file, loads, whole, start=start, use_cache=cache)
+    if roof is None:
         return NOT_CERTIFIED
-    surface = mirrored(shown.surface) if whole else shown.surface
-    painting = partial(projects.paint, surface, views=[seen], colour=colour, units=shown.units)
+    painting = partial(projects.paint, roof.shown.surface, views=[seen], colour=colour, units=roof.units)
     projects.write_all([(picture, painting)])
     print(f"written: {picture}")
     return OK

@@ -14,7 +14,6 @@ from .. import project as projects
 from ..accuracy import check_mesh
 from ..accuracy.adaptive import TRIANGLES
 from ..base import validate
-from ..certificate.certificate import certify
 from ..io import write
 from ..meshing.remeshing import remesh, size_note
 from . import NOT_CERTIFIED, OK, arguments, checking
@@ -22,6 +21,7 @@ from .arguments import (
     MANY_FILES,
     Cables,
     Cache,
+    FileUnits,
     Input,
     Loads,
     Pressures,
@@ -76,6 +76,7 @@ def solve_(
     mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
     cache: Cache = True,
     whole: Whole = False,
+    units: FileUnits = "",
 ) -> int:
     """Solve a surface or a project, certify it, write all files, or none; then check its mesh.
 
@@ -90,7 +91,7 @@ def solve_(
       pcmc solve sail.toml --cable "cable 1=12"
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
-    project = _project(file, folder, output, picture)
+    project = _project(file, folder, output, picture, units)
     project = projects.raised(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
     options = dict(project.options) if method in (None, project.method) else {}
     if target is not None:
@@ -100,35 +101,28 @@ def solve_(
     goal = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
-    # a report has the mesh check's numbers; else it comes after the files, so that Ctrl-C leaves them
-    wanted_before = False if project.documents.report is None else wanted
-    project = replace(project, mesh_check=wanted_before, whole=whole or project.whole)
+    project = replace(project, mesh_check=wanted, whole=whole or project.whole)
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
     with working() as say:
         loads = Loads(tension, pressure, weight, cable, volume, snow)
         changed = loads.of if loads else None
-        outcome = projects.run_project(project, say, anyway=anyway, changed=changed, use_cache=cache)
+        how: dict[str, Any] = {"anyway": anyway, "use_cache": cache, "check_after": False}
+        outcome = projects.run_project(project, say, changed=changed, **how)
     report(outcome)
     if project.outputs and not outcome.files:
         print("nothing written (use --anyway to write it)")
-    check = outcome.mesh_check
-    if check is None:
-        run = partial(projects.check_of, project, outcome)
-        check = checking.mesh_check(outcome.surface, outcome.certificate, wanted, run)
-    if check is not None:
+    if check := checking.mesh_check(outcome):
         print(f"\n{check.brief(outcome.units)}")
     return OK if outcome.good else NOT_CERTIFIED
 
 
 def _project(
-    file: Path, folder: Path | None, output: list[Path] | None, picture: Path | None
+    file: Path, folder: Path | None, output: list[Path] | None, picture: Path | None, units: str
 ) -> projects.Project:
     """The project, with the output files of the command line if there are any."""
     arguments.check_input(file)
-    if not projects.is_project(file):
-        return projects.Project(file, files=output or (), picture=picture, folder=folder)
-    project = projects.load(file).in_folder(file.parent if folder is None else folder)
+    project = projects.load(file, units=units).in_folder(file.parent if folder is None else folder)
     return replace(project, files=output or project.files, picture=picture or project.picture)
 
 
@@ -157,24 +151,21 @@ def certify_(
         validate.integer("--meshes", meshes, least=2)
     with working() as say:
         loads = Loads(tension, pressure, weight, cable, volume, snow)
-        shown = arguments.given(file, say, loads, start=start, cache=cache)
-        surface, outcome = shown.surface, shown.outcome
+        roof = arguments.opened(file, say, loads, start=start, use_cache=cache)
+        if whole:
+            roof = roof.unfolded()
         say("certifying")
-        if whole or outcome is None:
-            certificate = certify(surface, whole=whole)
-        else:
-            certificate = outcome.certificate
-    if outcome is not None:
-        report(outcome, verdict=False)
-    print(certificate.text(shown.units))
+        surface, certificate = roof.shown
+    if roof.result is not None:
+        report(roof, verdict=False)
+    print(certificate.text(roof.units))
     if meshes is not None and certificate.index is not None:
         sys.stdout.flush()
         with working() as say:
             say("checking the mesh")
             check = check_mesh(surface, meshes)
-        print(f"\n{check.text(shown.units)}")
-    good = certificate.certified if outcome is None else outcome.good
-    return OK if good else NOT_CERTIFIED
+        print(f"\n{check.text(roof.units)}")
+    return OK if roof.good else NOT_CERTIFIED
 
 
 def remesh_(
@@ -185,6 +176,7 @@ def remesh_(
         float | None, option("LENGTH", "Edge length at junctions and boundaries.", parser=number)
     ] = None,
     chord: Annotated[float | None, option("LENGTH", CHORD, parser=number)] = None,
+    units: FileUnits = "",
     solved: Annotated[
         bool, typer.Option("--solve/--no-solve", help="Solve and certify the new mesh.")
     ] = True,
@@ -197,19 +189,19 @@ def remesh_(
     """
     stage = projects.Remeshing(edge_length, near_curves, chord=chord, when="before")
     projects.check_names(output)
-    projects.check_outputs(output)
+    projects.check_outputs(output, inputs=projects.files_of(file))
     if not solved:
         with working() as say:
             say("remeshing")
-            shown = arguments.given(file, say, start=True)
-            surface = remesh(shown.surface, **stage.options)
-            writing = partial(write, surface=surface, units=shown.units)
+            roof = arguments.opened(file, say, start=True, units=units)
+            surface = remesh(roof.surface, **stage.options)
+            writing = partial(write, surface=surface, units=roof.units)
             projects.write_all([(path, writing) for path in output], say)
         if note := size_note(surface, edge_length):
             print(note)
         print(f"{surface.m} triangles, not solved; written: {', '.join(map(str, output))}")
         return OK
-    project = replace(_project(file, None, output, None), remeshing=(stage,), picture=None)
+    project = replace(_project(file, None, output, None, units), remeshing=(stage,), picture=None)
     project = replace(project, documents=projects.Documents())
     with working() as say:
         outcome = projects.run_project(project, say)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -10,9 +10,8 @@ from typing import Annotated
 import typer
 
 from .. import project as projects
-from ..solvers.result import Result
 from ..structure import write_structure
-from ..surface import Surface, mirrored
+from ..surface import Surface
 from . import NOT_CERTIFIED, OK, arguments
 from .arguments import Cache, Input, Whole, number, option
 from .progress import working
@@ -52,12 +51,11 @@ def structure(
     Example:
       pcmc structure roof.pcmc -o roof.inp --thickness 0.001 --young 1e6 --snow 0.6
     """
-    arguments.check_input(file)
     projects.check_model(output)
-    projects.check_outputs([output])
+    projects.check_outputs([output], inputs=projects.files_of(file))
     with working() as say:
-        shown = arguments.given(file, say, start=True)
-        project, start = shown.project, shown.surface
+        project = arguments.load(file)
+        start = projects.surface_of(project)
         given = {
             "thickness": _thickness(start, thickness),
             "young": young,
@@ -68,26 +66,19 @@ def structure(
             "wind": arguments.by_name([p.name for p in start.patches], wind, "--wind") if wind else None,
             "cable_area": cable_area,
         }
-        values = asdict(project.structure) if project is not None and project.structure is not None else {}
+        values = {} if project.structure is None else asdict(project.structure)
         wanted = projects.Structure(**values | {k: v for k, v in given.items() if v is not None})
         wanted.check(start)
-        solved: Surface | Result = start
-        if project is not None:
-            outcome = projects.designed(project, say, use_cache=cache)
-            shown = replace(shown, surface=outcome.surface, outcome=outcome)
-            solved = outcome.result
-        arguments.refuse_missed(file, shown, anyway)
-        if whole or (project is not None and project.whole):
-            solved = mirrored(shown.surface)
+        roof = arguments.to_build(project, say, anyway=anyway, cache=cache, whole=whole)
         say("certifying")
-        model = wanted.model(solved, anyway, units=shown.units)
+        model = roof.model(wanted, anyway)
         projects.write_all([(output, partial(write_structure, model=model))], say)
     if model.note:
         print(model.note)
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
-    return OK if model.certified and not shown.missed else NOT_CERTIFIED
+    return OK if roof.good else NOT_CERTIFIED
 
 
 def _thickness(surface: Surface, given: list[str] | None) -> float | dict[str, float] | None:

@@ -26,29 +26,15 @@ class DesignStatus(Enum):
     STOPPED = "not met: stopped on request; the returned surface is the best so far"
 
 
-UNIT_OF = dict.fromkeys(("apex", "height", "sag"), "length")
-UNIT_OF |= {"reaction": "tension", "weight": "pressure", "snow": "pressure", "lean": "angle"}
-"""The unit of quantities and parameters, as a name of ``Units``; others are named as their units."""
+def values_text(table: pd.DataFrame, units: Units = NO_UNITS) -> str:
+    """The values of targets or parameters in words, such as "apex of roof 1.2 m".
 
-
-def unit_of(label: str) -> str:
-    """The unit of a target or parameter, by its label, whose first word is the quantity.
-
-    >>> unit_of("apex of roof"), unit_of("tension of roof"), unit_of("tension of cable 1")
-    ('length', 'tension', 'force')
-    """
-    quantity = "force" if label.startswith("tension of cable ") else label.partition(" ")[0]
-    return UNIT_OF.get(quantity, quantity)
-
-
-def values_text(values: pd.Series, units: Units = NO_UNITS) -> str:
-    """Targets or parameters in words, such as "apex of roof 1.2 m".
-
-    >>> values_text(pd.Series({"apex of roof": 1.2, "tension of roof": 3.0}), Units("m", "kN"))
+    >>> table = {"value": [1.2, 3.0], "dimension": ["length", "tension"]}
+    >>> values_text(pd.DataFrame(table, index=["apex of roof", "tension of roof"]), Units("m", "kN"))
     'apex of roof 1.2 m, tension of roof 3 kN/m'
     """
-    labelled = {str(label): value for label, value in values.items()}
-    return ", ".join(f"{label} {x:.6g}{units.behind(unit_of(label))}" for label, x in labelled.items())
+    rows = zip(table.index, table["value"], table["dimension"], strict=True)
+    return ", ".join(f"{label} {value:.6g}{units.behind(dimension)}" for label, value, dimension in rows)
 
 
 def _away(value: float, wanted: float) -> str:
@@ -76,10 +62,11 @@ class Design:
     status : how the search ended.
     result : of the solve that gave ``surface``. If the search was stopped before any equilibrium was
         found, ``surface`` is the one given.
-    targets : a row per target: ``value``, ``wanted``, relative ``misfit``, ``met``, and ``limit``, the
+    targets : a row per target: ``value``, its ``dimension`` (the unit, as a name of ``Units``), ``wanted``,
+        relative ``misfit``, ``met``, and ``limit``, the
         nearest reachable value (at a fold, which is only approached, extrapolated; NaN where the search
         stopped before it was known).
-    parameters : a row per parameter: ``start``, ``value``, ``low``, ``high``.
+    parameters : a row per parameter: ``start``, ``value``, ``dimension``, ``low``, ``high``.
     solves : number of solves.
     history : a row per point tried: parameters, quantities, status, misfit. The status is the solve's
         in small letters, or ``"overloaded"`` if the load is more than the tension of the boundary could
@@ -98,7 +85,7 @@ class Design:
     def __repr__(self) -> str:
         """How the search ended, what it reached and with what, above the surface."""
         values = "\n".join(
-            f"  {name}: {values_text(table['value'])}"
+            f"  {name}: {values_text(table)}"
             for name, table in (("targets", self.targets), ("parameters", self.parameters))
         )
         return f"{self.message}\n{values}\n  {self.solves} solves\n{self.surface!r}"
@@ -130,11 +117,11 @@ class Design:
         for label, row in missed.iterrows():
             known = not math.isnan(row["limit"])
             reached = f"nearest reachable {row['limit']:.6g}" if known else f"so far {row['value']:.6g}"
-            unit = units.behind(unit_of(str(label)))
+            unit = units.behind(row["dimension"])
             away = _away(row["limit"], row["wanted"]) if known else ""
             text += f"; {label}: wanted {row['wanted']:.6g}{unit}, {reached}{unit}{away}"
         if len(missed):
-            text += f" ({values_text(self.parameters['value'], units)})"
+            text += f" ({values_text(self.parameters, units)})"
             text += f"; a step further, {self.reason}" if self.reason else ""
         return text + self._too_few()
 

@@ -10,13 +10,15 @@ from typing import Any
 from ..base import validate
 from ..base.errors import OptionError
 from ..energy.rooms import refuse_varied_pressure
+from ..quantities import dimension_of
 from ..surface import Surface
-from .quantities import QUANTITIES, Measurement, room_index
+from .quantities import MEASURES, Measurement, room_index
 
 KINDS = ("tension", "pressure", "volume", "weight", "snow", "cable")
 CABLE_QUANTITIES = ("sag", "length", "force")
 NAMED = {"curvature": "patch", "pressure": "room"} | dict.fromkeys(CABLE_QUANTITIES, "cable")
 """Quantities of one patch, room or cable alone."""
+SHORT = {"reaction": "reaction per length"}  # names that stand for others
 FACTOR = 20.0  # a parameter without bounds may change by this factor, up or down
 
 
@@ -28,13 +30,14 @@ class Target:
     ----------
     quantity : ``"apex"``, greatest height over Π of a patch; ``"height"`` over a point of Π;
         ``"volume"`` between a patch and Π (``volumes_below``), and ``"area"``; ``"curvature"``,
-        (p - s) / (2α), a patch's mean curvature at rest; ``"reaction"``, the greatest force per length
-        on the held boundary of a patch; ``"lean"`` of a wall, its largest angle from the vertical, degrees;
+        (p - s) / (2α), a patch's mean curvature at rest; ``"reaction per length"``, the greatest force per
+        length on the held boundary of a patch (``"reaction"`` stands for it); ``"lean"`` of a wall, its
+        largest angle from the vertical, degrees;
         ``"pressure"`` of a room of prescribed volume; ``"sag"`` of a
         cable, the largest distance of its vertices from the chord between its ends, its ``"length"``,
         and its ``"force"``, which is its tension.
     of : name of the patch, room or cable; for ``"height"`` the point (x, y) in the coordinates of Π. None:
-        all patches under pressure together (for ``"reaction"`` the whole held boundary); not for
+        all patches under pressure together (for reactions the whole held boundary); not for
         ``"curvature"``, ``"pressure"`` and the quantities of cables.
     value, at_most, at_least : a value, or a limit on one side or both. A target to be met has at least one of
         them; ``pcmc.sensitivities`` needs none.
@@ -60,7 +63,8 @@ class Target:
     name: str = ""
 
     def __post_init__(self) -> None:
-        validate.choice("quantity", self.quantity, tuple(QUANTITIES))
+        object.__setattr__(self, "quantity", SHORT.get(self.quantity, self.quantity))
+        validate.choice("quantity", self.quantity, tuple(MEASURES))
         if self.quantity == "height":
             object.__setattr__(self, "of", _point(self.of))
         elif not (isinstance(self.of, str) or (self.of is None and self.quantity not in NAMED)):
@@ -85,6 +89,11 @@ class Target:
         return self.quantity if self.of is None else f"{self.quantity} of {self.of}"
 
     @property
+    def dimension(self) -> str:
+        """The unit of its value, as a name of ``Units``."""
+        return dimension_of(self.quantity)
+
+    @property
     def limits(self) -> tuple[float, ...]:
         """The value or limits given; empty if the quantity is only measured."""
         return tuple(v for v in (self.value, self.at_most, self.at_least) if v is not None)
@@ -99,7 +108,7 @@ class Target:
 
     def scale(self, surface: Surface) -> float:
         """What a misfit is divided by: the value wanted or, if that is 0, the quantity's usual size."""
-        return max(map(abs, self.limits)) or QUANTITIES[self.quantity].size(surface)
+        return max(map(abs, self.limits)) or MEASURES[self.quantity].size(surface)
 
 
 @dataclass(frozen=True)
@@ -148,6 +157,11 @@ class Parameter:
         if self.kind == "cable":  # which may have the name "cable 1"
             return f"tension of cable {names.removeprefix('cable ')}"
         return f"{self.kind} of {names}"
+
+    @property
+    def dimension(self) -> str:
+        """The unit of its value, as a name of ``Units``."""
+        return dimension_of(self.kind)
 
     def value(self, surface: Surface) -> float:
         """Its value on a surface; of several patches that of the first."""
@@ -199,7 +213,7 @@ def measure(surface: Surface, target: Target) -> Measurement:
     >>> round(volume.value, 12), volume.by_position[4].round(12).tolist()
     (1.333333333333, [0.0, 0.0, 1.333333333333])
     """
-    return QUANTITIES[target.quantity].measure(surface, target.of)
+    return MEASURES[target.quantity].measure(surface, target.of)
 
 
 def as_parameters(given: Parameter | str | Iterable[Parameter | str]) -> list[Parameter]:

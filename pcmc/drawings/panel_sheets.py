@@ -3,48 +3,71 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from ..base.arrays import Floats
-from ..base.errors import OptionError
 from ..panels import Panels
-from .sheet import FORMATS, WIDTH, Line, Sheet, Text, corner, room
+from .sheet import WIDTH, Line, Sheet, Text, corner, room, table_sheets
 
 SPACE = 6.0  # mm between panels
+ROUNDING = 1e-9  # mm
 TURNS = np.radians(np.arange(180.0))  # in which a panel is tried that does not fit as it lies
 
 
 def panel_sheets(schedule: Panels, name: str, millimetres: float) -> list[Sheet]:
     """The panels in order of their numbers, row by row, on as many sheets as they need.
 
-    Raises
-    ------
-    OptionError : a panel does not fit a sheet at true size; the message names the smallest format.
+    Those that fit no sheet at true size are listed on sheets of their own; ``flat_panels`` has them.
     """
     labels = _labels(schedule)
     wide, high = room(name)
+    turned = [_turned_to_fit(panel, name) for panel in schedule.flat * millimetres]
+    fit = [k for k, panel in enumerate(turned) if panel is not None]
+    pages: list[list[int]] = []
     sheets: list[Sheet] = []
-    row: list[Floats] = []  # the panels of the row being filled
-    y = depth = 0.0  # the row's top below the sheet's, and its height
-    first = 0
-    for k, panel in enumerate(_turned_to_fit(schedule.flat * millimetres, name)):
-        size = np.ptp(panel, axis=0)
-        placed = _beside(row, panel)
-        if not sheets or placed[:, 0].max() > wide or y + size[1] > high:
+    for k, (page, placed) in zip(fit, _packed([p for p in turned if p is not None], wide, high), strict=True):
+        if page == len(sheets):
+            sheets.append(Sheet("", name, "1:1"))
+            pages.append([])
+        pages[page].append(k + 1)
+        _add_panel(sheets[page], placed + corner() + [0.0, high], k, schedule, labels[k])
+    for sheet, numbers in zip(sheets, pages, strict=True):
+        sheet.title = f"Panels {numbers[0]} to {numbers[-1]} at true size, outside up"
+    sizes = schedule.panels[["a", "b", "c"]].to_numpy() * millimetres
+    rows = [[str(k + 1), *(f"{x:.1f}" for x in sizes[k])] for k in range(len(turned)) if turned[k] is None]
+    if rows:
+        title = f"Panels larger than {name}: flat at true size in the model space of the .dxf"
+        sheets += table_sheets(title, ["panel", "a, mm", "b, mm", "c, mm"], rows, name)
+    return sheets
+
+
+def flat_panels(schedule: Panels, millimetres: float) -> Sheet:
+    """All panels side by side at true size, mm, on one sheet without an end: for the model space."""
+    labels, sheet = _labels(schedule), Sheet("Panels", "A0", "1:1")
+    panels = list(schedule.flat * millimetres)
+    across = 1.5 * float(np.sqrt(sum(np.prod(np.ptp(panel, axis=0)) for panel in panels)))
+    across = max(across, *(float(np.ptp(panel[:, 0])) for panel in panels))
+    for k, (_, placed) in enumerate(_packed(panels, across, np.inf)):
+        _add_panel(sheet, placed, k, schedule, labels[k])
+    return sheet
+
+
+def _packed(panels: Iterable[Floats], wide: float, high: float) -> Iterator[tuple[int, Floats]]:
+    """The page of each panel, and the panel (3,2) placed on it: rows below one another, from y = 0 down."""
+    page, y, depth = 0, 0.0, 0.0  # of the row that is filled: its top below the page's, and its height
+    row: list[Floats] = []
+    for panel in panels:
+        size, placed = np.ptp(panel, axis=0), _beside(row, panel)
+        if placed[:, 0].max() > wide + ROUNDING or y + size[1] > high + ROUNDING:
             y, depth, row = y + depth + SPACE, 0.0, []
-            if not sheets or y + size[1] > high:
-                if sheets:
-                    _name(sheets[-1], first, k)
-                sheets.append(Sheet("", name, "1:1"))
-                y, first = 0.0, k
+            if y + size[1] > high + ROUNDING:
+                page, y = page + 1, 0.0
             placed = _beside(row, panel)
         row.append(placed)
         depth = max(depth, float(size[1]))
-        place = corner() + np.array([0.0, high - y])
-        _add_panel(sheets[-1], placed + place, k, schedule, labels[k])
-    _name(sheets[-1], first, len(schedule.panels))
-    return sheets
+        yield page, placed - [0.0, y]
 
 
 def _beside(row: list[Floats], panel: Floats) -> Floats:
@@ -83,33 +106,15 @@ def _reach(triangle: Floats, levels: Floats) -> Floats:
     return np.stack([np.nanmin(x, axis=0), np.nanmax(x, axis=0)])
 
 
-def _name(sheet: Sheet, first: int, end: int) -> None:
-    sheet.title = f"Panels {first + 1} to {end} at true size, outside up"
-
-
-def _turned_to_fit(flat: Floats, name: str) -> Floats:
-    """(k,3,2) the panels; those that do not fit as they lie are turned until they do."""
-    wrong = np.flatnonzero((np.ptp(flat, axis=1) > np.array(room(name)) + 1e-9).any(axis=1))
-    flat = flat.copy()
-    for k in wrong:
-        turned = _turned(flat[k], name)
-        if turned is None:
-            better = next((f for f in FORMATS if _turned(flat[k], f) is not None), None)
-            wide, high = np.ptp(flat[k], axis=0)
-            text = f"sheet: panel {k + 1}, {wide:.0f} × {high:.0f} mm at true size, does not fit {name}; "
-            text += f"use sheet {better!r}" if better else "nor any format: leave the panel sheets out"
-            raise OptionError(text, what="sheet", found=name, expected=better)
-        flat[k] = turned
-    return flat
-
-
-def _turned(corners: Floats, name: str) -> Floats | None:
-    """A triangle (3,2) turned so that it fits a format, as low as possible; None if it fits in no way."""
+def _turned_to_fit(corners: Floats, name: str) -> Floats | None:
+    """A triangle (3,2) as it lies, or turned so that it is as low as possible; None if it fits in no way."""
+    if (np.ptp(corners, axis=0) <= np.array(room(name)) + ROUNDING).all():
+        return corners
     cosine, sine = np.cos(TURNS), np.sin(TURNS)
     turn = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
     ways = corners @ turn.transpose(0, 2, 1)
     sizes = np.ptp(ways, axis=1)
-    fit = np.flatnonzero((sizes <= np.array(room(name)) + 1e-9).all(axis=1))
+    fit = np.flatnonzero((sizes <= np.array(room(name)) + ROUNDING).all(axis=1))
     return ways[fit[sizes[fit, 1].argmin()]] if len(fit) else None
 
 
@@ -139,7 +144,8 @@ def _add_panel(sheet: Sheet, corners: Floats, k: int, schedule: Panels, labels: 
     radius = abs(first[0] * second[1] - first[1] * second[0]) / lengths.sum()
     number = str(k + 1)
     family = f"F{schedule.panels['family'].iloc[k]}"
-    height = min(12.0, 0.4 * radius, 1.2 * radius / (WIDTH * max(len(number), len(family))))
+    most = 1.2 * radius / (WIDTH * max(len(number), len(family)))
+    height = min(max(12.0, 0.15 * radius), 0.4 * radius, most)
     x, y = map(float, middle)
     sheet.texts.append(Text((x, y + 0.2 * height), number, height, align="C"))
     sheet.texts.append(Text((x, y - 0.9 * height), family, 0.6 * height, align="C"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +11,11 @@ from ..certificate import Certificate, Verdict
 from ..solvers import solve
 from ..solvers.result import Progress, Result
 from ..surface import Surface
+from ..surface.renewed import KINDS, all_values
 from ..surface.wall_pressures import with_pressures
 
 AT_REST = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.SADDLE)
 SMALLEST_STEP = 1.0 / 64.0  # part of the way; settling takes no smaller step
-KINDS = ("tensions", "pressures", "snows", "weights", "cables", "volumes")  # of values that can be changed
 Values = Mapping[str, Mapping[str, float]]
 
 
@@ -71,28 +71,11 @@ def reach(
 
 def between(start: Surface, end: Surface, part: float) -> Surface:
     """``start`` with its values moved a part of the way to those of ``end``."""
-
-    def mixed(here: Sequence[float], there: Sequence[float]) -> list[float]:
-        if part >= 1.0:
-            return list(there)  # to the last digit
-        return [(1.0 - part) * a + part * b for a, b in zip(here, there, strict=True)]
-
-    names = [p.name for p in start.patches]
-    by_patch = [
-        dict(zip(names, mixed(getattr(start, kind).tolist(), getattr(end, kind).tolist()), strict=True))
-        for kind in ("tensions", "pressures", "snows", "weights")
-    ]
-    cables = mixed([c.tension for c in start.cables], [c.tension for c in end.cables])
-    volumes = mixed([r.volume for r in start.rooms], [r.volume for r in end.rooms])
-    return start.retensioned(
-        by_patch[0],
-        by_patch[1],
-        [p.name for p in end.patches if p.wall],
-        snows=by_patch[2],
-        weights=by_patch[3],
-        cables=dict(zip([c.name for c in start.cables], cables, strict=True)),
-        volumes=dict(zip([r.name for r in start.rooms], volumes, strict=True)),
-    )
+    here, there = all_values(start), all_values(end)
+    if part < 1.0:  # at the end to the last digit
+        for kind, values in there.items():
+            there[kind] = {k: (1.0 - part) * here[kind][k] + part * value for k, value in values.items()}
+    return start.retensioned(walls=[p.name for p in end.patches if p.wall], **there)
 
 
 def wanted(surface: Surface, values: Values) -> Surface:

@@ -112,7 +112,7 @@ def solved_start_shape(project: projects.Project, start: Surface, stop: Stop) ->
 
     try:
         plain = replace(project, targets=(), wanted=AccuracyWanted(), search=False)
-        result = projects.solve_project(plain, start, check).result
+        result = projects.solve_project(plain, start, check).solved
     except TimeoutError:
         return None
     return result if result.certificate.verdict in AT_REST else None

@@ -9,18 +9,17 @@ import numpy as np
 import numpy.typing as npt
 
 from ..accuracy.mesh_check import MeshCheck, with_bar
-from ..accuracy.quantities import UNIT_OF
 from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
-from ..certificate.reactions import reactions, reactions_per_length
-from ..contact.pinching import standing_part
+from ..certificate.reactions import support_forces
 from ..design import Parameter, Target
 from ..energy.curvature import curvature_error, mean_curvature
 from ..energy.functional import patch_areas
 from ..panels.families import families
 from ..project.values import values_of
+from ..quantities import dimension_of
 from ..surface import Surface
 from ..surface.colours import patch_colors
 from ..surface.geometry import edge_vectors
@@ -131,12 +130,13 @@ def fields(state: State, origin: Floats) -> Arrays:
     """Vertices relative to the origin, and the values that colours may show."""
     surface, certificate, whole = state.surface, state.certificate, whole_of(state.surface)
     drawn = surface if whole is None else whole.surface
-    forces = certificate.reactions if whole is None else reactions(standing_part(drawn).surface)
+    acting = support_forces(drawn, certificate.reactions if whole is None else None)
     arrays: Arrays = {
         "vertices": drawn.vertices - origin,
         "curvature": mean_curvature(drawn, "variational"),
         "error": curvature_error(drawn, "cotangent"),
-        "reactions": reactions_per_length(drawn, forces),
+        "reactions": acting.per_length,
+        "points": acting.points,
     }
     if len(certificate.modes) and whole is None:
         arrays["mode"] = certificate.modes[0] / (np.abs(certificate.modes[0]).max() or 1.0)
@@ -195,7 +195,7 @@ def mesh_findings(check: MeshCheck, units: Units = NO_UNITS) -> dict[str, Any]:
     word, _, sentence = check.verdict.value.partition(": ")
     rows = []
     for row in check.table.to_dict(orient="records"):
-        unit = units.behind(UNIT_OF.get(row["quantity"], row["quantity"]))
+        unit = units.behind(dimension_of(row["quantity"]))
         rows.append(
             {
                 "name": " of ".join(filter(None, (row["quantity"], row["of"]))),

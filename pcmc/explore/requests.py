@@ -7,7 +7,7 @@ from http import HTTPStatus
 from typing import Any
 
 from ..design import Parameter, Target
-from .following import KINDS
+from ..surface.renewed import KINDS
 
 LONGEST_NAME = 1000  # characters
 MOST_AIMS = 100  # targets, and parameters, of one request

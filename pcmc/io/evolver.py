@@ -29,23 +29,24 @@ from ..energy.rooms import room_pressures, room_volumes
 from ..meshing.refinement import edges_on_planes
 from ..surface import Surface
 from . import evolver_forces
+from .evolver_forces import SPECIAL
 from .evolver_reading import ROUNDING, read
 from .mesh_data import FREE, SLIDING, given_support
-from .text import format_rows
+from .text import escaped, format_rows
 
 __all__ = ["read", "write"]
 
 HEADER = """\
 // Piecewise constant-mean-curvature surface, written by pcmc.
 // total_energy is E = sum tension * area - sum pressure * volume, volumes seen from the origin.
-{snow}// origin {origin}
+// Pressures are net: those of the air less the snow, an attribute of faces.
+// origin {origin}
 {names}
 SPACE_DIMENSION 3
 SYMMETRIC_CONTENT
 DEFINE FACET ATTRIBUTE patch INTEGER
 
 """
-SNOW = "// The pressures of bodies are net: those of the air less the snow, an attribute of the faces.\n"
 
 
 def write(path: Path, surface: Surface, **_: Any) -> None:
@@ -58,12 +59,11 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
     X = surface.vertices - origin
     sides = ((surface.topology.edge_of_face + 1) * surface.topology.sense)[:, [2, 0, 1]]
     header = HEADER.format(
-        snow=SNOW if surface.snows.any() else "",
         origin=" ".join(map(repr, origin.tolist())),
         names="\n".join(
-            [f"// patch {k} {p.name}" for k, p in patches]
+            [f"// patch {k} {escaped(p.name, SPECIAL)}" for k, p in patches]
             + [f"// wall {k}" for k, p in patches if p.wall]
-            + [f"// room {k} {room.name}" for k, room in enumerate(surface.rooms, 1)]
+            + [f"// room {k} {escaped(room.name, SPECIAL)}" for k, room in enumerate(surface.rooms, 1)]
             + evolver_forces.names(surface)
         ),
     )
@@ -92,9 +92,8 @@ def _constraints(surface: Surface, origin: Floats) -> str:
         terms = zip(plane.normal, "xyz", strict=True)
         formula = " + ".join(c if a == 1.0 else f"({a!r})*{c}" for a, c in terms if a != 0.0)
         if number > 1:
-            text += (
-                f"// plane {number} {'mirror' if plane.mirror else 'support'} {plane.name}".rstrip() + "\n"
-            )
+            kind = "mirror" if plane.mirror else "support"
+            text += f"// plane {number} {kind} {escaped(plane.name, SPECIAL)}".rstrip() + "\n"
         offset = -float(plane.height(origin)) or 0  # and not -0.0
         text += f"CONSTRAINT {number}\nFORMULA: {formula} = {offset!r}\n"
         own = np.flatnonzero(mask[tail] & mask[head])
@@ -186,8 +185,8 @@ def _room_pressures(surface: Surface) -> tuple[Floats, Floats]:
     both = np.flatnonzero((signs > 0.0).any(axis=0) & (signs < 0.0).any(axis=0) & (left != 0.0))
     if len(both):
         name = surface.patches[both[0]].name
-        text = f"patch {name!r} has a pressure of {left[both[0]]:g} beside that of its rooms, and a datafile"
-        text += " has one body on each side of a face; give its pressure to all patches of the rooms"
+        text = f"patch {name!r} has a net pressure of {left[both[0]]:g} beside that of its rooms, and a"
+        text += " datafile has one body on each side of a face; give all patches of its rooms its load"
         raise FileError(text, where=name, found=float(left[both[0]]))
     return multipliers, left
 

@@ -10,16 +10,31 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 
 from ..base.arrays import Floats, Ints
+from ..base.names import names_from_file
 from ..surface import Cable, Surface
+from .text import escaped
+
+WRITTEN = "written by pcmc"
+
+
+SPECIAL = "\\*"  # in names: the program joins lines at a backslash, and "/*" begins a comment
+
+
+def names_in(header: str, kind: str) -> dict[str, str]:
+    """The names that comments give to patches, rooms or cables, by number."""
+    rows = re.findall(rf"^// {kind} (\d+) ([^\n]+)$", header, re.M)
+    names = names_from_file(name for _, name in rows)[0]
+    return {number: unquote(names[name]) if WRITTEN in header else names[name] for number, name in rows}
 
 
 def names(surface: Surface) -> list[str]:
     """A comment for each cable's name."""
-    return [f"// cable {k} {cable.name}" for k, cable in enumerate(surface.cables, 1)]
+    return [f"// cable {k} {escaped(cable.name, SPECIAL)}" for k, cable in enumerate(surface.cables, 1)]
 
 
 def definitions(surface: Surface, origin: Floats) -> str:
@@ -78,7 +93,7 @@ def cables(
     ends : (e,2) its vertices.
     number : the value of a word in a row.
     """
-    known = dict(re.findall(r"^// cable (\d+) ([^\n]+)$", header, re.M))
+    known = names_in(header, "cable")
     found: dict[tuple[str, float], list[int]] = {}
     for k, rest in enumerate(rows):
         given = re.search(r"\b(?:tension|density)\s+(\S+)", rest, re.I)

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pandas as pd
@@ -23,6 +24,7 @@ from . import evolver_forces
 from .expressions import constant, linear
 from .mesh_data import FIXED, FREE, SLIDING, MeshData
 from .polygons import triangulate
+from .text import numbers
 
 ROUNDING = 1e-12  # of the largest pressure: what is left of differences
 
@@ -30,7 +32,7 @@ ROUNDING = 1e-12  # of the largest pressure: what is left of differences
 def read(path: Path) -> MeshData:
     """The mesh, tensions, pressures and supports of a datafile; errors name the line."""
     header, file = _open(path)
-    if "written by pcmc" in header:
+    if evolver_forces.WRITTEN in header:
         file["read"]  # its last line: without it the file is cut off
     known = _parameters(file["top"])
     ids, X, support, constraints = _vertices(file["vertices"], known)
@@ -260,7 +262,7 @@ def _patches(
                 target[k] = _numbers((given[1],), known, section, row)[0]
     laws = np.stack([number[code], tension[code], weight[code], snow[code], *of_face], axis=1)
     rows_, patch_of_face = np.unique(laws, axis=0, return_inverse=True)
-    names = dict(re.findall(r"^// patch (\d+) ([^\n]+)$", header, re.M))
+    names = evolver_forces.names_in(header, "patch")
     walls = {float(k) for k in re.findall(r"^// wall (\d+)$", header, re.M)}
     once = len(np.unique(rows_[:, 0])) == len(rows_)
     patches = [
@@ -274,7 +276,7 @@ def _rooms(
     header: str, prescribed: Mapping[tuple[str, float], Ints], patch_of_face: Ints, patches: tuple[Patch, ...]
 ) -> tuple[Room, ...]:
     """The bodies of prescribed volume as rooms, with the names that pcmc has given them."""
-    names = dict(re.findall(r"^// room (\d+) ([^\n]+)$", header, re.M))
+    names = evolver_forces.names_in(header, "room")
     rooms = []
     for (number, volume), sides in prescribed.items():
         of_patch = np.zeros(len(patches), dtype=np.int64)
@@ -310,7 +312,9 @@ def _planes(
         kind, name = described.get(number, ("support", ""))
         plane = _plane(top, number, origin, known, needed=True)
         assert plane is not None
-        others.append((replace(plane, name=name.strip(), mirror=kind == "mirror"), constraints[number]))
+        others.append(
+            (replace(plane, name=unquote(name.strip()), mirror=kind == "mirror"), constraints[number])
+        )
     return ground, tuple(others)
 
 
@@ -356,7 +360,7 @@ def _numbers(
 ) -> Floats:
     """Floats from words: numbers, or expressions of numbers and parameters."""
     try:
-        return np.array(words, dtype=np.float64)
+        return numbers(words)
     except ValueError:
         rows = range(len(words)) if row is None else [row]
         values = [

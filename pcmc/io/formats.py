@@ -8,9 +8,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from ..base.arrays import Floats
 from ..base.errors import FileError, unknown
 from ..base.units import Units
 from ..surface import Surface
+from .metadata import PARTS
 
 
 @dataclass(frozen=True)
@@ -25,15 +27,11 @@ class Format:
     colours : whether it holds colours of vertices.
     shared : whether patches certainly share their vertices, so that reading needs no merging.
     separate : whether it has a mesh per patch, which cannot have triangles without area.
-    walls : whether such triangles go with a separate format as text.
-    lines : whether it holds the lines and circles that vertices slide along.
-    cables : whether it holds cables.
-    rooms : whether it holds the volumes that rooms prescribe.
-    planes : whether it holds planes other than Π that vertices slide on, and mirror planes.
-    loses : what it never holds.
+    own : the parts that it holds in its own way; others are among the metadata.
+    bare : whether it holds nothing but triangles and names.
+    loses : the parts of ``LOST`` that it does not hold.
     reads : whether pcmc reads it, too.
     unit : the unit of length that the format prescribes; empty if a file may have any, or says none.
-    units : whether a file says its units.
     """
 
     module: str
@@ -42,64 +40,61 @@ class Format:
     colours: bool = False
     shared: bool = False
     separate: bool = False
-    walls: bool = False
-    lines: bool = False
-    cables: bool = False
-    rooms: bool = False
-    planes: bool = False
+    own: tuple[str, ...] = ()
+    bare: bool = False
     loses: tuple[str, ...] = ()
     reads: bool = True
     unit: str = ""
-    units: bool = True
 
     @property
     def functions(self) -> Any:
         """The module that reads and writes the format."""
         return import_module(f".{self.module}", __package__)
 
-    def lost(self, surface: Surface, units: Units) -> list[str]:
-        """What of a surface the format cannot hold, in words."""
-        parts = (
-            (surface.weights.any() and "tensions" in self.loses, "weights"),
-            (surface.snows.any() and "tensions" in self.loses, "snow"),
-            (
-                surface.given_supports.on_line and not self.lines,
-                "lines or circles that vertices slide along (they are fixed in it)",
-            ),
-            (surface.cables and not self.cables, "cables"),
-            (surface.rooms and not self.rooms, "volumes of rooms (it has the pressures reached)"),
-            (
-                surface.on_planes and not self.planes,
-                "planes other than Π that vertices slide on, and mirror planes (fixed in it)",
-            ),
-            (units and not self.units, f"its unit {units.length}"),
-        )
-        return [text for missing, text in parts if missing]
+    def carried(self, surface: Surface, scalars: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Those of a surface's scalars that the format holds."""
+        sizes = {"": (), "vertices": (surface.n,), "both": (surface.n, surface.m)}[self.scalars]
+        return {name: values for name, values in scalars.items() if len(values) in sizes}
 
+    def lost(self, surface: Surface, units: Units) -> list[str]:
+        """What of a surface the format does not hold, in words."""
+        there = {
+            "weights": surface.weights.any(),
+            "snow": surface.snows.any(),
+            "lines": surface.given_supports.on_line,
+            "cables": surface.cables,
+            "rooms": surface.rooms,
+            "planes": surface.on_planes,
+            "unit": units,
+        }
+        return [LOST[part].format(unit=units.length) for part in self.loses if there[part]]
+
+
+LOST = {
+    "weights": "weights",
+    "snow": "snow",
+    "lines": "lines or circles that vertices slide along (they are fixed in it)",
+    "cables": "cables",
+    "rooms": "volumes of rooms (it has the pressures reached)",
+    "planes": "planes other than Π that vertices slide on, and mirror planes (fixed in it)",
+    "unit": "its unit {unit}",
+}
+"""The parts of a surface that a format may lose, in words."""
 
 FORMATS = {
-    ".pcmc": Format(
-        "native",
-        scalars="both",
-        certificate=True,
-        shared=True,
-        lines=True,
-        planes=True,
-        cables=True,
-        rooms=True,
-    ),
-    ".fe": Format("evolver", shared=True, units=False, planes=True, cables=True, rooms=True),
-    ".dmp": Format("evolver", shared=True, units=False, planes=True, cables=True, rooms=True),
+    ".pcmc": Format("native", scalars="both", certificate=True, shared=True, own=PARTS),
+    ".fe": Format("evolver", shared=True, loses=("lines", "unit")),
+    ".dmp": Format("evolver", shared=True, loses=("lines", "unit")),
     ".obj": Format("obj"),
     ".ply": Format("ply", scalars="both"),
-    ".stl": Format("stl", separate=True, loses=("supports", "tensions", "pressures"), units=False),
+    ".stl": Format("stl", separate=True, bare=True, loses=tuple(LOST)),
     ".vtp": Format("vtk", scalars="both"),
     ".vtu": Format("vtk", scalars="both"),
-    ".glb": Format("gltf", scalars="vertices", colours=True, separate=True, walls=True, unit="m"),
-    ".gltf": Format("gltf", scalars="vertices", colours=True, separate=True, walls=True, unit="m"),
-    ".usda": Format("usd", scalars="vertices", colours=True, separate=True, walls=True, reads=False),
-    ".3dm": Format("rhino", separate=True, walls=True),
-    ".ifc": Format("ifc", certificate=True, separate=True, walls=True),
+    ".glb": Format("gltf", scalars="vertices", colours=True, separate=True, unit="m"),
+    ".gltf": Format("gltf", scalars="vertices", colours=True, separate=True, unit="m"),
+    ".usda": Format("usd", scalars="vertices", colours=True, separate=True, reads=False),
+    ".3dm": Format("rhino", separate=True, own=("cables",)),
+    ".ifc": Format("ifc", certificate=True, separate=True),
 }
 """The formats by suffix."""
 READ_ONLY = {suffix: Format("meshlab") for suffix in (".off", ".3ds", ".dae", ".x3d")}

@@ -23,14 +23,13 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import FileError
 from ..base.files import check_regular
-from ..base.units import Units
 from ..surface import Surface
 from ..surface.colours import linear, patch_colors, scalar_colors
 from ..surface.origin import file_origin
 from .flat_walls import KEY
 from .libraries import load_library, translated_errors
 from .mesh_data import MeshData, support_kinds, support_of
-from .metadata import metadata_text, parse_metadata
+from .metadata import parse_metadata
 from .trimesh_scene import from_meshes
 
 SUPPORT = "_SUPPORT"
@@ -42,7 +41,7 @@ def write(
     path: Path,
     surface: Surface,
     scalars: Mapping[str, Floats],
-    units: Units,
+    metadata: str,
     walls: str | None,
     colour: str,
     **_: Any,
@@ -78,7 +77,7 @@ def write(
             rgba = np.column_stack([linear(shades[used]), np.ones(len(used))])
             mesh.visual.vertex_attributes["color"] = np.round(255.0 * rgba).astype(np.uint8)
         scene.add_geometry(mesh, node_name=patch.name, geom_name=patch.name, transform=place)
-    scene.metadata["pcmc"] = metadata_text(surface, units)
+    scene.metadata["pcmc"] = metadata
     if walls is not None:
         scene.metadata[KEY] = walls
     if path.suffix.lower() == ".glb":

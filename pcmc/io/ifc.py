@@ -2,8 +2,9 @@
 
 Project, site, building, storey and one IfcRoof. Its parts are an IfcSlab of type ROOF for each patch and an
 IfcWall for each wall, with an IfcTriangulatedFaceSet in double precision, a colour, and the property set
-``Pcmc_Patch``. The roof has ``Pcmc_Certificate`` and, so that pcmc can read the file, ``Pcmc_Surface``. The
-same surface gives the same bytes: the content makes the identifiers, and the time stamp is always the same.
+``Pcmc_Patch``; and an IfcTendon for each cable, with its axis, its force, and ``Pcmc_Cable``. The roof has
+``Pcmc_Certificate`` and, so that pcmc can read the file, ``Pcmc_Surface``. The same surface gives the same
+bytes: the content makes the identifiers, and the time stamp is always the same.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ import numpy as np
 from ..base.errors import FileError, MissingExtra
 from ..base.units import Units, length_factor
 from ..energy.functional import patch_areas
-from ..surface import Surface
+from ..surface import Cable, Surface
 from ..surface.colours import patch_colors
 from ..surface.origin import file_origin
 from .ifc_units import assigned_units
 from .libraries import load_library
 from .mesh_data import MeshData, support_of, within
-from .metadata import metadata_text, parse_metadata
+from .metadata import parse_metadata
 from .reading_process import read_arrays
 
 SPACE = uuid.UUID("6fb0c1f4-5b0c-5f0b-9d5a-0b4c2f6f7a10")  # of our identifiers
@@ -40,17 +41,24 @@ NUMBERS = {  # in the property set of the certificate, by the name there
 
 
 def write(
-    path: Path, surface: Surface, certificate: Mapping[str, Any], walls: str | None, units: Units, **_: Any
+    path: Path,
+    surface: Surface,
+    certificate: Mapping[str, Any],
+    walls: str | None,
+    units: Units,
+    metadata: str,
+    **_: Any,
 ) -> None:
     """The whole file; without a unit of length, its lengths are metres."""
     load_library("ifcopenshell", "ifc")
-    model = _Model(surface, units)
+    model = _Model(surface, units, metadata)
     roof = model.add_roof(certificate, walls)
     areas = patch_areas(surface) * length_factor(units.length, "m") ** 2
     parts = []
     for k, color in enumerate(patch_colors(surface).tolist()):
         if (surface.patch_of_face == k).any():
             parts.append(model.add_part(k, color, float(areas[k]), roof.ObjectPlacement))
+    parts += [model.add_cable(cable, roof.ObjectPlacement) for cable in surface.cables]
     model.aggregate("roof's parts", roof, parts)
     path.write_text(model.text(), encoding="ascii")
 
@@ -58,14 +66,14 @@ def write(
 class _Model:
     """An IFC4 file that grows: each method adds entities."""
 
-    def __init__(self, surface: Surface, units: Units) -> None:
+    def __init__(self, surface: Surface, units: Units, metadata: str) -> None:
         import ifcopenshell
 
-        self.surface, self.given, self.units = surface, units, units or Units("m")
+        self.surface, self.metadata, self.units = surface, metadata, units or Units("m")
         self.file: Any = ifcopenshell.file(schema="IFC4")
         self.add = self.file.create_entity
         content = (surface.vertices, surface.faces, surface.patch_of_face, support_of(surface))
-        digest = hashlib.sha256(metadata_text(surface, units).encode())
+        digest = hashlib.sha256(metadata.encode())
         for array in content:
             digest.update(np.ascontiguousarray(array).tobytes())
         self.digest = digest.hexdigest()
@@ -97,12 +105,15 @@ class _Model:
             Precision=1e-9 * self.surface.size,
             WorldCoordinateSystem=self.add("IfcAxis2Placement3D", Location=origin),
         )
-        self.body = self.add(
-            "IfcGeometricRepresentationSubContext",
-            ContextIdentifier="Body",
-            ContextType="Model",
-            ParentContext=context,
-            TargetView="MODEL_VIEW",
+        self.body, self.axis = (
+            self.add(
+                "IfcGeometricRepresentationSubContext",
+                ContextIdentifier=name,
+                ContextType="Model",
+                ParentContext=context,
+                TargetView=view,
+            )
+            for name, view in (("Body", "MODEL_VIEW"), ("Axis", "GRAPH_VIEW"))
         )
         units = assigned_units(self.add, self.units)
         whole = self.rooted(
@@ -125,7 +136,7 @@ class _Model:
         )
         if certificate:
             self.add_properties("Pcmc_Certificate", roof, self._findings(certificate))
-        texts = {"Description": self._text(metadata_text(self.surface, self.given))}
+        texts = {"Description": self._text(self.metadata)}
         if walls is not None:
             texts["Walls"] = self._text(walls)
         self.add_properties("Pcmc_Surface", roof, texts)
@@ -145,20 +156,13 @@ class _Model:
         shading = self.add("IfcSurfaceStyleShading", SurfaceColour=rgb, Transparency=0.0)
         style = self.add("IfcSurfaceStyle", Name=patch.name, Side="BOTH", Styles=[shading])
         self.add("IfcStyledItem", Item=mesh, Styles=[style])
-        shape = self.add(
-            "IfcShapeRepresentation",
-            ContextOfItems=self.body,
-            RepresentationIdentifier="Body",
-            RepresentationType="Tessellation",
-            Items=[mesh],
-        )
         wall = bool(surface.walls[k])
         element = self.rooted(
             "IfcWall" if wall else "IfcSlab",
             f"patch {k}",
             Name=patch.name,
             ObjectPlacement=self.placement(place),
-            Representation=self.add("IfcProductDefinitionShape", Representations=[shape]),
+            Representation=self._shape(self.body, "Tessellation", [mesh]),
             PredefinedType="NOTDEFINED" if wall else "ROOF",
         )
         force = bool(self.units.force)
@@ -173,6 +177,38 @@ class _Model:
             values["TargetMeanCurvature"] = self.add("IfcReal", patch.target_curvature)
         self.add_properties("Pcmc_Patch", element, values, str(k))
         return element
+
+    def add_cable(self, cable: Cable, place: Any) -> Any:
+        """The tendon of a cable: its axis as polylines, and its force."""
+        chains = self.surface.topology.chains(cable.edges, np.zeros(self.surface.n, dtype=bool))
+        lines = []
+        for chain in chains:
+            points = (self.surface.vertices[chain.vertices] - self.middle).tolist()
+            entities = [self.add("IfcCartesianPoint", Coordinates=point) for point in points]
+            lines.append(self.add("IfcPolyline", Points=entities + entities[:1] * chain.closed))
+        force = self.add("IfcForceMeasure" if self.units.force else "IfcReal", cable.tension)
+        tendon = self.rooted(
+            "IfcTendon",
+            f"cable {cable.name}",
+            Name=cable.name,
+            ObjectPlacement=self.placement(place),
+            Representation=self._shape(self.axis, "Curve3D", lines),
+            TensionForce=cable.tension if self.units.force else None,
+            PredefinedType="NOTDEFINED",
+        )
+        self.add_properties("Pcmc_Cable", tendon, {"Force": force}, cable.name)
+        return tendon
+
+    def _shape(self, context: Any, kind: str, items: list[Any]) -> Any:
+        """The representation of an element in a context."""
+        shape = self.add(
+            "IfcShapeRepresentation",
+            ContextOfItems=context,
+            RepresentationIdentifier=context.ContextIdentifier,
+            RepresentationType=kind,
+            Items=items,
+        )
+        return self.add("IfcProductDefinitionShape", Representations=[shape])
 
     def add_properties(self, name: str, of: Any, values: Mapping[str, Any], role: str = "") -> None:
         """A property set of an element; values are entities of IFC's types."""
@@ -237,13 +273,5 @@ def read(path: Path) -> MeshData:
     faces = np.concatenate(F)
     if metadata.counts is not None:  # a vertex of two patches is in both, so vertices count for nothing
         metadata.check_counts(metadata.counts[0], len(faces))
-    return MeshData(
-        np.concatenate(X),
-        faces,
-        np.concatenate(patch),
-        metadata.named(names),
-        np.concatenate(support),
-        metadata.plane,
-        walls=arrays["walls"],
-        units=metadata.units,
-    )
+    about = {"support": np.concatenate(support), "walls": arrays["walls"]}
+    return metadata.mesh_data(np.concatenate(X), faces, np.concatenate(patch), names, **about)

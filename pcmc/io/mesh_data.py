@@ -45,6 +45,7 @@ class MeshData:
         no height.
     lines, planes, cables, rooms : as ``on_line``, ``on_planes``, ``cables`` and ``rooms`` in Surface.
     units : of the numbers; no unit where the file has none.
+    parts : cables, rooms, lines and planes as ``metadata`` writes them, until the mesh is whole.
     """
 
     vertices: Floats
@@ -63,6 +64,7 @@ class MeshData:
     planes: tuple[tuple[Plane, Bools], ...] = ()
     cables: tuple[Cable, ...] = ()
     rooms: tuple[Room, ...] = ()
+    parts: Mapping[str, Any] = field(default_factory=dict)
 
 
 def checked(data: MeshData) -> MeshData:

@@ -30,8 +30,8 @@ def read(path: Path) -> MeshData:
     if not X:
         raise FileError("the file has no triangles", where="faces", found=0)
     patch, names = pd.factorize(np.array(named, dtype=object))
-    patches = Metadata().named([path.stem] if len(names) == 1 else names.tolist())
-    return MeshData(np.concatenate(X), np.concatenate(F), patch, patches)
+    listed = [path.stem] if len(names) == 1 else names.tolist()
+    return Metadata().mesh_data(np.concatenate(X), np.concatenate(F), patch, listed)
 
 
 def require_meshlab() -> None:

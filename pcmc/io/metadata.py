@@ -1,22 +1,68 @@
-"""One line of JSON with what formats of plain meshes have no place for: patches, plane, counts."""
+"""One line of JSON with what formats of plain meshes have no place for: patches, plane, cables, rooms, ...
+
+Vertices are named by their number where the mesh keeps its vertices, or by their position where the file
+has a mesh per patch.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
+from typing import Any
 
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
+from ..base.names import names_from_file
 from ..base.units import NO_UNITS, Units
-from ..surface import Patch, Plane, Surface
+from ..surface import Cable, Circle, Line, Patch, Plane, Room, Surface
+from ..surface.geometry import bounding_size
+from .mesh_data import FREE, ROUNDING, SLIDING, MeshData, coincident, given_support, support_of, within
+
+DAMAGED = (ValueError, KeyError, TypeError, IndexError, AttributeError)
+CHANGED = "the surface has changed since it was written"
 
 
-def metadata_text(surface: Surface, units: Units = NO_UNITS) -> str:
-    """Patches, plane, counts, and units if there are any, as JSON: a format's comment or metadata."""
-    patches = [row_of(patch) for patch in surface.patches]
-    plane = surface.plane.point, surface.plane.normal
-    values: dict[str, object] = {"patches": patches, "plane": plane, "counts": [surface.n, surface.m]}
-    return json.dumps(values | ({"units": astuple(units)} if units else {}))
+def metadata_text(
+    surface: Surface,
+    units: Units = NO_UNITS,
+    joined: bool = True,
+    without: Sequence[str] = (),
+    counts: tuple[int, int] | None = None,
+) -> str:
+    """Everything of a surface but its mesh and supports on Π, as JSON: a format's comment or metadata.
+
+    Parameters
+    ----------
+    joined : whether vertices keep their numbers in the file.
+    without : the parts that the format holds itself.
+    counts : numbers of vertices and faces in the file, if not those of the surface.
+    """
+
+    def where(vertices: Ints) -> Any:
+        return (vertices if joined else surface.vertices[vertices]).tolist()
+
+    given, plain = given_support(surface), support_of(surface)
+    slides = [np.flatnonzero((given == kind) & (plain != kind)) for kind in (FREE, SLIDING)]
+    guides = [(guide, np.flatnonzero(along)) for guide, along in surface.given_supports.on_line]
+    planes = [(plane, np.flatnonzero(mask)) for plane, mask in surface.on_planes]
+    values: dict[str, object] = {
+        "patches": [row_of(patch) for patch in surface.patches],
+        "plane": (surface.plane.point, surface.plane.normal),
+        "counts": counts or (surface.n, surface.m),
+    }
+    parts = {
+        "units": astuple(units) if units else (),
+        "cables": [[cable.name, cable.tension, where(cable.edges)] for cable in surface.cables],
+        "rooms": [astuple(room) for room in surface.rooms],
+        "lines": [[astuple(guide), where(own)] for guide, own in guides if len(own)],
+        "planes": [[astuple(plane), where(own)] for plane, own in planes if len(own)],
+        "slides": [where(own) for own in slides] if planes else (),
+    }
+    return json.dumps(values | {key: part for key, part in parts.items() if part and key not in without})
 
 
 def row_of(patch: Patch) -> tuple[object, ...]:
@@ -25,18 +71,27 @@ def row_of(patch: Patch) -> tuple[object, ...]:
     return row if patch.snow else row[:-1] if patch.weight else row[:-2]
 
 
+PARTS = ("cables", "rooms", "lines", "planes", "slides")
+
+
 @dataclass(frozen=True)
 class Metadata:
-    """The same read back: patches by name, the plane, numbers of vertices and faces, units."""
+    """The same read back: patches by name, the plane, numbers of vertices and faces, units, other parts."""
 
     patches: Mapping[str, Patch] = field(default_factory=dict)
     plane: Plane | None = None
     counts: tuple[int, int] | None = None
     units: Units = NO_UNITS
+    parts: Mapping[str, Any] = field(default_factory=dict)
 
-    def named(self, names: Sequence[str]) -> tuple[Patch, ...]:
-        """The patches of these names; tension and pressure are 1 where the metadata lack them."""
-        return tuple(self.patches.get(name, Patch(name, 1.0)) for name in names)
+    def mesh_data(
+        self, X: Floats, F: Ints, patch: Ints, names: Sequence[str], notes: Sequence[str] = (), **more: Any
+    ) -> MeshData:
+        """A mesh with all of this; tension and pressure of a patch are 1 where the metadata lack its name."""
+        found, changed = names_from_file(names)
+        patches = tuple(self.patches.get(name) or Patch(found[name], 1.0) for name in names)
+        about = {"plane": self.plane, "units": self.units, "parts": self.parts} | more
+        return MeshData(X, F, patch, patches, notes=(*notes, *filter(None, (changed,))), **about)
 
     def check_counts(self, vertices: int, faces: int) -> None:
         """Raise FileError when the file lacks some of the mesh that was written."""
@@ -56,7 +111,87 @@ def parse_metadata(text: str | None) -> Metadata:
         plane = Plane(point, normal)
         counts = (int(values["counts"][0]), int(values["counts"][1]))
         units = Units(*values.get("units", ()))
-    except (ValueError, KeyError, TypeError, IndexError):
-        message = f"the pcmc metadata in it are damaged: {text[:60]!r}"
-        raise FileError(message, where="metadata", found=text[:60]) from None
-    return Metadata({p.name: p for p in patches}, plane, counts, units)
+    except DAMAGED:
+        raise _damaged(text) from None
+    parts = {key: values[key] for key in PARTS if key in values}
+    return Metadata({p.name: p for p in patches}, plane, counts, units, parts)
+
+
+def _damaged(text: str) -> FileError:
+    message = f"the pcmc metadata in it are damaged: {text[:60]!r}"
+    return FileError(message, where="metadata", found=text[:60])
+
+
+def with_parts(data: MeshData) -> MeshData:
+    """A file's mesh with the cables, rooms, lines and planes of its metadata.
+
+    Those whose vertices are no longer there are left out, with a note; what they hold stays fixed.
+    """
+    try:
+        return _Placed(data).result if data.parts else data
+    except DAMAGED:
+        raise _damaged(str(dict(data.parts))) from None
+
+
+class _Placed:
+    """The parts of metadata on the vertices of a mesh."""
+
+    def __init__(self, data: MeshData) -> None:
+        parts, n = data.parts, len(data.vertices)
+        self.X, self.lost = data.vertices, dict[str, None]()
+        self.keep: Ints = np.arange(n)
+        self.group: Ints = self.keep
+        cables = [
+            Cable(name, pull, self.keep[ends])
+            for name, pull, where in parts.get("cables", ())
+            if (ends := self.groups(where, f"cable {name!r} was left out")) is not None
+        ]
+        lines = [
+            (Circle(*row) if len(row) == 3 else Line(*row), np.isin(self.group, own))
+            for row, where in parts.get("lines", ())
+            if (own := self.groups(where, "what slides along a line is fixed", exact=True)) is not None
+        ]
+        what = "what slides on a plane is fixed"
+        planes = [
+            (Plane(*row), np.isin(self.group, own))
+            for row, where in parts.get("planes", ())
+            if (own := self.groups(where, what, exact=True)) is not None
+        ]
+        support = data.support
+        if support is not None and planes and what not in self.lost:
+            support = support.copy()
+            for kind, where in zip((FREE, SLIDING), parts["slides"], strict=True):
+                if len(where) and (own := self.groups(where, what)) is not None:
+                    support[np.isin(self.group, own)] = kind
+        self.result = replace(
+            data,
+            vertices=self.X,
+            support=support,
+            cables=tuple(cables),
+            rooms=tuple(Room(*row) for row in parts.get("rooms", ())),
+            lines=tuple(lines),
+            planes=() if what in self.lost else tuple(planes),
+            notes=(*data.notes, *([f"{', '.join(self.lost)}: {CHANGED}"] if self.lost else [])),
+        )
+
+    def groups(self, where: Any, what: str, exact: bool = False) -> Ints | None:
+        """The groups of vertices at one place that are meant, by number or position.
+
+        None, and ``what`` is lost, if one is gone. With ``exact`` the vertices get the positions of the
+        metadata, to the last digit.
+        """
+        given = np.array(where)
+        if given.dtype.kind in "iu":
+            return within(given, "metadata", len(self.X))
+        if self.keep is self.group:  # positions: at one place there may be several vertices
+            self.keep, self.group = coincident(self.X)
+        points = given.astype(np.float64).reshape(-1, 3)
+        distance, near = map(np.asarray, cKDTree(self.X[self.keep]).query(points))
+        if (distance > ROUNDING * bounding_size(self.X)).any():
+            self.lost[what] = None
+            return None
+        if exact:
+            positions = self.X[self.keep]
+            positions[near] = points
+            self.X = positions[self.group]
+        return near.reshape(given.shape[:-1])

@@ -23,11 +23,10 @@ import pandas as pd
 
 from ..base.arrays import Bools, Floats
 from ..base.errors import FileError
-from ..base.units import Units
 from ..surface import Cable, Circle, Guide, Line, Plane, Room, Surface
 from .libraries import translated_errors
 from .mesh_data import MeshData, given_support
-from .metadata import metadata_text, parse_metadata
+from .metadata import parse_metadata
 
 VERSION = 5  # since 2 lines, 3 circles, 4 planes, weights, cables, rooms, 5 snow; the oldest that will do
 FORMAT = "pcmc surface"
@@ -40,7 +39,7 @@ def write(
     surface: Surface,
     scalars: Mapping[str, Floats],
     certificate: Mapping[str, Any],
-    units: Units,
+    metadata: str,
     **_: Any,
 ) -> None:
     """The archive; the same surface gives the same bytes."""
@@ -48,7 +47,7 @@ def write(
     meta = {
         "format": FORMAT,
         "version": _version(surface),
-        "description": metadata_text(surface, units),
+        "description": metadata,
         "certificate": {k: v for k, v in certificate.items() if k not in tables},
     }
     if surface.rooms:

@@ -8,37 +8,39 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
-from ..base.units import Units
+from ..base.validate import parsed
 from ..surface import Surface
 from .mesh_data import FREE, HELD, MeshData, support_of
-from .metadata import metadata_text, parse_metadata
+from .metadata import parse_metadata
 from .polygons import triangulate
-from .text import format_rows
+from .text import escaped, format_rows, numbers
 
 MARK = "# pcmc "
+SPECIAL = "\\"
 VERTEX = re.compile(r"^[^\S\n]*v[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\n]*$", re.M)
 FACE = re.compile(r"^[^\S\n]*f[^\S\n]+([^\n]+)$", re.M)
 POINT = re.compile(r"^[^\S\n]*p[^\S\n]+(\d[\d \t]*)$", re.M)
-CORNER = re.compile(r"[-+]?\d{1,18}(/\S*)?")
+CORNER = re.compile(r"[-+]?[0-9]{1,18}(/\S*)?")
 
 
-def write(path: Path, surface: Surface, units: Units, **_: Any) -> None:
-    """Vertices with all digits, supports, then the faces group by group."""
+def write(path: Path, surface: Surface, metadata: str, **_: Any) -> None:
+    """Vertices with all digits, supports, then the faces group by group; a backslash would join lines."""
     support = support_of(surface)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"{MARK}{metadata_text(surface, units)}\n")
+        file.write(f"{MARK}{metadata}\n")
         file.write(format_rows("v %r %r %r\n", *surface.vertices.T))
         for name, kind in HELD.items():
             held = np.flatnonzero(support == kind) + 1
             if len(held):
                 file.write(f"g {name}\n" + format_rows("p %d\n", held))
         for k, patch in enumerate(surface.patches):
-            file.write(f"g {patch.name}\n")
+            file.write(f"g {escaped(patch.name, SPECIAL)}\n")
             file.write(format_rows("f %d %d %d\n", *(surface.faces[surface.patch_of_face == k].T + 1)))
 
 
@@ -53,7 +55,8 @@ def read(path: Path) -> MeshData:
     names: dict[str, int] = {}
     corners, counts, groups = [], [], []
     support = np.full(len(X), FREE, dtype=np.int8)
-    for name, part, offset in _parts(text, key, path.stem):
+    for group, part, offset in _parts(text, key, path.stem):
+        name = unquote(group) if comment else group
         count, corner = _faces(text, part, offset, len(X), starts)
         if len(count):
             counts.append(count)
@@ -69,9 +72,8 @@ def read(path: Path) -> MeshData:
     F, source, notes = triangulate(X, np.concatenate(corners), np.concatenate(counts))
     metadata.check_counts(len(X), len(F))
     known = support if comment or support.any() else None
-    patch, patches = np.concatenate(groups)[source], metadata.named(list(names))
-    about: dict[str, Any] = {"joined": metadata.counts is not None, "units": metadata.units}
-    return MeshData(X, F, patch, patches, known, metadata.plane, notes=notes, **about)
+    patch, joined = np.concatenate(groups)[source], metadata.counts is not None
+    return metadata.mesh_data(X, F, patch, list(names), notes, support=known, joined=joined)
 
 
 def _vertices(text: str) -> Floats:
@@ -79,12 +81,12 @@ def _vertices(text: str) -> Floats:
     lines = len(re.findall(r"^[^\S\n]*v(?=\s)", text, re.M))
     try:
         if len(coordinates) == lines:
-            return np.array(coordinates, dtype=np.float64).reshape(-1, 3)
+            return numbers([c for row in coordinates for c in row]).reshape(-1, 3)
     except ValueError:
         pass
     for line in re.finditer(r"^[^\S\n]*v(?=\s)[^\n]*$", text, re.M):
         try:
-            [float(c) for c in line[0].split()[1:4]][2]
+            [parsed(c) for c in line[0].split()[1:4]][2]
         except (ValueError, IndexError):
             raise _error(text, line.start(), "expected three coordinates", line[0]) from None
     raise FileError("its vertices cannot be read", where="vertices")
@@ -106,7 +108,7 @@ def _faces(text: str, part: str, offset: int, n: int, starts: Callable[[], Ints]
     bare = re.sub(r"/[^\s]*", "", "\n".join(faces)).split("\n") if faces else []
     counts = np.array([len(face.split()) for face in bare], dtype=np.int64)
     try:
-        corner = np.array(" ".join(bare).split(), dtype=np.int64)
+        corner = numbers(" ".join(bare).split(), np.int64)
     except (ValueError, OverflowError):
         lines = list(FACE.finditer(part))
         at = next((m for m in lines if not all(map(CORNER.fullmatch, m[1].split()))), lines[0])

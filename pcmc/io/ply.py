@@ -18,11 +18,11 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
-from ..base.units import Units
 from ..surface import Surface
 from .mesh_data import MeshData, support_of
-from .metadata import metadata_text, parse_metadata
+from .metadata import parse_metadata
 from .polygons import from_polygons
+from .text import numbers
 
 MARK = "comment pcmc "
 RESERVED = ("x", "y", "z", "support", "patch", "vertex_indices")
@@ -34,7 +34,7 @@ TYPES = {
 NAMES = {"u1": "uchar", "i4": "int", "f8": "double"}
 
 
-def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], units: Units, **_: Any) -> None:
+def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], metadata: str, **_: Any) -> None:
     """Little-endian binary."""
     vertex = {c: surface.vertices[:, d].astype("<f8") for d, c in enumerate("xyz")}
     vertex["support"] = support_of(surface).astype("u1")
@@ -48,7 +48,7 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], units: Un
     header = [
         "ply",
         "format binary_little_endian 1.0",
-        f"{MARK}{metadata_text(surface, units)}",
+        f"{MARK}{metadata}",
         f"element vertex {surface.n}",
         *_announced(vertex),
         f"element face {surface.m}",
@@ -110,7 +110,7 @@ def read(path: Path) -> MeshData:
     elements = _elements(header, kinds)
     if form == "ascii":
         try:
-            data, start = np.array(data[start:].split(), dtype=np.float64).tobytes(), 0
+            data, start = numbers(data[start:].decode("ascii").split()).tobytes(), 0
         except ValueError as error:
             raise FileError(f"its body is not all numbers ({error})", where="body") from None
     tables: dict[str, dict[str, Any]] = {}

@@ -123,9 +123,8 @@ def from_polygons(
     support = None if support is None else support_kinds(support)
     scalars = _scalars(point_data, "support", len(X))
     scalars |= {k: v[source] for k, v in _scalars(cell_data, label, len(counts)).items()}
-    about: dict[str, Any] = {"joined": metadata.counts is not None, "units": metadata.units}
-    patches = metadata.named(names)
-    return MeshData(X, F, patch[source], patches, support, metadata.plane, scalars, notes=notes, **about)
+    about: dict[str, Any] = {"support": support, "scalars": scalars, "joined": metadata.counts is not None}
+    return metadata.mesh_data(X, F, patch[source], names, notes, **about)
 
 
 def _scalars(data: Mapping[str, Any], other: str | None, size: int) -> dict[str, Floats]:

@@ -22,6 +22,7 @@ from .formats import FORMATS, READ_ONLY, Format, format_of
 from .import_warnings import import_warnings
 from .libraries import unreadable
 from .mesh_data import MeshData, checked, merged, to_surface, without_unused
+from .metadata import with_parts
 from .scaling import converted, stated
 
 NO_SUPPORTS = (
@@ -108,7 +109,7 @@ def load(path: str | os.PathLike[str]) -> MeshData:
     path = Path(path)
     with opened(path) as form:
         data = without_unused(checked(contents(form, path)))
-        return data if form.shared else restore_walls(merged(data))
+        return with_parts(data if form.shared else restore_walls(merged(data)))
 
 
 def contents(form: Format, path: Path) -> MeshData:

@@ -69,7 +69,7 @@ def vtk_arrays(path: str) -> dict[str, Any]:
 
 
 def rhino_arrays(path: str) -> dict[str, Any]:
-    """Layers and objects of a Rhino file, names, user texts, meshes and point clouds; its unit system."""
+    """Layers and objects of a Rhino file, names, user texts, meshes, points and lines; its unit system."""
     import numpy as np
     import rhino3dm
 
@@ -92,6 +92,8 @@ def rhino_arrays(path: str) -> dict[str, Any]:
             held["points"] = coordinates(geometry.Vertices.ToPoint3dArray())
         elif isinstance(geometry, rhino.PointCloud):
             held["points"] = coordinates(geometry.GetPoints())
+        elif isinstance(geometry, rhino.PolylineCurve):
+            held["line"] = coordinates(geometry.Point(k) for k in range(geometry.PointCount))
         objects.append(held)
     unit = str(model.Settings.ModelUnitSystem.name)
     return {"layers": layers, "objects": objects, "unit": unit}
@@ -112,6 +114,8 @@ def ifc_arrays(path: str) -> dict[str, Any]:
             continue
         found["text"], found["walls"] = texts["Description"], texts.get("Walls")
         for part in (part for whole in roof.IsDecomposedBy for part in whole.RelatedObjects):
+            if part.is_a("IfcTendon"):
+                continue
             item = part.Representation.Representations[0].Items[0]
             points = np.array(item.Coordinates.CoordList, dtype=np.float64).reshape(-1, 3)
             place = get_local_placement(part.ObjectPlacement)

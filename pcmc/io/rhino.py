@@ -1,13 +1,16 @@
 """Rhino (.3dm): a layer per patch with its mesh in double precision, in the patch's colour.
 
 Tensions, pressures, plane and walls without height are the layers' user text; supports are point clouds
-on the layers "fixed" and "sliding". Ridges, rims and wall lines are curves on layers of their own, for
-drawing; reading leaves them out. Scalars are lost.
+on the layers "fixed" and "sliding". Each cable is polylines on a layer "cable NAME". Ridges, rims and wall
+lines are curves on layers of their own, for drawing; reading leaves them out. Scalars are lost.
 """
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,29 +28,28 @@ from ..surface.geometry import bounding_size
 from . import flat_walls
 from .libraries import load_library
 from .mesh_data import FIXED, FREE, HELD, SLIDING, TOLERANCE, MeshData, support_of, within
-from .metadata import Metadata, metadata_text, parse_metadata
+from .metadata import Metadata, parse_metadata
 from .polygons import triangulate
 from .reading_process import read_arrays
 
-KEY = "pcmc"
+KEY, CABLE, NAME = "pcmc", "pcmc cable", "pcmc name"
 VERSION = 7  # of Rhino's format
 UNIT = "m"  # of files whose surface has none
 CURVES = {"PCMC-RIDGE": (200, 0, 0, 255), "PCMC-RIM": (0, 0, 0, 255), "PCMC-WALL": (0, 128, 0, 255)}
-COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255)}
+COLORS = {"fixed": (200, 16, 46, 255), "sliding": (31, 79, 191, 255), "cable": (128, 0, 128, 255)}
 
 
-def write(path: Path, surface: Surface, walls: str | None, units: Units, **_: Any) -> None:
+def write(path: Path, surface: Surface, walls: str | None, units: Units, metadata: str, **_: Any) -> None:
     """A layer per patch, in the unit of the surface; in metres if there is none."""
     rhino = load_library("rhino3dm")
     model = rhino.File3dm()
     model.Settings.ModelUnitSystem = getattr(rhino.UnitSystem, TABLE[units.length or UNIT].rhino)
-    text = metadata_text(surface, units)
     for k, (patch, color) in enumerate(zip(surface.patches, patch_colors(surface), strict=True)):
         faces = surface.faces[surface.patch_of_face == k]
         if not len(faces):
             continue
         rgba = (*(round(255 * float(c)) for c in color), 255)
-        attributes = _layer(rhino, model, patch.name, rgba, text)
+        attributes = _layer(rhino, model, patch.name, rgba, metadata)
         used, local = np.unique(faces, return_inverse=True)
         mesh = rhino.Mesh()
         mesh.Vertices.UseDoublePrecisionVertices = True
@@ -66,19 +68,23 @@ def write(path: Path, surface: Surface, walls: str | None, units: Units, **_: An
             cloud = rhino.PointCloud()
             for point in held.tolist():
                 cloud.Add(rhino.Point3d(*point))
-            model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], text))
+            model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], metadata))
     _add_curves(rhino, model, surface)
     if not model.Write(str(path), VERSION):
         raise FileError("rhino3dm cannot write it; check that the folder exists and the disk has space")
 
 
 def _add_curves(rhino: Any, model: Any, surface: Surface) -> None:
-    """Ridges, rims and wall lines as polylines, each kind on its layer."""
+    """Ridges, rims, wall lines and cables as polylines, each kind and each cable on its layer."""
     layers: dict[str, Any] = {}
-    for kind, curve in curves_by_kind(surface):
-        name = f"PCMC-{kind}"
+    curves = [(f"PCMC-{kind}", curve, "") for kind, curve in curves_by_kind(surface)]
+    free = np.zeros(surface.n, dtype=bool)
+    for cable in surface.cables:
+        named, own = f"cable {cable.name}", json.dumps([cable.name, cable.tension])
+        curves += [(named, chain, own) for chain in surface.topology.chains(cable.edges, free)]
+    for name, curve, cable_text in curves:
         if name not in layers:
-            layers[name] = _layer(rhino, model, name, CURVES[name], "")
+            layers[name] = _layer(rhino, model, name, CURVES.get(name, COLORS["cable"]), "", cable_text)
         points = surface.vertices[curve.vertices].tolist()
         line = rhino.Polyline(len(points) + 1)
         for point in points + points[:1] * curve.closed:
@@ -86,13 +92,17 @@ def _add_curves(rhino: Any, model: Any, surface: Surface) -> None:
         model.Objects.AddPolyline(line, layers[name])
 
 
-def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str) -> Any:
+def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str = "", cable: str = "") -> Any:
     """A new layer, and object attributes that put an object on it."""
     layer = rhino.Layer()
     layer.Name, layer.Color = name, color
-    layer.SetUserString(KEY, text)
+    for key, value in ((KEY, text), (CABLE, cable)):
+        layer.SetUserString(key, value)
     attributes = rhino.ObjectAttributes()
     attributes.LayerIndex, attributes.Name = model.Layers.Add(layer), name
+    added = model.Layers[attributes.LayerIndex]
+    if added.Name != name:  # Rhino's names do not begin with a bracket, nor differ in case alone
+        added.SetUserString(NAME, f"{added.Name}\n{name}")
     return attributes
 
 
@@ -105,11 +115,14 @@ def read(path: Path) -> MeshData:
     X, corners, counts, named = [], [], [], []
     held: dict[int, list[Floats]] = {FIXED: [], SLIDING: []}
     metadata, walls, others, start = Metadata(), None, 0, 0
+    cables: dict[str, list[Any]] = {}
     for item in arrays["objects"]:
         layer: dict[str, Any] = {"name": path.stem, "texts": {}}
         if 0 <= item["layer"] < len(layers):
             layer = layers[item["layer"]]
         name, texts = layer["name"], layer["texts"]
+        in_file, _, own = texts.get(NAME, "").partition("\n")
+        name = own if in_file == name else name
         if texts.get(KEY):
             metadata = parse_metadata(texts[KEY])
             walls = texts.get(flat_walls.KEY) or walls
@@ -124,6 +137,8 @@ def read(path: Path) -> MeshData:
             start += len(X[-1])
         elif "points" in item and name in HELD:
             held[HELD[name]].append(item["points"])
+        elif "line" in item and CABLE in texts:
+            cables.setdefault(texts[CABLE], []).extend(pairwise(item["line"].tolist()))
         elif name not in CURVES:
             others += 1
     if not X:
@@ -134,6 +149,8 @@ def read(path: Path) -> MeshData:
         own = metadata.units.length or UNIT
         factor, model = length_factor(model, own), own
         X = [factor * points for points in X]
+        rows = [[*json.loads(text), (factor * np.array(pairs)).tolist()] for text, pairs in cables.items()]
+        metadata = replace(metadata, parts={**metadata.parts, "cables": rows})
         held = {kind: [factor * points for points in parts] for kind, parts in held.items()}
     points = np.concatenate(X)
     F, source, cut = triangulate(points, np.concatenate(corners), np.concatenate(counts))
@@ -142,11 +159,9 @@ def read(path: Path) -> MeshData:
         notes = (*notes, f"{others} objects that are not meshes were left out")
     support = _supports(points, held) if metadata.plane is not None or any(held.values()) else None
     patch, names = pd.factorize(np.array(named, dtype=object))
-    patches = metadata.named(names.tolist())
     units = Units(model, metadata.units.force if model else "")
-    return MeshData(
-        points, F, patch[source], patches, support, metadata.plane, notes=notes, walls=walls, units=units
-    )
+    about: dict[str, Any] = {"support": support, "walls": walls, "units": units}
+    return metadata.mesh_data(points, F, patch[source], names.tolist(), notes, **about)
 
 
 def _supports(X: Floats, held: dict[int, list[Floats]]) -> Ints:

@@ -7,6 +7,7 @@ coordinates, is written about its middle, which the format has no place for.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from .metadata import Metadata
 from .text import format_rows
 from .trimesh_scene import from_meshes
 
+SPECIAL = re.compile("solid|vertex", re.I)  # readers look for these words, in names too
 FACET = (
     "facet normal %.6g %.6g %.6g\nouter loop\nvertex %.9g %.9g %.9g\nvertex %.9g %.9g %.9g\n"
     "vertex %.9g %.9g %.9g\nendloop\nendfacet\n"
@@ -37,6 +39,10 @@ def write(path: Path, surface: Surface, **_: Any) -> str:
     normal = area_vectors(P)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     lines = np.concatenate([normal, P.reshape(-1, 9)], axis=1)
+    for patch in surface.patches:
+        if word := SPECIAL.search(patch.name):
+            text = f"the patch name {patch.name!r} has the word {word[0]!r} of the format; rename the patch"
+            raise FileError(text, where="patches", found=patch.name)
     with path.open("w", encoding="utf-8", newline="\n") as file:
         for k, patch in enumerate(surface.patches):
             chosen = lines[surface.patch_of_face == k]
@@ -65,6 +71,10 @@ def _complete(path: Path) -> None:
     if data[:5] == b"solid" and b"facet" in data[:2000]:
         lines = data.rstrip().split(b"\n")
         last = lines[-1].strip()[:40].decode()
+        if odd := re.search(rb"^\s*vertex[^\n]*_[^\n]*", data, re.M):
+            line = 1 + data[: odd.start()].count(b"\n")
+            text = f"line {line}: expected three coordinates, found {odd[0].decode().strip()[:60]!r}"
+            raise FileError(text, where=line)
         if not last.startswith("endsolid"):
             text = f"line {len(lines)}: cut off before 'endsolid', found {last!r}"
             raise FileError(text, where=len(lines))

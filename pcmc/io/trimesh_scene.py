@@ -28,7 +28,8 @@ def from_meshes(scene: Any, default: str, metadata: Metadata) -> MeshData:
             points = points @ transform[:3, :3].T + transform[:3, 3]
         X.append(points)
         F.append(within(mesh.faces, f"faces of {node!r}", len(points)) + start)
-        named += [default if unnamed else node] * len(mesh.faces)
+        known = node if node in metadata.patches or key not in metadata.patches else key
+        named += [default if unnamed else known] * len(mesh.faces)
         for attribute, values in mesh.vertex_attributes.items():
             if np.size(values) == len(points):
                 data.setdefault(attribute, []).append(np.asarray(values, dtype=np.float64).ravel())
@@ -37,6 +38,4 @@ def from_meshes(scene: Any, default: str, metadata: Metadata) -> MeshData:
         raise FileError("the file has no triangles", where="faces", found=0)
     scalars = {k: np.concatenate(v) for k, v in data.items() if sum(map(len, v)) == start}
     patch, names = pd.factorize(np.array(named, dtype=object))
-    patches = metadata.named(names.tolist())
-    about: dict[str, Any] = {"plane": metadata.plane, "scalars": scalars, "units": metadata.units}
-    return MeshData(np.concatenate(X), np.concatenate(F), patch, patches, **about)
+    return metadata.mesh_data(np.concatenate(X), np.concatenate(F), patch, names.tolist(), scalars=scalars)

@@ -22,7 +22,6 @@ from ..surface import Surface
 from ..surface.colours import linear, patch_colors, scalar_colors
 from ..surface.origin import file_origin
 from .mesh_data import support_of
-from .metadata import metadata_text
 
 ROOF = "/Roof"
 SUPPORT = "support"
@@ -34,6 +33,7 @@ def write(
     scalars: Mapping[str, Floats],
     walls: str | None,
     units: Units,
+    metadata: str,
     colour: str,
     **_: Any,
 ) -> None:
@@ -48,7 +48,7 @@ def write(
     UsdGeom.SetStageMetersPerUnit(stage, length_factor(units.length, "m"))
     roof: Any = UsdGeom.Xform.Define(stage, ROOF)
     stage.SetDefaultPrim(roof.GetPrim())
-    roof.GetPrim().SetCustomDataByKey("pcmc", metadata_text(surface, units))
+    roof.GetPrim().SetCustomDataByKey("pcmc", metadata)
     if walls is not None:
         roof.GetPrim().SetCustomDataByKey("walls", walls)
     middle = file_origin(surface.vertices, surface.size)

@@ -16,11 +16,10 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, MissingExtra
-from ..base.units import Units
 from ..surface import Surface
 from .libraries import load_library
 from .mesh_data import MeshData, support_of
-from .metadata import metadata_text, parse_metadata
+from .metadata import parse_metadata
 from .polygons import from_polygons
 from .reading_process import read_arrays
 
@@ -30,7 +29,7 @@ ITEMS = 100  # of an array, for each byte of a file; those of one value compress
 FIRST_SOLID = 10  # VTK_TETRA; the kinds above it are solid or curved
 
 
-def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], units: Units, **_: Any) -> None:
+def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], metadata: str, **_: Any) -> None:
     """Polygons in a .vtp, cells in a .vtu."""
     pyvista = load_library("pyvista")
     mesh = pyvista.PolyData.from_regular_faces(surface.vertices, surface.faces)
@@ -41,7 +40,7 @@ def write(path: Path, surface: Surface, scalars: Mapping[str, Floats], units: Un
             text = f"scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"
             raise FileError(text, where=name, found=name)
         (mesh.point_data if len(values) == surface.n else mesh.cell_data)[name] = values
-    mesh.field_data["pcmc"] = [metadata_text(surface, units)]
+    mesh.field_data["pcmc"] = [metadata]
     if path.suffix.lower() == ".vtu":
         mesh = mesh.cast_to_unstructured_grid()
     library = load_library("vtkmodules.vtkIOXML")

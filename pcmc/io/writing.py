@@ -15,12 +15,14 @@ import numpy.typing as npt
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError
 from ..base.files import atomic_write, check_name, writing
+from ..base.names import checked_name
 from ..base.units import Units, length_factor
-from ..base.validate import choice
+from ..base.validate import choice, refuse
 from ..contact.pinching import standing_part
 from ..surface import Surface, expect_surface
 from .flat_walls import encode_walls
 from .formats import FORMATS, Format, format_of
+from .metadata import metadata_text
 from .scaling import as_units, scaled_surface
 
 
@@ -72,10 +74,11 @@ def write(
     check_name(path)
     form = format_of(path, FORMATS)
     surface, certificate = _unpacked(surface, certificate, form)
+    if not isinstance(scalars, Mapping | None):
+        refuse("scalars", scalars, "arrays by name, such as {'height': [...]}")
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
-    sizes = {"": (), "vertices": (surface.n,), "both": (surface.n, surface.m)}[form.scalars]
     units = as_units(units)
-    lost = [name for name, scalar in scalars.items() if len(scalar) not in sizes]
+    lost = [name for name in scalars if name not in form.carried(surface, scalars)]
     if colour:
         choice("colour", colour, [name for name, scalar in scalars.items() if len(scalar) == surface.n])
         if not form.colours:
@@ -89,19 +92,21 @@ def write(
     shown, walls = surface, None
     if form.separate:
         shown = standing_part(surface).surface
-        if shown.m < surface.m and form.walls:
-            walls = encode_walls(surface, shown)
-        elif shown.m < surface.m:
+        if shown.m < surface.m and form.bare:
             lost.append(f"{surface.m - shown.m} triangles of walls without height")
+        elif shown.m < surface.m:
+            walls = encode_walls(surface, shown)
     content: dict[str, Any] = {"scalars": scalars, "colour": colour, "certificate": _values(certificate)}
-    content |= {"walls": walls, "units": units}
+    text = metadata_text(surface, units, not form.separate, form.own, (shown.n, shown.m))
+    content |= {"walls": walls, "units": units, "metadata": text}
     with writing(path), atomic_write(path) as temporary:
         try:
             note = form.functions.write(temporary, shown, **content)
         except PcmcError as error:
             raise error.in_file(path, FileError, str(path)) from None
     if lost:
-        text = f"{path}: a {path.suffix} file cannot carry {', '.join([*lost, *form.loses])}; left out"
+        lost += ["supports", "tensions", "pressures"] if form.bare else []
+        text = f"{path}: a {path.suffix} file cannot carry {', '.join(lost)}; left out"
         warnings.warn(text, LostWarning, stacklevel=2)
     if note:
         warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
@@ -130,7 +135,11 @@ def _values(certificate: Any) -> Mapping[str, Any]:
 
 
 def _scalar(surface: Surface, name: str, value: npt.ArrayLike) -> Floats:
-    array = np.asarray(value, dtype=float)
+    checked_name("scalars", name)
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        refuse("scalars", value, "an array of numbers", where=name)
     if array.shape not in ((surface.n,), (surface.m,)):
         shapes = f"({surface.n},) for vertices or ({surface.m},) for faces"
         text = f"scalars[{name!r}]: expected shape {shapes}, found {array.shape}"

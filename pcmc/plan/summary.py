@@ -23,12 +23,11 @@ def summary(plan: PlanData) -> str:
     }
     cable = "" if plan.cable is None else f" of tension {plan.cable:g}"
     supports = f"; {len(plan.supports) - curves} points and {curves} curves are held" if plan.supports else ""
-    snow = f"; snow {plan.snow:g}" if plan.snow else ""
     mirrors = f"; mirror images beyond {len(plan.mirrors)} edges" if plan.mirrors else ""
     return "\n".join(
         [
             f"Plan of {width:.4g} × {depth:.4g}, edge length {plan.edge_length:g}",
-            f"  outline: {plan.edge}{cable}{supports}{mirrors}{snow}",
+            f"  outline: {plan.edge}{cable}{supports}{mirrors}",
             *(f"  {name}: {listed(texts)}" for name, texts in parts.items() if texts),
         ]
     )

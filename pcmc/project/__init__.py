@@ -1,8 +1,11 @@
 """A whole design in one TOML file: plan, solver, remeshing, targets, output.
 
-Gives ``designed``, ``run`` and ``load`` to sweeps, page, command. May import ``plot`` and the rooms below it.
+Gives ``load``, ``opened``, ``designed`` and ``run`` to sweep, page and command. May import ``plot`` and the
+rooms below it. A file becomes a ``Project`` (``load``, which meshes nothing), its ``Start``, an ``Outcome``
+(``designed``), and files (``run``); each is a value, made once. A drawing or a mesh alone is a project, too.
 
 ``designed(path)`` is the roof that a project describes, from a cache if it was solved before.
+``opened(path)`` is what is in any file: the designed roof of a project, or a surface as it is.
 
 ``sections()`` lists every section and key of a project file; ``reference()`` prints the list::
 
@@ -35,26 +38,20 @@ Gives ``designed``, ``run`` and ``load`` to sweeps, page, command. May import ``
 from .cache import cached_files
 from .cache import clear as clear_cache
 from .cache import folder as cache_folder
-from .designed import designed
+from .designed import designed, opened
 from .documents import Documents, check_model, schedule_paths, schedule_works
 from .drawn import files_of, is_drawing
-from .file import Project, build, load, project_of, raised, read_data, surface_of
+from .file import Project, is_project, load, project_of, raised, read_data
 from .keys import REQUIRED, Key, Section, reference, sections
-from .outcome import Outcome
+from .outcome import MOST_CHECKED, Outcome
 from .output import COLOURS, OnStep, check_names, check_outputs, check_picture, paint, write_all
 from .planning import drawing_reference, project_text, proposal_text
 from .remeshing import Remeshing
-from .running import (
-    MOST_CHECKED,
-    check_of,
-    check_project_mesh,
-    run,
-    run_project,
-    solve_project,
-    surface_files,
-)
+from .running import run, run_project, surface_files
+from .solving import solve_project
+from .start import Start, build, start_of, surface_of
 from .structure import Structure
-from .varied import check_varied, digest, is_project, varied
+from .varied import check_varied, digest, varied
 
 __all__ = [
     "COLOURS",
@@ -67,31 +64,31 @@ __all__ = [
     "Project",
     "Remeshing",
     "Section",
+    "Start",
     "Structure",
     "build",
     "cache_folder",
     "cached_files",
     "check_model",
     "check_names",
-    "check_of",
     "check_outputs",
-    "check_project_mesh",
     "check_picture",
     "check_varied",
     "clear_cache",
     "designed",
     "digest",
+    "drawing_reference",
     "files_of",
     "is_drawing",
     "is_project",
     "load",
+    "opened",
     "paint",
-    "project_text",
     "project_of",
-    "raised",
-    "drawing_reference",
-    "read_data",
+    "project_text",
     "proposal_text",
+    "raised",
+    "read_data",
     "reference",
     "run",
     "run_project",
@@ -99,6 +96,7 @@ __all__ = [
     "schedule_works",
     "sections",
     "solve_project",
+    "start_of",
     "surface_files",
     "surface_of",
     "varied",

@@ -24,6 +24,7 @@ import pandas as pd
 from .. import io
 from ..base.errors import FileError, LostWarning, PcmcError
 from ..base.files import atomic_write
+from ..base.units import Units
 from ..io.mesh_data import to_surface
 from ..solvers.result import Result, Status
 from ..surface import Surface
@@ -33,7 +34,7 @@ from .outcome import Outcome
 
 VARIABLE = "PCMC_CACHE"
 MOST = 100  # roofs kept; the one used longest ago goes first
-PARTS = ("plan", "method", "options", "wanted", "search", "remeshing", "targets", "vary", "misfit")
+PARTS = ("plan", "mesh", "method", "options", "wanted", "search", "remeshing", "targets", "vary", "misfit")
 
 
 def folder() -> Path | None:
@@ -105,11 +106,12 @@ def _same(one: Surface, other: Surface) -> bool:
 
 def _values(outcome: Outcome) -> dict[str, Any]:
     """All of an outcome but its surface, as numbers and texts."""
-    result, design = outcome.result, outcome.design
+    result, design = outcome.solved, outcome.design
     names = ("method", "energy", "iterations", "evaluations", "note")
     values: dict[str, Any] = {name: getattr(result, name) for name in names}
     values["status"] = result.status.name
     values["notes"] = list(outcome.notes)
+    values["units"] = [outcome.units.length, outcome.units.force]
     if design is not None:
         tables = {name: getattr(design, name).to_dict("split") for name in ("targets", "parameters")}
         values["design"] = {"status": design.status.name, "solves": design.solves, **tables}
@@ -122,7 +124,7 @@ def _outcome(project: Project, values: Mapping[str, Any], surface: Any) -> Outco
     solve = {name: values[name] for name in names}
     result = Result(surface, Status[values["status"]], rows=(), note=values["note"], **solve)
     design = None
-    if project.targets:
+    if "design" in values:
         from ..design import Design, DesignStatus
 
         given = values["design"]
@@ -130,20 +132,24 @@ def _outcome(project: Project, values: Mapping[str, Any], surface: Any) -> Outco
         status, solves = DesignStatus[given["status"]], given["solves"]
         design = Design(status, result, targets, parameters, solves, history=pd.DataFrame())
     notes = values.get("notes", ())
-    return Outcome(result, (), design, units=project.units, cached=True, notes=notes)
+    units = Units(*values["units"]) if project.plan is None else project.units
+    return Outcome(result, design=design, units=units, cached=True, notes=notes)
 
 
 def _path(project: Project) -> Path | None:
     """The file for a project; None for one that is not kept."""
     place = folder()
-    if place is None or project.plan is None:
+    if place is None or not (project.plan is not None or project.has_file):
         return None
     sha = hashlib.sha256(_program().encode())
     try:
         for name in PARTS:
             for part in _pieces(getattr(project, name)):
                 sha.update(part)
-    except TypeError:  # a value without a text of its own
+        if project.mesh is not None:
+            sha.update((project.path.parent / project.mesh.file).read_bytes())
+            sha.update(repr(project.units).encode())
+    except (TypeError, OSError):  # a value without a text of its own; a mesh that cannot be read
         return None
     return place / f"{sha.hexdigest()}.pcmc"
 

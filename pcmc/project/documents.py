@@ -13,13 +13,9 @@ from ..base.errors import OptionError
 from ..base.files import suffix_of
 from ..base.units import Units, expect_length
 from ..drawings.drawing_set import check_suffix as check_drawing
-from ..drawings.drawing_set import drawing_set
 from ..drawings.sheet import FORMATS
-from ..panels import Panels, panels
+from ..panels import Panels
 from ..report.document import check_suffix as check_report
-from ..report.document import roof_report
-from ..structure import write_structure
-from .outcome import Outcome
 from .output import Works
 from .structure import Structure
 
@@ -104,62 +100,6 @@ def documents_of(output: Mapping[str, Any]) -> Documents:
     return Documents(**{name: output[name] for name in known if name in output})
 
 
-def document_works(
-    documents: Documents,
-    structure: Structure | None,
-    outcome: Outcome,
-    name: str,
-    files: Mapping[str, str],
-    anyway: bool = False,
-) -> Works:
-    """Each document with the function that writes it.
-
-    Parameters
-    ----------
-    structure : of the project.
-    name : of the roof.
-    files : name of each other file of the project, and what it is, for the report.
-    anyway : make them of a roof that is not certified; drawings and report are marked.
-
-    Raises
-    ------
-    OptionError, SurfaceError : as ``drawing_set``, ``panels``, ``StructuralModel`` and ``roof_report``.
-    """
-    surface, units, works = outcome.shown.surface, outcome.units, Works()
-    if documents.drawings:
-        drawings = drawing_set(
-            surface,
-            units.length,
-            sheet=documents.sheet,
-            tolerance=documents.tolerance,
-            panel_sheets=documents.panel_sheets,
-            name=name,
-            anyway=anyway,
-        )
-        works += drawings.files(*documents.drawings)
-    if documents.panels is not None and documents.tolerance is not None:
-        schedule = panels(surface, documents.tolerance, anyway=anyway)
-        works += schedule_works(Path(documents.panels), schedule)
-    if documents.structure is not None and structure is not None:
-        solved = outcome.result if outcome.whole is None else outcome.whole.surface
-        model = structure.model(solved, anyway, units=units)
-        works.append((Path(documents.structure), partial(write_structure, model=model)))
-    if documents.report is not None:
-        report = roof_report(
-            surface,
-            units,
-            name=name,
-            tolerance=documents.tolerance,
-            mesh_check=outcome.mesh_check,
-            targets=None if outcome.design is None else outcome.design.targets,
-            files={**files, **{path.name: _content(path) for path, _ in works}},
-            date=documents.date,
-            anyway=anyway,
-        )
-        works.append((Path(documents.report), report.write))
-    return works
-
-
 def check_schedule(path: Path) -> None:
     """Refuse the name of a schedule that does not end with .csv."""
     suffix_of(path, (CSV,), "a schedule of panels")
@@ -180,16 +120,3 @@ def schedule_works(path: Path, schedule: Panels) -> Works:
     tables = (schedule.panels, schedule.families, schedule.edges)
     paths = schedule_paths(path)
     return [(one, partial(table.to_csv, index=False)) for one, table in zip(paths, tables, strict=True)]
-
-
-CONTENTS = {
-    ".csv": "panels",
-    INP: "structural model",
-    ".dxf": "drawings",
-    ".pdf": "drawings",
-    ".svg": "drawing",
-}
-
-
-def _content(path: Path) -> str:
-    return CONTENTS[path.suffix.lower()]

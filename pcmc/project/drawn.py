@@ -39,7 +39,7 @@ def is_drawing(path: Path) -> bool:
 
 
 def files_of(path: str | os.PathLike[str]) -> list[Path]:
-    """The files that a project depends on: itself, and the drawing that its plan refers to.
+    """The files that a project depends on: itself, and the drawing or the mesh that it refers to.
 
     A project that cannot be read depends on itself alone, so that a page which follows these files sees it
     mended.
@@ -48,11 +48,13 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     [PosixPath('notebooks/roof.toml')]
     """
     path = Path(path)
-    with suppress(OSError, ValueError, RecursionError, FileError):  # of TOML, of UTF-8, of a pipe
+    with suppress(OSError, ValueError, RecursionError, PcmcError):  # of TOML, of UTF-8
         if path.suffix.lower() == ".toml":
             check_regular(path)
-            plan = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("plan")
-            name = plan.get("drawing") if isinstance(plan, Mapping) else None
+            data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+            plan, mesh = data.get("plan"), data.get("mesh")
+            name = plan.get("drawing") if isinstance(plan, Mapping) else mesh
+            name = name.get("file") if isinstance(name, Mapping) else name
             return [path] if not isinstance(name, str) else [path, path.parent / name]
     return [path]
 
@@ -142,11 +144,7 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
     if "outline" in plan:
         text = f"{path}: a plan has an outline or a drawing, not both; remove one of them"
         raise FileError(text, what="plan.outline")
-    check_name(Path(name))
-    windows = PureWindowsPath(name)  # knows both kinds of slashes
-    if windows.drive or windows.root or ".." in windows.parts:
-        text = f"{path}: the drawing {name!r} is outside the project's folder; put it beside the project"
-        raise FileError(text, what="plan.drawing", found=name)
+    check_beside(path, name, "drawing")
     drawing = read(path.parent / name, str(data.get("units", "")), gap)
     from ..plan.proposal import proposed
 
@@ -162,6 +160,22 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
         meet = [{"quantity": "height", "of": [x, y], "value": z} for x, y, z in points]
         full["targets"] = {"meet": meet, "vary": list(lines["patches"])}
     return full, drawing, _chosen(plan, lines, drawing)
+
+
+def check_beside(path: Path, name: str, kind: str) -> None:
+    """Refuse a file outside the folder of the project that refers to it.
+
+    >>> check_beside(Path("hall.toml"), "../hall.dxf", "drawing")
+    Traceback (most recent call last):
+    ...
+    pcmc.base.errors.FileError: hall.toml: the drawing '../hall.dxf' is outside the project's folder; put it
+    beside the project
+    """
+    check_name(Path(name))
+    windows = PureWindowsPath(name)  # knows both kinds of slashes
+    if windows.drive or windows.root or ".." in windows.parts:
+        text = f"{path}: the {kind} {name!r} is outside the project's folder; put it beside the project"
+        raise FileError(text, what=f"plan.{kind}" if kind == "drawing" else kind, found=name)
 
 
 def read(path: Path, units: str, gap: float | None) -> Drawing:

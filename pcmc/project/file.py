@@ -6,7 +6,7 @@ import os
 import re
 import tomllib
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PureWindowsPath
@@ -14,19 +14,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import io
 from ..base import validate
-from ..base.errors import FileError, FileWarning, OptionError, PcmcError, PlanError, unknown
+from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
 from ..base.files import check_name, check_regular, system_error
 from ..base.units import NO_UNITS, Units, size_note
 from ..plan import Plan, plan_from
 from ..solvers import find_method
-from ..surface import Surface
 from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys, line_with
 from .documents import Documents, documents_of
 from .drawn import Chosen, is_drawing, with_drawing
 from .masts import mast_note
+from .mesh import MeshFile, mesh_file, mesh_of
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
 from .rises import Rise, take_rises, with_rises
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
 
 PathLike = str | os.PathLike[str]
 
+TOML = ".toml"
 ELSEWHERE = "name files in it, and give --folder to write them elsewhere"
 LARGEST = 4_000_000  # bytes of a project file
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
@@ -51,7 +51,9 @@ class Project:
     Attributes
     ----------
     path : the file.
-    plan : of the surface; None if ``path`` holds a surface itself.
+    plan : of the surface; None where a mesh is given.
+    mesh : of the surface; None where a plan is given.
+    text, data : of the file, as it is written and as TOML reads it; empty for a drawing and a mesh.
     units : of all its numbers, and of the files written.
     method, options : as in ``pcmc.solve``.
     wanted : the accuracy asked for.
@@ -73,6 +75,9 @@ class Project:
 
     path: Path
     plan: Plan | None = None
+    mesh: MeshFile | None = None
+    text: str = field(default="", repr=False)
+    data: Mapping[str, Any] = field(default_factory=dict, repr=False)
     units: Units = NO_UNITS
     method: str = "newton"
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -101,6 +106,17 @@ class Project:
         pictures = [] if self.picture is None else [self.picture]
         return [*(Path(f) for f in (*self.files, *pictures)), *self.documents.paths]
 
+    @property
+    def inputs(self) -> list[Path]:
+        """All files that it is read from, which nothing writes over."""
+        drawing = [] if self.drawing is None else [self.drawing.path]
+        return [self.path, *drawing, *([] if self.mesh is None else [self.path.parent / self.mesh.file])]
+
+    @property
+    def has_file(self) -> bool:
+        """Whether it is a project file: a drawing or a mesh alone says nothing about solving it."""
+        return bool(self.data) and self.path.suffix.lower() == TOML
+
     def in_folder(self, folder: PathLike) -> Project:
         """The same project with its output in a folder; FileError for output that a link leads out of it."""
         base = Path(folder)
@@ -114,8 +130,11 @@ class Project:
         return replace(self, files=files, picture=picture, documents=documents, folder=base)
 
 
-def load(path: PathLike) -> Project:
-    """Read a project file, or a drawing as a project without output.
+def load(path: PathLike, *, units: str = "") -> Project:
+    """Read a project file; or a drawing, or the file of a mesh, as a project without output.
+
+    ``units`` is the unit of length of a drawing's or a mesh's project: a file in another one is converted, a
+    file without a unit is taken to be in it. A project file says itself which it has.
 
     Raises
     ------
@@ -132,7 +151,15 @@ def load(path: PathLike) -> Project:
         and for a roof held at single points inside.
     """
     path = Path(path)
-    project = project_of(path, read_data(path)[1])
+    if not is_project(path):
+        return Project(path, mesh=mesh_file(path), units=Units(units))
+    text, data = read_data(path, units)
+    project = project_of(path, data, text)
+    if units and project.units.length not in ("", units):
+        text = f"{path}: the project is in {project.units.length}, not in {units}; leave out --units"
+        raise OptionError(text, what="units", found=units, expected=project.units.length)
+    if units:
+        project = replace(project, units=replace(project.units, length=units))
     if project.drawing is not None and project.drawing.notes:
         text = f"{project.drawing.path}: {'; '.join(project.drawing.notes)}"
         warnings.warn(text, FileWarning, stacklevel=2)
@@ -144,14 +171,19 @@ def load(path: PathLike) -> Project:
     return project
 
 
-def read_data(path: Path) -> tuple[str, dict[str, Any]]:
+def is_project(path: PathLike) -> bool:
+    """Whether a file is a project or the drawing of one; all others hold a surface."""
+    return Path(path).suffix.lower() == TOML or is_drawing(Path(path))
+
+
+def read_data(path: Path, units: str = "") -> tuple[str, dict[str, Any]]:
     """The text of a project file and its data, all keys checked; a drawing's data refer to it.
 
     Errors as in ``load``.
     """
     check_regular(path)
     if is_drawing(path):
-        return "", {"plan": {"drawing": path.name}}
+        return "", {"plan": {"drawing": path.name}} | ({"units": units} if units else {})
     try:
         if path.stat().st_size > LARGEST:
             text = (
@@ -210,37 +242,21 @@ def in_file(path: Path, kind: type[PcmcError] | None = None) -> Iterator[None]:
         raise error.in_file(f"{path}: line {line}" if line else path, kind) from None
 
 
-def build(path: PathLike) -> Surface:
-    """The mesh of a project's plan, before solving. Errors as in ``load``."""
-    return surface_of(load(path))
+def project_of(
+    path: Path, data: Mapping[str, Any], text: str = "", redrawn: Callable[[Plan], Plan] | None = None
+) -> Project:
+    """The project with the given data, which were read from a text. Errors as in ``load``.
 
-
-def surface_of(project: Project) -> Surface:
-    """The mesh of the project's plan, or the surface in its file."""
-    return start_of(project)[0]
-
-
-def start_of(project: Project) -> tuple[Surface, Units]:
-    """The mesh of the project's plan, or the surface in its file, and its units."""
-    if project.plan is None:
-        surface, data = io.read_bare(project.path)
-        return surface, data.units
-    layers = {} if project.drawing is None else project.drawing.layers
-    with in_file(project.path):
-        try:
-            return project.plan.surface(), project.units
-        except PlanError as error:
-            if error.what not in layers:
-                raise
-            text = f"{error} ({layers[str(error.what)]})"
-            raise PlanError(text, what=error.what, where=error.where, found=error.found) from None
-
-
-def project_of(path: Path, data: Mapping[str, Any]) -> Project:
-    """The project with the given data. Errors as in ``load``."""
+    ``redrawn`` is applied to the plan, before heights and named points of it become targets.
+    """
+    given, mesh = data, None
     with in_file(path, FileError):
-        data, rises = take_rises(data)
-    data, drawing, chosen = with_drawing(path, data)
+        rises = list[Rise]()
+        if "mesh" in data:
+            mesh = mesh_of(path, data["mesh"])
+        else:
+            data, rises = take_rises(data)
+    data, drawing, chosen = with_drawing(path, data) if mesh is None else (data, None, Chosen())
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
     method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
     files, picture = output.get("files", []), output.get("picture")
@@ -256,16 +272,23 @@ def project_of(path: Path, data: Mapping[str, Any]) -> Project:
         units = Units(data.get("units", ""), data.get("force", ""))
         structure = Structure(**data["structure"]) if "structure" in data else None
         documents.check(units, structure)
-        plan, targets, vary = with_rises(plan_from(data["plan"]), rises)
+        plan, targets, vary = None, list["Target"](), list["Parameter"]()
+        if mesh is None:
+            plan = plan_from(data["plan"])
+            plan, targets, vary = with_rises(plan if redrawn is None else redrawn(plan), rises)
         misfit = None
         if "targets" in data:
-            given = _search(data["targets"], plan)
-            _check_sought_once(rises, given["vary"], plan)
-            targets, vary = [*given["targets"], *targets], [*given["vary"], *vary]
-            misfit = given["misfit"]
+            search = _search(data["targets"], plan)
+            if plan is not None:
+                _check_sought_once(rises, search["vary"], plan)
+            targets, vary = [*search["targets"], *targets], [*search["vary"], *vary]
+            misfit = search["misfit"]
         return Project(
             path=path,
             plan=plan,
+            mesh=mesh,
+            text=text,
+            data=given,
             units=units,
             method=method,
             options=options,
@@ -318,12 +341,12 @@ def raised(project: Project, wanted: Mapping[str, float | None]) -> Project:
     if len(rises) > 1:
         text = f"{flag} and --{rises[1].kind.replace('_', '-')}: give one of them, the other follows"
         raise OptionError(text, what=flag)
-    if project.plan is None:
-        text = f"{flag} is for a project or a drawing; {project.path.name} has no plan"
-        raise OptionError(text, what=flag, found=str(project.path))
-    if project.targets:
+    if project.targets or (project.mesh is not None and project.mesh.rises):
         text = f"{flag}: {project.path.name} has targets already; change them there"
         raise OptionError(text, what=flag)
+    if project.mesh is not None:
+        return replace(project, mesh=replace(project.mesh, rises=rises))
+    assert project.plan is not None
     plan, targets, vary = with_rises(project.plan, rises)
     return replace(project, plan=plan, targets=targets, vary=vary, rises=rises)
 
@@ -345,18 +368,18 @@ def _check_inside(names: Sequence[str]) -> None:
             raise FileError(text, what="output", found=name)
 
 
-def _placed(entry: Mapping[str, Any], plan: Plan) -> Mapping[str, Any]:
+def _placed(entry: Mapping[str, Any], plan: Plan | None) -> Mapping[str, Any]:
     """A target, with the point of the plan that a height names."""
     if entry["quantity"] != "height" or not isinstance(entry.get("of"), str):
         return entry
-    name = entry["of"]
-    if name not in plan.points:
-        text = f"targets.meet: {unknown('point', name, plan.points)}; name it in [plan.points]"
+    name, points = entry["of"], {} if plan is None else plan.points
+    if name not in points:
+        text = f"targets.meet: {unknown('point', name, points)}; name it in [plan.points]"
         raise OptionError(text, what="targets.meet", found=name)
-    return {**entry, "of": plan.points[name], "name": name}
+    return {**entry, "of": points[name], "name": name}
 
 
-def _search(table: Mapping[str, Any], plan: Plan) -> dict[str, Any]:
+def _search(table: Mapping[str, Any], plan: Plan | None) -> dict[str, Any]:
     """The targets of a project, and the parameters that may vary."""
     from ..design import Parameter, Target
 

@@ -18,6 +18,7 @@ from ..solvers import METHODS, find_method
 from ..surface import Plane
 from .accuracy import AccuracyWanted
 from .documents import Documents
+from .mesh import PATCH_KEYS, MeshFile
 from .output import COLOURS
 from .remeshing import WHEN, Remeshing
 from .rises import RISES
@@ -94,6 +95,8 @@ KINDS: dict[str, Callable[[Any], bool]] = {
     "a list of names": _list_of(str),
     "a list of names or tables": _list_of(str, Mapping),
     "a list of names, lists of names, or tables": _list_of(str, list, Mapping),
+    "a name or a table": lambda value: isinstance(value, str | Mapping),
+    "a name or a list": lambda value: isinstance(value, str | list),
     "a name or a list of names": lambda value: isinstance(value, str) or _list_of(str)(value),
     "a list of points": _list_of(list),
     "a curve": lambda value: isinstance(value, list | Mapping),
@@ -140,6 +143,22 @@ def _plan_keys(kinds: Mapping[str, str]) -> tuple[Key, ...]:
     )
 
 
+def _mesh_keys() -> tuple[Key, ...]:
+    """The keys of [mesh]."""
+    kinds = {"file": "a text", "tension": "a number", "patches": "a table", "supports": "a name or a list"}
+    keys = _of_class(MeshFile, kinds, {"units": LENGTHS})
+    own = (
+        replace(key, default=REQUIRED) if key.name == "file" else key for key in keys if key.name != "rises"
+    )
+    return (*own, *_rise_keys("found by one tension of all patches under pressure", RISES))
+
+
+def _mesh_patch_keys() -> tuple[Key, ...]:
+    """The keys of a patch of a mesh, with the sentences of a plan's."""
+    wall = Key("wall", "true or false", None, "whether it is a wall between rooms")
+    return (*(Key(k.name, k.kind, None, k.help) for k in _of_class(Area) if k.name in PATCH_KEYS), wall)
+
+
 def _rise_keys(how: str, names: Sequence[str]) -> tuple[Key, ...]:
     """Keys for the height of a roof, from which its tension is found."""
     meanings = {
@@ -167,7 +186,13 @@ def main_sections() -> tuple[Section, ...]:
             (
                 Key("units", "a text", None, "of lengths: plan, heights, files and pictures", LENGTHS),
                 Key("force", "a text", None, "of forces; tensions are in ``force`` / ``units``", FORCES),
-                Key("plan", "a table", REQUIRED, "the roof, by the lines of its plan"),
+                Key("plan", "a table", REQUIRED, "the roof, by the lines of its plan", unless=("mesh",)),
+                Key(
+                    "mesh",
+                    "a name or a table",
+                    None,
+                    "the roof, by the triangles in a file beside it",
+                ),
                 Key("solve", "a table", None, "the solver and its options"),
                 Key("remesh", "a table or a list of tables", None, "other triangles, once or more"),
                 Key("targets", "a table", None, "heights, areas, sags or other quantities to be met"),
@@ -210,6 +235,8 @@ def main_sections() -> tuple[Section, ...]:
                 Key("normal", "a point [x, y, z]", Plane().normal, "its normal, of any length"),
             ),
         ),
+        Section("mesh", "The roof, by the triangles in a file.", _mesh_keys()),
+        Section("mesh.patches.NAME", "A patch of the mesh; NAME is its name.", _mesh_patch_keys()),
         Section(
             "remesh",
             "Other triangles, before or after solving; [[remesh]] if there are several.",
@@ -257,14 +284,15 @@ def solve_section(method: str) -> Section:
 def target_sections() -> tuple[Section, ...]:
     """[targets] and its tables."""
     from ..design import Parameter, Target  # needed by projects with targets only
-    from ..design.quantities import QUANTITIES
+    from ..design.quantities import MEASURES
     from ..design.targets import KINDS as KINDS_OF_PARAMETER
+    from ..design.targets import SHORT
 
     changing = _of_class(
         Parameter, {"patch": "a name or a list of names"}, choices={"kind": KINDS_OF_PARAMETER}
     )
     varied = "what may change; a name is a patch whose tension may, a list of names several with one tension"
-    wanted = _of_class(Target, {"of": "a name or a point [x, y]"}, {"quantity": tuple(QUANTITIES)})
+    wanted = _of_class(Target, {"of": "a name or a point [x, y]"}, {"quantity": (*MEASURES, *SHORT)})
     return (
         Section(
             "targets",
@@ -301,7 +329,7 @@ def sections() -> tuple[Section, ...]:
     """Every section that a project file may have, with its keys.
 
     >>> [key.name for key in sections()[0].keys]
-    ['units', 'force', 'plan', 'solve', 'remesh', 'targets', 'structure', 'output']
+    ['units', 'force', 'plan', 'mesh', 'solve', 'remesh', 'targets', 'structure', 'output']
     """
     solve = (solve_section(method) for method in METHODS)
     return (*main_sections(), *solve, *target_sections(), _CURVE)

@@ -1,24 +1,42 @@
-"""What a project leads to."""
+"""A roof that was opened or designed, with all that other rooms ask about it, each computed once."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
+import numpy as np
+
+from ..base.arrays import Ints
+from ..base.errors import PcmcError
 from ..base.units import NO_UNITS, Units
-from ..certificate.certificate import Certificate
-from ..solvers.result import Result
-from ..surface import Surface
+from ..certificate.certificate import Certificate, certify
+from ..solvers.result import Progress, Result
+from ..surface import Surface, mirrored, unfolded
+from .documents import Documents
 
 if TYPE_CHECKING:
     from ..accuracy import AccurateResult, MeshCheck
     from ..design import Design
+    from ..drawings import DrawingSet
+    from ..io.mesh_data import MeshData
+    from ..panels import Panels
+    from ..quantities import Figure
+    from ..report import RoofReport
+    from ..structure import StructuralModel
+    from .file import Project
+    from .output import OnStep
+
+MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
+SAME = 1e-9  # of the size: a vertex this near to a corner of the plan is that corner
+EXTENSIVE = ("area", "volume")  # targets of a part that are not those of the whole
 
 
 class Whole(NamedTuple):
-    """The whole roof with its certificate, which counts motions that are not symmetric, too."""
+    """A surface with its certificate."""
 
     surface: Surface
     certificate: Certificate
@@ -26,33 +44,41 @@ class Whole(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """The designed roof of a project: solved, its targets met, remeshed.
+    """A roof: the designed one of a project, its start shape, or the surface in a file.
 
     Attributes
     ----------
-    result : of the last solve; ``surface`` and ``certificate`` are its.
+    result : of the last solve; None for a surface that is shown as it is, which is ``start``.
     files : the files written.
     design : the search for the targets; None without targets.
-    mesh_check : the surface on finer meshes; None where the project asks for none.
     accurate : the search for an accuracy; None where the project asks for none.
-    units : those of the project, in which all numbers are.
-    whole : the whole roof, if the project asks for it: ``surface`` is the part between its mirror planes.
+    units : in which all numbers are.
     cached : whether the roof was solved before and comes from the cache. Then ``accurate`` is None, and the
         histories of ``result`` and ``design`` are empty.
     notes : what was chosen where the project does not say it, and what happened on the way.
     advice : where the roof is not good, what to type, a line each; empty if no remedy is known.
+    project : that it belongs to; None for a surface from a program.
+    start : the surface as it is; None where there is a result.
+    unfold : whether the whole roof is shown that ``surface`` is the part of between its mirror planes.
+    data : all that the file of ``start`` holds, such as scalars; None without a file.
+
+    ``certificate``, ``whole``, ``figures``, ``panels``, ``check_mesh`` and ``model`` are computed when first
+    asked for, and kept.
     """
 
-    result: Result
-    files: Sequence[Path]
+    result: Result | None
+    files: Sequence[Path] = ()
     design: Design | None = None
-    mesh_check: MeshCheck | None = None
     accurate: AccurateResult | None = None
     units: Units = NO_UNITS
     cached: bool = False
-    whole: Whole | None = None
     notes: Sequence[str] = ()
     advice: Sequence[str] = ()
+    project: Project | None = None
+    start: Surface | None = None
+    unfold: bool = False
+    data: MeshData | None = None
+    _known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __repr__(self) -> str:
         """The verdict, what the targets reached, what was written, and the advice, above the surface."""
@@ -71,25 +97,200 @@ class Outcome:
         return "\n".join([*lines, repr(self.shown.surface)])
 
     @property
-    def surface(self) -> Surface:
-        """The surface reached."""
-        return self.result.surface
+    def solved(self) -> Result:
+        """``result`` of a roof that was solved."""
+        return cast(Result, self.result)
 
     @property
+    def surface(self) -> Surface:
+        """The surface reached, or the one that is shown as it is."""
+        return cast(Surface, self.start) if self.result is None else self.result.surface
+
+    @cached_property
     def certificate(self) -> Certificate:
-        """The certificate of the surface reached."""
-        return self.result.certificate
+        """The certificate of ``surface``."""
+        return certify(self.surface) if self.result is None else self.result.certificate
+
+    @cached_property
+    def whole(self) -> Whole | None:
+        """The whole roof with its certificate, which counts motions that are not symmetric, too; None unless
+        ``unfold``."""
+        if not self.unfold:
+            return None
+        whole = mirrored(self.surface)
+        return Whole(whole, certify(whole))
 
     @property
     def shown(self) -> Whole:
-        """What is written and drawn: the whole roof if the project asks for it, with its certificate."""
+        """What is written, drawn and listed: the whole roof if it is asked for, with its certificate."""
         return Whole(self.surface, self.certificate) if self.whole is None else self.whole
+
+    @cached_property
+    def figures(self) -> list[Figure]:
+        """The key figures of what is shown."""
+        from ..quantities import figures
+
+        return figures(*self.shown)
+
+    @property
+    def certified(self) -> bool:
+        """Whether the surface, and the whole if that is asked for, is certified."""
+        return self.certificate.certified and (self.whole is None or self.whole.certificate.certified)
 
     @property
     def good(self) -> bool:
         """Whether the surface is certified, every target is met, and every accuracy reached."""
-        if self.cached:
-            return True  # no other roof is kept
         met = self.design is None or self.design.met
-        certified = self.certificate.certified and (self.whole is None or self.whole.certificate.certified)
-        return certified and met and (self.accurate is None or self.accurate.reached)
+        return self.certified and met and (self.accurate is None or self.accurate.reached)
+
+    @property
+    def name(self) -> str:
+        """The name of the roof: of its file, without suffix."""
+        return "" if self.project is None else self.project.path.stem
+
+    @property
+    def documents(self) -> Documents:
+        """What the project says about its documents."""
+        return Documents() if self.project is None else self.project.documents
+
+    def written(self, files: Sequence[Path]) -> Outcome:
+        """The same outcome, with these files written; what is known of it stays known."""
+        return self._same(files=files)
+
+    def unfolded(self) -> Outcome:
+        """The same outcome, with the whole roof shown."""
+        return self if self.unfold else self._same(unfold=True)
+
+    def _same(self, **changes: Any) -> Outcome:
+        other = replace(self, **changes)
+        other._known.update(self._known)
+        kept = ("certificate",) if "unfold" in changes else ("certificate", "whole", "figures")
+        vars(other).update({name: vars(self)[name] for name in kept if name in vars(self)})
+        return other
+
+    def panels(
+        self, tolerance: float, *, mirror_images: str = "alike", walls: bool = False, anyway: bool = False
+    ) -> Panels:
+        """The schedule of the panels of what is shown; see ``pcmc.panels``."""
+        from ..panels import panels
+
+        key = "panels", self.unfold, tolerance, mirror_images, walls
+        if key not in self._known:
+            surface, certificate = self.shown
+            self._known[key] = panels(
+                surface,
+                tolerance,
+                mirror_images=mirror_images,
+                walls=walls,
+                anyway=anyway,
+                certificate=certificate,
+            )
+        return cast("Panels", self._known[key])
+
+    def drawing_set(self, documents: Documents, *, anyway: bool = False, **options: Any) -> DrawingSet:
+        """The drawings of what is shown, as ``documents`` says; ``options`` as of ``pcmc.drawing_set``."""
+        from ..drawings import drawing_set
+
+        surface, certificate = self.shown
+        tolerance = documents.tolerance
+        return drawing_set(
+            surface,
+            self.units,
+            sheet=documents.sheet,
+            tolerance=tolerance,
+            panel_sheets=documents.panel_sheets,
+            name=self.name,
+            anyway=anyway,
+            certificate=certificate,
+            schedule=None if tolerance is None else self.panels(tolerance, anyway=anyway),
+            **options,
+        )
+
+    def report(self, documents: Documents, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:
+        """The report on what is shown, with the mesh check if it was made."""
+        from ..report import roof_report
+
+        surface, certificate = self.shown
+        tolerance = documents.tolerance
+        return roof_report(
+            surface,
+            self.units,
+            name=self.name,
+            tolerance=tolerance,
+            mesh_check=self.mesh_check,
+            mesh_failure=self.mesh_failure,
+            targets=None if self.design is None else self.design.targets,
+            files=files,
+            date=documents.date,
+            anyway=anyway,
+            certificate=certificate,
+            figures=self.figures,
+            schedule=None if tolerance is None else self.panels(tolerance, anyway=anyway),
+        )
+
+    def model(self, structure: Any, anyway: bool = False) -> StructuralModel:
+        """The structural model of what is shown."""
+        surface, certificate = self.shown
+        model = structure.model(surface, anyway, certificate=certificate, units=self.units)
+        return cast("StructuralModel", model)
+
+    @property
+    def mesh_check(self) -> MeshCheck | None:
+        """The mesh check, if it was made; see ``check_mesh``."""
+        return cast("MeshCheck | None", self._known.get(("mesh check", self.unfold)))
+
+    @property
+    def mesh_failure(self) -> str:
+        """Why a mesh check that was asked for failed; empty if it did not."""
+        return str(self._known.get(("mesh failure", self.unfold), ""))
+
+    def mesh_check_wanted(self, wanted: bool | None = None) -> bool | None:
+        """Whether the mesh is to be checked, as ``wanted`` or the project says; None where neither does."""
+        return self.project.mesh_check if wanted is None and self.project is not None else wanted
+
+    def wants_mesh_check(self, wanted: bool | None = None) -> bool:
+        """The same, where nothing is said up to 20 000 triangles; never of a surface that is not at rest."""
+        asked = self.mesh_check_wanted(wanted)
+        small = self.shown.surface.m <= MOST_CHECKED
+        return self.certificate.index is not None and (small if asked is None else asked)
+
+    def check_mesh(self, progress: OnStep | None = None) -> MeshCheck | None:
+        """The mesh check of what is shown, made once; None where it fails, and ``mesh_failure`` says why.
+
+        Corners of the plan stay corners.
+        """
+        from ..accuracy import check_mesh  # takes long to import
+
+        key, accurate = ("mesh check", self.unfold), self.accurate
+        if key in self._known:
+            return self.mesh_check
+        same = accurate is not None and accurate.surface is self.surface and not self.unfold
+        if accurate is not None and accurate.check is not None and same:
+            self._known[key] = accurate.check
+            return self.mesh_check
+
+        def callback(state: Progress) -> None:
+            if progress is not None:
+                progress(f"mesh check: {state.surface().m} triangles, step {state.iteration}")
+
+        shown = self.surface if self.whole is None else self.whole.surface
+        checked = self.result if self.whole is None and self.result is not None else shown
+        try:
+            self._known[key] = check_mesh(checked, corners=self.corners, callback=callback)
+        except PcmcError as error:  # the roof is good without it
+            self._known["mesh failure", self.unfold] = str(error)
+        return self.mesh_check
+
+    @property
+    def corners(self) -> Ints:
+        """(k,) the vertices of what is shown at the corners of the project's plan."""
+        from scipy.spatial import cKDTree
+
+        plan = None if self.project is None else self.project.plan
+        if plan is None or not len(plan.corners):
+            return np.empty(0, dtype=np.int64)
+        away, nearest = cKDTree(self.surface.vertices).query(plan.corners)
+        corners: Ints = np.asarray(nearest)[np.asarray(away) <= SAME * self.surface.size]
+        if not self.unfold:
+            return corners
+        return np.flatnonzero(np.isin(unfolded(self.surface).vertex, corners))

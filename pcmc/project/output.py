@@ -15,7 +15,7 @@ import numpy as np
 from .. import io
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknown
+from ..base.errors import FileError, FileWarning, PcmcError, unknown
 from ..base.files import atomic_writes, check_name, system_error, writing
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
@@ -67,14 +67,13 @@ def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
 
 @contextmanager
 def _final_name_in_warnings(temporary: Path, path: Path) -> Iterator[None]:
-    """Warnings name the final file. Losses due to the format are not shown: nobody asked for more."""
+    """Warnings name the final file."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FileWarning)
         yield
     for warning in caught:
-        if not issubclass(warning.category, LostWarning):
-            text = str(warning.message).replace(str(temporary), str(path))
-            warnings.warn(text, warning.category, stacklevel=4)
+        text = str(warning.message).replace(str(temporary), str(path))
+        warnings.warn(text, warning.category, stacklevel=4)
 
 
 def paint(
@@ -91,7 +90,7 @@ def paint(
     look: dict[str, Any] = {"legend": True}
     scalars = None
     if colour == "reactions":
-        reactions(surface, path, view=views[0], label=units.tension)
+        reactions(surface, path, view=views[0], units=units)
         return
     if colour == "curvature":
         scalars, look = mean_curvature(surface), {"label": f"mean curvature, {units.curvature}"}
@@ -152,9 +151,12 @@ def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> N
         check_suffix(picture)
 
 
-def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
-    """Refuse, before any work, paths that cannot be written; the folder ``made`` may be missing."""
-    seen = set()
+def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: Iterable[Path] = ()) -> None:
+    """Refuse, before any work, paths that cannot be written, and those of a command's own ``inputs``.
+
+    The folder ``made`` may be missing. A link to an input, and another way to write its path, is the input.
+    """
+    seen, read = set(), [path for path in inputs if path.exists()]
     if made is not None and made.exists() and not made.is_dir():
         raise FileError(f"{made} is a file; the output needs a folder", what=str(made))
     for path in paths:
@@ -169,6 +171,8 @@ def check_outputs(paths: Iterable[Path], made: Path | None = None) -> None:
         problem = None
         if is_folder:
             problem = "is a folder; give the name of a file"
+        elif path.exists() and any(path.samefile(one) for one in read):
+            problem = "is read here, and is not written over; name another file"
         elif place in seen:
             problem = "is named twice; name two files for the output"
         elif folder != made and not folder.is_dir():

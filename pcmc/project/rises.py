@@ -51,9 +51,9 @@ def take_rises(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Rise]]:
     patches = {name: dict(values) for name, values in plan.get("patches", {}).items()}
     rises = []
     for name, values in patches.items():
-        rises += _taken(values, RISES, name)
+        rises += taken(values, RISES, name)
     if not patches and "tension" not in plan:
-        rises += _taken(plan, WHOLE, None)
+        rises += taken(plan, WHOLE, None)
     elif misplaced := [key for key in WHOLE[1:] if key in plan]:
         text = f"plan.{misplaced[0]} is for a plan without tensions; remove it, or the tensions"
         raise OptionError(text, what=f"plan.{misplaced[0]}")
@@ -62,8 +62,10 @@ def take_rises(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Rise]]:
     return {**data, "plan": plan}, rises
 
 
-def _taken(values: dict[str, Any], kinds: Sequence[str], patch: str | None) -> list[Rise]:
-    """The rise in a table, which is taken out; the tension 1 stands for it."""
+def taken(
+    values: dict[str, Any], kinds: Sequence[str], patch: str | None, *, keep: bool = False
+) -> list[Rise]:
+    """The rise in a table, which is taken out; the tension 1 stands for it, unless ``keep``."""
     given = [kind for kind in kinds if kind in values]
     if not given:
         return []
@@ -72,7 +74,8 @@ def _taken(values: dict[str, Any], kinds: Sequence[str], patch: str | None) -> l
         both = " and a ".join([*given, *(["tension"] if "tension" in values else [])])
         text = f"{where} has a {both}; give one of them, the others follow"
         raise OptionError(text, what=given[0], where=patch)
-    values["tension"] = 1.0
+    if not keep:
+        values["tension"] = 1.0
     return [Rise(patch, given[0], values.pop(given[0]))]
 
 
@@ -97,11 +100,14 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
     return plan, targets, vary
 
 
+def net_pressures(plan: Plan) -> dict[str, float]:
+    """p - s of each of the patches that a plan has, by name."""
+    return {a.name: a.pressure - (plan.snow if a.snow is None else a.snow) for a in plan.patches}
+
+
 def _lifted(plan: Plan, kind: str) -> list[str]:
     """The names of the patches under pressure, whose tensions decide on the height; refused if none is."""
-    load = {
-        area.name: area.pressure - (plan.snow if area.snow is None else area.snow) for area in plan.patches
-    }
+    load = net_pressures(plan)
     names = [name for name in patch_names(plan) if load.get(name, plan.pressure - plan.snow)]
     if not names:
         problem = f"{kind} is for a roof that a pressure lifts, and none is left here; give"
@@ -113,18 +119,27 @@ def _retensioned(plan: Plan, patch: str | None, rise: float) -> Plan:
     """The plan with the first tension for a rise, of a patch or of all."""
     least, _ = _sizes(plan)
 
-    def first(pressure: float) -> float:
-        radius = 2.0 * least
-        cap = abs(pressure or 1.0) * (radius**2 + rise**2) / (4.0 * rise)
-        return float(f"{max(cap, LEAST * least * abs(pressure or 1.0)):.3g}")
-
     if plan.tension is not None:
-        return replace(plan, tension=first(plan.pressure))
-    areas = [replace(a, tension=first(a.pressure)) if patch in (None, a.name) else a for a in plan.patches]
+        return replace(plan, tension=first_tension(least, plan.pressure - plan.snow, rise))
+    first = {name: first_tension(least, pressure, rise) for name, pressure in net_pressures(plan).items()}
+    areas = [replace(a, tension=first[a.name]) if patch in (None, a.name) else a for a in plan.patches]
     if patch is None:
         highest = max(area.tension for area in areas)
         areas = [replace(area, tension=highest) for area in areas]
     return replace(plan, patches=areas)
+
+
+def first_tension(least: float, pressure: float, rise: float) -> float:
+    """The tension of a cap with this rise over a round plan of a least tension per pressure, to 3 digits.
+
+    α = p (R² + h²) / (4 h), R twice the least tension over p.
+
+    >>> first_tension(1.0, 1.0, 2.0)
+    1.15
+    """
+    radius, strength = 2.0 * least, abs(pressure or 1.0)
+    cap = strength * (radius**2 + rise**2) / (4.0 * rise)
+    return float(f"{max(cap, LEAST * least * strength):.3g}")
 
 
 def _height(plan: Plan, rise: Rise) -> float:

@@ -15,8 +15,9 @@ from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..plan import Plan
 from ..surface import Surface
-from .file import Project, project_of, surface_of
+from .file import Project, project_of
 from .rises import RISES, WHOLE
+from .start import surface_of
 
 SAME = 1e-11  # of the largest value of a kind: a difference that counts as none
 DIGITS = 12  # of the values written

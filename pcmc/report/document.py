@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import version
@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from .. import quantities
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units, as_units, expect_length
 from ..certificate import Certificate
-from ..certificate.reactions import held_lengths
 from ..certificate.required import certified, warning_mark
 from ..panels import Panels, panels
-from ..plot import draw, families, reactions, vectors
+from ..plot import draw, families, reactions
+from ..quantities import Figure
 from ..surface import Surface, expect_surface
 from . import pages, tables, words
 from .plan import PaperPlan, paper_plan
@@ -42,7 +43,8 @@ class RoofReport:
     name, date : in the head and the foot of the pages; empty for none.
     plan : to scale.
     schedule : the panels, if a tolerance was given; else None.
-    mesh_check, targets : as given to ``roof_report``.
+    mesh_check, mesh_failure, targets : as given to ``roof_report``.
+    figures : the key figures.
     files : name of each file that belongs to the roof, and what it is.
     """
 
@@ -54,8 +56,10 @@ class RoofReport:
     plan: PaperPlan
     schedule: Panels | None = None
     mesh_check: MeshCheck | None = None
+    mesh_failure: str = ""
     targets: pd.DataFrame | None = None
     files: Mapping[str, str] = field(default_factory=dict)
+    figures: Sequence[Figure] = ()
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the report as a PDF file; the same report gives the same bytes.
@@ -86,12 +90,8 @@ class RoofReport:
             "The roof": draw(surface, view="diagonal", legend=True, width=PIXELS),
             "Elevation": draw(surface, view="elevation", width=PIXELS),
         }
-        if held_lengths(surface).any():
-            label = f"{self.units.tension}, reactions per length of boundary"
-            pictures["Reactions"] = reactions(surface, label=label, width=PIXELS)
-        elif surface.fixed.any():
-            label = f"{self.units.force or 'force'}, reactions"
-            pictures["Reactions"] = vectors(surface, self.certificate.reactions, label=label, width=PIXELS)
+        if len(self.certificate.supports):
+            pictures["Reactions"] = reactions(surface, units=self.units, width=PIXELS)
         if self.schedule is not None:
             pictures["Panels"] = families(self.schedule, width=PIXELS)
         return {name: _png(picture) for name, picture in pictures.items()}
@@ -102,7 +102,7 @@ class RoofReport:
         story = [
             pages.heading("Verdict"),
             *map(pages.paragraph, words.verdict_sentences(certificate, self.mesh_check)),
-            *pages.table(tables.key_figures(surface, certificate, units)),
+            *pages.table(tables.key_figures(surface, self.figures, units)),
             *pages.picture("View from above", pictures["The roof"]),
             pages.new_page(),
             pages.heading(f"Plan, scale {self.plan.scale}, lengths in {units.length}"),
@@ -118,8 +118,8 @@ class RoofReport:
         listed = [
             tables.patch_table(surface, certificate, units),
             tables.junction_table(certificate, units),
-            tables.boundary_table(certificate, units),
-            tables.support_table(surface, certificate, units),
+            tables.wall_table(certificate, units),
+            *tables.support_tables(certificate, units),
             *tables.cable_tables(certificate, units),
             tables.room_table(certificate, units),
         ]
@@ -127,6 +127,9 @@ class RoofReport:
             story += [] if table is None else pages.table(table)
         if self.mesh_check is not None:
             story += self._mesh_story(self.mesh_check)
+        elif self.mesh_failure:
+            text = f"The mesh could not be checked: {self.mesh_failure}."
+            story += [pages.heading("Mesh check"), pages.paragraph(text)]
         if self.schedule is not None:
             story += self._panel_story(self.schedule, pictures["Panels"])
         return story + self._file_story()
@@ -179,10 +182,14 @@ def roof_report(
     name: str = "",
     tolerance: float | None = None,
     mesh_check: MeshCheck | None = None,
+    mesh_failure: str = "",
     targets: pd.DataFrame | None = None,
     files: Mapping[str, str] | None = None,
     date: str = "",
     anyway: bool = False,
+    certificate: Certificate | None = None,
+    schedule: Panels | None = None,
+    figures: Sequence[Figure] | None = None,
 ) -> RoofReport:
     """A report about a roof: pictures, plan, verdict in words, forces, panels, files.
 
@@ -193,10 +200,12 @@ def roof_report(
     name : of the roof.
     tolerance : of the panels' families, length; None for no panels.
     mesh_check : of the surface, for error bars; None for none.
+    mesh_failure : why it was asked for and failed; empty otherwise.
     targets : ``Design.targets``; None for none.
     files : name of each file that belongs to the roof, and what it is.
     date : of the report, as it is to be printed; no clock is read.
     anyway : report on a surface that is not certified; every page is marked.
+    certificate, schedule, figures : of the surface, where they are known; otherwise computed.
 
     Raises
     ------
@@ -217,11 +226,22 @@ def roof_report(
     units = as_units(units)
     expect_length(units.length, "a report")
     pages.register_fonts()
-    certificate = certified(surface, anyway)
-    schedule = None if tolerance is None else panels(surface, tolerance, anyway=anyway)
-    plan = paper_plan(surface, certificate, units)
+    certificate = certified(surface, anyway, certificate)
+    if schedule is None and tolerance is not None:
+        schedule = panels(surface, tolerance, anyway=anyway, certificate=certificate)
     return RoofReport(
-        surface, units, certificate, name, date, plan, schedule, mesh_check, targets, dict(files or {})
+        surface,
+        units,
+        certificate,
+        name,
+        date,
+        paper_plan(surface, certificate, units),
+        schedule,
+        mesh_check,
+        mesh_failure,
+        targets,
+        dict(files or {}),
+        quantities.figures(surface, certificate) if figures is None else figures,
     )
 
 

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Ints
 from ..base.units import Units
 from ..certificate import Certificate
-from ..certificate.reactions import held_lengths, reactions_per_length
-from ..design.outcome import unit_of
 from ..panels import Panels
+from ..quantities import Figure, dimension_of
 from ..surface import Surface
 
 if TYPE_CHECKING:
@@ -53,28 +51,29 @@ def one(value: float) -> str:
     return column([value])[0]
 
 
-def key_figures(surface: Surface, certificate: Certificate, units: Units) -> Table:
+LISTED = {
+    ("apex", "roof"): "highest point above the plane",
+    ("area", "roof"): "area of the roof",
+    ("area", "wall"): "area of walls",
+    ("volume", "roof"): "volume below it",
+    ("load", "roof"): "pressure, snow and weight, upwards",
+    ("reaction", "roof"): "all reactions, upwards",
+    ("reaction per length", "roof"): "largest reaction per length",
+}
+"""The key figures of a report; those of several walls are added."""
+
+
+def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Table:
     """Size, height, areas, volume, load, and the largest reaction per length."""
-    X, length = surface.vertices, units.length
-    width, depth, _ = np.ptp(X, axis=0).tolist()
-    heights = surface.plane.height(X)
-    area, roof = certificate.patches["area"].to_numpy(), surface.roof
-    per_length = np.linalg.norm(reactions_per_length(surface, certificate.reactions), axis=1)
-    rows = [
-        ["size in the plan", f"{one(width)} × {one(depth)} {length}"],
-        ["highest point above the plane", f"{one(float(heights.max()))} {length}"],
-        ["area of the roof", f"{one(float(area[roof].sum()))} {units.area}"],
-    ]
-    if not roof.all():
-        rows.append(["area of walls", f"{one(float(area[~roof].sum()))} {units.area}"])
-    force = units.force or "force"
-    rows += [
-        ["volume below it", f"{one(certificate.volume)} {units.volume}"],
-        ["pressure and weight, upwards", f"{one(certificate.load)} {force}"],
-        ["all reactions, upwards", f"{one(certificate.support)} {force}"],
-    ]
-    if np.isfinite(per_length).any():
-        rows.append(["largest reaction per length", f"{one(float(np.nanmax(per_length)))} {units.tension}"])
+    width, depth, _ = np.ptp(surface.vertices, axis=0).tolist()
+    rows = [["size in the plan", f"{one(width)} × {one(depth)} {units.length}"]]
+    for (quantity, owner), label in LISTED.items():
+        values = [
+            f.value for f in figures if (f.quantity, f.owner) == (quantity, owner) and f.value is not None
+        ]
+        if values:
+            unit = units.behind(dimension_of(quantity)).strip()
+            rows.append([label, f"{one(sum(values))} {unit}"])
     rows.append(["mesh", f"{surface.m} triangles, {surface.n} vertices"])
     return Table("Key figures", [], rows)
 
@@ -82,16 +81,14 @@ def key_figures(surface: Surface, certificate: Certificate, units: Units) -> Tab
 def patch_table(surface: Surface, certificate: Certificate, units: Units) -> Table:
     """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
     table, length = certificate.patches, units.length
+    loads = {"pressure": "pressure", "snow": "snow", "net": "net pressure"}
     columns = {
         f"tension, {units.tension}": column(table["tension"]),
-        f"pressure, {units.pressure}": column(table["pressure"]),
+        **{f"{name}, {units.pressure}": column(table[key]) for key, name in loads.items() if key in table},
         f"area, {units.area}": column(table["area"]),
         f"mean curvature, 1/{length}": column(table["mean_H"]),
         "its largest error": [small(x) for x in table["variational_max"].tolist()],
     }
-    if "snow" in table:
-        columns[f"snow, {units.pressure}"] = column(table["snow"])
-        columns[f"net pressure, {units.pressure}"] = column(table["net"])
     weights = [patch.weight for patch in surface.patches]
     if any(weights):
         columns[f"weight, {units.pressure}"] = column(weights)
@@ -114,36 +111,33 @@ def junction_table(certificate: Certificate, units: Units) -> Table | None:
     return _table("Junctions", ["", "between"], words, columns)
 
 
-def boundary_table(certificate: Certificate, units: Units) -> Table | None:
-    """A row per held boundary, numbered as in the plan: its reaction, and the largest per length."""
-    table, force = certificate.boundaries, units.force or "force"
+def support_tables(certificate: Certificate, units: Units) -> list[Table]:
+    """A row per support, numbered as in the plan, and how their sum balances the loads."""
+    table, force = certificate.supports, units.force or "force"
+    if not len(table):
+        return []
+    words = table[["support", "name", "kind"]].to_numpy(str).tolist()
+    words = [[label, "" if name == label else name, kind] for label, name, kind in words]
+    columns = {f"{axis}, {units.length}": column(table[axis]) for axis in "xyz"}
+    columns[f"length, {units.length}"] = column(table["length"].where(table["length"] > 0.0))
+    columns |= _vectors(table, "force", "R", force)
+    columns[f"largest, {units.tension}"] = column(table["per_length_max"])
+    listed = _table("Supports and their reactions", ["", "of", "kind"], words, columns)
+    balance, moment = certificate.balance, f"{force}·{units.length}"
+    columns = _vectors(balance, "force", "F", force) | _vectors(balance, "moment", "M", moment)
+    return [listed, _table("Balance", [""], [[part] for part in balance["of"]], columns)]
+
+
+def wall_table(certificate: Certificate, units: Units) -> Table | None:
+    """How far each wall leans from the vertical, and where."""
+    table = certificate.leaning
     if not len(table):
         return None
-    words = [[f"B{k}", name] for k, name in enumerate(table["boundary"], start=1)]
-    reaction = table[[f"reaction_{axis}" for axis in "xyz"]]
-    texts = np.array(column(reaction.to_numpy().ravel())).reshape(-1, 3).T
-    columns = {f"length, {units.length}": column(table["length"])}
-    columns |= {f"R{axis}, {force}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
-    columns[f"largest, {units.tension}"] = column(table["per_length_max"])
-    return _table("Boundaries and their reactions", ["", "boundary of"], words, columns)
-
-
-def point_supports(surface: Surface) -> Ints:
-    """(k,) fixed vertices apart from held boundaries, such as masts; in the plan the first is S1."""
-    return np.flatnonzero(surface.fixed & (held_lengths(surface) == 0.0))
-
-
-def support_table(surface: Surface, certificate: Certificate, units: Units) -> Table | None:
-    """A row per fixed point: its place, and its reaction."""
-    points, force = point_supports(surface), units.force or "force"
-    if not len(points):
-        return None
-    places, reactions = surface.vertices[points], certificate.reactions[points]
-    columns = {f"{axis}, {units.length}": column(part) for axis, part in zip("xyz", places.T, strict=True)}
-    texts = np.array(column(reactions.ravel())).reshape(-1, 3).T
-    columns |= {f"R{axis}, {force}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
-    names = [[f"S{k}"] for k in range(1, len(points) + 1)]
-    return _table("Supports at points", ["support"], names, columns)
+    columns = {"lean, °": [f"{lean:.1f}" for lean in table["lean"]]}
+    columns |= {f"{axis}, {units.length}": column(table[axis]) for axis in "xyz"}
+    return _table(
+        "Walls: the largest angle from the vertical", ["wall"], [[w] for w in table["wall"]], columns
+    )
 
 
 def cable_tables(certificate: Certificate, units: Units) -> list[Table]:
@@ -162,7 +156,7 @@ def cable_tables(certificate: Certificate, units: Units) -> list[Table]:
         held = ["held" if held else "free" for held in table["held"]]
         words = [[name, end] for name, end in zip(table["cable"], held, strict=True)]
         columns = {f"{axis}, {units.length}": column(table[axis]) for axis in "xyz"}
-        columns |= {f"F{axis}, {force}": column(table[f"force_{axis}"]) for axis in "xyz"}
+        columns |= _vectors(table, "force", "F", force)
         tables.append(_table("Ends of cables, and the forces on them", ["cable", "end"], words, columns))
     return tables
 
@@ -186,7 +180,7 @@ def target_table(targets: pd.DataFrame, units: Units) -> Table:
     columns = {
         "wanted": [one(x) for x in targets["wanted"].tolist()],
         "reached": [one(x) for x in targets["value"].tolist()],
-        "unit": [units.behind(unit_of(str(name))).strip() for name in targets.index],
+        "unit": [units.behind(dimension).strip() for dimension in targets["dimension"]],
         "met": ["yes" if met else "no" for met in targets["met"]],
     }
     return _table("Targets", ["quantity"], words, columns)
@@ -194,11 +188,9 @@ def target_table(targets: pd.DataFrame, units: Units) -> Table:
 
 def mesh_table(check: MeshCheck, units: Units) -> Table:
     """Each quantity with its error bar, and its limit on finer and finer meshes."""
-    from ..accuracy.quantities import UNIT_OF  # takes long to import
-
     table = check.table
     words = [[quantity, of] for quantity, of in zip(table["quantity"], table["of"], strict=True)]
-    kinds = [UNIT_OF.get(quantity, quantity) for quantity in table["quantity"]]
+    kinds = map(dimension_of, table["quantity"])
     columns = {
         "on this mesh": [one(x) for x in table["value"].tolist()],
         "error bar": [_bar(x) for x in table["error"].tolist()],
@@ -224,6 +216,13 @@ def family_table(schedule: Panels, units: Units) -> Table:
 def _table(title: str, head: list[str], words: list[list[str]], columns: dict[str, list[str]]) -> Table:
     rows = [[*start, *rest] for start, rest in zip(words, zip(*columns.values(), strict=True), strict=True)]
     return Table(title, [*head, *columns], rows, len(head))
+
+
+def _vectors(table: pd.DataFrame, kind: str, letter: str, unit: str) -> dict[str, list[str]]:
+    """Columns of vectors, with the decimals of their largest component."""
+    numbers = table[[f"{kind}_{axis}" for axis in "xyz"]].to_numpy(float)
+    texts = np.array(column(numbers.ravel())).reshape(-1, 3).T
+    return {f"{letter}{axis}, {unit}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
 
 
 def _middles(table: pd.DataFrame, units: Units) -> dict[str, list[str]]:

@@ -8,6 +8,21 @@ from typing import Any
 
 from ..base import validate
 
+KINDS = {
+    **{f"{field}s": ("patches", field) for field in ("tension", "pressure", "snow", "weight")},
+    "cables": ("cables", "tension"),
+    "volumes": ("rooms", "volume"),
+}
+"""The arguments of ``Surface.retensioned``: the parts of the surface that each changes, and their field."""
+
+
+def all_values(surface: Any) -> dict[str, dict[str, float]]:
+    """The values of a Surface by kind and name, as ``Surface.retensioned`` takes them."""
+    return {
+        kind: {part.name: getattr(part, field) for part in getattr(surface, parts)}
+        for kind, (parts, field) in KINDS.items()
+    }
+
 
 def renewed(kind: str, parts: tuple[Any, ...], **values: Mapping[str, object] | None) -> tuple[Any, ...]:
     """The parts, each a ``kind``, with other values of their fields; OptionError for an unknown name.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import MissingExtra
@@ -49,19 +50,8 @@ def bar(console: Console | None = None) -> Iterator[Callable[[Progress], None]]:
                 task,
                 total=state.total,
                 completed=state.done,
-                left=clock(state.seconds_left),
+                left=str(timedelta(seconds=round(state.seconds_left))),
                 description=" · ".join(f"{verdict} {count}" for verdict, count in counts),
             )
 
         yield draw
-
-
-def clock(seconds: float) -> str:
-    """Hours, minutes and seconds.
-
-    >>> clock(3725.4), clock(8)
-    ('1:02:05', '0:08')
-    """
-    minutes, second = divmod(round(seconds), 60)
-    hours, minute = divmod(minutes, 60)
-    return f"{hours}:{minute:02}:{second:02}" if hours else f"{minute}:{second:02}"

@@ -136,11 +136,9 @@ export function fieldOf(choice, arrays) {
   }
   if (choice === "family") return familyField(arrays.family);
   if (choice === "reactions") {
-    const values = new Float32Array(arrays.reactions.length / 3);
-    for (let v = 0; v < values.length; v++) {
-      values[v] = Math.hypot(...arrays.reactions.subarray(3 * v, 3 * v + 3));
-    }
-    return { values, limits: [0, ends(values)[1] || 1], map: sequential, linesOnly: true };
+    const sizes = (all) => Float32Array.from({ length: all.length / 3 }, (_, v) => Math.hypot(...all.subarray(3 * v, 3 * v + 3)));
+    const [values, points] = [sizes(arrays.reactions), sizes(arrays.points)];
+    return { values, points, limits: [0, ends(values)[1] || 1], map: sequential, linesOnly: true };
   }
   let [low, high] = ends(arrays.curvature, arrays.underPressure);
   if (high - low <= 1e-5 * Math.max(Math.abs(low), Math.abs(high))) {
@@ -160,15 +158,15 @@ function ends(values, chosen = null) {
   return low <= high ? [low, high] : [0, 1];
 }
 
-/** Arrows of the reactions per length, the longest an eighth of the surface's size. */
+/** Arrows of the reactions per length, and blue ones of forces at points; the longest of each an eighth of the size. */
 export function arrowsOf(arrays, field, size) {
   const arrows = [];
-  const stretch = (0.125 * size) / field.limits[1];
-  field.values.forEach((x, v) => {
-    if (!Number.isFinite(x) || x <= 0.005 * field.limits[1]) return;
-    const vector = Array.from(arrays.reactions.subarray(3 * v, 3 * v + 3), (c) => c * stretch);
-    arrows.push([v, vector, colourOf(field.map, x, ...field.limits)]);
+  const add = (sizes, vectors, most, colour) => sizes.forEach((x, v) => {
+    if (!(x > 0.005 * most)) return;
+    arrows.push([v, Array.from(vectors.subarray(3 * v, 3 * v + 3), (c) => (0.125 * size * c) / most), colour(x)]);
   });
+  add(field.values, arrays.reactions, field.limits[1], (x) => colourOf(field.map, x, ...field.limits));
+  add(field.points, arrays.points, ends(field.points)[1], () => [0.13, 0.4, 0.67]);
   return arrows;
 }
 
@@ -177,7 +175,9 @@ export function showLegend(root, choice, field, units, than) {
   root.hidden = !field;
   if (!field) return;
   const [low, high] = field.limits;
-  root.querySelector(".name").textContent = field.name ?? COLOURS[choice].name(units, than);
+  const most = ends(field.points ?? [])[1];
+  const points = field.points?.some((x) => x > 0) ? `; blue: at points, up to ${digits(most, 3)} ${units.force}` : "";
+  root.querySelector(".name").textContent = (field.name ?? COLOURS[choice].name(units, than)) + points;
   showClasses(root.querySelector("ul"), field.scale);
   for (const part of [".bar", ".ends"]) root.querySelector(part).hidden = Boolean(field.scale);
   root.querySelector(".bar").style.background = field.map.css;

@@ -145,7 +145,7 @@ export class Panel {
     const [alpha, p, s, w] = ["tensions", "pressures", "snows", "weights"]
       .map((k) => mine.find((r) => r.kind === k)?.value);
     const curved = alpha !== undefined && p !== undefined && w === undefined;
-    entry.target.textContent = entry.group.wall ? "wall" : curved ? `H̄ = ${s ? "(p − s)" : "p"} / 2α = ${digits((p - (s ?? 0)) / (2 * alpha), 3)}` : "";
+    entry.target.textContent = entry.group.wall ? "wall" : curved ? `${s ? `p − s = ${digits(p - s)}, H̄ =` : "H̄ = p / 2α ="} ${digits((p - (s ?? 0)) / (2 * alpha), 3)}` : "";
   }
 
   /** Show the values asked for; where the surface shown has others, mark them. */

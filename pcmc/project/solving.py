@@ -1,0 +1,219 @@
+"""Solving a project: its start shape, remeshing, targets and accuracy; nothing is written."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import count
+from typing import TYPE_CHECKING, Any
+
+from .. import solvers
+from ..base.errors import BalanceWarning, OptionError
+from ..certificate.balance import unbalanced
+from ..contact.pinching import standing_part
+from ..existence import solve
+from ..meshing.remeshing import remesh, size_note
+from ..solvers.result import Progress, Result, Status
+from ..surface import Surface
+from .advice import advice, chosen_values
+from .aims import aims_below_supports
+from .file import Project, in_file
+from .outcome import EXTENSIVE, Outcome
+from .output import OnStep, ignore, metres_note
+from .start import start_of
+
+if TYPE_CHECKING:
+    from ..design import Design, Target
+
+Changed = Callable[[Surface], Surface]
+
+
+def solve_from_start(project: Project, report: OnStep, changed: Changed | None) -> Outcome:
+    """Make the start shape of a project, and solve it; ``changed`` is applied to the start shape."""
+    report("reading" if project.plan is None else "meshing the plan")
+    start = start_of(project)
+    given, start = start, start if changed is None else start.with_surface(changed(start.surface))
+    project, surface = start.project, start.surface
+    if project.documents.structure is not None and project.structure is not None:
+        with in_file(project.path):
+            project.structure.check(surface)
+    if project.whole and not any(plane.mirror for plane, _ in surface.on_planes):
+        text = f"{project.path}: the roof has no mirror planes, so it is the whole already; leave out whole"
+        raise OptionError(f"{text}, or give the plan mirrors", what="whole")
+    _check_balance(surface)
+    solved = solve_project(project, surface, report)
+    notes = [*chosen_values(project, surface), *solved.notes]
+    if project.drawing is not None:
+        notes += metres_note(project.files, start.units.length)
+    if project.whole and any(target.quantity in EXTENSIVE for target in project.targets):
+        notes.append("targets of areas and volumes are those of the part between the mirror planes")
+    outcome = replace(
+        solved, units=start.units, unfold=project.whole, project=project, data=start.data, notes=notes
+    )
+    if outcome.good:
+        return outcome
+    notes += aims_below_supports(project.plan, surface, project.targets, start.units)
+    report("looking for advice")
+    return replace(outcome, advice=advice(project, given.surface, surface, outcome, solve_project))
+
+
+def _check_balance(surface: Surface) -> None:
+    """Warn before a long computation if the tensions alone show that a junction cannot balance.
+
+    The advice after it names a remedy that was tried.
+    """
+    pinchable = standing_part(surface).walls.pinchable
+    imbalance = unbalanced(surface, pinchable)
+    if imbalance:
+        unless = ", unless the junction rests on the plane" if pinchable.any() else ""
+        warnings.warn(f"{imbalance.imbalance}{unless}; solving anyway", BalanceWarning, stacklevel=4)
+
+
+def solve_project(project: Project, surface: Surface, progress: OnStep | None = None) -> Outcome:
+    """Solve a surface with the project's options, remesh it, meet its targets; write nothing.
+
+    A surface that is not certified, or misses a target, is not remeshed. The accuracy comes last; targets
+    are met once more on its mesh.
+    """
+    report, notes = progress or ignore, list[str]()
+    with in_file(project.path):
+        for stage in project.remeshing:
+            if stage.when == "before":
+                report("remeshing")
+                surface = remesh(surface, **stage.options)
+                notes.append(size_note(surface, stage.edge_length))
+        after = [stage for stage in project.remeshing if stage.when == "after"]
+        if project.wanted.accuracy and not after and not project.targets:
+            outcome = _solve_to_accuracy(project, surface, report)
+            return replace(outcome, notes=[*filter(None, notes), *outcome.notes], project=project)
+        outcome = _solve_or_meet(project, surface, report)
+        notes += outcome.notes
+        for stage in after:
+            if outcome.good:
+                report("remeshing")
+                before, surface = outcome, remesh(outcome.surface, **stage.options)
+                outcome = _again(project, surface, report)
+                notes += [size_note(surface, stage.edge_length), *outcome.notes]
+                notes += _met_before(project.targets, before, outcome)
+        if project.wanted.accuracy and outcome.good:
+            accurate = _solve_to_accuracy(project, outcome.surface, report)
+            if project.targets and accurate.good:
+                outcome = replace(_again(project, accurate.surface, report), accurate=accurate.accurate)
+                notes += outcome.notes
+            else:
+                outcome = replace(accurate, design=outcome.design)
+    return replace(outcome, notes=[note for note in notes if note], project=project)
+
+
+def _again(project: Project, surface: Surface, report: OnStep) -> Outcome:
+    """Solve the surface on another mesh, and meet the targets there."""
+    outcome = _solve_or_meet(replace(project, targets=()), surface, report)
+    if project.targets and outcome.good:  # otherwise its verdict is the better explanation
+        outcome = _solve_or_meet(project, outcome.surface, report)
+    return outcome
+
+
+def _met_before(targets: Sequence[Target], before: Outcome, after: Outcome) -> list[str]:
+    """That the targets were met on the mesh before, with which parameters, and what the finer one reaches."""
+    if before.design is None:
+        return []
+    values = ", ".join(f"{label} {value:.6g}" for label, value in before.design.parameters["value"].items())
+    met = f"targets met on the first mesh, {before.surface.m} triangles, with {values}"
+    where = f"on the new one, {after.surface.m} triangles"
+    if after.design is not None:
+        return [met if after.good else f"{met}; {where}, {after.design.status.value}"]
+    from ..design.targets import measure  # needed by projects with targets only
+
+    reached = ", ".join(f"{target.label} {measure(after.surface, target).value:.6g}" for target in targets)
+    return [f"{met}; {where}, the surface does not come to rest with them; it has {reached}"]
+
+
+def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Outcome:
+    """Solve on finer and finer meshes, and certify."""
+    from ..accuracy import AccuracyStatus, solve_to_accuracy
+
+    def callback(row: Mapping[str, Any]) -> None:
+        report(f"accuracy: {row['triangles']} triangles, error {row['excess']:.2g} of the accuracy wanted")
+
+    _newton_alone(project, "reach an accuracy")
+    report("solving to the accuracy")
+    corners = Outcome(None, start=surface, project=project).corners
+    accurate = solve_to_accuracy(
+        surface,
+        corners=corners,
+        callback=callback,
+        **vars(project.wanted),
+        **project.options,
+    )
+    if accurate.status is AccuracyStatus.STOPPED:  # by Ctrl-C, which ends the command
+        raise KeyboardInterrupt
+    accurate.result.certificate  # noqa: B018 — computed here, while the progress is shown
+    return Outcome(accurate.result, accurate=accurate)
+
+
+def _newton_alone(project: Project, act: str) -> None:
+    if project.method != "newton":
+        message = f"only method 'newton' can {act}, found {project.method!r}"
+        raise OptionError(message, what="solve.method", found=project.method, expected="newton")
+
+
+def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
+    """Solve the surface, or meet its targets, and certify it.
+
+    Where the search for the targets finds no equilibrium to start from, the surface is solved without them:
+    from a roof that is certified the search starts again, any other says why there is none.
+    """
+    if not project.targets:
+        return _certified(_solve(project, surface, report), None, report)
+    from ..design import NoStart  # needed by projects with targets only
+
+    try:
+        design = _meet(project, surface, report)
+    except NoStart:
+        outcome = _certified(_solve(project, surface, report), None, report)
+        if not outcome.good:
+            note = "targets not tried: without them there is no stable roof, either"
+            return replace(outcome, notes=[note])
+        design = _meet(project, outcome.surface, report)
+    return _certified(design.result, design, report)
+
+
+def _solve(project: Project, surface: Surface, report: OnStep) -> Result:
+    solver = solve if project.search else solvers.solve
+    result = solver(surface, project.method, reporter(report), **project.options)
+    if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
+        raise KeyboardInterrupt
+    return result
+
+
+def _certified(result: Result, design: Design | None, report: OnStep) -> Outcome:
+    report("certifying")
+    result.certificate  # noqa: B018 — computed here, while the progress is shown
+    return Outcome(result, design=design)
+
+
+def reporter(report: OnStep) -> Callable[[Progress], None]:
+    """A solver's callback that reports its step and the forces left."""
+
+    def callback(state: Progress) -> None:
+        force = state.row.get("residual", state.row["gradient_squared"])
+        report(f"solving: step {state.iteration}, forces left {force:.1e}")
+
+    return callback
+
+
+def _meet(project: Project, surface: Surface, report: OnStep) -> Design:
+    from ..design import DesignStatus, meet  # needed by projects with targets only
+
+    _newton_alone(project, "meet targets")
+    solves = count(1)
+
+    def callback(row: object) -> None:
+        report(f"meeting the targets: solve {next(solves)}")
+
+    options = dict(project.options) | ({} if project.misfit is None else {"tolerance": project.misfit})
+    design = meet(surface, project.targets, project.vary, callback=callback, **options)
+    if design.status is DesignStatus.STOPPED:  # by Ctrl-C
+        raise KeyboardInterrupt
+    return design
