@@ -119,10 +119,10 @@ class DrawnParts:
         """The error for an open loop: the smallest gap between two of its ends."""
         ends = [(path, k, point) for path in paths for k, point in enumerate(path.ends)]
         points = np.array([point for *_, point in ends])
-        apart, nearest = cKDTree(points).query(points, k=[2])
-        first = int(np.argmin(apart))
-        one, two = (ends[k] for k in sorted((first, int(nearest[first, 0]))))
-        gap = float(apart[first, 0])
+        apart, nearest = (np.ravel(found) for found in cKDTree(points).query(points, k=[2]))
+        place = int(np.argmin(apart))
+        one, two = (ends[k] for k in sorted((place, int(nearest[place]))))
+        gap = float(apart[place])
         first, second = (end[0].labels[-1 if end[1] else 0] for end in (one, two))
         between = f"between {first} at {point_text(one[2])} and {second} at {point_text(two[2])}"
         allow = f"draw what is missing, or close it with gap = {two_digits(gap):g}"

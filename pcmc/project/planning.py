@@ -12,7 +12,8 @@ from ..base.errors import FileError, MissingExtra
 from ..plan import plan_from
 from ..plan.curves import Curve
 from .drawn import FALLBACK, LENGTHS, read
-from .file import Project, surface_of
+from .file import Project
+from .start import surface_of
 
 if TYPE_CHECKING:
     from ..plan.drawing import Drawing
