@@ -1,7 +1,7 @@
 // The verdict, the numbers of the surface, and the fields that colours show.
 
 import { colourOf, diverging, sequential } from "./colours.js";
-import { element, tableRow, term } from "./elements.js";
+import { capital, element, tableRow, term } from "./elements.js";
 import { familyField, showClasses } from "./families.js";
 import { digits } from "./panel.js";
 
@@ -43,15 +43,14 @@ function drawn({ asked, shown }) {
   return `Shown: the last surface at rest, ${listed}`;
 }
 
-const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
-
 /** Numbers of the surface shown. */
-export function showFindings(body, findings, units) {
+export function showFindings(body, findings, figures, units) {
+  const of = (name) => figures.find(({ owner, quantity }) => owner === "roof" && quantity === name)?.value;
   const measured = (x, kind, count) => digits(x, count) + (units.given && x !== null ? ` ${units[kind]}` : "");
   const percent = (x) => (x === null ? "–" : x < 1e-6 ? "below 0.0001 %" : `${digits(100 * x, 3)} %`);
   const rows = [
-    ["Rise above the plane", measured(findings.height, "length"), `The largest height above the plane Π, ${units.length}.`],
-    ["Area under pressure", measured(findings.area, "area"), `Of all patches except walls, ${units.area}.`],
+    ["Rise above the plane", measured(of("apex"), "length"), `The largest height above the plane Π, ${units.length}.`],
+    ["Area under pressure", measured(of("area"), "area"), `Of all patches except walls, ${units.area}.`],
     ["Volume", measured(findings.volume, "volume"), `Between the patches with pressure and the plane Π, ${units.volume}.`],
     ["Energy", measured(findings.energy, "energy", 6), `Σ α A − Σ p V, ${units.energy}. A surface at rest has no nearby shape of other first-order energy; a stable one has the least.`],
     ["Morse index", findings.index ?? "–", "How many independent changes of shape lower the energy. 0: stable, every small push is resisted. 1 or more: a saddle, which a small push moves away from."],
@@ -75,28 +74,55 @@ export function showFindings(body, findings, units) {
   }));
 }
 
-/** Apex, area, volume and largest reaction of each patch. */
-export function showPatches(table, measures, units) {
-  const columns = [["apex", "Apex", "length"], ["area", "Area", "area"], ["volume", "Volume", "volume"],
-    ["reaction", "Reaction", "tension"]];
+const COLUMNS = { // of the parts of a roof, in the order of their tables
+  patch: ["apex", "area", "volume", "reaction per length", "snow", "net pressure"],
+  wall: ["area", "lean"], cable: ["force", "length", "sag"], room: ["volume"],
+};
+const SHORT = { "reaction per length": "Reaction", "net pressure": "Net p" };
+
+/** A table for the patches, the walls, the cables and the rooms, each with those of its quantities that are known. */
+export function showParts(root, figures, units) {
+  root.replaceChildren(...Object.entries(COLUMNS).flatMap(([owner, wanted]) => {
+    const own = figures.filter((one) => one.owner === owner || (owner === "patch" && one.owner === "roof"));
+    const parts = [...new Set(own.map(({ of }) => of))];
+    if (parts.filter(Boolean).length < 1) return [];
+    if (parts.length === 2 && parts.includes("")) parts.splice(parts.indexOf(""), 1); // the only patch is all
+    const columns = wanted.filter((name) => own.some(({ quantity }) => quantity === name));
+    const value = (of, name) => own.find((one) => one.of === of && one.quantity === name)?.value;
+    return [tableOf(`${capital(owner)}${owner === "patch" ? "es" : "s"}`, columns.map((name) => {
+      const { dimension } = own.find(({ quantity }) => quantity === name);
+      return [SHORT[name] ?? capital(name), units.given ? units[dimension] : ""];
+    }), parts.map((of) => [of || "all", columns.map((name) => digits(value(of, name)))]))];
+  }));
+}
+
+/** The forces of the supports, whose rows add up to the loads. */
+export function showSupports(root, { supports, balance }, units) {
+  const rows = [...supports, ...balance.filter(({ of }) => of !== "supports")];
+  const axes = ["x", "y", "z"];
+  const most = Math.max(...rows.flatMap((row) => axes.map((axis) => Math.abs(row[`force_${axis}`]))));
+  const force = (x) => digits(Math.abs(x) > 1e-9 * most ? x : 0, 3);
+  root.replaceChildren(...(supports.length ? [tableOf("Forces of the supports",
+    [["Length", units.given ? units.length : ""], ...axes.map((axis) => [axis, units.given ? units.force : ""])],
+    rows.map((row) => [row.of ? capital(row.of) : `${row.support} ${row.name === row.support ? row.kind : row.name}`, [
+      row.length ? digits(row.length, 3) : "",
+      ...axes.map((axis) => force(row[`force_${axis}`]))]]))] : []));
+}
+
+/** A table with a heading; columns are [name, unit], rows [name, texts]. */
+function tableOf(title, columns, rows) {
+  const table = element("table", "parts");
   const head = element("tr");
-  head.append(element("td"), ...columns.map(([, name, kind]) => {
+  head.append(element("td"), ...columns.map(([name, unit]) => {
     const th = element("th", "", name);
     th.scope = "col";
-    if (kind === "volume") th.title = "Between the patch and the plane Π, straight below it; the volumes of all patches add up to the volume of the roof";
-    if (units.given) th.append(element("span", "unit", units[kind]));
+    if (unit) th.append(element("span", "unit", unit));
     return th;
   }));
-  table.tHead.replaceChildren(head);
-  const rows = new Map();
-  for (const { quantity, of, value } of measures) {
-    if (!columns.some(([name]) => name === quantity)) continue;
-    if (quantity === "apex") rows.set(of, {});
-    if (rows.has(of)) rows.get(of)[quantity] = value;
-  }
-  if (rows.size === 2) rows.delete(""); // the only patch is all
-  table.tBodies[0].replaceChildren(...[...rows].map(([of, row]) => tableRow(of || "all",
-    columns.map(([name]) => digits(row[name])))));
+  table.createCaption().textContent = title;
+  table.createTHead().append(head);
+  table.createTBody().append(...rows.map(([name, texts]) => tableRow(name, texts)));
+  return table;
 }
 
 /** The answer of the mesh check. */
