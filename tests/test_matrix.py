@@ -95,9 +95,7 @@ PROJECTS = {
     ),
     "remesh": hall(extra="[remesh]\nedge_length = 0.8\n"),
     "drawing": 'force = "kN"\n[plan]\ndrawing = "plan.dxf"\nedge_length = 1000\n'
-    "patches = {{west = {{tension = 4e-3, pressure = 1e-6}}, east = {{tension = 4e-3, pressure = 1e-6}}}}\n".replace(
-        "{{", "{"
-    ).replace("}}", "}"),
+    "patches = {west = {tension = 4e-3, pressure = 1e-6}, east = {tension = 4e-3, pressure = 1e-6}}\n",
     "mesh": 'units = "m"\nforce = "kN"\n[mesh]\nfile = "bare.obj"\nsupports = "boundary"\n'
     "patches = {roof = {tension = 3.0, snow = 0.2}}\n",
 }
