@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 
 import pytest
 from browsing import SOFTWARE_GL, Explored, browser
@@ -11,6 +12,16 @@ from small_project import SMALL
 from generators import bezier_hall, spherical_cap
 from pcmc import explore, solve
 from pcmc.explore.session import Session, solved_start
+
+
+def pytest_addoption(parser):
+    text = "factorise with SuperLU, as where pypardiso is not installed"
+    parser.addoption("--superlu", action="store_true", help=text)
+
+
+def pytest_configure(config):
+    if config.getoption("--superlu"):
+        sys.modules["pypardiso"] = None  # found by no import
 
 
 def pytest_sessionstart():

@@ -66,7 +66,10 @@ def test_the_quick_form_prints_and_writes(small, tmp_path, capsys):
     assert expected <= set(table["what"])
     numbers = pd.to_numeric(table["median"], errors="coerce")
     slope = table["what"].str.startswith("exponent")  # of so small surfaces: only noise
-    assert (numbers[~slope].dropna() > 0.0).all()
+    difference = table["what"].str.endswith("difference")  # none is best
+    assert (numbers[~slope & ~difference].dropna() > 0.0).all()
+    assert (numbers[difference] >= 0.0).all()
+    assert table["met"][difference].tolist() == ["yes", "yes"]
     if evolver.available():
         assert numbers.notna().all()
     assert "machine" in json.loads((tmp_path / "benchmark" / "quick.json").read_text())

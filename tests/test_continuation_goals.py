@@ -11,6 +11,7 @@ from pcmc import Direction, Parameter, follow, solve
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.continuation import Ending, FollowOptions
 from pcmc.continuation.correction import NotOnBranch, correct, fixed_parameter
+from pcmc.continuation.options import CONTROLS
 from pcmc.continuation.segment import root
 from pcmc.continuation.state import QUANTITIES, BranchMesh, State
 from pcmc.continuation.tracing import Tracer
@@ -19,11 +20,28 @@ from pcmc.continuation.tracing import Tracer
 @pytest.mark.parametrize(
     ("goal", "value"), [("parameter", 0.55), ("energy", 1.2), ("volume", 1.2), ("height", 0.7)]
 )
-def test_goals_are_met_exactly(small_cap, goal, value):
+def test_goals_are_met(small_cap, goal, value):
     branch = follow(small_cap, "cap", until={goal: value}, step=-0.05)
     assert branch.ending is Ending.REACHED
-    assert branch.points[goal].iloc[-1] == pytest.approx(value, rel=1e-9)
+    assert branch.points[goal].iloc[-1] == pytest.approx(value, rel=1e-11)
     assert branch.last is branch.surfaces[len(branch.points) - 1]
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_a_branch_ends_to_the_last_digit_at_the_parameter_asked_for(control):
+    for stop in np.arange(71, 131, 7) / 100:
+        roof = pyramid(height=AT_REST)
+        branch = follow(roof, "roof", stop, control=control)
+        assert branch.points.parameter.iloc[-1] == branch.last.patches[0].tension == stop
+        branch = follow(roof, Direction(pressures={"roof": 1 / 3}), 3 / stop, control=control)
+        assert branch.points.parameter.iloc[-1] == 3 / stop
+        assert (
+            branch.points["pressure roof"].iloc[-1] == branch.last.patches[0].pressure == (1 / 3) * (3 / stop)
+        )
+        branch = follow(roof, Direction({"roof": stop - 1.0}, relative=True), 1.0, control=control)
+        assert branch.points.parameter.iloc[-1] == 1.0
+        assert branch.last.patches[0].tension == 1.0 + (stop - 1.0)
+    assert branch.points.residual.iloc[-1] < 1e-10
 
 
 @pytest.mark.parametrize("above", [False, True])
@@ -78,8 +96,7 @@ def test_root_of_a_function_that_does_not_quite_change_sign():
 
 def test_stop_gives_the_sense_and_where_it_is_now_there_is_nothing_to_do(small_cap):
     up, down = (follow(small_cap, "cap", stop) for stop in (0.7, 0.55))
-    assert up.last.tensions[0] == pytest.approx(0.7, rel=1e-9)
-    assert down.last.tensions[0] == pytest.approx(0.55, rel=1e-9)
+    assert (up.last.tensions[0], down.last.tensions[0]) == (0.7, 0.55)
     nothing = follow(small_cap, "cap", small_cap.tensions[0])
     assert (nothing.ending, len(nothing.points)) == (Ending.REACHED, 1)
     assert nothing.events.columns.tolist()[:2] == ["kind", "parameter"]

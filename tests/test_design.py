@@ -13,11 +13,22 @@ from generators import spherical_cap, two_caps
 from pcmc import Design, Parameter, Target, meet
 from pcmc.design import DesignStatus
 from pcmc.design.targets import measure
+from pcmc.plan import Plan
 
 
 @pytest.fixture
 def roof():
     return roof_at_rest()
+
+
+def gable(tension, ring=False):
+    """A roof whose highest point is held: the gables' tips, or a ring, at a height of 6."""
+    turns = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+    hole = np.stack([6.0 + 2.0 * np.cos(turns), 6.0 + 2.0 * np.sin(turns), np.full(16, 6.0)], axis=1)
+    outline = [[0, 0, 3], [6, 0, 6], [12, 0, 3], [12, 10, 3], [6, 10, 6], [0, 10, 3]]
+    square = [[0, 0], [12, 0], [12, 12], [0, 12]]
+    plan = {"outline": square, "holes": [hole]} if ring else {"outline": outline}
+    return Plan(tension=tension, edge_length=1.0, **plan).surface()
 
 
 # Targets met
@@ -40,6 +51,20 @@ def test_two_apexes_from_wrong_tensions(roof):
     assert len(design.history) == design.solves
     assert design.history["misfit"].iloc[-1] < 1e-6
     assert dataclasses.is_dataclass(design)
+
+
+@pytest.mark.parametrize(("ring", "tension"), [(False, 40.0), (False, 7.0), (True, 40.0), (True, 10.0)])
+def test_an_apex_above_a_held_one_is_met(ring, tension):
+    """There the apex has no derivative: it is that of the held point."""
+    roof = gable(tension, ring)
+    design = meet(roof, Target("apex", value=6.5), "patch 1")
+    assert design.met, design.message
+    top = int(design.surface.vertices[:, 2].argmax())
+    assert design.surface.vertices[top, 2] == pytest.approx(6.5, rel=1e-6)
+    assert design.surface.free[top]
+    lower = meet(roof, Target("apex", value=5.0), "patch 1")
+    assert lower.status is DesignStatus.CONFLICT
+    assert lower.targets["limit"].iloc[0] == 6.0
 
 
 def test_two_apexes_over_a_wall_that_slides():
@@ -159,6 +184,18 @@ def test_a_bound_in_the_way(roof):
     there = pcmc.solve(roof.retensioned({"north": 5.5})).surface
     nearest = measure(there, Target("apex", "north")).value
     assert design.targets["limit"].iloc[0] == pytest.approx(nearest, rel=1e-6)
+
+
+def test_a_tension_that_stays_and_a_bound_that_is_reached_keep_their_last_digit():
+    """The unknown is 1/α, and 1/(1/49) is not 49."""
+    for tension in np.arange(35, 140) * 0.49:
+        roof = pyramid(tension=tension)
+        met = meet(roof, Target("apex", "roof", at_least=0.0), "roof")
+        assert met.parameters["value"].iloc[0] == met.surface.patches[0].tension == tension
+        low, high = 0.9 * tension, 1.1 * tension
+        bounded = meet(roof, Target("apex", "roof", 9.0), Parameter("roof", low=low, high=high))
+        assert bounded.status is DesignStatus.AT_BOUND
+        assert bounded.surface.patches[0].tension == low
 
 
 def test_targets_that_contradict_each_other():

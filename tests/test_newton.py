@@ -186,9 +186,9 @@ def test_a_minimum_is_sought_below_saddles(make):
 
 def test_starting_at_the_saddle_is_enough_to_leave_it():
     saddle = solve(four_fans(5), target="stationary").surface
-    result = solve(saddle, iterations=30)
-    assert "saddle" in result.history["step"].tolist()[:10]
-    assert result.energy < result.history["energy"].iloc[0]
+    history = solve(saddle, iterations=30).history
+    assert "saddle" in history["step"].tolist()[:10]
+    assert history["energy"].min() < history["energy"].iloc[0] - 10.0  # 30 steps lead to no minimum
     stay = solve(saddle, target="stationary")
     assert stay.converged
     assert stay.iterations <= 1

@@ -11,7 +11,7 @@ from refusals import refused
 from tents import tent
 
 import pcmc
-from generators import two_squares
+from generators import double_bubble, two_squares
 from pcmc import plot
 from pcmc.base.errors import FileError, MissingExtra, OptionError
 from pcmc.explore.page_data import fields as page_fields
@@ -293,7 +293,7 @@ BAD = [
         {"what": "views", "found": 1, "expected": "2, one per surface"},
     ),
     (
-        lambda s: plot.reactions(pcmc.Surface(s.vertices, s.faces, s.patch_of_face, s.patches, fixed=[0])),
+        lambda s: plot.reactions(double_bubble()),
         {"what": "surface"},
     ),
     (lambda s: plot.vectors(s, np.zeros(10)), {"what": "field", "found": (10,)}),

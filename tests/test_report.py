@@ -18,12 +18,13 @@ import pcmc
 from pcmc import Patch, Surface, Verdict, cli
 from pcmc.base.errors import FileError, MissingExtra, OptionError, SurfaceError
 from pcmc.base.units import Units
-from pcmc.plan import Plan
+from pcmc.plan import Divider, Plan
 from pcmc.report import RoofReport, roof_report, tables, words
 from pcmc.report.plan import paper_plan
 
 TEXT = pytest.mark.skipif(shutil.which("pdftotext") is None, reason="pdftotext is not installed")
 UNITS = Units("m", "kN")
+FORCES = ["force_x", "force_y", "force_z"]
 GOAL = (
     WITH_UNITS
     + """[targets]
@@ -226,10 +227,38 @@ def test_masts_have_their_reactions(tmp_path):
     plan = Plan([[0, 0], [8, 0], [8, 6], [0, 6]], edge_length=1.5, patches=patches, **edge)
     roof = pcmc.solve(plan.surface()).surface
     text = "\n".join(words_of(roof_report(roof, UNITS).write(tmp_path / "mast.pdf")))
-    rows = np.array([row.split()[1:] for row in re.findall(r"^ *S\d +-?\d.*$", text, re.M)], dtype=float)
+    rows = np.array([row.split() for row in re.findall(r"^ *S\d +point (.*) –$", text, re.M)])
     points = np.flatnonzero(roof.fixed)
-    np.testing.assert_allclose(rows[:, :3], roof.vertices[points], atol=1e-3)
-    np.testing.assert_allclose(rows[:, 3:], pcmc.certify(roof).reactions[points], atol=0.01)
+    assert set(rows[:, 3]) == {"–"}  # a point has no length
+    np.testing.assert_allclose(rows[:, :3].astype(float), roof.vertices[points], atol=1e-3)
+    np.testing.assert_allclose(rows[:, 4:].astype(float), pcmc.certify(roof).reactions[points], atol=0.01)
     assert "Ends of cables" in text
     assert re.search(r"^ *roof +roof +4.000", text, re.M)  # no wall, though its pressure is 0
     assert "weight," in text
+
+
+@TEXT
+def test_upright_and_leaning_walls_and_the_balance(tmp_path):
+    """What holds an upright wall is a support like others; how far the other wall leans is told."""
+    walls = [Divider([[4, 0], [4, 4]], upright=True), Divider([[8, 0], [8, 4]])]
+    patches = {
+        name: {"tension": t, "pressure": p} for name, t, p in zip("abc", (4, 3, 3), (1, 1.3, 1), strict=True)
+    }
+    plan = Plan([[0, 0], [12, 0], [12, 4], [0, 4]], walls, edge_length=1.0, patches=patches)
+    roof = pcmc.solve(plan.surface()).surface
+    found, report = pcmc.certify(roof), roof_report(roof, UNITS)
+    text = "\n".join(words_of(report.write(tmp_path / "walls.pdf")))
+    (row,) = re.findall(r"^ *B\d+ +wall 1, upright +upright plane +(.*)$", text, re.M)
+    wanted = found.supports[found.supports["kind"] == "upright plane"].iloc[0]
+    numbers = [float(x) for x in row.split()]
+    np.testing.assert_allclose(numbers[3:], wanted[["length", *FORCES, "per_length_max"]].tolist(), atol=6e-3)
+    for part in ("loads", "supports", "remainder"):
+        (row,) = re.findall(rf"^ *{part} +(-?\d.*)$", text, re.M)
+        exact = found.balance.set_index("of").loc[part, [*FORCES, "moment_x", "moment_y", "moment_z"]]
+        np.testing.assert_allclose([float(x) for x in row.split()], exact.tolist(), atol=6e-3)
+    lean = found.leaning.set_index("wall")["lean"]
+    assert lean["wall 2"] > 1.0
+    for wall in ("wall 1", "wall 2"):
+        assert re.search(rf"^ *{wall} +{lean[wall]:.1f} ", text, re.M)
+    assert "The supports carry the loads" in " ".join(text.split())
+    assert {"B1", "B7"} <= {label.text for label in report.plan.texts}

@@ -38,6 +38,16 @@ def test_a_cap_gets_its_tension_from_its_rise(given, key, rise):
     assert outcome.surface.patches[0].tension == pytest.approx((25.0 + rise**2) / (4.0 * rise), rel=0.04)
 
 
+def test_an_apex_above_held_gables_is_met(given):
+    outline = "[[0, 0, 3], [6, 0, 6], [12, 0, 3], [12, 10, 3], [6, 10, 6], [0, 10, 3]]"
+    plan = f"[plan]\nedge_length = 1.0\noutline = {outline}\ntension = 20.0\n"
+    targets = '[targets]\nmeet = [{quantity = "apex", value = 6.5}]\nvary = ["patch 1"]\n'
+    outcome = run_project(given(plan + targets), use_cache=False)
+    assert outcome.good
+    assert apex(outcome) == pytest.approx(6.5, rel=1e-6)
+    assert 4.0 < outcome.surface.patches[0].tension < 5.0
+
+
 def test_each_patch_may_have_its_own_rise(given):
     patches = "[plan.patches]\nwest = {rise = 1.5}\neast = {apex = 1.0}\n"
     outcome = run_project(given(HALL + SEAM + patches), use_cache=False)

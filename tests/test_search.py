@@ -9,11 +9,12 @@ from shapes import pyramid, tube
 from starts import sphere, spherical_cap, two_caps, two_squares
 
 from generators import spherical_cap_exact
-from pcmc import Patch, Verdict, certify, solve, write
+from pcmc import Circle, Patch, Verdict, certify, solve, write
 from pcmc.certificate.neck import narrowest_neck
 from pcmc.certificate.proof import Fold, Overload, UnbalancedJunction, Unheld
 from pcmc.existence.starts import low_start
 from pcmc.io import native
+from pcmc.plan import Divider, Plan
 from pcmc.solvers import solve as one_start
 from pcmc.solvers.result import Status
 from pcmc.sweep import solve_case
@@ -99,6 +100,55 @@ def test_an_inflated_mesh_is_spread_anew():
     assert solve(again).certificate.verdict is Verdict.STABLE
     low = low_start(again)
     assert low.vertices[:, 2].max() == pytest.approx(0.1 * np.sqrt(8.0), rel=1e-6)
+
+
+# ---- starts keep to the supports
+
+
+def test_a_wall_between_mirrors_is_found_from_far_above():
+    """The vertices of its end stay in the mirror plane, where the mean of their neighbours does not lie."""
+    patches = {"south": {"tension": 4.0}, "north": {"tension": 3.0}}
+    outline, mirror = [[0, 0], [6, 0], [6, 8], [0, 8]], [[6, 0], [6, 8]]
+    wall = Divider([[0, 4], [6, 4]], 3.0)
+    half = Plan(outline, [wall], patches=patches, mirrors=[mirror], edge_length=0.6).surface()
+    result = solve(half.moved(half.vertices * [1.0, 1.0, 30.0]))
+    assert result.converged
+    assert "from a lower start" in result.note
+    assert result.energy == pytest.approx(solve(half).energy, rel=1e-3)  # vertices lie elsewhere along it
+
+
+def test_an_upright_wall_in_a_y_under_snow_ends_in_a_status():
+    at = {"a": [3, 6], "b": [17, 6], "c": [10, 11]}
+    patches = {name: {"tension": 2.5, "at": place} for name, place in at.items()}
+    walls = [Divider([[10, 5], end], 2.0, upright=end[1] == 0) for end in ([10, 0], [4, 12], [16, 12])]
+    hall = [[0, 0], [20, 0], [20, 12], [0, 12]]
+    roof = Plan(hall, walls, patches=patches, edge_length=0.6, snow=0.5).surface()
+    low = low_start(roof)
+    ((plane, mask),) = low.on_planes
+    assert np.abs(plane.height(low.vertices[mask])).max() < 1e-12
+    assert solve(roof).status in (Status.CONVERGED, Status.DEGENERATE)
+
+
+def test_the_crown_of_a_quarter_is_low_in_a_low_start():
+    """It slides along the line where the mirrors meet."""
+    outline, mirrors = [[0, 0], [5, 0], [5, 5], [0, 5]], [[[5, 0], [5, 5]], [[0, 5], [5, 5]]]
+    quarter = Plan(outline, tension=4.0, mirrors=mirrors).surface()
+    x, y, _ = quarter.vertices.T
+    X = np.stack([x, y, x * y], axis=1)
+    low = low_start(quarter.moved(X))
+    crown = int(quarter.vertices[:, :2].sum(axis=1).argmax())
+    assert X[crown, 2] == 25.0
+    assert low.vertices[crown, 2] == pytest.approx(low.vertices[:, 2].max()) == pytest.approx(0.1 * 50**0.5)
+
+
+def test_rings_that_vertices_slide_along_are_moved_apart_as_fixed_ones():
+    fixed = film(2.0)
+    top = fixed.vertices[:, 2] > 1.0
+    keep = np.isin(np.arange(fixed.n), [np.flatnonzero(fixed.fixed & side)[0] for side in (top, ~top)])
+    rings = {Circle((0, 0, 2.0 * s), (0, 0, 1), 1.0): fixed.fixed & ~keep & (top == (s > 0)) for s in (1, -1)}
+    held, sliding = (solve(f) for f in (fixed, fixed.rebuilt(fixed=keep, on_line=rings)))
+    assert sliding.status is held.status is Status.NO_EQUILIBRIUM
+    assert [p.value for p in sliding.proofs] == pytest.approx([p.value for p in held.proofs], rel=1e-3)
 
 
 def test_the_flow_of_the_paper_is_not_rescued():

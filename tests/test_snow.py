@@ -20,7 +20,7 @@ from pcmc.existence.starts import low_start
 from pcmc.explore.following import between, reach, wanted
 from pcmc.io.scaling import scaled_surface
 from pcmc.plan import Area, Plan
-from pcmc.project import digest, varied
+from pcmc.project import digest, run, varied
 from pcmc.project.values import values_of
 from pcmc.structure import Material, Snow, StructuralModel
 from pcmc.surface.wall_pressures import with_pressures
@@ -222,6 +222,7 @@ def test_the_search_raises_what_is_net_of_the_snow(tension, word):
         assert found.surface.patches == snowy.patches
     else:
         assert found.fold.value == other.fold.value == pytest.approx(0.8, rel=0.1)
+        assert "the net pressure is 1.2" in str(pcmc.solve(snowy).proofs[0])
 
 
 def test_a_branch_in_the_snow_keeps_the_wall_between_the_rooms():
@@ -239,3 +240,21 @@ def test_a_branch_in_the_snow_keeps_the_wall_between_the_rooms():
     np.testing.assert_allclose(line.gradient(roof, roof.vertices), force, atol=1e-13 * abs(force).max())
     with refused(SurfaceError, what="snow"):
         pcmc.follow(pcmc.solve(hypar_roof(4)).surface, pcmc.Direction(snows={"roof": 1.0}), 0.1)
+
+
+def test_a_rise_is_found_under_almost_as_much_snow_as_air(tmp_path):
+    """The first tension was that of the air alone, and the one wanted out of its bounds."""
+    outline = "outline = {circle = {centre = [0, 0], radius = 5}}"
+    (tmp_path / "dome.toml").write_text(f"[plan]\nedge_length = 2.0\n{outline}\nrise = 1.0\nsnow = 0.97\n")
+    outcome = run(tmp_path / "dome.toml")
+    assert outcome.design.met
+    assert outcome.surface.vertices[:, 2].max() == pytest.approx(1.0, rel=1e-6)
+
+
+def test_snow_beside_free_edges_of_a_mesh_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    pcmc.write("sail.pcmc", hypar_roof(4))
+    (tmp_path / "sail.toml").write_text('[mesh]\nfile = "sail.pcmc"\n[mesh.patches]\nroof = {snow = 0.1}\n')
+    for given in (["sail.toml"], ["sail.pcmc", "--snow", "0.1"]):
+        assert cli.main(["solve", *given]) == 2
+        assert "edges are free" in capsys.readouterr().err

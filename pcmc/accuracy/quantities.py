@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..certificate import Certificate
-from ..certificate.curve_tables import boundary_table, held_curves
+from ..certificate.supports import held_curves
 from ..energy.rooms import closing_volumes, prescribed_volumes, room_pressures
 from ..surface import Surface
 
@@ -111,11 +111,8 @@ def _boundaries(
 
     Of several curves of one name, each is named with its place.
     """
-    table = boundary_table(surface, certificate.reactions)
-    if not len(table):
-        return
     curves = held_curves(surface)
-    table = table.iloc[: len(curves)]  # without the pulls across mirror planes
+    table = certificate.boundaries.iloc[: len(curves)]  # the first of the supports
     names = table["boundary"].astype(str).tolist()
     middles = table[["middle_x", "middle_y", "middle_z"]].to_numpy()
     pulls = table[["reaction_x", "reaction_y", "reaction_z"]].to_numpy()

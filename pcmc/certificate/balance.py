@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import pandas as pd
 
 from ..base.arrays import Bools, Floats
 from ..surface import Surface
@@ -15,7 +16,7 @@ from ..surface.wall_tensions import balanced_wall
 from .proof import UnbalancedJunction, Unheld
 
 HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets meet at about 20°
-ROUNDING = 1e-12  # of the size: a coordinate below is 0
+FORCE, MOMENT = (tuple(f"{kind}_{axis}" for axis in "xyz") for kind in ("force", "moment"))
 
 
 def load_ratio(surface: Surface) -> float:
@@ -53,6 +54,52 @@ def load_ratio(surface: Surface) -> float:
     return abs(load(surface)) / capacity if capacity > 0.0 else 0.0
 
 
+def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
+    """Force and moment of the loads, of the supports, and what remains of both: a row each.
+
+    The loads are Σ p A_T ν_T - Σ w A_T n, the supports the rows of their table. What remains are the forces
+    at vertices that nothing holds: a mesh at rest balances along its normals; along the sheets forces are
+    left, smaller ones on finer meshes.
+
+    Columns: ``of``; ``force_x``, …, and ``moment_x``, …, about the middle of the surface's bounding box at
+    ``x``, ``y``, ``z``; ``force_share``, ``moment_share``, the largest component over the sum of the loads'
+    sizes, triangle by triangle; without loads, over that of the supports.
+    """
+    X, n = surface.vertices, np.array(surface.plane.normal)
+    corners, patch = X[surface.faces], surface.patch_of_face
+    vector = area_vectors(corners)
+    force = surface.net_pressures[patch, None] * vector
+    force -= (surface.weights[patch] * np.linalg.norm(vector, axis=1))[:, None] * n
+    about = 0.5 * (X.min(axis=0) + X.max(axis=0))
+    arm = corners.mean(axis=1) - about
+    loads = np.array([force.sum(axis=0), np.cross(arm, force).sum(axis=0)])
+    rows, arms = supports[[*FORCE]].to_numpy(float), supports[[*"xyz"]].to_numpy(float) - about
+    moments = supports[[*MOMENT]].to_numpy(float) + np.cross(arms, rows)
+    carried = np.array([rows.sum(axis=0), moments.sum(axis=0)])
+    sizes, away = (np.linalg.norm(part, axis=1) for part in ((force, arm) if force.any() else (rows, arms)))
+    scale = np.array([sizes.sum(), sizes @ away])
+    parts = np.array([loads, carried, loads + carried])
+    shares = np.abs(parts).max(axis=2) / np.where(scale > 0.0, scale, 1.0)
+    columns = [*FORCE, *MOMENT, *"xyz", "force_share", "moment_share"]
+    values = np.column_stack([parts.reshape(3, 6), np.tile(about, (3, 1)), shares])
+    table = pd.DataFrame(values, columns=columns)
+    table.insert(0, "of", ["loads", "supports", "remainder"])
+    return table
+
+
+def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:
+    """How exactly the supports carry the loads, of the piece between ``mirrors`` if there are any."""
+    left = table.iloc[-1]
+    share = (
+        f"to {left['force_share']:.1g} of them in x, y and z, and to {left['moment_share']:.1g} in moments"
+    )
+    if not table.iloc[0][[*FORCE]].any():
+        return f"the forces of the supports cancel {share}"
+    place = ", ".join(f"{left[c] + 0.0:.4g}" for c in "xyz")
+    whose = " of the piece between the mirror planes" if mirrors else ""
+    return f"the supports carry the loads{whose} {share} about ({place})"
+
+
 def load_is_given(surface: Surface) -> bool:
     """Whether a ``load_ratio`` above 1 rules out every shape of the surface, not this one alone.
 
@@ -62,6 +109,11 @@ def load_is_given(surface: Surface) -> bool:
     topo = surface.topology
     free = topo.boundary_edge & ~surface.held[topo.edges].all(axis=1)
     return not (surface.rooms or surface.weights.any() or free.any())
+
+
+def load_name(surface: Surface) -> str:
+    """What sentences call the load: "pressure", or "net pressure" where snow is taken off."""
+    return "net pressure" if surface.snows.any() else "pressure"
 
 
 def load(surface: Surface) -> float:

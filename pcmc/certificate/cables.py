@@ -57,23 +57,28 @@ def cable_end_table(surface: Surface) -> pd.DataFrame:
     direction from the end along the cable. Where several cables end, their support carries the sum.
     """
     rows = []
-    for cable, curve in _parts(surface):
-        if curve.closed:
-            continue
-        for end, beside in ((0, 1), (-1, -2)):
-            pair = curve.vertices[[end, beside]]
-            force = -cable.tension * directions(surface.vertices, pair[None])[0][0]
-            place = surface.vertices[pair[0]]
-            rows.append(
-                {
-                    "cable": cable.name,
-                    "vertex": int(pair[0]),
-                    **{axis: float(c) for axis, c in zip("xyz", place, strict=True)},
-                    "held": bool(surface.held[pair[0]]),
-                    **{f"force_{axis}": float(c) for axis, c in zip("xyz", force, strict=True)},
-                }
-            )
+    for cable, vertex, force in cable_ends(surface):
+        rows.append(
+            {
+                "cable": cable.name,
+                "vertex": vertex,
+                **dict(zip("xyz", surface.vertices[vertex].tolist(), strict=True)),
+                "held": bool(surface.held[vertex]),
+                **dict(zip(("force_x", "force_y", "force_z"), force.tolist(), strict=True)),
+            }
+        )
     return pd.DataFrame(rows)
+
+
+def cable_ends(surface: Surface) -> list[tuple[Cable, int, Floats]]:
+    """Each end of a part of a cable: the cable, the vertex, and -τ t (3,), the force that holds it there."""
+    ends = []
+    for cable, curve in _parts(surface):
+        for end, beside in () if curve.closed else ((0, 1), (-1, -2)):
+            pair = curve.vertices[[end, beside]]
+            direction = directions(surface.vertices, pair[None])[0][0]
+            ends.append((cable, int(pair[0]), -cable.tension * direction))
+    return ends
 
 
 def too_long(surface: Surface) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -31,12 +32,13 @@ from ..stability.modes import lowest, stiffness
 from ..surface import Plane, Surface, expect_surface, mirrored
 from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
-from .balance import load, load_ratio, pressures_left_over
+from .balance import FORCE, MOMENT, balance_sentence, balance_table, load, load_ratio, pressures_left_over
 from .cables import cable_end_table, cable_table
-from .curve_tables import boundary_table, junction_table
+from .curve_tables import junction_table
 from .leaning import lean_table, lean_texts
 from .proof import Proof
 from .reactions import reactions
+from .supports import boundary_view, support_table
 from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
@@ -68,8 +70,12 @@ class Certificate:
         area, errors by both definitions, quality.
     junctions : one row per junction curve: length, its middle (the centre of a closed one), forces
         left and Σ α n, force/length.
-    boundaries : one row per held boundary curve: length, middle, reaction, largest reaction per
-        length. A corner's reaction is shared equally by its curves; per length it counts in full.
+    supports : one row per support: a line, point, plane, mirror or end of a cable, with its length, middle,
+        force, moment and largest force per length; see ``pcmc.certificate.supports.support_table``.
+        Its forces and moments add up to those of the loads, but for the ``balance``'s remainder.
+    boundaries : the rows of ``supports`` that are as long as a curve: length, middle, reaction, largest
+        reaction per length.
+    balance : force and moment of the loads, of the supports, and what remains of both: a row each.
     rooms : one row per room of prescribed volume: the volume it has, the one prescribed, the difference
         over the latter, and the room's pressure.
     cables : one row per cable, cut at supports and branches: force, length, middle, the pull of the
@@ -99,7 +105,8 @@ class Certificate:
     walls_quality: float
     patches: pd.DataFrame
     junctions: pd.DataFrame
-    boundaries: pd.DataFrame
+    supports: pd.DataFrame
+    balance: pd.DataFrame
     load: float
     support: float
     reactions: Floats
@@ -116,6 +123,23 @@ class Certificate:
     def certified(self) -> bool:
         """At rest, and neither a saddle nor degenerate."""
         return self.verdict in (Verdict.STABLE, Verdict.NEUTRAL)
+
+    @cached_property
+    def boundaries(self) -> pd.DataFrame:
+        """The rows of ``supports`` that are as long as a curve, with the names of its columns for curves."""
+        return boundary_view(self.supports)
+
+    @property
+    def largest_reaction(self) -> float:
+        """The largest force per length of a support, but for the pull across mirror planes; NaN without."""
+        table = self.supports
+        return float(table["per_length_max"][table["kind"] != "mirror"].max())
+
+    @property
+    def remainder(self) -> tuple[Floats, Floats]:
+        """Force (3,) and moment (3,) that loads and supports leave; see ``balance``."""
+        left = self.balance.iloc[-1]
+        return left[[*FORCE]].to_numpy(float), left[[*MOMENT]].to_numpy(float)
 
     def numbers(self) -> dict[str, Any]:
         """The scalar findings, for tables."""
@@ -158,9 +182,11 @@ class Certificate:
             ("walls lean", ", ".join(lean_texts(self.leaning))),
             ("load over capacity", f"{self.load_ratio:.3f}"),
             ("load, reactions", ", ".join(f"{x:.6g}{force}" for x in sums) + " along the plane's normal"),
+            ("balance", balance_sentence(self.balance, self.symmetric_in)),
         ]
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
-        tables = self.patches, self.rooms, self.junctions, self.boundaries, self.cables, self.cable_ends
+        supports = self.supports.drop(columns=[*MOMENT])
+        tables = self.patches, self.rooms, self.junctions, supports, self.cables, self.cable_ends
         shown = [
             frame.to_string(index=False, float_format=lambda x: f"{x:.4g}") for frame in tables if len(frame)
         ]
@@ -229,6 +255,7 @@ def certify(
 
     patches = _patch_table(surface, standing, areas, qualities)
     ratio, support_forces = load_ratio(standing), reactions(standing)
+    supports = support_table(surface, support_forces)
     notes = _pulled_off(unheld), pressures_left_over(standing)
     findings = Findings(
         surface=surface,
@@ -262,7 +289,8 @@ def certify(
         walls_quality=float(qualities[in_wall].min(initial=1.0)),
         patches=patches,
         junctions=junction_table(standing, left),
-        boundaries=boundary_table(standing, support_forces),
+        supports=supports,
+        balance=balance_table(standing, supports),
         load=load(standing),
         support=float((support_forces @ np.array(surface.plane.normal)).sum()),
         reactions=support_forces,

@@ -1,19 +1,15 @@
-"""Tables of junctions and held boundaries: where each curve is, and the forces along it."""
+"""The table of junctions: where each curve is, and the forces along it."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
-from ..surface.supports import symmetric_part
 from ..surface.topology import Curve
 from .balance import edge_tensions
-from .reactions import reactions_per_length
 
 ROUNDING = 1e-12  # of the size: a coordinate below is 0
 
@@ -61,70 +57,6 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
-
-
-def boundary_table(surface: Surface, forces: Floats) -> pd.DataFrame:
-    """One row per held boundary curve: where it is, its share of the reactions (n,3), most per length.
-
-    Then one per curve in a mirror plane, named after it: there the image pulls, across the plane.
-    """
-    curves = held_curves(surface)
-    carried = symmetric_part(surface.on_planes, forces.copy())
-    per_length = np.linalg.norm(np.nan_to_num(reactions_per_length(surface, forces)), axis=1)
-    rows = _boundary_rows(surface, curves, ["" for _ in curves], carried, per_length)
-    for plane, mask in surface.on_planes:
-        if plane.mirror:
-            edges = surface.mirror_edge & mask[surface.topology.edges].all(axis=1)
-            curves = _curves_by_patch(surface, edges)
-            half = 0.5 * np.repeat(segment_lengths(surface.vertices, surface.topology.edges[edges]), 2)
-            share = np.bincount(surface.topology.edges[edges].ravel(), half, surface.n)
-            pull = (forces @ np.array(plane.normal)) * mask
-            per_length = np.divide(np.abs(pull), share, out=np.zeros(surface.n), where=share > 0.0)
-            across = pull[:, None] * np.array(plane.normal)
-            rows += _boundary_rows(surface, curves, [f" in the {plane}"] * len(curves), across, per_length)
-    return pd.DataFrame(rows)
-
-
-def _curves_by_patch(surface: Surface, edges: Bools) -> list[Curve]:
-    """The curves of boundary edges (e,), each in one patch."""
-    topo = surface.topology
-    curves: list[Curve] = []
-    patch = np.empty(len(topo.edges), dtype=np.int64)
-    patch[topo.edge_of_face] = surface.patch_of_face[:, None]
-    for p in np.unique(patch[edges]):
-        curves += topo.curves_among(edges & (patch == p))
-    return curves
-
-
-def held_curves(surface: Surface) -> list[Curve]:
-    """The boundary curves with a held vertex, but for those in mirror planes."""
-    curves = surface.topology.boundary_loops
-    if surface.mirror_edge.any():
-        curves = surface.topology.curves_among(surface.topology.boundary_edge & ~surface.mirror_edge)
-    return [curve for curve in curves if surface.held[curve.vertices].any()]
-
-
-def _boundary_rows(
-    surface: Surface, curves: Sequence[Curve], places: Sequence[str], forces: Floats, per_length: Floats
-) -> list[dict[str, object]]:
-    """The rows of curves; they share the force of a corner equally, so that they add up to the total."""
-    count = np.zeros(surface.n)
-    for curve in curves:
-        count[curve.vertices] += 1.0
-    parts = forces / np.maximum(count, 1.0)[:, None]
-    rows = []
-    for curve, place in zip(curves, places, strict=True):
-        total = parts[curve.vertices].sum(axis=0).tolist()
-        rows.append(
-            {
-                "boundary": " | ".join(surface.patches[i].name for i in curve.sheets) + place,
-                "length": float(segment_lengths(surface.vertices, curve.pairs).sum()),
-                **middle(surface, curve),
-                **dict(zip(("reaction_x", "reaction_y", "reaction_z"), total, strict=True)),
-                "per_length_max": float(per_length[curve.vertices].max()),
-            }
-        )
-    return rows
 
 
 def middle(surface: Surface, curve: Curve) -> dict[str, float]:

@@ -12,16 +12,18 @@ class Overload:
     Attributes
     ----------
     ratio : load over capacity, above 1; see ``pcmc.certificate.balance.load_ratio``.
+    load : what it is called, ``"pressure"`` or, under snow, ``"net pressure"``.
 
     >>> print(Overload(1.2))
     the pressure is 1.20 times what the boundary's tension could carry
     """
 
     ratio: float
+    load: str = "pressure"
 
     def __str__(self) -> str:
         digits = ".3f" if self.ratio < 1.1 else ".2f" if self.ratio < 1e4 else ".3g"
-        return f"the pressure is {self.ratio:{digits}} times what the boundary's tension could carry"
+        return f"the {self.load} is {self.ratio:{digits}} times what the boundary's tension could carry"
 
 
 @dataclass(frozen=True)

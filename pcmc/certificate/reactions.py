@@ -1,16 +1,22 @@
-"""The forces of the supports."""
+"""The forces of the supports, and how they act: along lines, at points, and across mirror planes."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Bools, Floats
 from ..contact.pinching import standing_part
 from ..energy import kernels
 from ..energy.functional import add_cables_and_weights, apply_supports
 from ..surface import Surface
+from ..surface.checks import lying
 from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
 from ..surface.supports import symmetric_part
+from .cables import cable_ends
+
+SPAN = 1e-9  # of the largest force: what planes leave of the forces that they carry
 
 
 def held_lengths(surface: Surface) -> Floats:
@@ -18,10 +24,7 @@ def held_lengths(surface: Surface) -> Floats:
 
     In a mirror plane nothing is held.
     """
-    ends = surface.topology.edges[surface.topology.boundary_edge & ~surface.mirror_edge]
-    ends = ends[surface.held[ends].all(axis=1)]
-    half = 0.5 * segment_lengths(surface.vertices, ends)
-    return np.asarray(np.bincount(ends.ravel(), np.repeat(half, 2), surface.n), dtype=float)
+    return _half_lengths(surface, np.tile(_held_boundary(surface)[:, None], 2))
 
 
 def reactions(surface: Surface) -> Floats:
@@ -42,11 +45,99 @@ def reactions(surface: Surface) -> Floats:
     return forces - apply_supports(surface, forces.copy())
 
 
-def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floats:
-    """(n,3) the reactions over the length of held boundary at each vertex; NaN where there is none.
+class SupportForces(NamedTuple):
+    """The reactions by how they act, force; ``along`` + ``points`` + ``mirrors`` are all of them.
 
-    Each end of a held boundary edge gets half of its length. ``forces`` (n,3) are by default the
-    reactions of the part of the surface that stands. The pull of images in mirror planes is left out.
+    Attributes
+    ----------
+    surface, standing : the surface, and the part of it that stands, which the supports hold.
+    along : (n,3) on lines and sheets.
+    points : (n,3) at single points, and of the cables that end on a line.
+    mirrors : (n,3) the pull of images across mirror planes.
+    lines : (e,2) the ends of edges that are held as lines: of the boundary, of lines inside the surface, and
+        of junctions that a plane holds, as on an upright wall, or that rest on Π.
+    lengths : (n,) half the length of the edges of ``lines`` at each vertex; 0 where there is none.
+    clamped : (n,) the vertices that cannot move, or only along a line that was given.
+    single : (n,) those of them that are in no line.
+    by_plane : (1 + planes,n,3) what Π and each of ``on_planes`` carry at the vertices that slide on them.
+    cables : (1 + planes,n,3) the part of these that holds the ends of cables.
+    """
+
+    surface: Surface
+    standing: Surface
+    along: Floats
+    points: Floats
+    mirrors: Floats
+    lines: Bools
+    lengths: Floats
+    clamped: Bools
+    single: Bools
+    by_plane: Floats
+    cables: Floats
+
+    @property
+    def per_length(self) -> Floats:
+        """(n,3) ``along`` over ``lengths``, force/length; NaN where there is no line."""
+        share = self.lengths[:, None]
+        return np.divide(self.along, share, out=np.full(self.along.shape, np.nan), where=share > 0.0)
+
+    def of_patch(self, patch: int | None) -> Bools:
+        """(n,) the vertices of lines at the edges of a patch, or of all lines."""
+        topo, mask = self.surface.topology, np.zeros(self.surface.n, dtype=bool)
+        own = np.full(len(topo.edges), patch is None)
+        own[topo.edge_of_face[self.surface.patch_of_face == patch]] = True
+        mask[topo.edges[self.lines & own[:, None]]] = True
+        return mask & (self.lengths > 0.0)
+
+    def largest_per_length(self, patch: int | None = None) -> float | None:
+        """The largest force per length on lines at the edges of a patch, or on all; None without any."""
+        chosen = self.of_patch(patch)
+        return float(np.linalg.norm(self.per_length[chosen], axis=1).max()) if chosen.any() else None
+
+
+def support_forces(surface: Surface, forces: Floats | None = None) -> SupportForces:
+    """The reactions of a surface by how they act; ``forces`` (n,3) are by default those of its standing part.
+
+    A vertex on several planes divides its force among them: Σ c_i n_i of their normals. Where a fixed vertex
+    lies in mirror planes, these take the part across them.
+    """
+    standing = standing_part(surface).surface
+    forces = reactions(standing) if forces is None else forces
+    planes, topo = standing.on_planes, surface.topology
+    ends = np.zeros_like(forces)
+    for _, vertex, force in cable_ends(standing):
+        ends[vertex] += force
+    ends -= apply_supports(standing, ends.copy())
+    clamped, by_plane, cables = _divided(standing, forces, ends)
+    mirror = [False, *(plane.mirror for plane, _ in planes)]
+    mirrors = by_plane[mirror].sum(axis=0)
+    boundary, held = _held_boundary(surface), standing.fixed | standing.on_plane
+    on_boundary, used = np.zeros((2, surface.n), dtype=bool)
+    on_boundary[topo.edges[boundary]] = True
+    used[standing.faces] = used[standing.cable_edges.ends] = True
+    for plane, mask in planes:
+        held = held | (mask & (not plane.mirror))
+    single, sliding = (used & ~on_boundary & side for side in (clamped, held & ~clamped))
+    junction = (topo.junction_edge | topo.seam_edge) & held[topo.edges].all(axis=1)
+    inner = single[topo.edges].all(axis=1)
+    lines = (junction[:, None] & sliding[topo.edges]) | (inner | boundary)[:, None]
+    lengths = _half_lengths(surface, lines)
+    points = np.where(lengths[:, None] > 0.0, ends - cables[mirror].sum(axis=0), 0.0)
+    inside = forces - mirrors
+    alone = single & (lengths == 0.0)
+    points[alone] = inside[alone]
+    along = inside - points
+    return SupportForces(
+        surface, standing, along, points, mirrors, lines, lengths, clamped, alone, by_plane, cables
+    )
+
+
+def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floats:
+    """(n,3) the reactions over the length of the held lines at each vertex; NaN where there is none.
+
+    Each end of an edge gets half of its length. ``forces`` (n,3) are by default the reactions of the part of
+    the surface that stands. Forces at single points, those of cables that end on a line, and the pull of
+    images in mirror planes are left out; see ``support_forces``.
 
     >>> from pcmc import Patch
     >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
@@ -54,8 +145,53 @@ def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floa
     >>> (3 * reactions_per_length(square)).round(9)[1].tolist()  # tension -1, 1; a third of p A = 2
     [-1.5, 1.5, -1.0]
     """
-    share = held_lengths(surface)[:, None]
-    if forces is None:
-        forces = reactions(standing_part(surface).surface)
-    forces = symmetric_part(surface.on_planes, forces.copy())
-    return np.divide(forces, share, out=np.full((surface.n, 3), np.nan), where=share > 0.0)
+    return support_forces(surface, forces).per_length
+
+
+def _held_boundary(surface: Surface) -> Bools:
+    """(e,) edges of the boundary that are held at both ends, but for those in mirror planes."""
+    topo = surface.topology
+    return topo.boundary_edge & ~surface.mirror_edge & surface.held[topo.edges].all(axis=1)
+
+
+def _half_lengths(surface: Surface, ends: Bools) -> Floats:
+    """(n,) at each vertex half the length of the edges (e,2) that have one of the chosen ends there."""
+    half = 0.5 * segment_lengths(surface.vertices, surface.topology.edges)
+    chosen = surface.topology.edges[ends], np.broadcast_to(half[:, None], ends.shape)[ends]
+    return np.asarray(np.bincount(*chosen, minlength=surface.n), dtype=float)
+
+
+def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Floats, Floats]:
+    """The vertices (n,) that lines and points hold, and what Π and the other planes, (1 + planes,n,3), carry
+    of the reactions (n,3), and of those at the ends of cables.
+    """
+    planes = (surface.plane, *(plane for plane, _ in surface.on_planes))
+    normals = np.array([plane.normal for plane in planes])
+    mirror, X = np.array([plane.mirror for plane in planes]), surface.vertices
+    ground = surface.on_plane | (surface.fixed & lying(surface.plane.height(X), X))
+    on = np.array([ground, *(mask for _, mask in surface.on_planes)])
+    clamped = surface.given_supports.fixed_and_sliding()[0]
+    least = SPAN * float(np.linalg.norm(forces, axis=1).max(initial=0.0))
+    for _ in range(2):  # again with those clamped that planes cannot carry, as where a held bottom is pinched
+        here = np.where(clamped, on & mirror[:, None], on)
+        carried, of_cables = (
+            _by_normal(
+                normals,
+                here,
+                np.where(clamped[:, None], part - symmetric_part(surface.on_planes, part.copy()), part),
+            )
+            for part in (forces, ends)
+        )
+        clamped = clamped | (np.linalg.norm(forces - carried.sum(axis=0), axis=1) > least)
+    return clamped, carried, of_cables
+
+
+def _by_normal(normals: Floats, on: Bools, vectors: Floats) -> Floats:
+    """(k,n,3) the parts c_i n_i of vectors (n,3), n_i the normals (k,3) of the planes each is ``on``."""
+    parts = np.zeros((len(normals), *vectors.shape))
+    some = np.flatnonzero(on.any(axis=0))
+    for pattern in np.unique(on[:, some], axis=1).T:
+        here, own = some[(on[:, some] == pattern[:, None]).all(axis=0)], normals[pattern]
+        sizes = vectors[here] @ np.linalg.pinv(own)
+        parts[np.ix_(pattern, here)] = sizes.T[:, :, None] * own[:, None, :]
+    return parts

@@ -12,7 +12,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats
 from ..energy.weight import compressed, effective_tensions
 from ..surface import Surface
-from .balance import coarseness, hardly_balanced, load_is_given, unbalanced, unheld
+from .balance import coarseness, hardly_balanced, load_is_given, load_name, unbalanced, unheld
 from .cables import too_long
 from .collapse import held_wall_down, where_collapsed
 from .neck import Neck, pinched_neck
@@ -96,7 +96,7 @@ class Findings:
             return ()
         of_shape = (
             unbalanced(self.surface, self.pinchable),
-            Overload(self.load_ratio) if self.overloaded else None,
+            Overload(self.load_ratio, load_name(self.surface)) if self.overloaded else None,
             unheld(self.surface, stable=False),
         )
         proofs = [proof for proof in of_shape if proof is not None]
@@ -170,8 +170,8 @@ def _forces_left(f: Findings) -> str:
     reason = "; ".join(filter(None, (reason, too_long(f.surface), _compressed(f))))
     if f.load_ratio > 1.0 and load_is_given(f.surface):
         reason += (
-            f"; the pressure is {f.load_ratio:.3f} times what the boundary's tension could carry:"
-            " only a mesh as coarse as this may come to rest, a finer one cannot"
+            f"; the {load_name(f.surface)} is {f.load_ratio:.3f} times what the boundary's tension could"
+            " carry: only a mesh as coarse as this may come to rest, a finer one cannot"
         )
     return reason
 

@@ -56,17 +56,21 @@ class ContactChanged(NotOnBranch):
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """The equation g(X, λ) = 0 beside equilibrium: g, of order 1, with ∂g/∂X (n,3) and ∂g/∂λ."""
+    """The equation g(X, λ) = 0 beside equilibrium: g, of order 1, with ∂g/∂X (n,3) and ∂g/∂λ.
+
+    ``parameter`` : λ, if the equation gives it: then it has that value to the last digit.
+    """
 
     value: Callable[[State], float]
     gradient: Callable[[State], Floats]
     rate: float
+    parameter: float | None = None
 
 
 def fixed_parameter(parameter: float, scale: float) -> Constraint:
     """λ is given."""
     return Constraint(
-        lambda at: (at.parameter - parameter) / scale, lambda at: np.zeros_like(at.X), 1.0 / scale
+        lambda at: (at.parameter - parameter) / scale, lambda at: np.zeros_like(at.X), 1.0 / scale, parameter
     )
 
 
@@ -152,7 +156,7 @@ class BorderedMatrix:
 
 def correct(start: State, constraint: Constraint, tolerance: float) -> State:
     """The point of the branch near a state that meets the constraint too; NotOnBranch where there is none."""
-    mesh, at = start.mesh, start
+    mesh, at = start.mesh, start.at_value(constraint.parameter)
     last, slow = np.inf, 0
     _check_tensions(at)
     for iteration in range(ITERATIONS + 1):
@@ -170,7 +174,8 @@ def correct(start: State, constraint: Constraint, tolerance: float) -> State:
         step = at.motion(s[:size], change)
         if not np.abs(step).max() < mesh.full.size:
             break
-        at = at.step(step, at.parameter + change, iteration + 1, at.with_rooms(s[size:]))
+        value = at.parameter + change if constraint.parameter is None else constraint.parameter
+        at = at.step(step, value, iteration + 1, at.with_rooms(s[size:]))
         _check_tensions(at)
         if at.quality < COLLAPSED:
             raise MeshCollapsed("triangles collapse")

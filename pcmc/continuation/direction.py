@@ -86,17 +86,26 @@ class Direction:
         v = _volume_rates(surface, self.volumes)
         loads = Loads.of(surface, self.weights, self.cables, self.snows)
         value = 0.0 if self.relative else _common_value(surface, w, u, v, loads)
-        u = u + wall_pressure_changes(surface, u, {surface.patch_index(name) for name in self.pressures})
+        followed = wall_pressure_changes(surface, u, {surface.patch_index(name) for name in self.pressures})
+        # zero, and not only to rounding: so a value of λ that is asked for gives exactly the values named
+        a, b, c = (
+            values if self.relative else np.where(rates != 0.0, 0.0, values)
+            for values, rates in (
+                (surface.tensions, w),
+                (surface.pressures - followed * value, u),
+                (prescribed_volumes(surface), v),
+            )
+        )
+        u = u + followed
         refuse_varied_pressure(surface, np.flatnonzero(u))
         if not (surface.tensions[w != 0.0] > 0.0).all():
             name = surface.patches[int(np.argmax((w != 0.0) & (surface.tensions <= 0.0)))].name
             message = f"the tension of {name!r} is 0, where its triangles stop pulling; start from one > 0"
             raise OptionError(message, what="parameter", where=name, found=0.0)
         loads.check()
-        loads = loads.with_walls(surface)
-        with_pressures(surface, snows=loads.at(1.0)["snows"])  # refuses snow beside free edges
-        start = surface.tensions - w * value, surface.pressures - u * value
-        return ParameterLine(value, *start, w, u, prescribed_volumes(surface) - v * value, v, loads)
+        loads = loads.line(self.relative).with_walls(surface, value)
+        with_pressures(surface, snows=loads.at(value + 1.0)["snows"])  # refuses snow beside free edges
+        return ParameterLine(value, a, b, w, u, c, v, loads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +137,7 @@ class ParameterLine:
         tensions = (self.tensions + w * self.value)[w != 0.0]
         pressures = (self.pressures + u * self.value)[u != 0.0]
         volumes = (self.volumes + v * self.value)[v != 0.0]
-        loads, rates = self.loads.starts, self.loads.rates
+        loads, rates = self.loads.values(self.value), self.loads.rates
         size = np.linalg.norm(np.concatenate([tensions, pressures, volumes, loads]))
         return float(size / np.linalg.norm(np.concatenate([w, u, v, rates]))) or 1.0
 
@@ -136,7 +145,7 @@ class ParameterLine:
         """Whether every varied tension is still positive at λ."""
         w = self.tension_rates
         pulling = bool(((self.tensions + w * value)[w != 0.0] > 0.0).all())
-        return pulling and self.loads.allow(value - self.value)
+        return pulling and self.loads.allow(value)
 
     def surface_at(self, surface: Surface, value: float) -> Surface:
         """The surface with its tensions, pressures and prescribed volumes at λ."""
@@ -147,7 +156,7 @@ class ParameterLine:
             {names[i]: self.pressures[i] + u[i] * value for i in np.flatnonzero(u)},
             walls=[names[i] for i in self._followed() if surface.walls[i]],
             volumes=self._varied_volumes(surface, value),
-            **self.loads.at(value - self.value),
+            **self.loads.at(value),
         )
 
     def _followed(self) -> list[int]:
@@ -170,7 +179,7 @@ class ParameterLine:
                 columns[f"pressure {patch.name}"] = self.pressures[i] + self.pressure_rates[i] * value
         for name, volume in self._varied_volumes(surface, value).items():
             columns[f"volume {name}"] = volume
-        return columns | self.loads.columns(value - self.value)
+        return columns | self.loads.columns(value)
 
     def boundary(self, value: float) -> None:
         """No fixed vertex moves."""

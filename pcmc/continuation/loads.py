@@ -19,7 +19,7 @@ from ..surface.wall_pressures import wall_pressure_changes
 
 @dataclass(frozen=True)
 class Load:
-    """A weight, snow or a cable's tension: its value at the start, and its rate with λ."""
+    """A weight, snow or a cable's tension: value at the start, or (``Loads.line``) at λ = 0; its rate."""
 
     kind: str
     name: str
@@ -30,7 +30,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Loads:
-    """The loads that vary; ``change`` is that of λ since the start."""
+    """The loads that vary."""
 
     parts: tuple[Load, ...] = ()
 
@@ -53,14 +53,19 @@ class Loads:
             parts.append(Load("cable", name, index, surface.cables[index].tension, rate))
         return cls(tuple(parts))
 
-    def with_walls(self, surface: Surface) -> Loads:
-        """The same with the snow of walls, which follows from that of the patches beside them."""
+    def with_walls(self, surface: Surface, value: float) -> Loads:
+        """The same with the snow of walls, which follows from that of the patches beside them.
+
+        ``value`` is λ of the surface, at which they have the snow that they have there.
+        """
         snows = {load.index: load.rate for load in self.parts if load.kind == "snow"}
         rates = np.zeros(len(surface.patches))
         rates[list(snows)] = list(snows.values())
         follow = wall_pressure_changes(surface, rates, snows)
         names = {surface.patches[k].name: float(follow[k]) for k in np.flatnonzero(follow)}
-        return replace(self, parts=(*self.parts, *Loads.of(surface, {}, {}, names).parts))
+        walls = Loads.of(surface, {}, {}, names).parts
+        at_zero = (replace(load, start=load.start - load.rate * value) for load in walls)
+        return Loads((*self.parts, *at_zero))
 
     def check(self) -> None:
         """Refuse a cable of tension 0: from there on its curve would slide for nothing."""
@@ -69,30 +74,37 @@ class Loads:
                 message = f"the tension of the cable {load.name!r} is 0; start from one > 0"
                 raise OptionError(message, what="parameter", where=load.name, found=load.start)
 
-    @property
-    def starts(self) -> Floats:
-        """(l,) the values at the start."""
-        return np.array([load.start for load in self.parts])
+    def line(self, relative: bool) -> Loads:
+        """These with their values at λ = 0 for those at the start, where λ is 0 if ``relative``."""
+        return self if relative else Loads(tuple(replace(load, start=0.0) for load in self.parts))
+
+    def values(self, value: float) -> Floats:
+        """(l,) the values at λ."""
+        return np.array([load.start + load.rate * value for load in self.parts])
 
     @property
     def rates(self) -> Floats:
         """(l,) the rates."""
         return np.array([load.rate for load in self.parts])
 
-    def allow(self, change: float) -> bool:
-        """Whether every cable still pulls."""
-        return all(load.kind != "cable" or load.start + load.rate * change > 0.0 for load in self.parts)
+    def allow(self, value: float) -> bool:
+        """Whether every cable still pulls at λ."""
+        return all(
+            load.kind != "cable" or pull > 0.0
+            for load, pull in zip(self.parts, self.values(value), strict=True)
+        )
 
-    def at(self, change: float) -> dict[str, Any]:
-        """The loads as arguments of ``Surface.retensioned``."""
-        values: dict[str, Any] = {"weights": {}, "snows": {}, "cables": {}}
-        for load in self.parts:
-            values[f"{load.kind}s"][load.name] = load.start + load.rate * change
-        return values
+    def at(self, value: float) -> dict[str, Any]:
+        """The loads at λ as arguments of ``Surface.retensioned``."""
+        kinds: dict[str, Any] = {"weights": {}, "snows": {}, "cables": {}}
+        for load, load_value in zip(self.parts, self.values(value).tolist(), strict=True):
+            kinds[f"{load.kind}s"][load.name] = load_value
+        return kinds
 
-    def columns(self, change: float) -> dict[str, float]:
-        """The loads as columns of a table."""
-        return {f"{load.kind} {load.name}": load.start + load.rate * change for load in self.parts}
+    def columns(self, value: float) -> dict[str, float]:
+        """The loads at λ as columns of a table."""
+        names = [f"{load.kind} {load.name}" for load in self.parts]
+        return dict(zip(names, self.values(value).tolist(), strict=True))
 
     def energy_derivative(self, surface: Surface, X: Floats) -> float:
         """∂E/∂λ = Σ ẇ ∫ z dA + Σ ṡ V + Σ τ̇ L at X (n,3)."""

@@ -53,9 +53,9 @@ class Segment:
             return self.end
         return branch_point(self.solve(t), self.start.tangent)
 
-    def up_to(self, t: float) -> Segment:
-        """The part of the segment from its start to t."""
-        return replace(self, end=self.point(t), length=t)
+    def up_to(self, t: float, end: BranchPoint) -> Segment:
+        """The part of the segment from its start to t, where ``end`` is."""
+        return replace(self, end=end, length=t)
 
     def value(self, name: str, t: float) -> float:
         """A quantity at t."""
@@ -98,10 +98,10 @@ class Segment:
         """t at which λ turns, if it does."""
         return self.turning_point("parameter")
 
-    def first_goal(self, goals: Mapping[str, float]) -> float | None:
-        """t at which the first of the goals is met; None where none is."""
-        places = [self._crossing(name, goal) for name, goal in goals.items()]
-        return min((t for t in places if t is not None), default=None)
+    def first_goal(self, goals: Mapping[str, float]) -> tuple[float, str] | None:
+        """t at which the first of the goals is met, and its name; None where none is."""
+        places = [(self._crossing(name, goal), name) for name, goal in goals.items()]
+        return min(((t, name) for t, name in places if t is not None), default=None)
 
     def _crossing(self, name: str, goal: float) -> float | None:
         ends = [0.0, self.length]

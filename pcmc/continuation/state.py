@@ -290,6 +290,12 @@ class State:
             X[fixed] = boundary
         return State(self.mesh, X, parameter, iterations, rooms)
 
+    def at_value(self, parameter: float | None) -> State:
+        """This state at another λ, its inside where it was; itself where that is None or its own."""
+        if parameter is None or parameter == self.parameter:
+            return self
+        return self.step(np.zeros_like(self.X), parameter, self.iterations)
+
     def moved(self, d: Floats) -> Floats:
         """X + d (n,3), with the rows of walls below their crest."""
         X = onto_circles(self.mesh.surface, self.X + d)

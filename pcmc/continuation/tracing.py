@@ -165,8 +165,16 @@ class Tracer:
         if goal is not None:
             if not segment.same_mesh:
                 raise NotOnBranch("the contact of a wall with the plane changes just before the goal")
-            segment = segment.up_to(goal)
+            segment = segment.up_to(goal[0], self.point_at(segment, *goal))
         return Step(segment, bend, goal is not None, self.events_on(segment))
+
+    def point_at(self, segment: Segment, t: float, goal: str) -> BranchPoint:
+        """The point of a segment that meets a goal; of λ to the last digit, which no search finds."""
+        point = segment.point(t)
+        if goal != "parameter" or point.state.parameter == self.goals[goal]:
+            return point
+        asked = fixed_parameter(self.goals[goal], self.line.scale)
+        return branch_point(correct(point.state, asked, self.options.tolerance), self.here.tangent)
 
     def bend(self, there: State, length: float) -> float:
         """Distance of a state from the tangent, over the length of the step."""

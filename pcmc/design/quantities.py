@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
-from ..certificate.reactions import held_lengths, reactions
+from ..certificate.cables import cable_ends
+from ..certificate.reactions import support_forces
 from ..energy import kernels
 from ..energy.cables import add_cable_products
 from ..energy.functional import gradient_by, weighted
@@ -23,7 +24,6 @@ from ..energy.volume_below import volume_below_gradient, volumes_below
 from ..energy.weight import add_weight_products
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d, vertex_sums
-from ..surface.supports import symmetric_part
 from . import cable_quantities
 from .lean import lean
 from .measurement import Measurement
@@ -42,12 +42,16 @@ class Measure:
 
 def _apex(surface: Surface, of: str | None) -> Measurement:
     """Greatest height over Π: that of the highest vertex, for triangles are flat."""
-    height = surface.plane.height(surface.vertices)
-    vertices = np.unique(surface.faces[_faces_of(surface, of)])
-    top = vertices[height[vertices].argmax()]
+    top = int(vertices_up(surface, of)[-1])
     slope = np.zeros_like(surface.vertices)
     slope[top] = surface.plane.normal
-    return Measurement(float(height[top]), slope)
+    return Measurement(float(surface.plane.height(surface.vertices[top])), slope)
+
+
+def vertices_up(surface: Surface, of: str | None) -> Ints:
+    """The vertices of a patch, or of all under pressure, from the lowest over Π to the highest."""
+    vertices = np.unique(surface.faces[_faces_of(surface, of)])
+    return vertices[np.argsort(surface.plane.height(surface.vertices[vertices]))]
 
 
 def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
@@ -116,36 +120,35 @@ def room_index(surface: Surface, name: str) -> int:
 
 
 def _reaction(surface: Surface, of: str | None) -> Measurement:
-    """max |f_v| / ℓ_v over the patch's held boundary, ℓ_v half the length of the held edges at v.
+    """max |f_v| / ℓ_v over the lines that hold a patch, ℓ_v half the length of the held edges at v.
 
-    f_v = Σ α ∂A - ⅓ Σ p A_T ν_T over all triangles at v, and the forces of cables and weights there, as in
-    the certificate: at a corner the
-    patches' pulls along their junction cancel. A vertex that slides takes only the force along Π's
-    normal. Force/length.
+    f_v = Σ α ∂A - ⅓ Σ p A_T ν_T over all triangles at v, and the forces of weights and of cables that run
+    through v, as in the certificate's table of supports: at a corner the patches' pulls along their junction
+    cancel, and cables that end there are apart. A vertex that slides takes only the force across its plane.
+    Force/length.
     """
-    topo = surface.topology
-    held = surface.held[topo.edges].all(axis=1)
-    edges = considered = np.flatnonzero(topo.boundary_edge & held & ~surface.mirror_edge)
-    if of is not None:
-        considered = np.intersect1d(edges, topo.edge_of_face[_faces_of(surface, of)])
-    if not len(considered):
-        raise OptionError(f"reaction of {of}: nothing holds the boundary of that patch", what="of", found=of)
-    ends, share = topo.edges[edges], held_lengths(surface)
-    force = symmetric_part(surface.on_planes, reactions(surface))
-    vertices = np.unique(topo.edges[considered])
+    acting = support_forces(surface)
+    vertices = np.flatnonzero(acting.of_patch(None if of is None else surface.patch_index(of)))
+    if not len(vertices):
+        raise OptionError(f"reaction of {of}: nothing holds the edges of that patch", what="of", found=of)
+    force, share = acting.along, acting.lengths
     size = np.linalg.norm(force[vertices], axis=1) / share[vertices]
     v, value = int(vertices[size.argmax()]), float(size.max())
     pull = force[v] / (float(np.linalg.norm(force[v])) or 1.0) / share[v]
-    slope = _force_gradient(surface, v, pull)
-    ends = ends[(ends == v).any(axis=1)]
+    standing, topo = acting.standing, surface.topology
+    ending = {cable.name: 0.0 for cable, vertex, _ in cable_ends(standing) if vertex == v}
+    slope = _force_gradient(standing.retensioned(cables=ending), v, pull)
+    ends = topo.edges[(acting.lines & (topo.edges == v)).any(axis=1)]
     side = surface.vertices[ends[:, 1]] - surface.vertices[ends[:, 0]]
     along = (0.5 * value / share[v] / np.linalg.norm(side, axis=1))[:, None] * side
     np.add.at(slope, ends[:, 0], along)
     np.add.at(slope, ends[:, 1], -along)
-    by_tension, by_pressure = _force_by_patch(surface, v)
+    by_tension, by_pressure = _force_by_patch(standing, v)
     by_load = {}
-    for kind, count in (("weight", len(surface.patches)), ("cable", len(surface.cables))):
-        by_load[kind] = np.array([gradient_by(surface, kind, i)[v] @ pull for i in range(count)])
+    for kind, parts in (("weight", surface.patches), ("cable", surface.cables)):
+        slopes = np.array([gradient_by(surface, kind, i)[v] @ pull for i in range(len(parts))])
+        apart = np.array([kind == "cable" and part.name in ending for part in parts], dtype=bool)
+        by_load[kind] = np.where(apart, 0.0, slopes)
     return Measurement(value, slope, by_tension @ pull, by_pressure @ pull, by_load)
 
 

@@ -15,17 +15,19 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from scipy.optimize import lsq_linear
+from scipy.spatial import cKDTree
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..certificate.balance import coarseness, load_is_given, load_ratio
+from ..certificate.balance import coarseness, load_is_given, load_name, load_ratio
 from ..certificate.proof import Overload
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 from .outcome import Design, DesignStatus, NoStart
+from .quantities import vertices_up
 from .sensitivity import sensitivities
 from .steps import Iterate, StepPlan, Trial
 from .targets import KINDS, Parameter, Target, as_parameters, as_targets, measure
@@ -40,6 +42,7 @@ STARTS = 7  # solves with stiffer tensions: 1.5⁶ is 11; if that does not help,
 INFLATION = 4.0  # of a solve, which starts near its solution: a surface that grows more runs away
 ITERATIONS = 60  # of a solve, for the same reason
 SMALL_CHANGE = 0.02  # of an unknown: below it the mesh is not improved, as quantities depend on it a little
+ROUNDING = 1e-12  # of an unknown's size: a bound that is nearer is reached
 OVERLOADED = "overloaded"  # in place of a solve's status where none was tried
 
 
@@ -120,6 +123,7 @@ class Search:
     def __post_init__(self) -> None:
         surface, parameters = self.surface, self.parameters
         self.options = {"inflation": INFLATION, "iterations": ITERATIONS, **self.options}
+        self.given = np.array([p.value(surface) for p in parameters])
         self.limits = np.array([p.bounds(surface) for p in parameters], dtype=float)
         self.reciprocal = np.array([p.tension_under_pressure(surface) for p in parameters])
         self.bounds = np.sort(self.converted(self.limits.T), axis=0)
@@ -127,6 +131,7 @@ class Search:
         self.scale = np.array([t.scale(surface) for t in self.targets])
         self.trust = 1.0  # longest step, as a part of the unknowns' sizes
         self.solves = 0
+        self.instead: dict[int, Target] = {}  # of targets, by their numbers: see ``aimed``
         self.best: Trial | None = None
         self.rows: list[dict[str, Any]] = []
         self.failed: Result | Overload | None = None
@@ -141,6 +146,20 @@ class Search:
         """Parameters to unknowns, or back: reciprocals of the tensions of patches under pressure."""
         safe = np.where(self.reciprocal, values, 1.0)
         return np.where(self.reciprocal, 1.0 / safe, values)
+
+    def values(self, x: Floats) -> Floats:
+        """The parameters of unknowns; given ones and bounds to the last digit, though 1/(1/49) is not 49."""
+        values = self.converted(x)
+        for known in (*self.limits.T, self.given):
+            values = np.where(x == self.converted(known), known, values)
+        return values
+
+    def ahead(self, here: Iterate, step: Floats) -> Floats:
+        """The unknowns a step ahead, which are at a bound where they are beside it only by rounding."""
+        x = here.x + step
+        for bound in self.bounds:
+            x = np.where(np.abs(x - bound) <= ROUNDING * self.sizes(here), bound, x)
+        return x
 
     def run(self) -> Design:
         """Search to the end; if asked to stop, end with the best so far."""
@@ -161,10 +180,10 @@ class Search:
                 return self.design(DesignStatus.MET, here)
             step, misfit = self.gauss_newton(here)
             if here.phi - misfit <= LEAST_GAIN * here.phi:
-                end = here.x + step
+                end = self.ahead(here, step)
                 bounded = ((end <= self.bounds[0]) | (end >= self.bounds[1])).any()
                 return self.design(DesignStatus.AT_BOUND if bounded else DesignStatus.CONFLICT, here)
-            plan = StepPlan.of(before, here, step)
+            plan = StepPlan.of(before if here.aims == self.targets else None, here, step)
             if plan.at_fold:
                 change = plan.to_limit * (here.jacobian @ plan.step) * self.scale
                 return self.design(DesignStatus.AT_FOLD, here, here.quantities + change)
@@ -175,8 +194,7 @@ class Search:
 
     def initial_unknowns(self) -> Floats:
         """The unknowns of the surface given, within their bounds."""
-        values = np.array([p.value(self.surface) for p in self.parameters])
-        return np.clip(self.converted(values), *self.bounds)
+        return np.clip(self.converted(self.given), *self.bounds)
 
     def first_iterate(self) -> Iterate:
         """The first solution; tensions are raised until there is one."""
@@ -200,7 +218,7 @@ class Search:
         """
         surface = self.with_unknowns(start, x)
         if load_is_given(surface) and load_ratio(surface) > 1.0 + coarseness(surface):
-            self.failed = Overload(load_ratio(surface))
+            self.failed = Overload(load_ratio(surface), load_name(surface))
             self.record(x, OVERLOADED)
             return None
         result = solve(surface, "newton", **{**quality, **self.options})
@@ -217,7 +235,7 @@ class Search:
     def with_unknowns(self, surface: Surface, x: Floats) -> Surface:
         """The surface with the tensions and pressures that the unknowns stand for."""
         values: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
-        for parameter, value in zip(self.parameters, self.converted(x).tolist(), strict=True):
+        for parameter, value in zip(self.parameters, self.values(x).tolist(), strict=True):
             values[parameter.kind] |= dict.fromkeys(parameter.names, value)
         changed = with_pressures(surface, values["tension"], values["pressure"], snows=values["snow"])
         others = {f"{kind}s": values[kind] for kind in ("volume", "weight", "cable") if values[kind]}
@@ -226,8 +244,27 @@ class Search:
     def trial(self, x: Floats, result: Result) -> Trial:
         """The quantities and misfits of a solve."""
         quantities = np.array([measure(result.surface, t).value for t in self.targets])
-        r = (quantities - self.wanted(quantities)) / self.scale
-        return Trial(x, result, quantities, r, float(np.linalg.norm(r)))
+        wanted = self.wanted(quantities)
+        aimed = [
+            self.aimed(result.surface, k, *pair)
+            for k, pair in enumerate(zip(quantities, wanted, strict=True))
+        ]
+        r = (np.array([value for _, value in aimed]) - wanted) / self.scale
+        return Trial(x, result, quantities, r, float(np.linalg.norm(r)), [aim for aim, _ in aimed])
+
+    def aimed(self, surface: Surface, number: int, value: float, wanted: float) -> tuple[Target, float]:
+        """The quantity that the search changes for a target, and its value: the target's own, as a rule.
+
+        Where the highest point is held and a higher one is wanted, no small change moves it. There it is the
+        height over the point of Π farthest from what is held, until another point is the highest.
+        """
+        target = self.targets[number]
+        if target.quantity == "apex" and wanted - value > self.tolerance * self.scale[number]:
+            low, held = vertices_up(surface, target.of), surface.pinned | surface.on_ground
+            if held[low[-1]] and not held[low].all():
+                aim = self.instead.setdefault(number, _middle(surface, low, held))
+                return aim, measure(surface, aim).value
+        return target, value
 
     def wanted(self, quantities: Floats) -> Floats:
         """(targets,) the wanted values nearest to these."""
@@ -236,12 +273,12 @@ class Search:
     def with_jacobian(self, at: Trial) -> Iterate | None:
         """The trial with its derivatives; None at a fold."""
         try:
-            slopes = sensitivities(at.result.surface, self.targets, self.parameters).to_numpy()
+            slopes = sensitivities(at.result.surface, at.aims, self.parameters).to_numpy()
         except SurfaceError:
             return None
         jacobian = slopes * np.where(self.reciprocal, -(self.converted(at.x) ** 2), 1.0)
         jacobian = jacobian * (at.r != 0.0)[:, None] / self.scale[:, None]
-        return Iterate(at.x, at.result, at.quantities, at.r, at.phi, jacobian)
+        return Iterate(at.x, at.result, at.quantities, at.r, at.phi, at.aims, jacobian)
 
     def is_met(self, at: Trial) -> bool:
         """Whether every target is met."""
@@ -273,7 +310,7 @@ class Search:
         for attempt in range(TRIES):
             if self.solves >= self.max_solves:
                 return DesignStatus.SOLVES
-            x = here.x + t * plan.step
+            x = self.ahead(here, t * plan.step)
             small = (np.abs(x - here.x) < SMALL_CHANGE * self.sizes(here)).all()
             there = self.solve_from(here.result.surface, x, {"min_quality": 0.0} if small else {})
             if there is not None and there.phi < here.phi:
@@ -291,7 +328,7 @@ class Search:
 
     def record(self, x: Floats, status: str, trial: Trial | None = None) -> None:
         """Add a row to the history, and call the callback with it."""
-        row = dict(zip((p.label for p in self.parameters), self.converted(x).tolist(), strict=True))
+        row = dict(zip((p.label for p in self.parameters), self.values(x).tolist(), strict=True))
         if trial is not None:
             row |= zip((t.label for t in self.targets), trial.quantities.tolist(), strict=True)
         misfit = math.nan if trial is None else trial.phi
@@ -318,7 +355,7 @@ class Search:
         )
         parameters = pd.DataFrame(
             {
-                "start": [p.value(self.surface) for p in self.parameters],
+                "start": self.given,
                 "value": [p.value(here.result.surface) for p in self.parameters],
                 "dimension": [p.dimension for p in self.parameters],
                 "low": self.limits[:, 0],
@@ -337,6 +374,15 @@ def _unsolved(surface: Surface) -> Result:
         raise StopIteration
 
     return solve(surface, "newton", stop)
+
+
+def _middle(surface: Surface, vertices: Ints, held: Bools) -> Target:
+    """The height over the vertex of these (k,) that is farthest along Π from the held ones of them."""
+    place = surface.plane.to_local(surface.vertices)[:, :2]
+    free, fixed = vertices[~held[vertices]], vertices[held[vertices]]
+    distance = np.asarray(cKDTree(place[fixed]).query(place[free])[0])
+    x, y = place[free[distance.argmax()]].tolist()
+    return Target("height", (x, y))
 
 
 def _metric(parameters: Sequence[Parameter], reciprocal: Bools) -> Floats:

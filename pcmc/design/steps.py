@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..solvers.result import Result
+from .targets import Target
 
 FOLD_GAP = 1e-3  # relative distance of the misfit from its value at a fold where the search ends
 FOLD_SHARE = 0.97  # of the parameters' way to a fold is tried next
@@ -20,13 +21,17 @@ FOLD_SHARE = 0.97  # of the parameters' way to a fold is tried next
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A surface at rest: unknowns x, quantities, relative misfits r and φ = ‖r‖."""
+    """A surface at rest: unknowns x, quantities, relative misfits r and φ = ‖r‖.
+
+    ``aims`` are the quantities whose misfits these are: the targets', but at a held top (``Search.aimed``).
+    """
 
     x: Floats
     result: Result
     quantities: Floats
     r: Floats
     phi: float
+    aims: list[Target]
 
 
 @dataclass(frozen=True, eq=False)

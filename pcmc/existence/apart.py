@@ -44,8 +44,14 @@ class Spread:
     def of(cls, surface: Surface) -> Spread | None:
         """The line through the middles of the fixed curves; that across Π where the surface slides there.
 
-        None without two curves to be moved apart.
+        None without two curves to be moved apart, or where the end of a junction or cable slides along one.
+        The other vertices that slide so are held meanwhile, which changes no shape.
         """
+        for _, along in surface.on_line:
+            if (along & surface.topology.on_junction).any() or along[surface.cable_edges.ends].any():
+                return None
+        if surface.on_line and not surface.on_planes:
+            surface = surface.rebuilt(fixed=surface.fixed, on_line=())
         groups, lengths = held_groups(surface)
         fixed = np.isfinite(lengths)
         X, plane = surface.vertices, surface.plane

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..certificate.balance import load_ratio
+from ..certificate.balance import load_name, load_ratio
 from ..certificate.proof import Fold
 from ..continuation import Direction
 from ..surface import Surface
@@ -20,7 +20,7 @@ def raise_pressure(low: Surface, attempts: Attempts) -> Further:
     What grows is p - s, so the snow is not there at the start and comes with the pressure. The branch begins
     at the highest of a few pressures at which a minimum is found from the low start.
     """
-    load = "net pressure" if low.snows.any() else "pressure"
+    load = load_name(low)
     gross, snows = ({p.name: getattr(p, key) for p in low.patches} for key in ("pressure", "snow"))
     pressures = {patch.name: patch.net_pressure for patch in low.patches if patch.net_pressure != 0.0}
     low = low.retensioned(None, dict.fromkeys(gross, 0.0) | pressures, snows=dict.fromkeys(snows, 0.0))

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from ..base.arrays import Bools
-from ..certificate.balance import hardly_balanced, load_is_given, load_ratio, unbalanced, unheld
+from ..certificate.balance import hardly_balanced, load_is_given, load_name, load_ratio, unbalanced, unheld
 from ..certificate.certificate import TOLERANCE
 from ..certificate.neck import pinched_neck
 from ..certificate.proof import Overload, Proof
@@ -59,7 +59,7 @@ def _search(start: Surface, first: Result, attempts: Attempts) -> Result:
             break
     lost = first.status in (Status.DIVERGED, Status.DEGENERATE)
     if lost and load_is_given(start) and load_ratio(start) > 1.0:
-        proofs.insert(0, Overload(load_ratio(start)))
+        proofs.insert(0, Overload(load_ratio(start), load_name(start)))
     return _proved(first, tuple(proofs), attempts)
 
 

@@ -61,8 +61,10 @@ def low_start(surface: Surface) -> Surface | None:
         low[:, 2] += above * min(1.0, rise / most) if kept else above * (rise / most)
     if not roof.all():
         # walls below: between their feet and the roof; rows of walls that can pinch right below it
-        low = _in_the_middle(surface.faces, roof | held, low)
-        moved = _at(surface, low)
+        moved = _at(surface, _in_the_middle(surface.faces, roof | held, low))
+        if (surface.held & ~(roof | held)).any():  # the others follow those that went back to their planes
+            place = surface.plane.to_local(moved.vertices)
+            moved = _at(surface, _in_the_middle(surface.faces, roof | surface.held, place))
         return moved.moved(place_wall_rows(moved, find_walls(moved), moved.vertices))
     return _at(surface, low)
 
@@ -87,10 +89,9 @@ def _upright(surface: Surface) -> bool:
 
 
 def _at(surface: Surface, place: Floats) -> Surface:
-    """The surface with its vertices at coordinates (n,3) on and above Π."""
+    """The surface with its vertices at coordinates (n,3) on and above Π, or where supports let them be."""
     X = place @ surface.plane.axes + np.array(surface.plane.point)
-    X[surface.fixed] = surface.vertices[surface.fixed]
-    return surface.moved(X)
+    return surface.moved(surface.onto_supports(X))
 
 
 def _dome(faces: Ints, known: Bools) -> Floats:

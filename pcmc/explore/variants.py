@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..certificate import Certificate
-from ..certificate.reactions import reactions_per_length
+from ..certificate.reactions import support_forces
 from ..energy.volume_below import volumes_below
 from ..panels.distance import distances
 from ..surface import Surface
@@ -38,32 +38,26 @@ def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]
     """What a designer reads from a surface: of each patch under pressure, cable and room, and of all.
 
     A row has ``quantity``, ``of`` ("" for all patches under pressure), ``kind`` of its unit, and ``value``.
-    The apex is the greatest height over Π, the reaction the largest force per length on the held boundary.
+    The apex is the greatest height over Π, the reaction the largest force per length of a support.
     """
     height, areas = surface.plane.height(surface.vertices), certificate.patches["area"].to_numpy()
-    sizes = np.linalg.norm(reactions_per_length(surface, certificate.reactions), axis=1)
-    topo, volumes, rows = surface.topology, volumes_below(surface), []
+    acting, volumes = support_forces(surface, certificate.reactions), volumes_below(surface)
+    rows: list[dict[str, Any]] = []
 
     def add(quantity: str, of: str, kind: str, value: float | None) -> None:
         rows.append({"quantity": quantity, "of": of, "kind": kind, "value": value})
 
-    def largest(reactions: Floats) -> float | None:
-        known = reactions[np.isfinite(reactions)]
-        return float(known.max()) if len(known) else None
-
     roofs = np.flatnonzero(surface.roof)
-    for k in roofs:
+    for k in roofs.tolist():
         name, faces = surface.patches[k].name, surface.patch_of_face == k
-        edges = np.unique(topo.edge_of_face[faces])
-        boundary = np.unique(topo.edges[edges[topo.boundary_edge[edges] & ~surface.mirror_edge[edges]]])
         add("apex", name, "length", float(height[surface.faces[faces]].max()))
         add("area", name, "area", float(areas[k]))
         add("volume", name, "volume", float(volumes[k]))
-        add("reaction", name, "tension", largest(sizes[boundary]))
+        add("reaction", name, "tension", acting.largest_per_length(k))
     add("apex", "", "length", float(height.max()))
     add("area", "", "area", float(areas[roofs].sum()))
     add("volume", "", "volume", float(certificate.volume))
-    add("reaction", "", "tension", largest(sizes))
+    add("reaction", "", "tension", acting.largest_per_length())
     for patch, of_roof in zip(surface.patches, surface.roof.tolist(), strict=True):
         add("tension", patch.name, "tension", patch.tension)
         if of_roof:

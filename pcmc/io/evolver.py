@@ -185,8 +185,8 @@ def _room_pressures(surface: Surface) -> tuple[Floats, Floats]:
     both = np.flatnonzero((signs > 0.0).any(axis=0) & (signs < 0.0).any(axis=0) & (left != 0.0))
     if len(both):
         name = surface.patches[both[0]].name
-        text = f"patch {name!r} has a pressure of {left[both[0]]:g} beside that of its rooms, and a datafile"
-        text += " has one body on each side of a face; give its pressure to all patches of the rooms"
+        text = f"patch {name!r} has a net pressure of {left[both[0]]:g} beside that of its rooms, and a"
+        text += " datafile has one body on each side of a face; give all patches of its rooms its load"
         raise FileError(text, where=name, found=float(left[both[0]]))
     return multipliers, left
 

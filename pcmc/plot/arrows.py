@@ -10,14 +10,15 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..certificate.reactions import reactions_per_length
+from ..base.units import NO_UNITS, Units
+from ..certificate.reactions import support_forces
 from ..surface import Surface
 from .figure import INK, SMALL, TEXT, Image, finish
 from .pictures import DOTS_FROM, EDGES_FROM, Path, ViewName, fit_frames, frame_axes, frames_of
 from .raster import paint
 from .scene import mean_edge, scene, view_of
 
-ARROW = "#B2182B"
+ARROW, AT_POINTS = "#B2182B", "#2166AC"
 
 
 def vectors(
@@ -29,6 +30,8 @@ def vectors(
     most: int = 400,
     view: ViewName = "diagonal",
     label: str = "",
+    points: npt.ArrayLike | None = None,
+    points_label: str = "",
     title: str = "",
     supports: bool = True,
     edges: bool | None = None,
@@ -43,54 +46,65 @@ def vectors(
     length : of the longest arrow, as a part of the surface's size.
     most : number of arrows; if there were more, the longest of each neighbourhood is drawn.
     label : the unit, beside an arrow of round length that shows the scale.
+    points, points_label : (n,3) vectors of another unit, such as forces at points beside forces per length,
+        drawn in blue with a scale of their own; all of them are drawn.
     view, title, supports, edges, width, renderer : as in ``draw``.
     """
-    arrows = np.asarray(field, dtype=float)
-    if arrows.shape != (surface.n, 3) or not np.isfinite(arrows).all():
-        validate.refuse("field", arrows.shape, f"finite numbers of shape ({surface.n}, 3)")
-    seen = view_of(surface, view)
-    size = np.linalg.norm(arrows, axis=1)
-    longest = float(size.max())
-    stretch = length * surface.size / longest if longest > 0.0 else 0.0
+    seen, fields = view_of(surface, view), []
+    for what, values, unit, color in (
+        ("field", field, label, ARROW),
+        ("points", points, points_label, AT_POINTS),
+    ):
+        arrows = np.zeros((surface.n, 3)) if values is None else np.asarray(values, dtype=float)
+        if arrows.shape != (surface.n, 3) or not np.isfinite(arrows).all():
+            validate.refuse(what, arrows.shape, f"finite numbers of shape ({surface.n}, 3)")
+        if longest := float(np.linalg.norm(arrows, axis=1).max()):
+            fields.append((arrows, length * surface.size / longest, longest, unit, color))
     at = seen.project(surface.vertices)
-    tips = at + stretch * seen.project(arrows)
-    (frame,) = frames_of([np.concatenate([at, tips])], 1, width)
+    tips = [at + stretch * seen.project(arrows) for arrows, stretch, *_ in fields]
+    (frame,) = frames_of([np.concatenate([at, *tips])], 1, width)
     spacing = mean_edge(surface) * frame.scale
     dotted, meshed = supports and spacing >= DOTS_FROM, spacing >= EDGES_FROM if edges is None else edges
     painted = scene(surface, seen, None, supports=dotted, edges=meshed)
     figure, (axes,) = frame_axes([frame], 1, width)
     axes.set_title(title, fontsize=TEXT, color=INK, pad=5.0)
-    if label:
+    if label or points_label:
         figure.supxlabel(" ", fontsize=2.0 * SMALL)  # the place of the arrow that tells the scale
     fit_frames(figure, [axes], [frame], 1)
     frame.show(axes, paint(painted, frame.low, frame.scale, frame.size, renderer))
-    if longest > 0.0:
-        chosen = _thinned(at, size, most)
+    for k, ((arrows, stretch, longest, unit, color), tip) in enumerate(zip(fields, tips, strict=True)):
+        size = np.linalg.norm(arrows, axis=1)
+        chosen = _thinned(at, size, most if color == ARROW else surface.n)
         in_plane = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
         heads = {"headwidth": 4.0, "headlength": 5.0, "headaxislength": 4.5}
-        arrow = [*at[chosen].T, *(tips - at)[chosen].T]
-        quiver = axes.quiver(*arrow, color=ARROW, width=2.2 / width, **in_plane, **heads)
-        if label:
-            unit, middle = float(f"{longest:.1g}"), 0.5 * axes.get_position().y0
+        arrow = [*at[chosen].T, *(tip - at)[chosen].T]
+        quiver = axes.quiver(*arrow, color=color, width=2.2 / width, **in_plane, **heads)
+        if unit:
+            rounded, middle = float(f"{longest:.1g}"), 0.5 * axes.get_position().y0
             look = {"labelpos": "E", "fontproperties": {"size": SMALL}, "labelcolor": INK}
-            text = f"{unit:g} {label}"
-            axes.quiverkey(quiver, 0.5, middle, unit * stretch, text, coordinates="figure", **look)
+            place, text = (2 * k + 1) / (2 * len(fields)), f"{rounded:g} {unit}"
+            axes.quiverkey(quiver, place, middle, rounded * stretch, text, coordinates="figure", **look)
     return finish(figure, path)
 
 
-def reactions(surface: Surface, path: Path | None = None, **options: Any) -> Image:
-    """Arrows of the reactions along the held boundary, force per length; see ``reactions_per_length``.
+def reactions(
+    surface: Surface, path: Path | None = None, *, units: Units = NO_UNITS, **options: Any
+) -> Image:
+    """Arrows of the reactions: along lines force per length, in blue the forces at single points.
 
-    ``options`` are those of ``vectors``: view, length, most, label, title, supports, edges, width, renderer.
+    Forces of cables that end on a line are forces at points; see ``pcmc.certificate.reactions``.
+    ``options`` are those of ``vectors``: view, length, most, title, supports, edges, width, renderer.
 
     Raises
     ------
-    OptionError : when no boundary is held, so that there are no reactions.
+    OptionError : when nothing holds the surface, so that there are no reactions.
     """
-    per_length = reactions_per_length(surface)
-    if np.isnan(per_length).all():
-        raise OptionError("no boundary of the surface is held: no reactions to draw", what="surface")
-    return vectors(surface, np.nan_to_num(per_length), path, **{"label": "force/length", **options})
+    acting = support_forces(surface)
+    lines, held = acting.per_length, acting.points.any(axis=1)
+    if np.isnan(lines).all() and not held.any():
+        raise OptionError("nothing holds the surface: no reactions to draw", what="surface")
+    labels = {"label": f"{units.tension} along lines", "points_label": f"{units.force or 'force'} at points"}
+    return vectors(surface, np.nan_to_num(lines), path, points=acting.points, **labels | options)
 
 
 def _thinned(at: Floats, size: Floats, most: int) -> npt.NDArray[np.intp]:

@@ -22,6 +22,7 @@ from .accuracy import AccuracyWanted
 from .file import Project
 from .masts import SHARES, point_masts, ring_lines, with_rings
 from .outcome import Outcome
+from .rises import net_pressures
 from .sails import as_sail, sail_lines
 
 if TYPE_CHECKING:
@@ -227,7 +228,7 @@ def _stiffer(plan: Plan, outcome: Outcome) -> Plan:
     """All tensions at least at those with which a first roof succeeds, and well beyond a fold."""
     from ..plan.proposal import ROOM, least_tension, plan_area  # needs shapely
 
-    pressures = [abs(area.pressure) for area in plan.patches] or [1.0]
+    pressures = [abs(p) for p in net_pressures(plan).values()] or [abs(plan.pressure - plan.snow)]
     least = ROOM * least_tension(plan_area(plan), max(pressures))
     folds = [1.0 / proof.value for proof in outcome.certificate.proofs if isinstance(proof, Fold)]
     factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)

@@ -86,7 +86,7 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
             "on_planes": (),
             "on_line": (),
         }
-    return (surface.rebuilt(**changes) if changes else surface), data
+    return (surface.rebuilt(**changes).with_held_snow() if changes else surface), data
 
 
 def _patches(surface: Surface, mesh: MeshFile) -> list[Patch]:
@@ -168,7 +168,7 @@ def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Targ
             raise OptionError(f"{text} instead, the greatest height over the plane", what=rise.kind)
         height = rise.value if rise.kind == "apex" else level + rise.value
         given = {
-            p.name: first_tension(least, p.pressure, height - level)
+            p.name: first_tension(least, p.net_pressure, height - level)
             for p in surface.patches
             if p.name in names
         }

@@ -92,7 +92,7 @@ def paint(
     look: dict[str, Any] = {"legend": True}
     scalars = None
     if colour == "reactions":
-        reactions(surface, path, view=views[0], label=units.tension)
+        reactions(surface, path, view=views[0], units=units)
         return
     if colour == "curvature":
         scalars, look = mean_curvature(surface), {"label": f"mean curvature, {units.curvature}"}

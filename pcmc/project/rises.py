@@ -100,11 +100,14 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
     return plan, targets, vary
 
 
+def net_pressures(plan: Plan) -> dict[str, float]:
+    """p - s of each of the patches that a plan has, by name."""
+    return {a.name: a.pressure - (plan.snow if a.snow is None else a.snow) for a in plan.patches}
+
+
 def _lifted(plan: Plan, kind: str) -> list[str]:
     """The names of the patches under pressure, whose tensions decide on the height; refused if none is."""
-    load = {
-        area.name: area.pressure - (plan.snow if area.snow is None else area.snow) for area in plan.patches
-    }
+    load = net_pressures(plan)
     names = [name for name in patch_names(plan) if load.get(name, plan.pressure - plan.snow)]
     if not names:
         problem = f"{kind} is for a roof that a pressure lifts, and none is left here; give"
@@ -117,8 +120,8 @@ def _retensioned(plan: Plan, patch: str | None, rise: float) -> Plan:
     least, _ = _sizes(plan)
 
     if plan.tension is not None:
-        return replace(plan, tension=first_tension(least, plan.pressure, rise))
-    first = {area.name: first_tension(least, area.pressure, rise) for area in plan.patches}
+        return replace(plan, tension=first_tension(least, plan.pressure - plan.snow, rise))
+    first = {name: first_tension(least, pressure, rise) for name, pressure in net_pressures(plan).items()}
     areas = [replace(a, tension=first[a.name]) if patch in (None, a.name) else a for a in plan.patches]
     if patch is None:
         highest = max(area.tension for area in areas)

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from ..base.arrays import Bools
 from ..certificate import Certificate
-from ..certificate.reactions import reactions_per_length
+from ..certificate.reactions import support_forces
 from ..energy.volume_below import volumes_below
 from ..surface import Surface
 from .table import dimension_of
@@ -52,7 +49,7 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
         rows.append(Figure(quantity, of, owner, value))
 
     height, area = surface.plane.height(surface.vertices), certificate.patches["area"].to_numpy()
-    volume, per_length = volumes_below(surface), _ReactionPerLength(surface, certificate)
+    volume, acting = volumes_below(surface), support_forces(surface, certificate.reactions)
     roof = surface.roof
     for k, patch in enumerate(surface.patches):
         owner, name = "patch" if roof[k] else "wall", patch.name
@@ -61,7 +58,7 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
         add("area", name, owner, float(area[k]))
         if roof[k]:
             add("volume", name, owner, float(volume[k]))
-            add("reaction per length", name, owner, per_length.largest(surface.patch_of_face == k))
+            add("reaction per length", name, owner, acting.largest_per_length(k))
         add("tension", name, owner, patch.tension)
         if roof[k]:
             add("pressure", name, owner, patch.pressure)
@@ -87,25 +84,7 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
         ("energy", float(certificate.energy)),
         ("load", float(certificate.load)),
         ("reaction", float(certificate.support)),
-        ("reaction per length", per_length.largest(None)),
+        ("reaction per length", acting.largest_per_length()),
     ):
         add(quantity, "", "roof", value)
     return rows
-
-
-class _ReactionPerLength:
-    """The largest reaction per length along the held boundary of some faces."""
-
-    def __init__(self, surface: Surface, certificate: Certificate) -> None:
-        forces = reactions_per_length(surface, certificate.reactions)
-        self.size, self.surface = np.linalg.norm(forces, axis=1), surface
-
-    def largest(self, faces: Bools | None) -> float | None:
-        """Of the boundary of the faces (m,); of the whole without them; None where nothing is held."""
-        topo, size = self.surface.topology, self.size
-        if faces is not None:
-            edges = np.unique(topo.edge_of_face[faces])
-            edges = edges[topo.boundary_edge[edges] & ~self.surface.mirror_edge[edges]]
-            size = size[np.unique(topo.edges[edges])]
-        known = size[np.isfinite(size)]
-        return float(known.max()) if len(known) else None

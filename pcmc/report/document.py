@@ -18,10 +18,9 @@ from .. import quantities
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units, as_units, expect_length
 from ..certificate import Certificate
-from ..certificate.reactions import held_lengths
 from ..certificate.required import certified, warning_mark
 from ..panels import Panels, panels
-from ..plot import draw, families, reactions, vectors
+from ..plot import draw, families, reactions
 from ..quantities import Figure
 from ..surface import Surface, expect_surface
 from . import pages, tables, words
@@ -91,12 +90,8 @@ class RoofReport:
             "The roof": draw(surface, view="diagonal", legend=True, width=PIXELS),
             "Elevation": draw(surface, view="elevation", width=PIXELS),
         }
-        if held_lengths(surface).any():
-            label = f"{self.units.tension}, reactions per length of boundary"
-            pictures["Reactions"] = reactions(surface, label=label, width=PIXELS)
-        elif surface.fixed.any():
-            label = f"{self.units.force or 'force'}, reactions"
-            pictures["Reactions"] = vectors(surface, self.certificate.reactions, label=label, width=PIXELS)
+        if len(self.certificate.supports):
+            pictures["Reactions"] = reactions(surface, units=self.units, width=PIXELS)
         if self.schedule is not None:
             pictures["Panels"] = families(self.schedule, width=PIXELS)
         return {name: _png(picture) for name, picture in pictures.items()}
@@ -123,8 +118,8 @@ class RoofReport:
         listed = [
             tables.patch_table(surface, certificate, units),
             tables.junction_table(certificate, units),
-            tables.boundary_table(certificate, units),
-            tables.support_table(surface, certificate, units),
+            tables.wall_table(certificate, units),
+            *tables.support_tables(certificate, units),
             *tables.cable_tables(certificate, units),
             tables.room_table(certificate, units),
         ]

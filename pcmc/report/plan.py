@@ -14,12 +14,11 @@ from ..certificate import Certificate
 from ..drawings import views
 from ..drawings.sheet import LAYERS, SMALL, WIDTH, Line, Text
 from ..surface import Surface
-from .tables import point_supports
 
 FORMAT = "A4"
 LEAST_EDGE = 1.2  # mm on paper: shorter edges of panels are not drawn
 COLORS = {1: "#D00000", 3: "#008000", 5: "#0040C0", 6: "#A000A0", 7: "#000000", 8: "#B8B8B8"}
-LABELS = {"J": "#D00000", "B": "#0040C0", "S": "#0040C0"}  # by the first letter
+LABELS = {"J": "#D00000", "B": "#0040C0", "S": "#0040C0", "C": "#0040C0"}  # by the first letter
 CAPITAL = 0.73  # height of a capital in the size of its font
 AROUND = 1.0  # mm kept free around what is drawn
 
@@ -58,9 +57,8 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
     drawn = [line.points for line in sheet.lines if line.layer not in ("PCMC-TEXT", "PCMC-PANEL")]
     factor = length_factor(units.length, "mm") / float(sheet.scale.removeprefix("1:"))
     shift = np.concatenate(drawn or [line.points for line in panels]).min(axis=0) - factor * low
-    labels = _labels("J", certificate.junctions) + _labels("B", certificate.boundaries)
-    at = surface.vertices[point_supports(surface), :2]
-    labels += [(f"S{k}", place) for k, place in enumerate(at, start=1)]
+    labels = _labels("J", certificate.junctions)
+    labels += zip(certificate.supports["support"], certificate.supports[["x", "y"]].to_numpy(), strict=True)
     texts = sheet.texts + _apart([(name, factor * at + shift) for name, at in labels], sheet.texts)
     boxes = np.array([*(_box(text) for text in texts), *(_extent(line) for line in lines)])
     corner, top = boxes[:, 0].min(axis=0) - AROUND, boxes[:, 1].max(axis=0) + AROUND

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Ints
 from ..base.units import Units
 from ..certificate import Certificate
-from ..certificate.reactions import held_lengths
 from ..panels import Panels
 from ..quantities import Figure, dimension_of
 from ..surface import Surface
@@ -113,36 +111,33 @@ def junction_table(certificate: Certificate, units: Units) -> Table | None:
     return _table("Junctions", ["", "between"], words, columns)
 
 
-def boundary_table(certificate: Certificate, units: Units) -> Table | None:
-    """A row per held boundary, numbered as in the plan: its reaction, and the largest per length."""
-    table, force = certificate.boundaries, units.force or "force"
+def support_tables(certificate: Certificate, units: Units) -> list[Table]:
+    """A row per support, numbered as in the plan, and how their sum balances the loads."""
+    table, force = certificate.supports, units.force or "force"
+    if not len(table):
+        return []
+    words = table[["support", "name", "kind"]].to_numpy(str).tolist()
+    words = [[label, "" if name == label else name, kind] for label, name, kind in words]
+    columns = {f"{axis}, {units.length}": column(table[axis]) for axis in "xyz"}
+    columns[f"length, {units.length}"] = column(table["length"].where(table["length"] > 0.0))
+    columns |= _vectors(table, "force", "R", force)
+    columns[f"largest, {units.tension}"] = column(table["per_length_max"])
+    listed = _table("Supports and their reactions", ["", "of", "kind"], words, columns)
+    balance, moment = certificate.balance, f"{force}·{units.length}"
+    columns = _vectors(balance, "force", "F", force) | _vectors(balance, "moment", "M", moment)
+    return [listed, _table("Balance", [""], [[part] for part in balance["of"]], columns)]
+
+
+def wall_table(certificate: Certificate, units: Units) -> Table | None:
+    """How far each wall leans from the vertical, and where."""
+    table = certificate.leaning
     if not len(table):
         return None
-    words = [[f"B{k}", name] for k, name in enumerate(table["boundary"], start=1)]
-    reaction = table[[f"reaction_{axis}" for axis in "xyz"]]
-    texts = np.array(column(reaction.to_numpy().ravel())).reshape(-1, 3).T
-    columns = {f"length, {units.length}": column(table["length"])}
-    columns |= {f"R{axis}, {force}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
-    columns[f"largest, {units.tension}"] = column(table["per_length_max"])
-    return _table("Boundaries and their reactions", ["", "boundary of"], words, columns)
-
-
-def point_supports(surface: Surface) -> Ints:
-    """(k,) fixed vertices apart from held boundaries, such as masts; in the plan the first is S1."""
-    return np.flatnonzero(surface.fixed & (held_lengths(surface) == 0.0))
-
-
-def support_table(surface: Surface, certificate: Certificate, units: Units) -> Table | None:
-    """A row per fixed point: its place, and its reaction."""
-    points, force = point_supports(surface), units.force or "force"
-    if not len(points):
-        return None
-    places, reactions = surface.vertices[points], certificate.reactions[points]
-    columns = {f"{axis}, {units.length}": column(part) for axis, part in zip("xyz", places.T, strict=True)}
-    texts = np.array(column(reactions.ravel())).reshape(-1, 3).T
-    columns |= {f"R{axis}, {force}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
-    names = [[f"S{k}"] for k in range(1, len(points) + 1)]
-    return _table("Supports at points", ["support"], names, columns)
+    columns = {"lean, °": [f"{lean:.1f}" for lean in table["lean"]]}
+    columns |= {f"{axis}, {units.length}": column(table[axis]) for axis in "xyz"}
+    return _table(
+        "Walls: the largest angle from the vertical", ["wall"], [[w] for w in table["wall"]], columns
+    )
 
 
 def cable_tables(certificate: Certificate, units: Units) -> list[Table]:
@@ -161,7 +156,7 @@ def cable_tables(certificate: Certificate, units: Units) -> list[Table]:
         held = ["held" if held else "free" for held in table["held"]]
         words = [[name, end] for name, end in zip(table["cable"], held, strict=True)]
         columns = {f"{axis}, {units.length}": column(table[axis]) for axis in "xyz"}
-        columns |= {f"F{axis}, {force}": column(table[f"force_{axis}"]) for axis in "xyz"}
+        columns |= _vectors(table, "force", "F", force)
         tables.append(_table("Ends of cables, and the forces on them", ["cable", "end"], words, columns))
     return tables
 
@@ -221,6 +216,13 @@ def family_table(schedule: Panels, units: Units) -> Table:
 def _table(title: str, head: list[str], words: list[list[str]], columns: dict[str, list[str]]) -> Table:
     rows = [[*start, *rest] for start, rest in zip(words, zip(*columns.values(), strict=True), strict=True)]
     return Table(title, [*head, *columns], rows, len(head))
+
+
+def _vectors(table: pd.DataFrame, kind: str, letter: str, unit: str) -> dict[str, list[str]]:
+    """Columns of vectors, with the decimals of their largest component."""
+    numbers = table[[f"{kind}_{axis}" for axis in "xyz"]].to_numpy(float)
+    texts = np.array(column(numbers.ravel())).reshape(-1, 3).T
+    return {f"{letter}{axis}, {unit}": part.tolist() for axis, part in zip("xyz", texts, strict=True)}
 
 
 def _middles(table: pd.DataFrame, units: Units) -> dict[str, list[str]]:

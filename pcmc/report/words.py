@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..base.units import Units
 from ..certificate import Certificate, Verdict
+from ..certificate.balance import balance_sentence
 from .tables import small
 
 if TYPE_CHECKING:
@@ -29,9 +30,9 @@ VERDICTS = {
 
 
 LEGEND = (
-    "J1, J2 and so on number the junctions, B1, B2 and so on the held boundaries, S1, S2 and so on the"
-    " supports at points, as in the tables. Black: rims. Red: ridges. Green: bottoms and ends of walls."
-    " Violet: cables. Grey: edges of panels."
+    "J1, J2 and so on number the junctions, B1, B2 and so on the supports along lines, S1, S2 and so on those"
+    " at points, C1, C2 and so on the ends of cables on lines, as in the tables. Black: rims. Red: ridges."
+    " Green: bottoms and ends of walls. Violet: cables. Grey: edges of panels."
 )
 """How to read the plan."""
 
@@ -57,6 +58,9 @@ def verdict_sentences(certificate: Certificate, check: MeshCheck | None = None) 
         )
         share = f"{100.0 * certificate.load_ratio:.0f} %"
         sentences.append(f"Pressure and weight use {share} of the most that the boundary could carry.")
+    if len(certificate.supports):
+        balance = balance_sentence(certificate.balance, certificate.symmetric_in)
+        sentences.append(f"{balance[:1].upper()}{balance[1:]}.")
     if check is not None:
         sentences.append(f"The mesh check: {check.verdict.value.partition(': ')[2]}.")
     if certificate.symmetric_in:

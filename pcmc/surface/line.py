@@ -43,14 +43,23 @@ class Line:
         """
         return (np.asarray(points, dtype=float) - np.array(self.point)) @ np.array(self.direction)
 
+    def nearest(self, points: npt.ArrayLike) -> Floats:
+        """(…,3) the points of the line nearest to points (…,3).
+
+        >>> Line((1, 0, 0), (1, 0, 0)).nearest([3, 4, 0]).tolist()
+        [3.0, 0.0, 0.0]
+        """
+        point = np.array(self.point)
+        return np.asarray(point + self.along(np.asarray(points, dtype=float) - point))
+
     def distance(self, points: npt.ArrayLike) -> Floats:
         """(…) the distance of points (…,3) from the line.
 
         >>> Line((1, 0, 0), (1, 0, 0)).distance([3, 4, 0]).item()
         4.0
         """
-        away = np.asarray(points, dtype=float) - np.array(self.point)
-        return np.asarray(np.linalg.norm(away - self.along(away), axis=-1))
+        away = np.asarray(points, dtype=float) - self.nearest(points)
+        return np.asarray(np.linalg.norm(away, axis=-1))
 
     def along(self, vectors: Floats, points: Floats | None = None) -> Floats:
         """(…,3) the components of vectors (…,3) along the line, the same at all points: ⟨v, t⟩ t."""

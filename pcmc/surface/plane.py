@@ -88,6 +88,14 @@ class Plane:
         """(…) signed distance of points (…,3) from the plane, positive along the normal."""
         return (np.asarray(points, dtype=float) - np.array(self.point)) @ np.array(self.normal)
 
+    def nearest(self, points: npt.ArrayLike) -> Floats:
+        """(…,3) the points of the plane nearest to points (…,3).
+
+        >>> Plane(point=(0, 0, 1)).nearest([2, 3, 5]).tolist()
+        [2.0, 3.0, 1.0]
+        """
+        return np.asarray(points, dtype=float) - self.height(points)[..., None] * np.array(self.normal)
+
     def along(self, vectors: Floats) -> Floats:
         """(…,3) the components of vectors (…,3) parallel to the plane: v - ⟨v, n⟩ n, Eq. (19)."""
         normal = np.array(self.normal)

@@ -274,6 +274,19 @@ class Surface:
         checks.on_lines(self.on_line, X)
         return self._with(vertices=read_only(X))
 
+    def onto_supports(self, X: Floats) -> Floats:
+        """X (n,3) with fixed vertices where they are, and sliding ones put on their plane, line or circle.
+
+        >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        >>> flat = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 2.0)], fixed=[0], on_plane=[1])
+        >>> flat.onto_supports(flat.vertices + 1.0).tolist()
+        [[0.0, 0.0, 0.0], [2.0, 1.0, 0.0], [1.0, 2.0, 1.0]]
+        """
+        put = np.where(self.fixed[:, None], self.vertices, X)
+        for support, sliding in (*self.on_line, *self.sliding):
+            put[sliding] = support.nearest(X[sliding])
+        return put
+
     def rebuilt(self, **changes: Any) -> Surface:
         """The surface with other parts, checked anew; all others as they were given to this one.
 

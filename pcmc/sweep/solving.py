@@ -149,12 +149,11 @@ def _heights(surface: Surface, certificate: Certificate) -> dict[str, float]:
     np.maximum.at(apex, surface.patch_of_face, height[surface.faces].max(axis=1))
     lowest = height[surface.held].min(initial=height.max()) if surface.held.any() else height.min()
     roof = ~walls if not walls.all() else walls
-    per_length = certificate.boundaries.get("per_length_max")
     numbers = {f"{p.name}.apex": float(apex[k]) for k, p in enumerate(surface.patches) if not walls[k]}
     return numbers | {
         "rise": float(apex[roof].max() - lowest),
         "roof_area": float(certificate.patches["area"][roof].sum()),
-        "largest_reaction": 0.0 if per_length is None else float(per_length.max()),
+        "largest_reaction": float(np.nan_to_num(certificate.largest_reaction)),
     }
 
 

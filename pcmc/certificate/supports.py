@@ -1,0 +1,267 @@
+"""The table of supports: each line, point, plane, mirror and end of a cable that holds a surface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from ..base.arrays import Bools, Floats, Ints
+from ..surface import Plane, Surface
+from ..surface.geometry import segment_lengths
+from ..surface.topology import POINT, Curve, vertex_kind
+from .cables import cable_ends
+from .curve_tables import middle
+from .reactions import SupportForces, support_forces
+
+COLUMNS = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
+COLUMNS += ["moment_x", "moment_y", "moment_z", "per_length_max"]
+AT_POINTS = ("point", "cable end")  # the kinds whose forces act at one point
+STEEP = 1e-9  # of a normal's part along that of Π, up to which a plane is upright
+
+
+class _Part(NamedTuple):
+    """A support: name and kind, its vertices (k,), its share of the force at each (k,3), length, place."""
+
+    name: str
+    kind: str
+    vertices: Ints
+    forces: Floats
+    length: float
+    place: Floats
+    per_length: float = np.nan
+
+
+def support_table(surface: Surface, forces: Floats | None = None) -> pd.DataFrame:
+    """A row per support of the part of a surface that stands; together they carry all its reactions.
+
+    ``forces`` (n,3) are by default the ``reactions``. Where curves meet in a corner, they share its force
+    equally; per length it counts in full in each.
+
+    Columns: ``support``, the number in plans and reports: B1, B2, … for what is as long as a curve, S1, S2, …
+    for points, C1, C2, … for ends of cables. ``name``, that of the patches there, or of the cables.
+    ``kind``: "line", a boundary or line inside the surface that is held; "ground", what slides or rests on
+    Π; "upright plane", across which a wall or boundary is held that slides in it ("plane" if it is not
+    upright); "mirror", the pull of the image across a mirror plane; "point", a single fixed point with the
+    cables that end there; "cable end", the force of cables that end on a line, which has no part in it.
+    ``length``, 0 for points; ``x``, ``y``, ``z``, the middle; ``force_x``, …, of the support on the surface;
+    ``moment_x``, …, that of these forces about the middle; ``per_length_max``, the largest force per length.
+    """
+    acting = support_forces(surface, forces)
+    parts = [*_held_lines(acting), *_mirrors(acting), *_inner_lines(acting), *_planes(acting)]
+    rows, count = [], {"B": 0, "S": 0, "C": 0}
+    size = surface.size
+    for part in (*parts, *_points(acting), *_ends_of_cables(acting)):
+        letter = {"point": "S", "cable end": "C"}.get(part.kind, "B")
+        count[letter] += 1
+        at = np.where(np.abs(part.place) <= 1e-12 * size, 0.0, part.place)
+        moment = np.cross(surface.vertices[part.vertices] - at, part.forces).sum(axis=0)
+        label = f"{letter}{count[letter]}"
+        numbers = [part.length, *at, *part.forces.sum(axis=0), *moment, part.per_length]
+        rows.append([label, part.name or label, part.kind, *map(float, numbers)])
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def boundary_view(supports: pd.DataFrame) -> pd.DataFrame:
+    """The rows of a table of supports that are as long as a curve, as ``Certificate.boundaries`` has them."""
+    rows = supports[~supports["kind"].isin(AT_POINTS)]
+    names = {"name": "boundary"} | {f"force_{c}": f"reaction_{c}" for c in "xyz"}
+    names |= {c: f"middle_{c}" for c in "xyz"}
+    chosen = ["name", "length", *"xyz", "force_x", "force_y", "force_z", "per_length_max"]
+    return rows[chosen].rename(columns=names).reset_index(drop=True)
+
+
+def held_curves(surface: Surface) -> tuple[Curve, ...]:
+    """The curves of the held boundary, but for those in mirror planes, each along one patch."""
+    topo = surface.topology
+    boundary = topo.boundary_edge & ~surface.mirror_edge
+    held = boundary & surface.held[topo.edges].all(axis=1)
+    stop = vertex_kind(topo.edges[boundary], surface.n) == POINT
+    patch = _patch_of_edge(surface)
+    for p in np.unique(patch[held]):
+        there = np.zeros((2, surface.n), dtype=bool)
+        there[0, topo.edges[held & (patch == p)]] = there[1, topo.edges[held & (patch != p)]] = True
+        stop |= there.all(axis=0)
+    return topo.chains(topo.edges[held], stop)
+
+
+def _held_lines(acting: SupportForces) -> Iterator[_Part]:
+    """The held boundary; its kind is that of the longer part."""
+    surface, curves = acting.surface, held_curves(acting.surface)
+    for curve, forces in zip(curves, _shared(acting.along, [c.vertices for c in curves]), strict=True):
+        lengths = segment_lengths(surface.vertices, curve.pairs)
+        fixed = acting.clamped[curve.pairs].all(axis=1)
+        on_ground = _on_ground(acting)[curve.pairs].all(axis=1)
+        kinds = {"line": fixed, "ground": on_ground & ~fixed}
+        kind = max(kinds, key=lambda kind: float(lengths[kinds[kind]].sum()))
+        if not (fixed | on_ground).any():
+            planes = (plane for plane, mask in surface.on_planes if mask[curve.vertices].all())
+            kind = _kind(surface, next(planes, surface.plane))
+        yield _line(acting, kind, curve, forces, _names(surface, curve.sheets))
+
+
+def _mirrors(acting: SupportForces) -> Iterator[_Part]:
+    """The pull of the image along each curve in a mirror plane, and of single vertices there."""
+    surface = acting.surface
+    topo = surface.topology
+    patch = _patch_of_edge(surface)
+    for k, (plane, mask) in enumerate(surface.on_planes, start=1):
+        if not plane.mirror:
+            continue
+        edges = surface.mirror_edge & mask[topo.edges].all(axis=1)
+        curves = [c for p in np.unique(patch[edges]) for c in topo.curves_among(edges & (patch == p))]
+        ends = np.repeat(0.5 * segment_lengths(surface.vertices, topo.edges[edges]), 2)
+        share = np.asarray(np.bincount(topo.edges[edges].ravel(), ends, surface.n), dtype=float)
+        pull, even = acting.by_plane[k], acting.by_plane[k] - acting.cables[k]
+        groups = [curve.vertices for curve in curves]
+        for curve, forces in zip(curves, _shared(pull, groups), strict=True):
+            name = f"{_names(surface, curve.sheets)} in the {plane}"
+            yield _line(acting, "mirror", curve, forces, name, even, share)
+        yield from _others(acting, "mirror", pull, mask, groups, f"single points in the {plane}")
+
+
+def _inner_lines(acting: SupportForces) -> Iterator[_Part]:
+    """The lines inside the surface that are held."""
+    surface, topo = acting.surface, acting.surface.topology
+    inside = acting.clamped & ~_on_held_boundary(acting)
+    chosen = np.asarray(acting.lines.all(axis=1) & inside[topo.edges].all(axis=1), dtype=bool)
+    curves = topo.curves_among(chosen)
+    for curve, forces in zip(curves, _shared(acting.along, [c.vertices for c in curves]), strict=True):
+        yield _line(acting, "line", curve, forces, f"{_names(surface, curve.sheets)}, inside")
+
+
+def _planes(acting: SupportForces) -> Iterator[_Part]:
+    """What Π and the planes carry away from the held boundary: upright walls, and junctions at rest."""
+    surface, topo = acting.surface, acting.surface.topology
+    inside = ~acting.clamped & ~_on_held_boundary(acting)
+    planes = [(surface.plane, _on_ground(acting)), *surface.on_planes]
+    for k, (plane, mask) in enumerate(planes):
+        if plane.mirror or not (mask & inside).any():
+            continue
+        kind = "ground" if k == 0 else _kind(surface, plane)
+        where = (
+            f" in the {plane}" if plane.name else {"ground": ", at rest"}.get(kind, f", {kind.split()[0]}")
+        )
+        listed = np.where(acting.lengths[:, None] > 0.0, acting.cables[k], 0.0)  # as ends of cables
+        pull, flat = (
+            np.where(inside[:, None], acting.by_plane[k] - listed, 0.0),
+            mask[surface.faces].all(axis=1),
+        )
+        held = (topo.junction_edge | topo.seam_edge) & (mask | acting.clamped)[topo.edges].all(axis=1)
+        groups: list[tuple[str, Ints, Bools]] = []
+        for wall in np.unique(surface.patch_of_face[flat]).tolist() if k else ():
+            faces = flat & (surface.patch_of_face == wall)
+            own = np.zeros_like(held)
+            own[topo.edge_of_face[faces]] = True
+            groups.append((surface.patches[wall].name, np.unique(surface.faces[faces]), own & held))
+        done = np.zeros_like(inside)
+        done[[v for _, vertices, _ in groups for v in vertices]] = True
+        rest = held & (mask & inside & ~done)[topo.edges].any(axis=1)
+        for curve in topo.curves_among(rest):
+            numbers = np.zeros_like(held)
+            numbers[topo.edge_numbers(curve.pairs)] = True
+            groups.append((_names(surface, curve.sheets), curve.vertices, numbers))
+        shares = _shared(pull, [vertices for _, vertices, _ in groups])
+        for (name, vertices, edges), forces in zip(groups, shares, strict=True):
+            ends = topo.edges[edges]
+            lengths = segment_lengths(surface.vertices, ends)
+            points = surface.vertices[ends].mean(axis=1) if edges.any() else surface.vertices[vertices]
+            place = np.average(points, axis=0, weights=lengths if lengths.sum() > 0.0 else None)
+            most = _most(acting.per_length, vertices[inside[vertices]])
+            yield _Part(name + where, kind, vertices, forces, float(lengths.sum()), place, most)
+        name = f"single points{where}"
+        yield from _others(acting, kind, pull, mask & inside, [vertices for _, vertices, _ in groups], name)
+
+
+def _points(acting: SupportForces) -> Iterator[_Part]:
+    """The single fixed points, with the cables that end there."""
+    for v in np.flatnonzero(acting.single)[:, None]:
+        yield _Part("", "point", v, acting.points[v], 0.0, acting.surface.vertices[v[0]])
+
+
+def _ends_of_cables(acting: SupportForces) -> Iterator[_Part]:
+    """The vertices of lines where cables end, with the force of all of these."""
+    names: dict[int, list[str]] = {}
+    for cable, vertex, _ in cable_ends(acting.standing):
+        names.setdefault(vertex, []).append(cable.name)
+    for v in sorted(names):
+        if acting.lengths[v] > 0.0 and acting.points[v].any():
+            at = np.array([v])
+            yield _Part(
+                " + ".join(names[v]), "cable end", at, acting.points[at], 0.0, acting.surface.vertices[v]
+            )
+
+
+def _line(
+    acting: SupportForces,
+    kind: str,
+    curve: Curve,
+    forces: Floats,
+    name: str,
+    field: Floats | None = None,
+    share: Floats | None = None,
+) -> _Part:
+    """A support along a curve; the largest force per length is that of ``field`` over ``share``."""
+    surface, per_length = acting.surface, acting.per_length
+    if field is not None and share is not None:
+        per_length = np.divide(field, share[:, None], out=np.zeros_like(field), where=share[:, None] > 0.0)
+    length = float(segment_lengths(surface.vertices, curve.pairs).sum())
+    place, most = np.array(list(middle(surface, curve).values())), _most(per_length, curve.vertices)
+    return _Part(name, kind, curve.vertices, forces, length, place, most)
+
+
+def _most(per_length: Floats, vertices: Ints) -> float:
+    """The largest of forces per length (n,3) at the vertices; NaN where there is none."""
+    sizes = np.linalg.norm(per_length[vertices], axis=1)
+    return float(np.nanmax(sizes)) if np.isfinite(sizes).any() else np.nan
+
+
+def _shared(forces: Floats, groups: Sequence[Ints]) -> list[Floats]:
+    """The forces (n,3) at the vertices of each group; groups with a vertex in common share its force."""
+    count = np.zeros(len(forces))
+    for vertices in groups:
+        count[vertices] += 1.0
+    return [forces[vertices] / count[vertices, None] for vertices in groups]
+
+
+def _others(
+    acting: SupportForces, kind: str, forces: Floats, mask: Bools, groups: Iterable[Ints], name: str
+) -> Iterator[_Part]:
+    """The vertices of a mask with a force that are in none of the groups, as one support."""
+    left = mask & forces.any(axis=1)
+    left[[v for group in groups for v in group]] = False
+    vertices = np.flatnonzero(left)
+    if len(vertices):
+        place = acting.surface.vertices[vertices].mean(axis=0)
+        yield _Part(name, kind, vertices, forces[vertices], 0.0, place)
+
+
+def _on_ground(acting: SupportForces) -> Bools:
+    """(n,) vertices that slide or rest on Π."""
+    surface = acting.standing
+    return surface.on_ground | (acting.by_plane[0].any(axis=1) & ~acting.clamped)
+
+
+def _on_held_boundary(acting: SupportForces) -> Bools:
+    surface, mask = acting.surface, np.zeros(acting.surface.n, dtype=bool)
+    for curve in held_curves(surface):
+        mask[curve.vertices] = True
+    return mask
+
+
+def _patch_of_edge(surface: Surface) -> Ints:
+    """(e,) a patch at each edge: the patch, at the boundary."""
+    patch = np.empty(len(surface.topology.edges), dtype=np.int64)
+    patch[surface.topology.edge_of_face] = surface.patch_of_face[:, None]
+    return patch
+
+
+def _kind(surface: Surface, plane: Plane) -> str:
+    steep = abs(float(np.dot(plane.normal, surface.plane.normal))) <= STEEP
+    return "upright plane" if steep else "plane"
+
+
+def _names(surface: Surface, sheets: Iterable[int]) -> str:
+    return " | ".join(dict.fromkeys(surface.patches[i].name for i in sheets))

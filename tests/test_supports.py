@@ -1,0 +1,179 @@
+"""The table of supports: its rows add up to the loads, in forces and in moments."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pictures import near
+
+import pcmc
+from generators import spherical_cap, two_squares
+from pcmc import Plane, Target, cut, plot
+from pcmc.base.units import Units
+from pcmc.certificate.reactions import support_forces
+from pcmc.contact.pinching import standing_part
+from pcmc.design.targets import measure
+from pcmc.explore.variants import measures
+from pcmc.meshing.refinement import refine
+from pcmc.plan import CableLine, Divider, Plan
+from pcmc.plot import arrows
+from pcmc.surface.colours import rgb
+from pcmc.surface.geometry import area_vectors
+
+FORCE, MOMENT = ["force_x", "force_y", "force_z"], ["moment_x", "moment_y", "moment_z"]
+ROOMS = {"south east": [9, 1, 1.0], "north": [6, 5, 1.2], "south west": [3, 1, 0.8]}
+MAST = {"supports": [[0, 0, 0], [8, 0, 1], [8, 6, 0], [0, 6, 1]]}
+SIDES = [[[0, 0, 0], [8, 0, 1]], [[8, 0, 1], [8, 6, 0]]]
+
+
+def hall_of_upright_walls():
+    """Three upright walls meet over rooms of different pressures."""
+    ends = {"a": [6, 0], "b": [12, 4], "c": [0, 4]}
+    walls = [Divider([end, [6, 3]], 0.8, name, upright=True) for name, end in ends.items()]
+    rooms = {name: {"tension": 4.0, "pressure": p, "at": [x, y]} for name, (x, y, p) in ROOMS.items()}
+    return Plan([[0, 0], [12, 0], [12, 6], [0, 6]], walls, edge_length=1.0, patches=rooms).surface()
+
+
+def half_with_mirror():
+    """Half a hall whose wall leans, cut at a mirror plane, under snow."""
+    whole = Plan([[0, 0], [9, 0], [9, 4], [0, 4]], [Divider([[4, 0], [4, 4]])], edge_length=0.7, tension=4.0)
+    return cut(whole.surface().with_snow(0.3), Plane((0, 2, 0), (0, 1, 0), "middle", mirror=True))
+
+
+def on_masts(**more):
+    """A sail of some weight between cables, on four masts."""
+    sail = {"roof": {"tension": 4.0, "pressure": 0.0, "weight": 0.2}}
+    options = {"edge": "cable", "cable": 30.0, "patches": sail} | MAST | more
+    return Plan([[0, 0], [8, 0], [8, 6], [0, 6]], edge_length=1.0, **options).surface()
+
+
+def cables_between_walls():
+    """Three raised sides are held, a cable along the fourth ends on them; inside, a mast and a line."""
+    inside = [[4, 3, 1.5], [[2, 2, 0.8], [2, 4, 0.8]]]
+    sides = [[8, 0, 1], [8, 6, 0], [0, 6, 1], [0, 0, 0.5]]
+    sail = {"roof": {"tension": 4.0, "pressure": 0.0, "weight": 0.2}}
+    outline = [*sides[3:], *sides[:3]]
+    free = [CableLine([[0, 0], [8, 0]], 30.0)]
+    return Plan(outline, edge_length=1.0, patches=sail, supports=inside, cables=free).surface()
+
+
+def resting():
+    """Two squares over a wall that is so strong that it is pinched."""
+    return two_squares(6, alpha_aux=3.0)
+
+
+CASES = {  # how many supports there are of each kind
+    hall_of_upright_walls: {"line": 6, "upright plane": 3},
+    half_with_mirror: {"line": 3, "mirror": 3},
+    on_masts: {"point": 4},
+    cables_between_walls: {"line": 2, "point": 1, "cable end": 2},
+    resting: {"line": 2, "ground": 2},
+}
+
+
+@pytest.fixture(scope="module", params=CASES, ids=lambda case: case.__name__)
+def solved(request):
+    return request.param, pcmc.solve(request.param(), target="stationary")
+
+
+def wrench(places, forces, about):
+    return np.array([forces.sum(axis=0), np.cross(places - about, forces).sum(axis=0)])
+
+
+def test_the_rows_add_up_to_the_loads(solved):
+    """In forces and moments, up to what the mesh leaves: ∇E at the vertices that are not held."""
+    case, result = solved
+    found, part = result.certify(), standing_part(result.surface).surface
+    table, X = found.supports, part.vertices
+    assert found.certified
+    assert table["kind"].value_counts().to_dict() == CASES[case]
+    assert table["support"].is_unique
+    about = found.balance[[*"xyz"]].to_numpy()[0]
+    rows = wrench(table[[*"xyz"]].to_numpy(), table[FORCE].to_numpy(), about)
+    rows[1] += table[MOMENT].to_numpy().sum(axis=0)
+    corners, patch = X[part.faces], part.patch_of_face
+    areas, heavy = area_vectors(corners), part.weights[patch]
+    push = part.net_pressures[patch, None] * areas - np.outer(
+        heavy * np.linalg.norm(areas, axis=1), [0, 0, 1]
+    )
+    loads = wrench(corners.mean(axis=1), push, about)
+    size = np.abs(found.reactions).sum()
+    np.testing.assert_allclose(rows, wrench(X, found.reactions, about), atol=1e-13 * size * part.size)
+    np.testing.assert_allclose(rows + loads, -wrench(X, pcmc.gradient(part), about), atol=1e-12 * size)
+    np.testing.assert_allclose(found.remainder, rows + loads, atol=1e-12 * size)
+    assert 0.0 < found.balance["force_share"].iloc[-1] < 0.05
+    assert "the supports carry the loads" in str(found)
+
+
+def test_what_remains_falls_with_the_mesh():
+    coarse = pcmc.solve(spherical_cap(0.4, alpha=0.6)).surface
+    fine = pcmc.solve(refine(refine(coarse))).surface
+    shares = [pcmc.certify(cap).balance.iloc[-1] for cap in (coarse, fine)]
+    assert 0.0 < shares[1]["force_share"] < 0.6 * shares[0]["force_share"]
+    assert shares[1]["moment_share"] < 1e-12  # a cap is symmetric
+
+
+def test_upright_walls_hold_what_neighbours_of_unequal_tension_leave():
+    """A long hall of tensions 5 and 4: far from its ends the plane takes their difference."""
+    patches = {"west": {"tension": 5.0}, "east": {"tension": 4.0}}
+    wall = [Divider([[3, 0], [3, 12]], 1.0, upright=True)]
+    hall = Plan([[0, 0], [6, 0], [6, 12], [0, 12]], wall, edge_length=0.6, patches=patches)
+    found = pcmc.solve(hall.surface()).certify()
+    across = found.supports.set_index("kind").loc["upright plane"]
+    assert across["name"] == "wall 1, upright"
+    total = found.reactions[:, 0].sum()
+    assert abs(across["force_x"]) > 100.0 * abs(total)  # without it the table would not add up
+    lines = found.supports[found.supports["kind"] == "line"]["force_x"].sum()
+    assert across["force_x"] == pytest.approx(total - lines, rel=1e-9)
+    assert across["per_length_max"] == pytest.approx(1.0, rel=0.2)  # the difference, at small slopes
+
+
+def test_the_largest_reaction_is_one_number(solved):
+    """In the table, as a target, in the page's table; the force of a cable has no part in it."""
+    _, result = solved
+    found, surface = result.certify(), result.surface
+    rows = [row for row in measures(surface, found) if row["quantity"] == "reaction" and row["of"] == ""]
+    if np.isnan(found.largest_reaction):
+        assert rows[0]["value"] is None
+        return
+    assert rows[0]["value"] == pytest.approx(found.largest_reaction, rel=1e-12)
+    assert measure(surface, Target("reaction")).value == pytest.approx(found.largest_reaction, rel=1e-12)
+    assert found.largest_reaction < 1.2 * surface.tensions.max()
+
+
+def test_the_derivative_of_a_reaction_beside_the_end_of_a_cable():
+    """At the corner where the cable ends: by positions, and by the cable's own tension, which is apart."""
+    surface = cables_between_walls()
+    surface = surface.retensioned(weights={"roof": 3.0})
+    acting, target = support_forces(surface), Target("reaction", "roof")
+    top = np.nanargmax(np.linalg.norm(acting.per_length, axis=1))
+    assert acting.points[top].any()
+    found = measure(surface, target)
+    d = np.random.default_rng(0).standard_normal((surface.n, 3))
+    t = 1e-6
+    ahead, behind = (measure(surface.moved(surface.vertices + s * t * d), target).value for s in (1, -1))
+    assert (found.by_position * d).sum() == pytest.approx((ahead - behind) / (2 * t), rel=1e-6)
+    assert not found.by_load["cable"].any()
+    assert measure(surface.retensioned(cables={"cable 1": 60.0}), target).value == pytest.approx(found.value)
+
+
+def test_forces_at_points_have_arrows_of_their_own(monkeypatch, solved):
+    _, result = solved
+    found, drawn = result.certify(), {}
+    monkeypatch.setattr(arrows, "vectors", lambda s, field, *_, **more: drawn.update(more, field=field))
+    plot.reactions(result.surface, units=Units("m", "kN"))
+    at_points = found.supports[found.supports["kind"].isin(["point", "cable end"])]
+    sizes = np.sort(np.linalg.norm(drawn["points"], axis=1))[::-1]
+    np.testing.assert_allclose(
+        sizes[: len(at_points)], np.sort(np.linalg.norm(at_points[FORCE], axis=1))[::-1], rtol=1e-12
+    )
+    assert not sizes[len(at_points) :].any()
+    most = np.linalg.norm(drawn["field"], axis=1).max()
+    assert most == pytest.approx(np.nan_to_num(found.largest_reaction), rel=1e-12)
+    assert (drawn["label"], drawn["points_label"]) == ("kN/m along lines", "kN at points")
+
+
+def test_forces_at_points_are_blue():
+    image = plot.reactions(pcmc.solve(cables_between_walls()).surface)
+    assert near(image, rgb("#2166AC")).sum() > 100
+    assert near(image, rgb("#B2182B")).sum() > 100
