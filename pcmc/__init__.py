@@ -8,6 +8,7 @@ surface energy             what a surface is; E with its derivatives, and its cu
 contact meshing            walls that pinch; better, finer and new triangles
 io plan                    surfaces from and to files; surfaces from the lines of a plan
 stability certificate      lowest modes and Morse index; the verdict on a finished surface
+quantities                 what is measured on a roof: names, units, key figures
 solvers                    the paper's flow, L-BFGS, and the geometric Newton solver
 design                     tensions that meet targets
 continuation existence     branches of equilibria; whether there is one at all

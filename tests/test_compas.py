@@ -74,7 +74,7 @@ def arch() -> pcmc.Surface:
         X,
         F,
         [0, 1, 0, 1] * 2,
-        [pcmc.Patch("west", 2.0, weight=0.1), pcmc.Patch("east", 1 / 3)],
+        [pcmc.Patch("west", 2.0, weight=0.1, snow=0.2), pcmc.Patch("east", 1 / 3)],
         fixed=[6, 7, 8],
         on_planes={mirror: [0, 1], pcmc.Plane((0, 0, 0), (1, 0, 0)): [0, 3]},
         cables=[pcmc.Cable("ridge", 0.1, [[4, 1], [7, 4]]), pcmc.Cable("arch", 0.7, [[1, 2]])],

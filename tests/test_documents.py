@@ -6,6 +6,7 @@ import csv
 import shutil
 from pathlib import Path
 
+import ezdxf
 import numpy as np
 import pytest
 from PIL import Image
@@ -152,16 +153,14 @@ def test_a_patch_that_is_not_there_is_refused_before_the_roof_is_solved(tmp_path
         project.run(tmp_path / "roof.toml")
 
 
-def test_panels_larger_than_a_sheet_leave_no_file(tmp_path, capsys, monkeypatch):
-    """The message names what is too large, and nothing of the other files is left."""
+def test_panels_larger_than_a_sheet_are_in_model_space(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     output = 'files = ["a.obj"]\ndrawings = ["a.dxf"]\ntolerance = 0.1\npanel_sheets = true\nsheet = "A4"\n'
     (tmp_path / "roof.toml").write_text(UNITS + SMALL + OUTPUT + output, encoding="utf-8")
-    assert cli.main(["solve", "roof.toml"]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert "A4" in error
-    assert [path.name for path in tmp_path.iterdir()] == ["roof.toml"]
+    assert cli.main(["solve", "roof.toml"]) == 0
+    doc = ezdxf.readfile(tmp_path / "a.dxf")
+    assert "Panels larger than A4" in doc.layouts.names()
+    assert len(doc.modelspace().query('LWPOLYLINE[layer=="PCMC-CUT"]')) == 26
 
 
 def test_an_uncertified_roof_writes_nothing_or_marked_documents(tmp_path, monkeypatch):

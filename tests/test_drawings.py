@@ -15,14 +15,15 @@ from refusals import refused
 from shapely.geometry import Polygon
 
 import pcmc
-from generators import spherical_cap, two_squares
+from generators import hypar_roof, spherical_cap, two_squares
 from pcmc.base.errors import FileError, OptionError, SurfaceError
+from pcmc.base.units import Units
 from pcmc.cli import main
 from pcmc.drawings import FORMATS, drawing_set, pdf
 from pcmc.drawings.panel_sheets import panel_sheets
-from pcmc.drawings.sections import section
-from pcmc.drawings.sheet import LAYERS, corner, room
+from pcmc.drawings.sheet import LAYERS, box, corner, room
 from pcmc.surface.geometry import cross_2d, edge_vectors
+from pcmc.surface.sections import section
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -131,13 +132,26 @@ def test_labels_of_neighbours_name_each_other_and_the_same_edge(squares):
     assert seen == 2 * int((schedule.edges["neighbour"] > 0).sum())
 
 
-def test_a_panel_that_does_not_fit_names_the_smallest_format(squares):
-    schedule = pcmc.panels(squares, 0.01)
-    longest = schedule.panels[["a", "b", "c"]].to_numpy().max()
-    with refused(OptionError, what="sheet", found="A4", expected="A2"):
-        panel_sheets(schedule, "A4", 480.0 / longest)
-    with refused(OptionError, what="sheet", found="A0", expected=None):
-        panel_sheets(schedule, "A0", 3000.0 / longest)
+def test_panels_larger_than_the_sheet_are_flat_at_true_size_in_model_space(tmp_path, squares):
+    drawings = drawing_set(squares, "m", sheet="A4", tolerance=0.01, panel_sheets=True)
+    titles = [sheet.title for sheet in drawings.sheets]
+    assert titles[-1] == "Panels larger than A4: flat at true size in the model space of the .dxf"
+    listed = [text.text for sheet in drawings.sheets for text in sheet.texts if sheet.title == titles[-1]]
+    assert {str(k) for k in drawings.schedule.panels["panel"]} <= set(listed)
+    drawings.write(tmp_path / "roof.dxf")
+    doc = ezdxf.readfile(tmp_path / "roof.dxf")
+    outlines = [np.array(o.get_points("xy")) for o in doc.modelspace().query('LWPOLYLINE[layer=="PCMC-CUT"]')]
+    assert len(outlines) == len(drawings.schedule.panels)
+    for outline, face in zip(outlines, drawings.schedule.panels["face"], strict=True):
+        solid = np.linalg.norm(edge_vectors(squares.vertices[squares.faces[face]]), axis=1)
+        flat = np.linalg.norm(edge_vectors(np.pad(outline, ((0, 0), (0, 1)))), axis=1)
+        assert np.abs(flat - solid).max() <= 1e-9
+    shapes = [Polygon(outline) for outline in outlines]
+    assert max(a.intersection(b).area for a, b in combinations(shapes, 2)) < 1e-9
+    assert min(outline[:, 0].min() for outline in outlines) > squares.vertices[:, 0].max()
+    longest = drawings.schedule.panels[["a", "b", "c"]].max(axis=1).median()
+    some = panel_sheets(drawings.schedule, "A3", 400.0 / longest)  # some fit, and some do not
+    assert {sheet.title.split()[1] == "larger" for sheet in some} == {True, False}
 
 
 # ---------------------------------------------------------------------------------------- files
@@ -162,10 +176,59 @@ def test_the_dxf_passes_the_audit_and_has_the_roof_in_its_units(tmp_path, square
     assert np.array_equal(points, drawings.points[["x", "y", "z"]].to_numpy())
     assert {text.dxf.text for text in model.query("TEXT")} == set(drawings.points["point"])
     assert len(doc.layouts) == 1 + len(drawings.sheets)
-    first = doc.layouts.get("001")
+    assert doc.layouts.names_in_taborder()[1:4] == ["Plan", "Elevations", "Sections at heights"]
+    first = doc.layouts.get("Plan")
     assert (first.dxf.paper_width, first.dxf.paper_height) == FORMATS["A3"]
     shown = {text.dxf.text for text in first.query("TEXT")}
     assert {"Plan", f"sheet 1 of {len(drawings.sheets)}"} <= shown
+
+
+def test_sheets_are_dimensioned_between_corners_of_the_outline_not_over_the_bulge(tmp_path, squares):
+    bulge = np.where(squares.free[:, None], [1.0, 3.0, 1.0], 1.0)
+    moved = drawing_set(squares.moved(squares.vertices * bulge), "m", sheet="A3", anyway=True)
+    assert np.ptp(moved.surface.vertices, axis=0)[1] > 5.0  # the outline is 8 by 4
+    moved.write(tmp_path / "roof.dxf")
+    doc = ezdxf.readfile(tmp_path / "roof.dxf")
+    assert not doc.audit().errors
+
+    def measured(name, angle):
+        entities = [d for d in doc.layouts.get(name).query("DIMENSION") if d.dxf.angle == angle]
+        return sorted(round(d.get_measurement() * d.override().get("dimlfac"), 6) for d in entities)
+
+    assert measured("Plan", 0.0) == [4.0, 4.0, 8.0]
+    assert measured("Plan", 90.0) == [4.0]
+    assert measured("Elevations", 0.0) == [4.0, 4.0, 8.0, 8.0]
+    top = f"+{squares.vertices[:, 2].max():.3f}"
+    texts = [text.dxf.text for text in doc.layouts.get("Elevations").query('TEXT[layer=="PCMC-DIM"]')]
+    assert sorted(set(texts)) == sorted({top, "±0.000"})
+
+
+def test_cables_are_whole_curves_with_names_and_masts_are_marked(tmp_path):
+    sail = pcmc.solve(hypar_roof(6)).surface
+    drawings = drawing_set(sail, Units("m", "kN"), sheet="A3")
+    drawings.write(tmp_path / "sail.dxf")
+    doc = ezdxf.readfile(tmp_path / "sail.dxf")
+    lines = doc.modelspace().query('POLYLINE[layer=="PCMC-CABLE"]')
+    names = [line.get_xdata("PCMC")[0].value for line in lines]
+    assert sorted(names) == sorted(cable.name for cable in sail.cables)
+    total = sum(length(np.array(list(line.points()))) for line in lines)
+    assert total == pytest.approx(pcmc.certify(sail).cables["length"].sum())
+    masts = np.array([tuple(p.dxf.location) for p in doc.modelspace().query('POINT[layer=="PCMC-SUPPORT"]')])
+    np.testing.assert_array_equal(masts, sail.vertices[sail.pinned])
+    plan = {text.dxf.text for text in doc.layouts.get("Plan").query("TEXT")}
+    assert {"S1", "S2", "S3", "S4", *names} <= plan
+    listed = {text.dxf.text for text in doc.layouts.get("Cables").query("TEXT")}
+    assert {"force, kN", *names} <= listed
+    assert {"S4", "point", "force_z, kN"} <= {t.dxf.text for t in doc.layouts.get("Supports").query("TEXT")}
+
+
+def test_no_text_of_a_sheet_covers_another(drawings):
+    sail = drawing_set(pcmc.solve(hypar_roof(8, weight=0.02)).surface, "m", sheet="A3", tolerance=0.1)
+    for sheet in (*drawings.sheets, *sail.sheets):
+        boxes = np.array([box(text) for text in sheet.drawn()[1]])
+        low, high = boxes[:, None, 0], boxes[None, :, 1]
+        both = (low < high).all(axis=2)
+        assert (both & both.T).sum() == len(boxes), sheet.title
 
 
 @pytest.mark.parametrize(
@@ -193,8 +256,8 @@ def test_pdf_pages_and_svg_files_have_the_size_of_their_sheets(tmp_path, drawing
     data = (tmp_path / "roof.pdf").read_bytes()
     boxes = re.findall(rb"/MediaBox \[ *0 0 ([\d.]+) ([\d.]+) *\]", data)
     assert len(boxes) == count
-    for box in boxes:
-        assert [float(side) * 25.4 / 72.0 for side in box] == pytest.approx(FORMATS["A3"], abs=0.01)
+    for sides in boxes:
+        assert [float(side) * 25.4 / 72.0 for side in sides] == pytest.approx(FORMATS["A3"], abs=0.01)
     root = ET.parse(tmp_path / "roof-1.svg").getroot()
     assert (root.get("width"), root.get("height")) == ("420mm", "297mm")
     drawings.write(tmp_path / "again.pdf")

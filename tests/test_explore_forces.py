@@ -11,7 +11,7 @@ import pcmc
 from pcmc import explore
 from pcmc.base.errors import OptionError
 from pcmc.certificate import Verdict
-from pcmc.explore.page_data import outline
+from pcmc.explore.page_data import fields, outline
 from pcmc.explore.session import Session, solved_start
 
 
@@ -38,6 +38,9 @@ def test_cables_weights_and_rooms_have_values_that_move_the_surface():
     assert state.surface.cables[0].tension == 6.0
     assert state.surface.patches[0].weight == 0.2
     assert state.certificate.verdict is Verdict.STABLE
+    at_points = fields(state, np.zeros(3))["points"]  # the ends of the cables, whose arrows are apart
+    assert np.flatnonzero(at_points.any(axis=1)).tolist() == [0, 1]
+    assert np.linalg.norm(at_points[1]) == pytest.approx(6.0)
     depth = [s.vertices[5, 1] for s in (session.undo().surface, state.surface)]
     assert depth[0] > depth[1] > 0.0  # a stronger cable is straighter
     with refused(OptionError, what="cable", found="egde"):

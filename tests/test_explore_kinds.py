@@ -5,10 +5,14 @@ from __future__ import annotations
 import tomllib
 
 import pytest
+from browsing import Explored, needs_browser, until
+from explore_cases import followed
 
+from pcmc.design import Target
+from pcmc.design.targets import measure
 from pcmc.explore import saving
 from pcmc.explore.roof import read_roof
-from pcmc.project.values import differences, values_of
+from pcmc.project.values import differences, single_points, values_of
 
 HALL = "[plan]\nedge_length = 1.0  # coarse\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
 CUT = "dividers = [[[6, 0], [6, 6]]]\n"
@@ -88,7 +92,116 @@ def test_every_kind_of_project_is_saved_with_the_values_of_the_surface(kind, tmp
             0.25,
             {"patch 1": {"tension": 5.0}, "patch 2": {"tension": 5.5}},
         )
+    if kind == "sail":
+        lower = roof.surface.vertices.copy()
+        lower[single_points(surface)[2]] = [7.0, 8.5, 3.0]
+        path, _ = saving.save(roof, surface.moved(lower), "lower.toml", False)
+        plan = tomllib.loads(path.read_text())["plan"]
+        assert (plan["supports"][2], plan["outline"][2]) == ([7.0, 8.5, 3.0], [7.0, 8.5])
+        assert plan["cables"][1] == {"name": "cable 2", "curve": [[8.0, 0.0], [7.0, 8.5]], "tension": 9.9}
     if kind == "patches":
         output = tomllib.loads(path.read_text())["output"]
         assert output == {"files": ["other.obj", "other-out.glb"], "report": "other-report.pdf"}
         assert "edge_length = 1.0  # coarse" in path.read_text()
+
+
+TARGETS = {  # a quantity, what it is of, and the factor by which it is to change
+    "patches": ("area", "west", 1.01),
+    "one tension": ("volume", None, 1.05),
+    "rise": ("apex", None, 0.9),
+    "drawing": ("reaction per length", "south", 1.05),
+    "sail": ("sag", "cable 1", 0.95),
+    "half": ("height", None, 1.1),
+}
+LABELS = {"tensions": "Tension α", "pressures": "Pressure p", "cables": "Tension τ"}
+
+
+@needs_browser
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", TEXTS)
+def test_every_kind_of_project_goes_through_the_page(kind, driver, tmp_path):
+    """Opened, moved by hand, brought to a target, saved, and opened again with the same numbers."""
+    with followed(written(kind, tmp_path)) as running:
+        page = Explored(driver, running.url)
+        session = next(reversed(running.sessions.values()))
+        assert page.verdict == "stable"
+        _drag(page, kind, session)
+        quantity, of, factor = TARGETS[kind]
+        _add_target(page, quantity, of)
+        target = Target(quantity, page.picked if quantity == "height" else of)
+        wanted = float(f"{factor * measure(session.surface, target).value:.4g}")
+        page.find("#targets .target-row input[aria-label='Value wanted']").send_keys(str(wanted))
+        page.find("#targets .meet").click()
+        told = page.find("#targets .message")
+        until(lambda: told.get_attribute("data-state") in ("met", "missed"), "the target")
+        assert told.get_attribute("data-state") == "met", told.text
+        page.idle()
+        shown = session.state().surface
+        assert measure(shown, target).value == pytest.approx(wanted, rel=1e-6)
+        page.find("#save-project").click()
+        name = page.find("#saving input[type=text]")
+        name.clear()
+        name.send_keys("other", "\ue007")
+        until(lambda: "Saved as other.toml" in page.text("#note") + page.text("#saving .message"), "the file")
+        assert page.complaints() == []
+    assert not differences(read_roof(tmp_path / "other.toml", start_shape=True).surface, shown)
+    with followed(tmp_path / "other.toml") as running:
+        page = Explored(driver, running.url)
+        assert page.verdict == "stable"
+        label = f"{LABELS[MOVED[kind][0]]} of {MOVED[kind][1]}"
+        value = float(page.number(label).get_attribute("value"))
+        assert value == pytest.approx(values_of(shown)[MOVED[kind][0]][MOVED[kind][1]], rel=0.02)  # new mesh
+        assert measure(running.start.surface, target).value == pytest.approx(wanted, rel=1e-6)
+        assert page.complaints() == []
+
+
+def _drag(page, kind, session):
+    """Move a slider with the mouse; of the sail a mast, too."""
+    from selenium.webdriver import ActionChains
+
+    before = session.state().surface
+    label = f"{LABELS[MOVED[kind][0]]} of {MOVED[kind][1]}"
+    slider = page.slider(label)
+    ActionChains(page.driver).click_and_hold(slider).move_by_offset(4, 0).move_by_offset(
+        4, 0
+    ).release().perform()
+    page.idle()
+    moved = session.state().surface
+    assert differences(before, moved)
+    if kind == "sail":
+        x, y = page.driver.execute_script(
+            "const v = window.pcmc.viewer; const p = window.pcmc.header.values.shown.points['point 3'];"
+            "const s = v.camera.seen(p.map((x, k) => x - window.pcmc.tools.origin[k]));"
+            "return [s[0] * v.canvas.clientWidth / 2, -s[1] * v.canvas.clientHeight / 2]"
+        )
+        hand = ActionChains(page.driver).move_to_element_with_offset(page.find("#canvas"), round(x), round(y))
+        hand.click_and_hold().move_by_offset(0, -10).move_by_offset(0, -10).release().perform()
+        page.idle()
+        place = values_of(session.state().surface)["points"]["point 3"]
+        assert place[2] > 4.1
+        z = page.find("input[aria-label='z of point 3']")
+        assert float(z.get_attribute("value")) == pytest.approx(place[2], rel=1e-5)
+    assert page.verdict == "stable"
+
+
+def _add_target(page, quantity, of):
+    """The only target of the form: a quantity that is chosen, or the height at a point that is clicked."""
+    from selenium.webdriver.support.select import Select
+
+    for row in page.driver.find_elements("css selector", "#targets .target-row button")[1:]:
+        row.click()
+    if quantity == "height":
+        page.find("#targets .target-row button").click()
+        page.find("#views .measure").click()
+        page.find("#canvas").click()
+        until(lambda: page.text("#measured").startswith("Height"), "the point")
+        page.find("#measured button").click()
+        page.picked = page.driver.execute_script("return window.pcmc.targets.rows[0].target.of")
+        return
+    Select(page.find("#targets select[aria-label=Quantity]")).select_by_value(quantity)
+    Select(page.find("#targets select[aria-label=Of]")).select_by_value(f"={of or ''}")
+    wanted = page.find("#targets input[aria-label='Value wanted']")
+    wanted.clear()
+    page.driver.execute_script("document.querySelector('#targets details').open = true")
+    if quantity == "sag":
+        page.find(f"#targets input[aria-label='{of} may change']").click()

@@ -179,8 +179,8 @@ def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(
     with followed(path) as running:
         page = Explored(driver, running.url)
         assert page.text("#targets .message").startswith("met")
-        assert "kN/m" in page.text("#by-patch")
-        assert "west 1.2 " in page.text("#by-patch")
+        assert "kN/m" in page.text("#parts")
+        assert "west 1.2 " in page.text("#parts")
         page.driver.execute_script("document.querySelector('#targets details').open = true")
         boxes = page.driver.find_elements("css selector", "#targets .vary input")
         chosen = [box.get_attribute("aria-label") for box in boxes if box.is_selected()]
@@ -196,7 +196,7 @@ def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(
             told = page.find("#targets .message")
             until(lambda told=told, state=state: told.get_attribute("data-state") == state, state)
             page.idle()
-            assert "west 1.5 " in page.text("#by-patch")
+            assert "west 1.5 " in page.text("#parts")
         assert "nearest reachable" in page.text("#targets .message")
         # compared with what was kept
         before = page.picture()
@@ -229,14 +229,14 @@ def test_a_project_from_its_target_through_variants_to_a_saved_and_watched_file(
         page.complaints()  # the refused save
         # followed: another plan, then a broken one
         path.write_text(PROJECT.replace("[6, 0], [6, 6]", "[7, 0], [7, 6]"))
-        until(lambda: "west 1.2 " in page.text("#by-patch"), "the new roof")
+        until(lambda: "west 1.2 " in page.text("#parts"), "the new roof")
         page.idle()
         assert changed(before, page.picture()) > 0.01
         assert page.text("#variants li").startswith("Variant 1")
         path.write_text("[plan]\n")
         until(lambda: page.find("#watch").get_attribute("data-state") == "problem", "the problem")
         assert "edge_length" in page.text("#watch") or "outline" in page.text("#watch")
-        assert "west 1.2 " in page.text("#by-patch")
+        assert "west 1.2 " in page.text("#parts")
         assert page.complaints() == []
 
 
@@ -265,7 +265,7 @@ def test_tied_tensions_are_one_choice_and_stay_equal(driver, tmp_path):
         wanted.clear()
         wanted.send_keys("1.4")
         page.find("#targets .meet").click()
-        until(lambda: "west 1.4 " in page.text("#by-patch"), "the targets")
+        until(lambda: "west 1.4 " in page.text("#parts"), "the targets")
         page.idle()
         west, east = (page.number(f"Tension α of {name}").get_attribute("value") for name in ("west", "east"))
         assert west == east

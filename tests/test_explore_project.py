@@ -17,7 +17,7 @@ from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
 from pcmc.explore.roof import Roof, read_roof
 from pcmc.explore.session import Session
-from pcmc.explore.variants import difference, measures
+from pcmc.explore.variants import difference, figures_data
 
 CAP = spherical_cap(edge_length=0.25)
 
@@ -43,7 +43,7 @@ def test_a_project_opens_at_its_targets(hall_roof, client):
     assert header["note"] == "met: every target is reached"
     assert header["units"]["tension"] == "kN/m"
     assert (header["name"], header["project"], header["file"]) == ("hall", True, "hall.toml")
-    rows = {(r["quantity"], r["of"]): r["value"] for r in header["measures"]}
+    rows = {(r["quantity"], r["of"]): r["value"] for r in header["figures"]}
     assert rows["apex", "west"] == pytest.approx(1.2, rel=1e-6)
     assert rows["apex", "east"] == pytest.approx(1.0, rel=1e-6)
     assert rows["volume", ""] == pytest.approx(rows["volume", "west"] + rows["volume", "east"])
@@ -58,9 +58,9 @@ def test_the_start_shape_is_shown_only_when_asked_for(hall_folder, hall_roof):
 
 
 def test_what_is_measured_agrees_with_targets(hall_roof):
-    rows = measures(hall_roof.surface, pcmc.certify(hall_roof.surface))
+    rows = figures_data(hall_roof.surface, pcmc.certify(hall_roof.surface))
     for row in rows:
-        if row["quantity"] in ("apex", "area", "volume", "reaction"):
+        if row["quantity"] in ("apex", "area", "volume", "reaction per length", "lean"):
             value = measure(hall_roof.surface, Target(row["quantity"], row["of"] or None)).value
             assert row["value"] == pytest.approx(value, rel=1e-9), row
 
@@ -184,7 +184,7 @@ def test_variants_are_kept_compared_shown_again_and_removed(client):
     assert moved["verdict"]["name"] == "stable"
     header, arrays = client.ask(f"/api/{name}/compare", {"number": 0})
     assert header["compared"] == 0
-    rows = {(r["quantity"], r["of"]): r["value"] for r in header["measures"]}
+    rows = {(r["quantity"], r["of"]): r["value"] for r in header["figures"]}
     assert arrays["difference"].max() > 0.2
     assert arrays["difference"].max() < rows["apex", ""] - 1.0 + 1e-6
     back, arrays = client.ask(f"/api/{name}/recall", {"number": 0})
@@ -216,4 +216,4 @@ def test_a_wall_nearby_does_not_hide_a_difference(hall_roof):
 
 
 def test_names_of_downloads_are_those_of_files():
-    assert Roof(CAP, "a/b", Units("m")).name == "a-b"
+    assert Roof.of(CAP, "a/b", Units("m")).name == "a-b"

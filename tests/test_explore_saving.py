@@ -51,8 +51,8 @@ def test_saving_what_the_page_met_writes_its_targets(hall_roof, hall_session):
     path, note = saving.save(hall_roof, state.surface, "met.toml", False, hall_session.aims)
     assert note == "with its targets: apex of west, height at (9, 3)"
     again = read_roof(path, use_cache=False)
-    assert again.targets == targets
-    assert again.vary == vary
+    assert again.aims[0] == targets
+    assert again.aims[1] == vary
     assert again.note.startswith("met")
     path.unlink()
 
@@ -62,13 +62,13 @@ def test_a_named_point_keeps_its_name(tmp_path):
     named = HALL_TOML.replace('quantity = "apex", of = "west"', 'quantity = "height", of = "crown"')
     path.write_text(named.replace("outline", "points = {crown = [3.0, 3.0]}\noutline"))
     roof = read_roof(path, use_cache=False)
-    assert roof.targets[0].label == "height at crown"
+    assert roof.aims[0][0].label == "height at crown"
     state = Session(solved_start(roof.surface)).settle({"tensions": {"west": 4.0}})
     text, note, _ = saving.project_with(roof, state.surface)
     assert "(height at crown, apex of east)" in note
     met = Session(solved_start(roof.surface))
-    targets = Target("height", (3, 3), 1.3, name="crown"), roof.targets[1]
-    assert met.meet(targets, roof.vary).message.startswith("met")
+    targets = Target("height", (3, 3), 1.3, name="crown"), roof.aims[0][1]
+    assert met.meet(targets, roof.aims[1]).message.startswith("met")
     text, note, _ = saving.project_with(roof, met.surface, met.aims)
     assert note == "with its targets: height at crown, apex of east"
     assert tomllib.loads(text)["targets"]["meet"][0] == {"quantity": "height", "of": "crown", "value": 1.3}
@@ -138,7 +138,7 @@ def test_walls_are_found_by_name_number_and_as_bare_curves(tmp_path):
 
 def test_surfaces_without_a_project_are_not_saved(tmp_path):
     with pytest.raises(FileError, match="use Export"):
-        saving.save(Roof(CAP), CAP, "cap", False)
+        saving.save(Roof.of(CAP), CAP, "cap", False)
 
 
 def test_on_the_network_nothing_is_saved(hall_roof, hall_folder):
@@ -177,7 +177,7 @@ def test_the_page_follows_the_file_and_survives_a_broken_save(tmp_path):
         until(lambda: news()["version"] == 1, "the new roof")
         assert news()["problem"] == ""
         renewed, _ = client.ask("/api/open", {"session": name})
-        rows = {(r["quantity"], r["of"]): r["value"] for r in renewed["measures"]}
+        rows = {(r["quantity"], r["of"]): r["value"] for r in renewed["figures"]}
         assert rows["apex", "west"] == pytest.approx(1.5, rel=1e-6)
         assert renewed["mesh"] != kept["mesh"]
         assert renewed["undo"] == 1

@@ -16,6 +16,8 @@ from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate import Verdict
 from pcmc.explore.following import between, reach
 from pcmc.explore.session import Session, solved_start
+from pcmc.plan import Plan
+from pcmc.project.values import values_of
 from pcmc.surface.wall_pressures import with_pressures
 
 CAP = spherical_cap(edge_length=0.25)
@@ -217,6 +219,22 @@ def test_values_that_cannot_be_are_refused_and_change_nothing(cap):
     state = session.state()
     assert state.asked == cap.surface.patches
     assert state.failure is None
+
+
+def test_a_single_point_is_moved_and_the_surface_follows():
+    masts = [[0, 0, 4], [8, 0, 0], [8, 8, 4], [0, 8, 0]]
+    square = [mast[:2] for mast in masts]
+    plan = {"edge_length": 1.0, "edge": "cable", "cable": 9.0, "tension": 1.0, "pressure": 0.0}
+    session = Session(solved_start(Plan(square, supports=masts, **plan).surface()))
+    state = session.settle({"points": {"point 3": [8.5, 8.0, 3.0]}})
+    assert state.failure is None
+    assert values_of(state.surface)["points"]["point 3"] == [8.5, 8.0, 3.0]
+    masts[2], square[2] = [8.5, 8.0, 3.0], [8.5, 8.0]
+    again = pcmc.solve(Plan(square, supports=masts, **plan).surface())
+    assert state.certificate.energy == pytest.approx(again.energy, rel=2e-3)  # another mesh
+    assert session.undo().surface.vertices.max() == 8.0
+    with refused(OptionError, found="point 9"):
+        session.settle({"points": {"point 9": [0, 0, 0]}})
 
 
 def test_between_is_the_straight_way():

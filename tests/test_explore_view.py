@@ -9,11 +9,13 @@ from itertools import pairwise
 import numpy as np
 from browsing import Explored, browser, changed, needs_browser, until
 from explore_cases import HALL_TOML, followed
+from pictures import near
 
 from generators import spherical_cap, two_squares
 from pcmc import explore
 from pcmc.base.units import Units
 from pcmc.explore.page_data import family_of_face
+from pcmc.plan import Plan
 
 CAP = spherical_cap(edge_length=0.25)
 pytestmark = needs_browser
@@ -66,6 +68,35 @@ def test_units_stand_behind_the_numbers_where_they_are_given(driver):
         rows = until(lambda: page.text("#check-result tbody"), "the mesh check")
         assert re.search(r"Height of cap\s+[\d.]+ ± [\d.]+ ft\s+[\d.]+ ± [\d.]+ ft\n", rows)
         assert " kip/ft³" in rows
+        assert not page.complaints()
+    finally:
+        running.close()
+
+
+def test_forces_at_masts_have_arrows_with_a_scale_of_their_own(driver):
+    masts = [[0, 0, 0], [8, 0, 1], [8, 6, 0], [0, 6, 1]]
+    sail = Plan(
+        [m[:2] for m in masts],
+        edge_length=1.0,
+        tension=4.0,
+        pressure=0.0,
+        edge="cable",
+        cable=30.0,
+        supports=masts,
+    )
+    running = explore.start(sail.surface(), units=Units("m", "kN"))
+    try:
+        page = Explored(driver, running.url)
+
+        def blue():
+            return near(255.0 * page.picture(), (0.13, 0.4, 0.67)).sum()
+
+        before = blue()
+        page.find("#colours input[value=reactions]").click()
+        page.idle()
+        most = np.linalg.norm(running.start.certificate.reactions, axis=1).max()
+        assert f"blue: at points, up to {most:.3g} kN" in page.text("#legend .name")
+        assert blue() > before + 10
         assert not page.complaints()
     finally:
         running.close()

@@ -275,6 +275,12 @@ def test_paths_that_cannot_be(tmp_path):
             pcmc.write(path, tent())
     with refused(FileError, what="scalars", where="h", found=(3,)):
         pcmc.write(tmp_path / "a.ply", tent(), scalars={"h": np.zeros(3)})
+    for wrong in ("abc", [1.0], 3):
+        with refused(OptionError, what="scalars", found=wrong):
+            pcmc.write(tmp_path / "a.ply", tent(), scalars=wrong)
+    for named in ({"h": "abc"}, {"a\nb": np.zeros(10)}, {3: np.zeros(10)}):
+        with refused(OptionError, what="scalars"):
+            pcmc.write(tmp_path / "a.ply", tent(), scalars=named)
     for suffix in (".ply", ".vtp"):
         with refused(FileError, where="support", found="support"):
             pcmc.write(tmp_path / f"a{suffix}", tent(), scalars={"support": np.zeros(10)})

@@ -141,7 +141,7 @@ def test_stl_at_the_origin_is_written_where_it_is(tmp_path):
     )
 
 
-def test_output_says_that_it_is_moved_but_not_what_nobody_asked_for(tmp_path):
+def test_output_says_that_it_is_moved_and_what_it_lost_of_the_final_file(tmp_path):
     _, far = surveyed()
     path = tmp_path / "roof.stl"
 
@@ -151,5 +151,6 @@ def test_output_says_that_it_is_moved_but_not_what_nobody_asked_for(tmp_path):
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         project.write_all([(path, write)])
-    assert len(found) == 1
-    assert str(found[0].message).startswith(f"{path}: its coordinates are relative to")
+    lost, moved = (str(warning.message) for warning in found)
+    assert lost.startswith(f"{path}: a .stl file cannot carry height, supports")
+    assert moved.startswith(f"{path}: its coordinates are relative to")

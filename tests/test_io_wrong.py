@@ -17,6 +17,14 @@ trimesh = pytest.importorskip("trimesh")
 V = "".join("v {} {} {}\n".format(*x) for x in X.tolist())
 WRONG = {  # the suffix, what is in the file, and where the error is
     "obj, a coordinate": (".obj", "v 0 0 0\nv 1 zero 0\n", 2),
+    "obj, a coordinate for Python": (".obj", V + "v 0 1_000 0\nf 1 2 7\n", 7),
+    "obj, a corner for Python": (".obj", V + "f 1 2 0_5\n", 7),
+    "ply, a number for Python": (".ply", PLY.replace("2 1 0.5", "2 1_0 0.5"), "body"),
+    "stl, a number for Python": (
+        ".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1_0 0\n"
+        "endloop\nendfacet\nendsolid a\n", 6,
+    ),
+    "fe, a number for Python": (".fe", "VERTICES\n1 0 0 0\n2 1_000 0 0\n3 0 1 0\nEDGES\n1 1 2\nFACES\n", 3),
     "obj, two coordinates": (".obj", "v 0 0\n", 1),
     "obj, no faces": (".obj", V, "faces"),
     "obj, a number": (".obj", V + "f 1 2 x\n", 7),

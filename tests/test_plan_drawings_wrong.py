@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import drawn
 import numpy as np
 import pytest
@@ -161,3 +163,11 @@ def test_flipped_bits_of_a_drawing_raise_our_errors_only(tmp_path):
         except (FileError, PlanError, OptionError, SurfaceError) as error:
             outcomes.add("refused" if "\n" not in str(error) else "in several lines")
     assert outcomes == {"read", "refused"}
+
+
+@pytest.mark.parametrize(("start", "end"), [(0.0, math.inf), (-math.inf, 1.0), (math.nan, 1.0)])
+def test_an_ellipse_without_ends_is_refused_in_one_line(tmp_path, start, end):
+    path = drawing(tmp_path, ("ellipse", "support", (3, 3), (2, 0), 0.5, start, end))
+    with refused(FileError, what=str(path)) as caught:
+        read_drawing(path)
+    assert "its ends are no angles; draw it again" in str(caught.value)

@@ -119,6 +119,17 @@ def test_legend_names_what_is_seen(monkeypatch):
     assert shown[1][1] == {"fixed": FIXED_DOT, "sliding": SLIDING_DOT}
 
 
+def test_names_are_drawn_as_written_and_not_as_mathematics():
+    """Between two signs $ matplotlib reads mathematics: another name, or an error."""
+    pictures = []
+    for name in ("$x$", "$\\frac{$", "x"):
+        surface = tent(names=(name, "50 $", "a" * 100))
+        pictures.append(plot.draw(surface, legend=True, width=600))
+    assert pictures[0].shape != pictures[2].shape or (pictures[0] != pictures[2]).any()
+    roof, titles = two_squares(3), ["$x$", "$\\frac{$"]
+    assert plot.panel([roof, roof], titles=titles, width=600).any()
+
+
 def test_no_text_of_a_full_panel_lies_on_another(monkeypatch):
     """Titles, scale and legend each have a place of their own, and the pictures keep their height."""
     finished = []

@@ -97,6 +97,20 @@ def test_a_bubble_room_by_its_volume_from_toml(folder, capsys):
     capsys.readouterr()
 
 
+def test_a_project_says_what_its_files_lose_once_each_and_not_what_nobody_asked_for(folder):
+    (folder / "lost.toml").write_text(
+        SAIL_TOML.replace('"sail.3dm"', '"sail.stl", "sail.obj"'), encoding="utf-8"
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run("lost.toml")
+    losses = sorted(str(w.message) for w in caught if issubclass(w.category, LostWarning))
+    assert losses == [
+        "sail.fe: a .fe file cannot carry its unit m; left out",
+        "sail.stl: a .stl file cannot carry cables, its unit m, supports, tensions, pressures; left out",
+    ]
+
+
 def test_half_of_a_roof_is_written_whole(folder, capsys):
     (folder / "half.toml").write_text(HALF_TOML, encoding="utf-8")
     outcome = run("half.toml")

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -235,6 +236,14 @@ def test_masts_have_their_reactions(tmp_path):
     assert "Ends of cables" in text
     assert re.search(r"^ *roof +roof +4.000", text, re.M)  # no wall, though its pressure is 0
     assert "weight," in text
+
+
+def test_names_as_long_and_odd_as_they_may_be_are_laid_out(tmp_path, caps):
+    """Names that do not fit a column are broken; none is markup or mathematics."""
+    names = ["W" * 100, "$\\frac{$ </b> & %s", "x" * 50 + " " + "y" * 49]
+    patches = [replace(patch, name=name) for patch, name in zip(caps.patches, names, strict=False)]
+    report = roof_report(caps.rebuilt(patches=patches), "m", name="W" * 255, tolerance=0.05, anyway=True)
+    assert report.write(tmp_path / "roof.pdf").read_bytes().startswith(b"%PDF")
 
 
 @TEXT

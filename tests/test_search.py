@@ -311,7 +311,8 @@ def test_a_file_keeps_the_proof(tmp_path):
     result = solve(paraboloid(1.0, 0.45))
     write(tmp_path / "cap.pcmc", result.surface, certificate=result.certificate)
     overload, fold = native.read(tmp_path / "cap.pcmc").certificate["proofs"]
-    assert overload == {"kind": "Overload", "ratio": pytest.approx(result.proofs[0].ratio)}
+    ratio = pytest.approx(result.proofs[0].ratio)
+    assert overload == {"kind": "Overload", "ratio": ratio, "load": "pressure"}
     assert fold["kind"] == "Fold"
     assert fold["value"] == result.proofs[1].value
 

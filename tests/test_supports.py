@@ -62,12 +62,19 @@ def resting():
     return two_squares(6, alpha_aux=3.0)
 
 
+def wedge():
+    """A sixth of a cap, between two mirror planes at 60°."""
+    planes = Plane(normal=(0, 1, 0), mirror=True), Plane(normal=(0.75**0.5, -0.5, 0), mirror=True)
+    return cut(cut(spherical_cap(0.3, alpha=0.6), planes[0]), planes[1])
+
+
 CASES = {  # how many supports there are of each kind
     hall_of_upright_walls: {"line": 6, "upright plane": 3},
     half_with_mirror: {"line": 3, "mirror": 3},
     on_masts: {"point": 4},
     cables_between_walls: {"line": 2, "point": 1, "cable end": 2},
     resting: {"line": 2, "ground": 2},
+    wedge: {"line": 1, "mirror": 2},
 }
 
 

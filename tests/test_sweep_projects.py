@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pydoc
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,12 +16,12 @@ import pcmc
 from generators import two_squares
 from pcmc import cli
 from pcmc.base.errors import FileError, OptionError, PcmcError
-from pcmc.project import digest, run, varied
+from pcmc.project import check_varied, designed, digest, run, varied
 from pcmc.sweep import draw_sweep, read_store
 from pcmc.sweep import run as run_sweep
 from pcmc.sweep.projects import project_sweep, solve_project
 
-NUMBERS = ["west.apex", "east.apex", "rise", "roof_area", "largest_reaction"]
+NUMBERS = ["west.apex", "east.apex", "rise", "area", "reaction per length"]
 TEXT = """
 [plan]
 edge_length = 1.5                 # coarse: these are tests
@@ -69,6 +72,90 @@ def test_numbers_of_the_file_and_of_patches_are_replaced(roof):
     assert pcmc.energy(same_start) == pcmc.energy(start)
 
 
+DRAWN = """
+[plan]
+edge_length = 1.5
+tension = 4.0
+outline = [[0, 0], [9, 0], [9, 6], [0, 6]]
+dividers = [[[3, -1], [3, 7]], {name = "eye", curve = {arc = [[6, -1], [7, 3], [6, 7]]}}]
+holes = [{name = "eye", curve = {circle = {centre = [1.5, 3], radius = 0.5}}}]
+supports = [[8, 3, 2]]
+points = {crown = [4.5, 3]}
+"""
+
+
+def test_lines_and_points_are_shifted_as_they_are(roof):
+    roof.write_text(DRAWN, encoding="utf-8")
+    aims = '[targets]\nmeet = [{quantity = "height", of = "crown", value = 1}]\nvary = ["patch 2"]\n'
+
+    plain = varied(roof, {})[0].plan
+    shifts = {
+        "wall 1.x": 0.5,
+        "divider eye.x": -0.25,
+        "hole eye.y": 1.0,
+        "hole eye.z": 0.75,
+        "support 1.z": 1.0,
+    }
+    roof.write_text(DRAWN + aims, encoding="utf-8")
+    project, surface = varied(roof, shifts | {"crown.x": 0.25, "crown.y": -1.0})
+    moved = project.plan
+    t = np.array([0.0, 0.5, 1.0])
+    for before, after, by in (
+        (plain.dividers[0].curve, moved.dividers[0].curve, [0.5, 0.0]),
+        (plain.dividers[1].curve, moved.dividers[1].curve, [-0.25, 0.0]),
+    ):
+        np.testing.assert_array_equal(after.at(t), before.at(t) + by)
+    assert moved.holes[0].curve.at(0.0).tolist() == [[2.0, 4.0, 0.75]]
+    assert moved.supports[0].tolist() == [8.0, 3.0, 3.0]
+    assert moved.points == {"crown": (4.75, 2.0)}
+    assert project.targets[0].of == (4.75, 2.0)  # the target goes with its point
+    assert surface.vertices[surface.fixed, 2].max() == 3.0
+    same = varied(roof, dict.fromkeys(shifts, 0.0))[1]
+    np.testing.assert_array_equal(same.vertices, varied(roof, {})[1].vertices)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("eye.x", "several lines; type divider eye.x or hole eye.x"),
+        ("wal 1.x", "unknown number 'wal 1.x'; did you mean 'divider wall 1.x'"),
+        ("wall 1.z", "only its place in plan counts"),
+        ("crown.z", "only its place in plan counts"),
+    ],
+)
+def test_a_shift_that_cannot_be_is_refused(roof, name, message):
+    roof.write_text(DRAWN, encoding="utf-8")
+    with pytest.raises(PcmcError, match=message) as caught:
+        project_sweep(roof, {name: [0.0, 0.5]})
+    assert str(caught.value).startswith(f"{roof}: ")
+
+
+def test_the_file_is_read_once_and_meshed_for_names_alone(roof, monkeypatch):
+    counts = {"read": 0, "meshed": 0}
+    for place, name in (("tomllib.loads", "read"), ("pcmc.plan.Plan.surface", "meshed")):
+        original = pydoc.locate(place)
+
+        def counted(*given, original=original, name=name, **rest):
+            counts[name] += 1
+            return original(*given, **rest)
+
+        monkeypatch.setattr(place, counted)
+    check_varied(roof, {"plan.edge_length": [1.0, 2.0], "wall 1.x": [0.0, 0.1], "plan.snow": [0.0, 0.1]})
+    assert counts == {"read": 1, "meshed": 0}
+    check_varied(roof, {"west.tension": [1.0, 2.0, 3.0], "wall 1.tension": [0.5, 1.0]})
+    assert counts == {"read": 2, "meshed": 1}
+    varied(roof, {"west.tension": 3.0, "plan.edge_length": 1.2})
+    assert counts == {"read": 3, "meshed": 2}
+
+
+def test_numbers_that_the_file_leaves_out_vary_too(roof):
+    values = {"plan.rise": 0.7, "plan.patches.west.snow": 0.2, "plan.dividers.1.cable": 2.0}
+    project = varied(roof, values | {"solve.iterations": 7})[0]
+    plan = project.plan
+    assert (plan.rise, plan.patches[0].snow, plan.dividers[0].cable) == (0.7, 0.2, 2.0)
+    assert project.options["iterations"] == 7
+
+
 def test_a_case_is_what_the_project_with_these_numbers_gives(roof):
     case = solve_project("roof.toml", digest(roof), **{"west.tension": 3.2, "wall 1.tension": 0.5})
     text = TEXT.replace("west = {tension = 3.0", "west = {tension = 3.2").replace("0.8", "0.5")
@@ -77,6 +164,70 @@ def test_a_case_is_what_the_project_with_these_numbers_gives(roof):
     assert case["verdict"] == "stable"
     assert case["energy"] == pytest.approx(pcmc.energy(alone.surface), rel=1e-12)
     assert case["west.tension_reached"] == 3.2
+
+
+HALF = """
+[plan]
+edge_length = 1.5
+tension = 4.0
+outline = [[0, 0], [6, 0], [6, 4], [0, 4]]
+mirrors = [[[6, 0], [6, 4]]]
+"""
+
+
+@pytest.mark.parametrize(
+    ("output", "extent"), [("[output]\nwhole = true\n", "whole"), ("", "part between mirrors")]
+)
+def test_a_case_has_the_figures_of_the_roof_that_the_project_shows(roof, output, extent):
+    roof.write_text(HALF + output, encoding="utf-8")
+    case = solve_project("roof.toml", digest(roof))
+    outcome = designed(roof, use_cache=False)
+    assert case["extent"] == extent
+    for figure in outcome.figures:
+        name = f"{figure.of}.{figure.quantity}" if figure.of else figure.quantity
+        assert case[name] == pytest.approx(figure.value, rel=1e-9), name
+    assert (case["area"] > 40.0) == bool(output)
+    assert case["volume"] == pytest.approx(outcome.shown.certificate.volume, rel=1e-9)
+
+
+def test_cells_are_empty_where_nothing_is_at_rest(roof, capsys):
+    given = ["sweep", "roof.toml", "east.tension=0.2,3", "--csv", "t.csv", "--workers", "1"]
+    assert cli.main([*given, "--all"]) == 1
+    shown = capsys.readouterr().out.splitlines()
+    assert "NaN" not in "".join(shown)
+    table = pd.read_csv("t.csv", index_col="case")
+    assert table["verdict"].eq("stable").tolist() == [False, True]
+    numbers = table.select_dtypes("number")
+    kept = {"triangles", "iterations_taken", "evaluations_made", "gradient_squared", "residual", "load_ratio"}
+    assert set(numbers.columns[numbers.loc[0].notna()]) == kept | {"east.tension"}
+    assert table.loc[1, NUMBERS].notna().all()
+
+
+def test_any_quantity_is_shown_and_drawn(roof, capsys, monkeypatch):
+    drawn = {}
+    monkeypatch.setattr("pcmc.plot.lines", lambda curves, path, **rest: drawn.update(rest, curves=curves))
+    roof.write_text(f'units = "m"\nforce = "kN"\n{TEXT}', encoding="utf-8")
+    given = ["sweep", "roof.toml", "wall 1.x=0,0.5", "--workers", "1", "--csv", "t.csv", "--plot", "t.png"]
+    assert cli.main([*given, "--show", "volume", "--show", "west.area", "--show", "sag"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    for label in ("wall 1.x [m]", "west.volume [m³]", "volume [m³]", "west.area [m²]"):
+        assert label in shown[0]
+    assert "rise" not in shown[0]
+    assert shown[-1] == "no case has sag"
+    table = pd.read_csv("t.csv", index_col="case")
+    assert list(table) == [
+        "wall 1.x",
+        "status",
+        "verdict",
+        "west.volume",
+        "east.volume",
+        "volume",
+        "west.area",
+    ]
+    assert table["west.volume"].diff()[1] > 0.2  # the wall has moved to the east
+    assert (drawn["y"], set(drawn["curves"])) == ("volume [m³]", {"west", "east", "roof"})
+    assert cli.main([*given, "--show", "west.volum"]) == 2
+    assert "did you mean 'volume'" in capsys.readouterr().err
 
 
 def test_targets_and_remeshing_are_the_projects(roof):
@@ -97,7 +248,9 @@ def test_the_digest_is_of_what_the_file_says(roof, tmp_path):
     pcmc.write(tmp_path / "a.pcmc", surface)
     pcmc.write(tmp_path / "b.pcmc", surface.retensioned({"left": 9.0}))
     pcmc.write(tmp_path / "c.pcmc", surface.moved(surface.vertices * (1.0 + 1e-15)))
-    assert len({digest(tmp_path / f"{name}.pcmc") for name in "abc"}) == 3
+    wall = [replace(patch, wall=True) for patch in surface.patches]
+    pcmc.write(tmp_path / "d.pcmc", surface.rebuilt(patches=wall))
+    assert len({digest(tmp_path / f"{name}.pcmc") for name in "abcd"}) == 4
 
 
 BAD = [
@@ -169,8 +322,8 @@ def test_the_command_makes_a_table(roof, capsys):
     start = varied(roof, {"west.tension": 3.0, "wall 1.tension": 0.5, "east.tension": 3.1})[1]
     first = pcmc.solve(start).certificate
     row = short.loc[0]
-    assert row["roof_area"] == pytest.approx(first.patches["area"][:2].sum(), rel=1e-9)
-    assert row["largest_reaction"] == pytest.approx(first.boundaries["per_length_max"].max(), rel=1e-9)
+    assert row["area"] == pytest.approx(first.patches["area"][:2].sum(), rel=1e-9)
+    assert row["reaction per length"] == pytest.approx(first.boundaries["per_length_max"].max(), rel=1e-9)
 
 
 def test_one_varied_number_is_drawn_as_curves_of_the_certified_cases():
@@ -322,6 +475,17 @@ def test_a_number_that_the_targets_find_is_not_swept(roof, name):
         project_sweep("roof.toml", {"plan.tension": [3, 4]})
 
 
+def test_a_tension_that_the_rise_of_a_mesh_finds_is_not_swept(roof):
+    pcmc.write("roof.obj", varied(roof, {})[1])
+    text = '[mesh]\nfile = "roof.obj"\nrise = 1.0\n[mesh.patches.east]\nweight = 0.1\n'
+    roof.write_text(text, encoding="utf-8")
+    for name in ("west.tension", "mesh.tension", "mesh.patches.east.tension"):
+        with pytest.raises(PcmcError, match="is found by the search"):
+            project_sweep("roof.toml", {name: [3, 4]})
+    others = {"mesh.patches.east.weight": [0.1, 0.2], "mesh.rise": [1.0, 1.1]}
+    assert len(project_sweep("roof.toml", others)) == 4
+
+
 def test_the_table_and_the_picture_of_a_sweep_have_the_units_of_the_project(roof, capsys, monkeypatch):
     seen = {}
     monkeypatch.setattr("pcmc.plot.lines", lambda *curves, **rest: seen.update(rest))
@@ -339,7 +503,7 @@ def test_the_table_and_the_picture_of_a_sweep_have_the_units_of_the_project(roof
     ]
     assert cli.main(given) == 0
     header = capsys.readouterr().out.splitlines()[0]
-    for label in ("west.tension [kN/m]", "west.apex [m]", "roof_area [m²]", "largest_reaction [kN/m]"):
+    for label in ("west.tension [kN/m]", "west.apex [m]", "area [m²]", "reaction per length [kN/m]"):
         assert label in header
     assert (seen["x"], seen["y"]) == ("west.tension [kN/m]", "apex [m]")
     assert next(iter(pd.read_csv("t.csv", index_col="case"))) == "west.tension"

@@ -25,7 +25,7 @@ from math import sqrt
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..certificate.reactions import held_lengths, reactions
+from ..certificate.reactions import held_lengths, support_forces
 from ..contact.pinching import standing_part
 from ..design.targets import Target, measure
 from ..energy.functional import energy_and_gradient
@@ -158,7 +158,8 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
     """(n,3) the derivative of a quantity by the positions."""
     if quantity in ("height", "area", "volume"):
         return measure(surface, Target({"height": "apex"}.get(quantity, quantity), of or None)).by_position
-    forces, share = reactions(surface), held_lengths(surface)
+    acting = support_forces(surface)
+    forces, share = acting.along, acting.lengths
     vertices = _held_vertices(surface, of)
     pull = np.zeros_like(forces)
     if quantity == "reaction per length":

@@ -82,7 +82,7 @@ def _from_text(text: str) -> dict[str, float]:
     for part in text.split(","):
         name, sign, value = part.rpartition("=")
         try:
-            wanted[name.strip()] = float(value)
+            wanted[name.strip()] = validate.parsed(value)
         except ValueError:
             sign = ""
         if not sign or not name.strip():

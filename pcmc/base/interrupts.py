@@ -25,7 +25,7 @@ def defer_interrupts() -> Iterator[None]:
     and then the end
     """
     pressed: list[int] = []
-    with _handled(lambda number, _: pressed.append(number), instead_of=signal.default_int_handler):
+    with interrupts_handled(lambda number, _: pressed.append(number)):
         yield
     if pressed:
         raise KeyboardInterrupt
@@ -34,12 +34,12 @@ def defer_interrupts() -> Iterator[None]:
 @contextmanager
 def termination_as_interrupt() -> Iterator[None]:
     """Treat SIGTERM and SIGHUP like Ctrl-C within the block, so that temporary files are removed."""
-    with _handled(signal.default_int_handler, instead_of=signal.SIG_DFL):
+    with interrupts_handled(signal.default_int_handler, instead_of=signal.SIG_DFL):
         yield
 
 
 @contextmanager
-def _handled(handler: Any, instead_of: Any) -> Iterator[None]:
+def interrupts_handled(handler: Any, instead_of: Any = signal.default_int_handler) -> Iterator[None]:
     """Replace a handler by another in the block. Only the main thread may set handlers."""
     main = threading.current_thread() is threading.main_thread()
     known = [getattr(signal, name) for name in ENDINGS if hasattr(signal, name)]

@@ -70,6 +70,17 @@ def real(value: object) -> float:
         return math.nan
 
 
+def parsed(text: str) -> float:
+    """The number in a text; ValueError for another text, and for 1_000, which Python alone reads as one.
+
+    >>> parsed("1.5e3")
+    1500.0
+    """
+    if "_" in text or not text.isascii():
+        raise ValueError(f"no number: {text!r}")
+    return float(text)
+
+
 def positive(name: str, value: object) -> float:
     """A finite float > 0.
 

@@ -69,22 +69,24 @@ def balance_table(surface: Surface, supports: pd.DataFrame) -> pd.DataFrame:
     corners, patch = X[surface.faces], surface.patch_of_face
     vector = area_vectors(corners)
     force = surface.net_pressures[patch, None] * vector
-    force -= (surface.weights[patch] * np.linalg.norm(vector, axis=1))[:, None] * n
+    if surface.weights.any():
+        force -= (surface.weights[patch] * np.linalg.norm(vector, axis=1))[:, None] * n
     about = 0.5 * (X.min(axis=0) + X.max(axis=0))
     arm = corners.mean(axis=1) - about
-    loads = np.array([force.sum(axis=0), np.cross(arm, force).sum(axis=0)])
-    rows, arms = supports[[*FORCE]].to_numpy(float), supports[[*"xyz"]].to_numpy(float) - about
-    moments = supports[[*MOMENT]].to_numpy(float) + np.cross(arms, rows)
-    carried = np.array([rows.sum(axis=0), moments.sum(axis=0)])
+    products = arm.T @ force
+    moment = [products[i - 2, i - 1] - products[i - 1, i - 2] for i in range(3)]  # Σ arm × force
+    loads = np.array([force.sum(axis=0), moment])
+    columns = [*FORCE, *MOMENT, *"xyz"]
+    rows, moments, places = np.split(supports[columns].to_numpy(float), 3, axis=1)
+    arms = places - about
+    carried = np.array([rows.sum(axis=0), (moments + np.cross(arms, rows)).sum(axis=0)])
     sizes, away = (np.linalg.norm(part, axis=1) for part in ((force, arm) if force.any() else (rows, arms)))
     scale = np.array([sizes.sum(), sizes @ away])
     parts = np.array([loads, carried, loads + carried])
     shares = np.abs(parts).max(axis=2) / np.where(scale > 0.0, scale, 1.0)
-    columns = [*FORCE, *MOMENT, *"xyz", "force_share", "moment_share"]
-    values = np.column_stack([parts.reshape(3, 6), np.tile(about, (3, 1)), shares])
-    table = pd.DataFrame(values, columns=columns)
-    table.insert(0, "of", ["loads", "supports", "remainder"])
-    return table
+    values = np.column_stack([parts.reshape(3, 6), np.tile(about, (3, 1)), shares]).T
+    columns = ["of", *columns, "force_share", "moment_share"]
+    return pd.DataFrame(dict(zip(columns, [["loads", "supports", "remainder"], *values], strict=True)))
 
 
 def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:

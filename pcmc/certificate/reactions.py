@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..contact.pinching import standing_part
 from ..energy import kernels
 from ..energy.functional import add_cables_and_weights, apply_supports
@@ -59,6 +59,7 @@ class SupportForces(NamedTuple):
     lengths : (n,) half the length of the edges of ``lines`` at each vertex; 0 where there is none.
     clamped : (n,) the vertices that cannot move, or only along a line that was given.
     single : (n,) those of them that are in no line.
+    on_boundary : (n,) the vertices of the held boundary.
     by_plane : (1 + planes,n,3) what Π and each of ``on_planes`` carry at the vertices that slide on them.
     cables : (1 + planes,n,3) the part of these that holds the ends of cables.
     """
@@ -72,6 +73,7 @@ class SupportForces(NamedTuple):
     lengths: Floats
     clamped: Bools
     single: Bools
+    on_boundary: Bools
     by_plane: Floats
     cables: Floats
 
@@ -118,8 +120,8 @@ def support_forces(surface: Surface, forces: Floats | None = None) -> SupportFor
     for plane, mask in planes:
         held = held | (mask & (not plane.mirror))
     single, sliding = (used & ~on_boundary & side for side in (clamped, held & ~clamped))
-    junction = (topo.junction_edge | topo.seam_edge) & held[topo.edges].all(axis=1)
-    inner = single[topo.edges].all(axis=1)
+    junction = (topo.junction_edge | topo.seam_edge) & at_both_ends(held, topo.edges)
+    inner = at_both_ends(single, topo.edges)
     lines = (junction[:, None] & sliding[topo.edges]) | (inner | boundary)[:, None]
     lengths = _half_lengths(surface, lines)
     points = np.where(lengths[:, None] > 0.0, ends - cables[mirror].sum(axis=0), 0.0)
@@ -128,7 +130,18 @@ def support_forces(surface: Surface, forces: Floats | None = None) -> SupportFor
     points[alone] = inside[alone]
     along = inside - points
     return SupportForces(
-        surface, standing, along, points, mirrors, lines, lengths, clamped, alone, by_plane, cables
+        surface,
+        standing,
+        along,
+        points,
+        mirrors,
+        lines,
+        lengths,
+        clamped,
+        alone,
+        on_boundary,
+        by_plane,
+        cables,
     )
 
 
@@ -148,17 +161,23 @@ def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floa
     return support_forces(surface, forces).per_length
 
 
+def at_both_ends(mask: Bools, edges: Ints) -> Bools:
+    """(e,) whether both ends of edges (e,2) are in a mask (n,)."""
+    return np.asarray(mask[edges[:, 0]] & mask[edges[:, 1]])
+
+
 def _held_boundary(surface: Surface) -> Bools:
     """(e,) edges of the boundary that are held at both ends, but for those in mirror planes."""
     topo = surface.topology
-    return topo.boundary_edge & ~surface.mirror_edge & surface.held[topo.edges].all(axis=1)
+    return topo.boundary_edge & ~surface.mirror_edge & at_both_ends(surface.held, topo.edges)
 
 
 def _half_lengths(surface: Surface, ends: Bools) -> Floats:
     """(n,) at each vertex half the length of the edges (e,2) that have one of the chosen ends there."""
-    half = 0.5 * segment_lengths(surface.vertices, surface.topology.edges)
-    chosen = surface.topology.edges[ends], np.broadcast_to(half[:, None], ends.shape)[ends]
-    return np.asarray(np.bincount(*chosen, minlength=surface.n), dtype=float)
+    chosen = np.flatnonzero(ends[:, 0] | ends[:, 1])
+    edges, ends = surface.topology.edges[chosen], ends[chosen]
+    half = np.repeat(0.5 * segment_lengths(surface.vertices, edges)[:, None], 2, axis=1)
+    return np.asarray(np.bincount(edges[ends], half[ends], surface.n), dtype=float)
 
 
 def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Floats, Floats]:

@@ -14,7 +14,7 @@ from ..surface.geometry import segment_lengths
 from ..surface.topology import POINT, Curve, vertex_kind
 from .cables import cable_ends
 from .curve_tables import middle
-from .reactions import SupportForces, support_forces
+from .reactions import SupportForces, at_both_ends, support_forces
 
 COLUMNS = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
 COLUMNS += ["moment_x", "moment_y", "moment_z", "per_length_max"]
@@ -77,7 +77,7 @@ def held_curves(surface: Surface) -> tuple[Curve, ...]:
     """The curves of the held boundary, but for those in mirror planes, each along one patch."""
     topo = surface.topology
     boundary = topo.boundary_edge & ~surface.mirror_edge
-    held = boundary & surface.held[topo.edges].all(axis=1)
+    held = boundary & at_both_ends(surface.held, topo.edges)
     stop = vertex_kind(topo.edges[boundary], surface.n) == POINT
     patch = _patch_of_edge(surface)
     for p in np.unique(patch[held]):
@@ -110,7 +110,7 @@ def _mirrors(acting: SupportForces) -> Iterator[_Part]:
     for k, (plane, mask) in enumerate(surface.on_planes, start=1):
         if not plane.mirror:
             continue
-        edges = surface.mirror_edge & mask[topo.edges].all(axis=1)
+        edges = surface.mirror_edge & at_both_ends(mask, topo.edges)
         curves = [c for p in np.unique(patch[edges]) for c in topo.curves_among(edges & (patch == p))]
         ends = np.repeat(0.5 * segment_lengths(surface.vertices, topo.edges[edges]), 2)
         share = np.asarray(np.bincount(topo.edges[edges].ravel(), ends, surface.n), dtype=float)
@@ -125,8 +125,8 @@ def _mirrors(acting: SupportForces) -> Iterator[_Part]:
 def _inner_lines(acting: SupportForces) -> Iterator[_Part]:
     """The lines inside the surface that are held."""
     surface, topo = acting.surface, acting.surface.topology
-    inside = acting.clamped & ~_on_held_boundary(acting)
-    chosen = np.asarray(acting.lines.all(axis=1) & inside[topo.edges].all(axis=1), dtype=bool)
+    inside = acting.clamped & ~acting.on_boundary
+    chosen = acting.lines[:, 0] & acting.lines[:, 1] & at_both_ends(inside, topo.edges)
     curves = topo.curves_among(chosen)
     for curve, forces in zip(curves, _shared(acting.along, [c.vertices for c in curves]), strict=True):
         yield _line(acting, "line", curve, forces, f"{_names(surface, curve.sheets)}, inside")
@@ -135,7 +135,7 @@ def _inner_lines(acting: SupportForces) -> Iterator[_Part]:
 def _planes(acting: SupportForces) -> Iterator[_Part]:
     """What Π and the planes carry away from the held boundary: upright walls, and junctions at rest."""
     surface, topo = acting.surface, acting.surface.topology
-    inside = ~acting.clamped & ~_on_held_boundary(acting)
+    inside = ~acting.clamped & ~acting.on_boundary
     planes = [(surface.plane, _on_ground(acting)), *surface.on_planes]
     for k, (plane, mask) in enumerate(planes):
         if plane.mirror or not (mask & inside).any():
@@ -149,7 +149,7 @@ def _planes(acting: SupportForces) -> Iterator[_Part]:
             np.where(inside[:, None], acting.by_plane[k] - listed, 0.0),
             mask[surface.faces].all(axis=1),
         )
-        held = (topo.junction_edge | topo.seam_edge) & (mask | acting.clamped)[topo.edges].all(axis=1)
+        held = (topo.junction_edge | topo.seam_edge) & at_both_ends(mask | acting.clamped, topo.edges)
         groups: list[tuple[str, Ints, Bools]] = []
         for wall in np.unique(surface.patch_of_face[flat]).tolist() if k else ():
             faces = flat & (surface.patch_of_face == wall)
@@ -242,13 +242,6 @@ def _on_ground(acting: SupportForces) -> Bools:
     """(n,) vertices that slide or rest on Π."""
     surface = acting.standing
     return surface.on_ground | (acting.by_plane[0].any(axis=1) & ~acting.clamped)
-
-
-def _on_held_boundary(acting: SupportForces) -> Bools:
-    surface, mask = acting.surface, np.zeros(acting.surface.n, dtype=bool)
-    for curve in held_curves(surface):
-        mask[curve.vertices] = True
-    return mask
 
 
 def _patch_of_edge(surface: Surface) -> Ints:

@@ -67,7 +67,7 @@ MANY_FILES = option("FILE", "File to write; may be repeated.", "-o", "--output")
 def number(text: str | float) -> float:
     """The number in an option. The error shows the text, which typer's own parser does not."""
     try:
-        return float(text)
+        return validate.parsed(str(text))
     except ValueError:
         raise typer.BadParameter(f"expected a number, found {text!r}") from None
 
@@ -75,6 +75,7 @@ def number(text: str | float) -> float:
 def integer(text: str | int) -> int:
     """The whole number in an option; see ``number``."""
     try:
+        validate.parsed(str(text))  # which refuses 1_000
         return int(text)
     except ValueError:
         raise typer.BadParameter(f"expected a whole number, found {text!r}") from None
@@ -151,7 +152,7 @@ def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, f
     for text in given or ():
         name, sign, value = text.rpartition("=")
         try:
-            amount = float(value)
+            amount = validate.parsed(value)
         except ValueError:
             amount = math.nan
         if (sign and not name) or math.isnan(amount):
@@ -189,7 +190,7 @@ def _value(text: str) -> Any:
 def view_of(text: str) -> Any:
     """The name of a view, or (azimuth, elevation)."""
     try:
-        azimuth, elevation = (float(part) for part in text.split(","))
+        azimuth, elevation = map(validate.parsed, text.split(","))
     except ValueError:
         return text
     return azimuth, elevation

@@ -199,7 +199,7 @@ def _chosen(documents: projects.Documents, **given: Any) -> projects.Documents:
 def _ends(text: str) -> Any:
     """Two points from X,Y,X,Y."""
     try:
-        a, b, c, d = (float(part) for part in text.split(","))
+        a, b, c, d = map(validate.parsed, text.split(","))
     except ValueError:
         validate.refuse("--line", text, "four numbers X,Y,X,Y")
     return (a, b), (c, d)

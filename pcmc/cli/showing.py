@@ -71,7 +71,7 @@ def convert(
     roof = _shown(file, loads, whole, start=start, use_cache=cache, units=units)
     if roof is None:
         return NOT_CERTIFIED
-    projects.write_all(projects.surface_files(roof, [output], colour), losses=roof.result is None)
+    projects.write_all(projects.surface_files(roof, [output], colour))
     print(f"written: {output}")
     return OK
 
@@ -170,7 +170,7 @@ def explore(
             roof, again = read(progress=say, report=report), read if watch else None
         else:
             values = {name: listed[0] for name, listed in map(arguments.values_of, parameter or ())}
-            roof = Roof(_example(str(example), values), str(example))
+            roof = Roof.of(_example(str(example), values), str(example))
         say("solving")
         explorer = start_roof(roof, host, port, again)
     open_and_wait(explorer, browser)

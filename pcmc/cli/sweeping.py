@@ -20,7 +20,8 @@ from .progress import sweeping
 
 WHAT = "A project (.toml), a surface, or package.module:function that returns a Surface."
 SEARCH = "Try further starts where the first leads to no equilibrium: slower, but with the proof."
-PLOT = "Picture to write: apexes over one varied number, or the rise over two."
+PLOT = "Picture over one varied number or two: of the first --show, else apexes or the rise."
+SHOW = "What the table has: apex, area, volume, force, ..., or of one part: west.area. Repeat for several."
 STORE = "File for finished cases. The same command again runs only the missing ones."
 
 
@@ -34,6 +35,7 @@ def sweep(
     csv: Annotated[Path | None, option("FILE", "Table to write (.csv or .parquet).")] = None,
     every: Annotated[bool, typer.Option("--all", help="Write all columns, not only the first ones.")] = False,
     plot: Annotated[Path | None, option("FILE", PLOT)] = None,
+    show: Annotated[list[str] | None, option("QUANTITY", SHOW)] = None,
     workers: Annotated[
         int | None, option("NUMBER", "Local processes; default: one per processor.", parser=integer)
     ] = None,
@@ -54,18 +56,23 @@ def sweep(
     For a project or a surface, NAME is PATCH.tension, PATCH.pressure, PATCH.weight or PATCH.snow of a patch
     or wall, CABLE.tension of a cable, or ROOM.volume of a room that has one. For a project it may also be the
     keys of a number in the file: plan.edge_length, plan.outline.3.1 (the first coordinate of the third
-    corner). For a generator it is one of its parameters, or an option of the method. With a store, values may
-    be added later: only new cases are run. If the project file has changed, name a new store.
+    corner); or the shift of a whole divider, hole, support or named point along x, y or z: "wall 1.x". For a
+    generator it is one of its parameters, or an option of the method. With a store, values may be added
+    later: only new cases are run. If the project file has changed, name a new store.
     The table has the parameters, the verdict, the apex of each patch, the rise, the area, and the largest
-    reaction per length; with --all it has every number of the certificate, too.
+    reaction per length, or what --show names; with --all it has every number of the certificate, too. Cells
+    are empty where nothing is at rest.
 
     \b
     Examples:
       pcmc sweep roof.toml corner.tension=6,6.2 "wall 1.tension=1,2" --csv roof.csv
       pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
     """
+    from ..base.units import NO_UNITS
+    from ..quantities import dimension_of
     from ..sweep import draw_sweep, run, short_table, write_table
-    from ..sweep.projects import column_labels
+    from ..sweep.projects import units_of
+    from ..sweep.short_table import columns_of, with_units
     from ..sweep.store import FAILED
     from ..sweep.table import TABLES
 
@@ -75,6 +82,8 @@ def sweep(
         raise MissingExtra("pyarrow", "files")
     if plot is not None:
         check_suffix(plot)
+    for name in show or ():
+        dimension_of(name.rpartition(".")[2])  # refuses what is no quantity
     given: dict[str, list[Any]] = {}
     for name, listed in map(values_of, values):
         if name in given:
@@ -97,13 +106,17 @@ def sweep(
         )
     if table.empty:
         return INTERRUPTED
-    first = short_table(table, list(grid))
+    first = short_table(table, list(grid), show or ())
     if csv is not None:
         write_table(csv, table if every else first)
-    labels = {} if ":" in what and not Path(what).exists() else column_labels(what, map(str, first))
+    units = NO_UNITS if ":" in what and not Path(what).exists() else units_of(what)
+    labels = with_units(map(str, table), units, table)
     if plot is not None:
-        draw_sweep(table, list(grid), plot, labels)
-    print(first.rename(columns=labels).to_string(float_format=lambda x: f"{x:.5g}"))
+        draw_sweep(table, list(grid), plot, labels, *(show or ())[:1])
+    print(first.rename(columns=labels).to_string(float_format=lambda x: f"{x:.5g}", na_rep=""))
+    for name in show or ():
+        if not columns_of(table, name, list(grid)):
+            print(f"no case has {name}")
     _print_failures(table[table["status"].isin(FAILED)])
     if len(table) < len(cases):
         return INTERRUPTED

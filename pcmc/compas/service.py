@@ -75,7 +75,8 @@ def certify(
     Returns
     -------
     dict : ``certified``, ``verdict``, ``detail``, the numbers of ``Certificate.numbers``, the tables
-        ``patches``, ``junctions`` and ``boundaries`` as lists of rows, and ``warnings``. None stands for NaN.
+        ``patches``, ``junctions``, ``boundaries`` and ``supports`` as lists of rows, and ``warnings``.
+        None stands for NaN.
     """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -97,7 +98,7 @@ def write(path: str | os.PathLike[str], meshes: Any, weld: bool = False, **optio
 
 def _plain_certificate(found: Certificate) -> dict[str, Any]:
     """Its findings as JSON has them."""
-    tables = {name: getattr(found, name) for name in ("patches", "junctions", "boundaries")}
+    tables = {name: getattr(found, name) for name in ("patches", "junctions", "boundaries", "supports")}
     values = {"certified": found.certified, **found.numbers(), "detail": found.detail, **tables}
     return {name: _plain(value) for name, value in values.items()}
 

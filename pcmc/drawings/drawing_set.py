@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -16,17 +16,19 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..base.files import atomic_writes, suffix_of, writing
-from ..base.units import expect_length, length_factor
+from ..base.units import Units, as_units, expect_length, length_factor
 from ..certificate import Certificate
 from ..certificate.required import certified, warning_mark
 from ..panels import Panels, panels
 from ..surface import Surface, expect_surface
+from ..surface.sections import Polyline, section
 from . import dxf, pdf, views
+from .panel_sheets import flat_panels
 from .panel_sheets import panel_sheets as panels_at_true_size
-from .sections import Polyline, section
 from .sheet import FORMATS, Sheet, add_frames, table_sheets
 
 SUFFIXES = (".dxf", ".pdf", ".svg")
+SUPPORT = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
 DECIMALS = {"m": 3, "cm": 1, "mm": 0, "ft": 4, "in": 2}  # about a millimetre or better
 Ends = tuple[tuple[float, float], tuple[float, float]]
 
@@ -42,7 +44,9 @@ class DrawingSet:
     curves : ridges, rims and wall lines, with their layers.
     sections : the lines in which each plane cuts the roof.
     points : setting-out points: ``point``, ``x``, ``y``, ``z``, ``on`` (ridge, rim, wall or cable).
+    marks : name and place (3,) of each mast or other support of one point.
     schedule : the panels, if a tolerance was given; else None.
+    flat : all panels at true size, mm, where sheets of panels are asked for; else None.
     sheets : the sheets of paper, in order.
     """
 
@@ -52,7 +56,9 @@ class DrawingSet:
     curves: Sequence[views.Curve]
     sections: Sequence[Polyline]
     points: pd.DataFrame
+    marks: Sequence[tuple[str, Floats]]
     schedule: Panels | None
+    flat: Sheet | None
     sheets: Sequence[Sheet]
 
     def files(self, *paths: str | os.PathLike[str]) -> list[tuple[Path, Callable[[Path], None]]]:
@@ -62,7 +68,8 @@ class DrawingSet:
         for path in map(Path, paths):
             suffix = check_suffix(path)
             if document is None:
-                model = dxf.Model(self.surface, self.curves, self.sections, self.points)
+                shown = self.surface, self.curves, self.sections, self.points, self.marks, self.flat
+                model = dxf.Model(*shown, length_factor(self.units, "mm"))
                 document = dxf.document(model, self.units, self.sheets)
             if suffix == ".dxf":
                 works.append((path, partial(dxf.write_dxf, document)))
@@ -94,7 +101,7 @@ class DrawingSet:
 
 def drawing_set(
     surface: Surface,
-    units: str,
+    units: str | Units,
     *,
     sheet: str = "A1",
     scale: int | None = None,
@@ -108,19 +115,23 @@ def drawing_set(
     certificate: Certificate | None = None,
     schedule: Panels | None = None,
 ) -> DrawingSet:
-    """Draw a roof: plan, elevations, sections, setting-out points, schedule, panels at true size.
+    """Draw a roof: plan, elevations, sections, setting-out points, cables, supports, panels at true size.
+
+    Plan and sections are dimensioned between the corners of the outline and the walls, elevations over the
+    outline; beside heights stand levels.
 
     Parameters
     ----------
     surface : a certified surface, z up.
-    units : of its lengths: "m", "cm", "mm", "ft" or "in".
+    units : of its lengths: "m", "cm", "mm", "ft" or "in"; or ``Units("m", "kN")``, to name those of forces.
     sheet : format of the sheets, "A4" to "A0".
     scale : of plan, elevations and sections, 1 to this; by default the largest usual one that fits.
     heights : z of horizontal sections; by default at a quarter, half and three quarters of the height.
     lines : pairs of points (x, y) in the plan, for vertical sections; by default through the middle of
         the plan, along x and along y.
     tolerance : of the panels' families; None for no schedule.
-    panel_sheets : whether to draw every panel at true size; needs a tolerance.
+    panel_sheets : whether to draw every panel at true size, on sheets and flat in the .dxf's model space;
+        needs a tolerance. What is larger than a sheet is in model space alone.
     mirror_images : as in ``pcmc.panels``.
     name : of the roof, in the title strips.
     anyway : draw a surface that is not certified; every sheet is marked.
@@ -130,8 +141,8 @@ def drawing_set(
     Raises
     ------
     SurfaceError : the surface is not certified.
-    OptionError : for units that are missing; a section that misses the roof; a view or a panel that does
-        not fit the sheet, with the smallest format that holds it.
+    OptionError : for units that are missing; a section that misses the roof; a view that does not fit the
+        sheet, with the smallest format that holds it.
 
     Examples
     --------
@@ -141,12 +152,14 @@ def drawing_set(
     ...                [Patch("roof", 1.0)], fixed=range(4))
     >>> drawings = drawing_set(roof, "m", sheet="A3")
     >>> [sheet.title for sheet in drawings.sheets]
-    ['Plan', 'Elevations', 'Sections at heights', 'Sections along lines', 'Setting-out points']
+    ['Plan', 'Elevations', 'Sections at heights', 'Sections along lines', 'Setting-out points', 'Supports']
     >>> drawings.sheets[0].scale
     '1:10'
     """
     expect_surface(surface)
-    millimetres = _millimetres(units)
+    units = as_units(units)
+    length = expect_length(units.length, "a drawing")
+    millimetres, decimals = length_factor(length, "mm"), DECIMALS[length]
     validate.choice("sheet", sheet, tuple(FORMATS))
     if scale is not None:
         validate.integer("scale", scale, least=1)
@@ -165,10 +178,15 @@ def drawing_set(
         schedule = panels(surface, tolerance, mirror_images=mirror_images, **options)
     curves = views.model_curves(surface)
     points = _setting_out(curves)
-    named = [(str(row.point), np.array([row.x, row.y, row.z])) for row in points.itertuples()]
+    at_points = certificate.supports[certificate.supports["kind"] == "point"]
+    marks = list(zip(at_points["support"], at_points[[*"xyz"]].to_numpy(), strict=True))
+    named = [(at, name, "PCMC-SUPPORT") for name, at in marks]
+    named += [
+        (np.array(at), name, "PCMC-POINT") for name, *at in points[["point", *"xyz"]].to_numpy().tolist()
+    ]
     levels = _levels(surface, heights)
     profiles = _profiles(surface, lines)
-    size: dict[str, Any] = {"name": sheet, "millimetres": millimetres, "scale": scale}
+    size: dict[str, Any] = {"name": sheet, "millimetres": millimetres, "scale": scale, "decimals": decimals}
     sheets = [
         views.placed([views.plan(surface, curves, named)], "Plan", **size),
         views.placed(views.elevations(surface, curves), "Elevations", **size),
@@ -177,26 +195,30 @@ def drawing_set(
         sheets.append(views.placed([views.contours(surface, curves, levels)], "Sections at heights", **size))
     if profiles:
         sheets.append(views.placed([view for view, _ in profiles], "Sections along lines", **size))
-    sheets += [
-        *table_sheets("Setting-out points", *_point_rows(points, DECIMALS[units]), sheet),
-    ]
+    sheets += table_sheets("Setting-out points", *_rows(points, decimals), sheet)
+    if len(certificate.cables):
+        cables = certificate.cables[["cable", "tension", "length"]]
+        cables = cables.rename(columns={"tension": "force"})
+        sheets += table_sheets("Cables", *_rows(cables, decimals, {"force": units.force}), sheet)
+    if len(certificate.supports):
+        listed = certificate.supports[SUPPORT]
+        forces = dict.fromkeys(SUPPORT[-3:], units.force)
+        sheets += table_sheets("Supports", *_rows(listed, decimals, forces), sheet)
+    flat = None
     if schedule is not None:
-        sheets += table_sheets("Families of panels", *_family_rows(schedule, DECIMALS[units]), sheet)
+        sheets += table_sheets("Families of panels", *_rows(_families(schedule), decimals), sheet)
     if schedule is not None and panel_sheets:
+        flat = flat_panels(schedule, millimetres)
         sheets += panels_at_true_size(schedule, sheet, millimetres)
-    add_frames(sheets, name, units, warning_mark(certificate))
+    part = "a part of the roof, which goes on behind its mirror planes" if surface.mirror_edge.any() else ""
+    add_frames(sheets, ", ".join(filter(None, (name, part))), length, warning_mark(certificate))
     cut = [one for _, group in levels for one in group] + [one for _, group in profiles for one in group]
-    return DrawingSet(surface, units, certificate, curves, cut, points, schedule, sheets)
+    return DrawingSet(surface, length, certificate, curves, cut, points, marks, schedule, flat, sheets)
 
 
 def check_suffix(path: Path) -> str:
     """The suffix of a drawing's file; another is refused."""
     return suffix_of(path, SUFFIXES, "a drawing")
-
-
-def _millimetres(units: object) -> float:
-    """Millimetres in the unit of length."""
-    return length_factor(expect_length(units, "a drawing"), "mm")
 
 
 def _setting_out(curves: Sequence[views.Curve]) -> pd.DataFrame:
@@ -260,19 +282,19 @@ def _cut(surface: Surface, point: Sequence[float], normal: Sequence[float]) -> l
     return section(surface, np.array(point), np.array(normal))
 
 
-def _point_rows(points: pd.DataFrame, decimals: int) -> tuple[list[str], list[list[str]]]:
-    head = ["point", "x", "y", "z", "on"]
-    rows = [
-        [point, *(f"{c:.{decimals}f}" for c in at), on]
-        for point, *at, on in points[head].to_numpy(dtype=object).tolist()
-    ]
-    return head, rows
+def _families(schedule: Panels) -> pd.DataFrame:
+    """The families as they are listed."""
+    listed = schedule.families[["family", "count", "mirrored", *"abc", "area"]]
+    shown = listed.assign(family=[f"F{k}" for k in listed["family"]])
+    return shown.rename(columns={"count": "panels", "mirrored": "turned over"})
 
 
-def _family_rows(schedule: Panels, decimals: int) -> tuple[list[str], list[list[str]]]:
-    keys = ["family", "count", "mirrored", "a", "b", "c", "area"]
+def _rows(
+    table: pd.DataFrame, decimals: int, units: Mapping[str, str] | None = None
+) -> tuple[list[str], list[list[str]]]:
+    """The head, with the units that columns have, and the rows of a table as texts."""
     rows = [
-        [f"F{family}", str(count), str(mirrored), *(f"{x:.{decimals}f}" for x in sides), f"{area:.4g}"]
-        for family, count, mirrored, *sides, area in schedule.families[keys].to_numpy(dtype=object).tolist()
+        [f"{x:.{decimals}f}" if isinstance(x, float) else str(x) for x in row]
+        for row in table.to_numpy(dtype=object).tolist()
     ]
-    return ["family", "panels", "turned over", "a", "b", "c", "area"], rows
+    return [", ".join(filter(None, (name, (units or {}).get(name)))) for name in table.columns], rows

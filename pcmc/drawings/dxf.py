@@ -2,30 +2,42 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 
+from ..base.arrays import Floats
 from ..base.errors import MissingExtra
 from ..base.units import TABLE
 from ..surface import Surface
-from .sections import Polyline
-from .sheet import LAYERS, Sheet, Text
+from ..surface.sections import Polyline
+from .sheet import LAYERS, SMALL, Dimension, Sheet
 from .views import Curve, section_layer
 
 VERSION = "R2018"
 MODEL_TEXT = 0.004  # height of letters in the model, in its size
+DIMENSION = {"dimtxt": SMALL, "dimtxsty": "PCMC", "dimtad": 1, "dimgap": 0.6, "dimtsz": 0.8, "dimexo": 1.0}
+DIMENSION |= {"dimexe": 1.0, "dimtix": 1, "dimtoh": 0, "dimtih": 0, "dimdsep": ord("."), "dimzin": 0}
 
 
 class Model(NamedTuple):
-    """What is drawn in three dimensions: see ``DrawingSet``."""
+    """What is drawn in three dimensions: see ``DrawingSet``.
+
+    ``marks`` are the supports of one point, by name; ``flat`` the panels at true size, mm, for the ground
+    beside the roof, and ``millimetres`` those in the unit of the roof.
+    """
 
     surface: Surface
     curves: Sequence[Curve]
     sections: Sequence[Polyline]
     points: pd.DataFrame
+    marks: Sequence[tuple[str, Floats]]
+    flat: Sheet | None
+    millimetres: float
 
 
 def _ezdxf() -> Any:
@@ -37,30 +49,46 @@ def _ezdxf() -> Any:
 
 
 def document(model: Model, units: str, sheets: Sequence[Sheet]) -> Any:
-    """The model, in the surface's unit, and a layout per sheet, in millimetres.
+    """The model, in the surface's unit, and a layout per sheet, in millimetres, with its title as its name.
 
-    The model has ridges, rims, wall lines and sections as polylines, panels as 3D faces and the setting-out
-    points, each on the layer of its kind.
+    The model has ridges, rims, wall lines, cables and sections as polylines, each a whole curve with the
+    name of its patches or its cable (XDATA of "PCMC"), panels as 3D faces, setting-out points and supports
+    of one point, each on the layer of its kind; beside the roof the panels flat at true size.
     """
     ezdxf = _ezdxf()
     doc = ezdxf.new(VERSION)
     doc.units = TABLE[units].dxf
     doc.header["$MEASUREMENT"] = int(units not in ("ft", "in"))
     doc.styles.add("PCMC", font="LiberationSans-Regular.ttf")
+    doc.dimstyles.new("PCMC", dxfattribs=DIMENSION)
+    doc.appids.add("PCMC")
     for name, layer in LAYERS.items():
         entry = doc.layers.add(name, color=layer.color, lineweight=layer.weight)
         entry.description = layer.about
     _add_model(doc.modelspace(), model)
+    taken = {"model"}
     for number, sheet in enumerate(sheets, start=1):
-        name = f"{number:03d}"
+        name = layout_name(sheet.title, taken)
         if number == 1:
             doc.layouts.rename("Layout1", name)
-            layout = doc.layouts.get(name)
-        else:
-            layout = doc.layouts.new(name)
+        layout = doc.layouts.get(name) if number == 1 else doc.layouts.new(name)
         layout.page_setup(size=sheet.size, margins=(0, 0, 0, 0), units="mm")
         _add_sheet(layout, sheet)
     return doc
+
+
+def layout_name(title: str, taken: set[str]) -> str:
+    """A name for a layout that no other in ``taken`` has; it is added to these.
+
+    >>> taken = set()
+    >>> [layout_name(title, taken) for title in ("Plan", "Panels 1 to 9 at true size, outside up", "Plan")]
+    ['Plan', 'Panels 1 to 9', 'Plan 2']
+    """
+    short = re.sub(r'[<>/\\":;?*|,=`\']', " ", re.split(" at true size|:", title)[0])[:200].strip()
+    names = (short if k == 1 else f"{short} {k}" for k in range(1, len(taken) + 2))
+    name = next(name for name in names if name.lower() not in taken)
+    taken.add(name.lower())
+    return name
 
 
 def _add_model(space: Any, model: Model) -> None:
@@ -68,33 +96,55 @@ def _add_model(space: Any, model: Model) -> None:
     roof = surface.roof[surface.patch_of_face]
     for corners in surface.vertices[surface.faces[roof]].tolist():
         space.add_3dface(corners, dxfattribs={"layer": "PCMC-PANEL"})
-    for curve in model.curves:
-        space.add_polyline3d(curve.points.tolist(), close=curve.closed, dxfattribs={"layer": curve.layer})
-    for line in model.sections:
-        layer = section_layer(surface, line)
-        space.add_polyline3d(line.points.tolist(), close=line.closed, dxfattribs={"layer": layer})
+    lines: list[tuple[str, Any, str]] = [(curve.layer, curve, curve.name) for curve in model.curves]
+    names = [patch.name for patch in surface.patches]
+    lines += [(section_layer(surface, line), line, names[line.patch]) for line in model.sections]
+    for layer, line, name in lines:
+        entity = space.add_polyline3d(line.points.tolist(), close=line.closed, dxfattribs={"layer": layer})
+        entity.set_xdata("PCMC", [(1000, name[:250])])
     height = MODEL_TEXT * surface.size
-    look = {"layer": "PCMC-POINT"}
-    for name, x, y, z in model.points[["point", "x", "y", "z"]].to_numpy().tolist():
-        space.add_point((x, y, z), dxfattribs=look)
-        text = space.add_text(name, height=height, dxfattribs={**look, "style": "PCMC"})
-        text.set_placement((x + 0.3 * height, y + 0.3 * height, z))
+    rows = model.points[["point", "x", "y", "z"]].to_numpy().tolist()
+    labels = [(name, at, "PCMC-POINT") for name, *at in rows]
+    labels += [(name, at.tolist(), "PCMC-SUPPORT") for name, at in model.marks]
+    for name, at, layer in labels:
+        space.add_point(at, dxfattribs={"layer": layer})
+        text = space.add_text(name, height=height, dxfattribs={"layer": layer, "style": "PCMC"})
+        text.set_placement((at[0] + 0.3 * height, at[1] + 0.3 * height, at[2]))
+    if model.flat is not None:
+        low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
+        every = np.concatenate([line.points for line in model.flat.lines]) / model.millimetres
+        place = np.array([high[0] + 0.1 * surface.size, low[1]]) - every.min(axis=0)
+        _add_sheet(space, model.flat, 1.0 / model.millimetres, place)
 
 
-def _add_sheet(layout: Any, sheet: Sheet) -> None:
-    for line in sheet.lines:
-        layout.add_lwpolyline(line.points.tolist(), close=line.closed, dxfattribs={"layer": line.layer})
-    for text in sheet.texts:
-        _add_text(layout, text)
-
-
-def _add_text(layout: Any, text: Text) -> None:
+def _add_sheet(space: Any, sheet: Sheet, scale: float = 1.0, shift: Floats | float = 0.0) -> None:
+    """What is on a sheet, in millimetres, in a layout, or scaled and shifted in the model."""
     from ezdxf.enums import TextEntityAlignment
 
-    align = {"L": "MIDDLE_LEFT", "C": "MIDDLE_CENTER", "R": "MIDDLE_RIGHT"}[text.align]
-    look = {"layer": text.layer, "style": "PCMC", "rotation": text.turn}
-    entity = layout.add_text(text.text, height=text.height, dxfattribs=look)
-    entity.set_placement(text.at, align=TextEntityAlignment[align])
+    for line in sheet.lines:
+        points = (scale * line.points + shift).tolist()
+        space.add_lwpolyline(points, close=line.closed, dxfattribs={"layer": line.layer})
+    for text in sheet.texts:
+        align = {"L": "MIDDLE_LEFT", "C": "MIDDLE_CENTER", "R": "MIDDLE_RIGHT"}[text.align]
+        look = {"layer": text.layer, "style": "PCMC", "rotation": text.turn}
+        entity = space.add_text(text.text, height=scale * text.height, dxfattribs=look)
+        entity.set_placement((scale * np.array(text.at) + shift).tolist(), align=TextEntityAlignment[align])
+    for dimension in sheet.dimensions:
+        _add_dimension(space, dimension)
+
+
+def _add_dimension(layout: Any, dimension: Dimension) -> None:
+    """A dimension that measures in the unit of the roof."""
+    override = {"dimlfac": dimension.unit, "dimdec": dimension.decimals}
+    layout.add_linear_dim(
+        base=[dimension.at, dimension.at],
+        p1=dimension.start.tolist(),
+        p2=dimension.end.tolist(),
+        angle=90.0 * dimension.axis,
+        dimstyle="PCMC",
+        override=override,
+        dxfattribs={"layer": "PCMC-DIM"},
+    ).render()
 
 
 def write_dxf(doc: Any, path: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra
-from .sheet import LAYERS, Sheet
+from .sheet import LAYERS, Line, Sheet
 
 INCH = 25.4  # mm
 POINT = INCH / 72.0  # mm
@@ -37,11 +37,12 @@ def write_pdf(sheets: Sequence[Sheet], path: Path) -> None:
             FigureCanvasPdf(figure)
             axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, width), ylim=(0.0, height))
             axes.set_axis_off()
-            for layer, lines in _by_layer(sheet).items():
+            lines_of_sheet, texts = sheet.drawn()
+            for layer, lines in _by_layer(lines_of_sheet).items():
                 look = LAYERS[layer]
                 points = look.weight / 100.0 / POINT
                 axes.add_collection(LineCollection(lines, colors=COLORS[look.color], linewidths=points))
-            for text in sheet.texts:
+            for text in texts:
                 figure.add_artist(
                     Text(
                         *text.at,
@@ -59,10 +60,10 @@ def write_pdf(sheets: Sequence[Sheet], path: Path) -> None:
             pages.savefig(figure)
 
 
-def _by_layer(sheet: Sheet) -> dict[str, list[Floats]]:
+def _by_layer(drawn: Sequence[Line]) -> dict[str, list[Floats]]:
     """The lines of each layer, closed ones with their first point at the end too."""
     lines = defaultdict(list)
-    for line in sheet.lines:
+    for line in drawn:
         points = np.append(line.points, line.points[:1], axis=0) if line.closed else line.points
         lines[line.layer].append(points)
     return lines

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -18,7 +19,7 @@ SCALES = (1, 2, 5, 10, 20, 25, 50, 100, 200, 250, 500, 1000, 2000, 5000)
 
 MARGIN, STRIP = 10.0, 16.0  # mm: around the frame; height of the title strip within it
 GAP = 8.0  # mm between views
-SMALL, LARGE = 2.5, 3.5  # mm: heights of letters
+TINY, SMALL, LARGE = 1.8, 2.5, 3.5  # mm: heights of letters
 WIDTH = 0.72  # of a letter, in its height, for what must fit
 
 
@@ -39,6 +40,8 @@ LAYERS = {
     "PCMC-SECTION": Layer(5, 50, "sections of the roof"),
     "PCMC-SECTION-WALL": Layer(3, 35, "sections of walls"),
     "PCMC-POINT": Layer(6, 18, "setting-out points"),
+    "PCMC-SUPPORT": Layer(5, 50, "masts and other supports of one point"),
+    "PCMC-DIM": Layer(7, 18, "dimensions and levels"),
     "PCMC-TEXT": Layer(7, 18, "texts, numbers and tables"),
     "PCMC-FRAME": Layer(7, 35, "frames of sheets"),
     "PCMC-CUT": Layer(7, 25, "outlines of panels at true size"),
@@ -66,6 +69,43 @@ class Text(NamedTuple):
     turn: float = 0.0
 
 
+class Dimension(NamedTuple):
+    """The distance of two points (2,) mm along an axis, 0 or 1, shown where the other coordinate is ``at``.
+
+    ``unit`` is the length that 1 mm stands for, in the unit of the roof.
+
+    >>> Dimension(np.array([5.0, 9.0]), np.array([45.0, 7.0]), 0, 2.0, 0.1, 2).text
+    '4.00'
+    """
+
+    start: Floats
+    end: Floats
+    axis: int
+    at: float
+    unit: float
+    decimals: int
+
+    @property
+    def text(self) -> str:
+        """The distance as it is written."""
+        return f"{abs(self.end - self.start)[self.axis] * self.unit:.{self.decimals}f}"
+
+    def drawn(self) -> tuple[list[Line], Text]:
+        """Its lines and its text, for files that have no dimensions of their own."""
+        ends, other = np.array([self.start, self.end]), 1 - self.axis
+        feet, beside = ends.copy(), np.zeros(2)
+        feet[:, other] = self.at
+        away = np.sign(feet - ends)
+        lines = [feet, *np.stack([ends + away, feet + away], axis=1), *(feet[:, None] + TICK)]
+        beside[other] = SMALL if self.axis == 0 else -SMALL
+        x, y = map(float, feet.mean(axis=0) + 0.8 * beside)
+        text = Text((x, y), self.text, layer="PCMC-DIM", align="C", turn=90.0 * self.axis)
+        return [Line(line, "PCMC-DIM") for line in lines], text
+
+
+TICK = np.array([[-0.8, -0.8], [0.8, 0.8]])  # mm
+
+
 @dataclass
 class Sheet:
     """A sheet being drawn: what is on it, in millimetres."""
@@ -75,11 +115,56 @@ class Sheet:
     scale: str = ""
     lines: list[Line] = field(default_factory=list)
     texts: list[Text] = field(default_factory=list)
+    dimensions: list[Dimension] = field(default_factory=list)
 
     @property
     def size(self) -> tuple[float, float]:
         """Width and height, mm."""
         return FORMATS[self.format]
+
+    def drawn(self) -> tuple[list[Line], list[Text]]:
+        """All lines and texts, those of dimensions too."""
+        parts = [dimension.drawn() for dimension in self.dimensions]
+        return self.lines + [line for lines, _ in parts for line in lines], self.texts + [t for _, t in parts]
+
+
+def apart(labels: Sequence[Text], others: Sequence[Text], rings: int = 6, needed: bool = True) -> list[Text]:
+    """Labels at or beside their places, so that none covers another text.
+
+    One without room within ``rings`` steps of its height stays at its place if it is needed, else it is left
+    out.
+    """
+    steps = np.indices((2 * rings + 1, 2 * rings + 1)).reshape(2, -1).T - rings
+    steps = steps[np.hypot(*steps.T).argsort(kind="stable")]
+    boxes, count, placed = np.empty((len(others) + len(labels), 2, 2)), len(others), []
+    boxes[:count] = np.array([box(text) for text in others]).reshape(-1, 2, 2)
+    for label in labels:
+        tries = box(label) + 0.8 * label.height * steps[:, None]
+        low, high = tries.min(axis=(0, 1)), tries.max(axis=(0, 1))
+        taken = boxes[:count]
+        near = taken[((low < taken[:, 1]) & (taken[:, 0] < high)).all(axis=1)]
+        covers = ((tries[:, None, 0] < near[:, 1]) & (near[:, 0] < tries[:, None, 1])).all(axis=2).any(axis=1)
+        if needed or not covers.all():
+            k = int(covers.argmin())
+            x, y = (label.at + tries[k, 0] - box(label)[0]).tolist()
+            placed.append(label._replace(at=(x, y)))
+            boxes[count], count = tries[k], count + 1
+    return placed
+
+
+def width(text: str, height: float = SMALL) -> float:
+    """The width of a text, mm, rather too large."""
+    return WIDTH * len(text) * height
+
+
+def box(text: Text) -> Floats:
+    """(2,2) lower and upper corner of what a text covers, with a little room around it."""
+    wide = width(text.text, text.height)
+    left = {"L": 0.0, "C": 0.5, "R": 1.0}[text.align] * wide
+    corners = np.array([[-left - 0.3, -0.7 * text.height], [wide - left + 0.3, 0.7 * text.height]])
+    if text.turn == 90.0:
+        corners = np.array([[corners[0, 1], corners[0, 0]], [corners[1, 1], corners[1, 0]]])
+    return np.asarray(text.at + corners)
 
 
 def room(name: str) -> tuple[float, float]:

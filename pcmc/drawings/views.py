@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,37 +14,61 @@ from ..base.errors import OptionError
 from ..surface import Surface
 from ..surface.curve_kinds import curves_by_kind
 from ..surface.geometry import area_vectors
-from .sections import Polyline
-from .sheet import FORMATS, SCALES, SMALL, Line, Sheet, Text, corner, fits, room
+from ..surface.sections import Polyline
+from .sheet import (
+    FORMATS,
+    SCALES,
+    SMALL,
+    TINY,
+    Dimension,
+    Line,
+    Sheet,
+    Text,
+    apart,
+    corner,
+    fits,
+    room,
+    width,
+)
 
-CAPTION = 13.0  # mm below a view, for its size and its title
-BESIDE = np.array([CAPTION, CAPTION + 3.0])  # mm to the left of a view and below it
+ROW = 6.0  # mm between a view and its dimensions, and between their rows
+BEFORE = np.array([2 * ROW + 5.0, 2 * ROW + 10.0])  # mm left of a view and below it: dimensions, title
+BEHIND = np.array([24.0, 4.0])  # mm right of a view and above it: levels
+CORNER = 0.87  # cosine of the turn from which a point of an outline is a corner
 ELEVATIONS = {  # to the right, and towards the viewer
-    "front, seen along y": ((1.0, 0.0), (0.0, -1.0)),
-    "right, seen against x": ((0.0, 1.0), (1.0, 0.0)),
-    "back, seen against y": ((-1.0, 0.0), (0.0, 1.0)),
-    "left, seen along x": ((0.0, -1.0), (-1.0, 0.0)),
+    "south, seen along y": ((1.0, 0.0), (0.0, -1.0)),
+    "east, seen against x": ((0.0, 1.0), (1.0, 0.0)),
+    "north, seen against y": ((-1.0, 0.0), (0.0, 1.0)),
+    "west, seen along x": ((0.0, -1.0), (-1.0, 0.0)),
 }
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A ridge, a rim, a wall line or a cable's edge: its layer, points (k,3), and whether it is closed."""
+    """A ridge, a rim, a wall line or a cable: its layer, points (k,3), whether it is closed, and its name."""
 
     layer: str
     points: Floats
     closed: bool
     vertices: tuple[int, ...] = field(repr=False)
+    name: str = ""
 
 
 @dataclass
 class View:
-    """What is drawn on two axes, in the surface's unit: lines by layer, and texts at points."""
+    """What is drawn on two axes, in the surface's unit: lines by layer, and texts at points.
+
+    Texts stand beside their point in a direction (2,). ``points`` are marked on their layer, with names.
+    ``stations`` are the places along each axis between which the view is dimensioned, ``levels`` the heights
+    that are marked beside it.
+    """
 
     title: str
     lines: list[Line] = field(default_factory=list)
-    texts: list[tuple[Floats, str]] = field(default_factory=list)
-    points: list[tuple[Floats, str]] = field(default_factory=list)
+    texts: list[tuple[Floats, str, Floats]] = field(default_factory=list)
+    points: list[tuple[Floats, str, str]] = field(default_factory=list)
+    stations: tuple[Floats, Floats] = (np.empty(0), np.empty(0))
+    levels: Floats = field(default_factory=lambda: np.empty(0))
 
     @property
     def box(self) -> tuple[Floats, Floats]:
@@ -54,27 +79,55 @@ class View:
 
 def model_curves(surface: Surface) -> list[Curve]:
     """Ridges, where two sheets of the roof meet; rims, where one ends; lines of walls alone; cables."""
-    curves = [
-        Curve(f"PCMC-{kind}", surface.vertices[curve.vertices], curve.closed, tuple(map(int, curve.vertices)))
+    names = [patch.name for patch in surface.patches]
+    found = [
+        (f"PCMC-{kind}", curve, " | ".join(dict.fromkeys(names[k] for k in curve.sheets)))
         for kind, curve in curves_by_kind(surface)
     ]
-    edges = [edge for cable in surface.cables for edge in cable.edges]  # cables may branch
-    return curves + [Curve("PCMC-CABLE", surface.vertices[e], False, tuple(map(int, e))) for e in edges]
+    nowhere = np.zeros(surface.n, dtype=bool)
+    for cable in surface.cables:
+        found += [("PCMC-CABLE", c, cable.name) for c in surface.topology.chains(cable.edges, nowhere)]
+    return [
+        Curve(layer, surface.vertices[c.vertices], c.closed, tuple(c.vertices.tolist()), name)
+        for layer, c, name in found
+    ]
 
 
-def plan(surface: Surface, curves: Sequence[Curve], points: Sequence[tuple[str, Floats]]) -> View:
-    """From above: panels, curves, setting-out points, and the overall size."""
-    view = View("plan")
+def outline(curves: Sequence[Curve], axis: Sequence[float]) -> Floats:
+    """Where the corners and ends of rims and wall lines are along an axis (3,), and how far these reach."""
+    places = []
+    for curve in curves:
+        if curve.layer in ("PCMC-RIM", "PCMC-WALL"):
+            P = curve.points
+            before, after = P - np.roll(P, 1, axis=0), np.roll(P, -1, axis=0) - P
+            sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+            sharp = np.einsum("ij,ij->i", before, after) < CORNER * sizes
+            if not curve.closed:
+                sharp[[0, -1]] = True
+            along = P @ np.array(axis)
+            places += [along[sharp], [along.min(), along.max()]]
+    return np.concatenate(places) if places else np.empty(0)
+
+
+def plan(surface: Surface, curves: Sequence[Curve], points: Sequence[tuple[Floats, str, str]]) -> View:
+    """From above: panels, curves with the names of cables, points, and the places of outline and walls."""
+    view = View("plan", points=[(at[:2], name, layer) for at, name, layer in points])
     roof = surface.roof[surface.patch_of_face]
     edges = surface.topology.edges[np.unique(surface.topology.edge_of_face[roof])]
     view.lines += [Line(pair, "PCMC-PANEL") for pair in surface.vertices[edges][:, :, :2]]
     view.lines += [Line(c.points[:, :2], c.layer, c.closed) for c in curves]
-    view.points += [(at[:2], name) for name, at in points]
+    middle = 0.5 * np.sum(view.box, axis=0)
+    for curve in curves:
+        if curve.layer == "PCMC-CABLE":
+            at = curve.points[len(curve.points) // 2, :2]
+            away = at - middle
+            view.texts.append((at, curve.name, away / (np.linalg.norm(away) or 1.0)))
+    view.stations = outline(curves, (1.0, 0.0, 0.0)), outline(curves, (0.0, 1.0, 0.0))
     return view
 
 
 def elevations(surface: Surface, curves: Sequence[Curve]) -> list[View]:
-    """From four sides: curves, and the edges of the panels that face the viewer."""
+    """From four sides: curves, the edges of the panels that face the viewer, and levels."""
     topo, X = surface.topology, surface.vertices
     roof = surface.roof[surface.patch_of_face]
     normal = area_vectors(X[surface.faces])
@@ -83,7 +136,9 @@ def elevations(surface: Surface, curves: Sequence[Curve]) -> list[View]:
         axes = np.array([[*right, 0.0], [0.0, 0.0, 1.0]])
         facing = roof & (normal[:, :2] @ np.array(towards) > 0.0)
         edges = topo.edges[np.unique(topo.edge_of_face[facing])]
-        view = View(title)
+        along, heights = (np.sort(outline(curves, axis)) for axis in axes)
+        view = View(title, stations=(along[[0, -1]] if len(along) else along, np.empty(0)))
+        view.levels = np.append(heights, [X[:, 2].min(), X[:, 2].max()])
         view.lines += [Line(pair, "PCMC-PANEL") for pair in X[edges] @ axes.T]
         view.lines += [Line(c.points @ axes.T, c.layer, c.closed) for c in curves]
         views.append(view)
@@ -92,21 +147,30 @@ def elevations(surface: Surface, curves: Sequence[Curve]) -> list[View]:
 
 def contours(surface: Surface, curves: Sequence[Curve], cuts: Sequence[tuple[float, list[Polyline]]]) -> View:
     """Sections at heights, seen from above, each with its height."""
-    view = View("sections at heights")
-    view.lines += [Line(c.points[:, :2], c.layer, c.closed) for c in curves]
+    view = plan(surface, curves, ())
+    view.title, view.lines = (
+        "sections at heights",
+        [line for line in view.lines if line.layer != "PCMC-PANEL"],
+    )
     for height, lines in cuts:
         view.lines += [Line(one.points[:, :2], section_layer(surface, one), one.closed) for one in lines]
-        longest = max(lines, key=lambda one: len(one.points))
-        view.texts.append((longest.points[len(longest.points) // 2, :2], f"z = {height:.6g}"))
+        top = max((one.points for one in lines), key=lambda points: float(points[:, 1].max()))
+        view.texts.append((top[top[:, 1].argmax(), :2], f"z = {height:.6g}", np.array([0.0, 1.0])))
     return view
 
 
 def profile(surface: Surface, name: str, start: Floats, along: Floats, lines: list[Polyline]) -> View:
-    """A section along a line in the plan: distance from the line's first point, and height."""
-    view = View(name)
+    """A section along a line in the plan: distance from the line's first point, and height.
+
+    Its stations and levels are the ends of its lines, where the roof ends or meets a wall, and its top.
+    """
+    view, ends = View(name), [np.empty((0, 2))]
     for one in lines:
         flat = np.stack([(one.points[:, :2] - start) @ along, one.points[:, 2]], axis=1)
         view.lines.append(Line(flat, section_layer(surface, one), one.closed))
+        ends.append(flat[[flat[:, 0].argmin(), flat[:, 0].argmax()] if one.closed else [0, -1]])
+    stations, levels = np.concatenate(ends).T
+    view.stations, view.levels = (stations, np.empty(0)), np.append(levels, [end[1] for end in view.box])
     return view
 
 
@@ -115,7 +179,9 @@ def section_layer(surface: Surface, line: Polyline) -> str:
     return "PCMC-SECTION" if surface.roof[line.patch] else "PCMC-SECTION-WALL"
 
 
-def placed(views: Sequence[View], title: str, name: str, millimetres: float, scale: int | None) -> Sheet:
+def placed(
+    views: Sequence[View], title: str, name: str, millimetres: float, scale: int | None, decimals: int = 3
+) -> Sheet:
     """The views on one sheet, in a grid, at one scale: the one given, or the largest that fits.
 
     Raises
@@ -128,17 +194,17 @@ def placed(views: Sequence[View], title: str, name: str, millimetres: float, sca
     rows = math.ceil(len(views) / columns)
     sheet = Sheet(title, name, f"1:{scale}")
     factor = millimetres / scale
-    cell = extent * factor + BESIDE
-    origin = corner() + 0.5 * (np.array(room(name)) - np.array([columns, rows]) * cell) + BESIDE
+    cell = extent * factor + BEFORE + BEHIND
+    origin = corner() + 0.5 * (np.array(room(name)) - np.array([columns, rows]) * cell) + BEFORE
     for k, (view, (low, high)) in enumerate(zip(views, boxes, strict=True)):
         place = origin + np.array([k % columns, rows - 1 - k // columns]) * cell
         spare = np.array([0.5 * factor * (extent - (high - low))[0], 0.0])
         shift = place + spare - factor * low
-        _add(sheet, view, factor, shift)
-        _add_size(sheet, factor * low + shift, factor * high + shift, high - low)
+        _add_dimensions(sheet, view, factor, shift, decimals)
         if len(views) > 1:
-            at = float(0.5 * factor * (low + high)[0] + shift[0]), float(place[1]) - CAPTION + SMALL
+            at = float(0.5 * factor * (low + high)[0] + shift[0]), float(place[1] - BEFORE[1]) + SMALL
             sheet.texts.append(Text(at, view.title, align="C"))
+        _add(sheet, view, factor, shift)
     return sheet
 
 
@@ -147,10 +213,10 @@ def _scale(size: Floats, count: int, name: str, scale: int | None, title: str) -
     grids = [(columns, math.ceil(count / columns)) for columns in range(1, count + 1)]
     for one in SCALES if scale is None else (scale,):
         for grid in grids:
-            if fits(np.array(grid) * (size / one + BESIDE), name):
+            if fits(np.array(grid) * (size / one + BEFORE + BEHIND), name):
                 return one, grid[0]
     one = scale or SCALES[-1]
-    needed = [np.array(grid) * (size / one + BESIDE) for grid in grids]
+    needed = [np.array(grid) * (size / one + BEFORE + BEHIND) for grid in grids]
     better = next((f for f in FORMATS if any(fits(each, f) for each in needed)), None)
     least = min(needed, key=lambda each: float(each.max()))
     text = (
@@ -161,33 +227,64 @@ def _scale(size: Floats, count: int, name: str, scale: int | None, title: str) -
 
 
 def _add(sheet: Sheet, view: View, factor: float, shift: Floats) -> None:
+    """Lines, marked points, and the names that find room: those of supports and cables first."""
     sheet.lines += [
         Line(factor * line.points + shift, line.layer, line.closed)
         for line in sorted(view.lines, key=lambda line: line.layer != "PCMC-PANEL")
     ]
-    for at, text in view.texts:
-        x, y = factor * at + shift
-        sheet.texts.append(Text((float(x), float(y) + SMALL), text, align="C"))
-    for at, text in view.points:
-        x, y = map(float, factor * at + shift)
-        for step in ((0.8, 0.8), (0.8, -0.8)):
-            cross = np.array([[x - step[0], y - step[1]], [x + step[0], y + step[1]]])
-            sheet.lines.append(Line(cross, "PCMC-POINT"))
-        sheet.texts.append(Text((x + 1.0, y + 1.2), text, 1.3, "PCMC-POINT"))
+    small: list[Text] = []
+    large: list[Text] = []
+    marks: list[Text] = []
+    for at, text, way in view.texts:
+        x, y = (factor * at + shift + way * [0.5 * width(text) + 1.0, SMALL]).tolist()
+        large.append(Text((x, y), text, align="C"))
+    for at, name, layer in view.points:
+        place = factor * at + shift
+        half, height = (0.8, TINY) if layer == "PCMC-POINT" else (1.5, SMALL)
+        sheet.lines += [Line(place + half * np.array([[-1.0, s], [1.0, -s]]), layer) for s in (-1.0, 1.0)]
+        if layer != "PCMC-POINT":
+            square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+            sheet.lines.append(Line(place + half * square, layer, True))
+            marks.append(Text((float(place[0]), float(place[1])), "##", align="C"))  # kept free of names
+        x, y = (place + np.array([half + 0.3, half + 0.6 * height])).tolist()
+        (small if layer == "PCMC-POINT" else large).append(Text((x, y), name, height, layer))
+    sheet.texts += apart(large, sheet.drawn()[1])
+    sheet.texts += apart(small, [*sheet.drawn()[1], *marks], rings=2, needed=False)
 
 
-def _add_size(sheet: Sheet, low: Floats, high: Floats, size: Floats) -> None:
-    """The overall size along both axes, below and to the left."""
-    for axis in (0, 1):
-        if size[axis] <= 0.0:
-            continue
-        a, b = low - 4.0, low - 4.0
-        a[axis], b[axis] = low[axis], high[axis]
-        tick = np.array([1.0, 1.0])
+def _add_dimensions(sheet: Sheet, view: View, factor: float, shift: Floats, decimals: int) -> None:
+    """Distances between stations, and over all, below and left of a view; levels at its right."""
+    low, high = (factor * end + shift for end in view.box)
+    for axis, stations in enumerate(view.stations):
+        places = np.unique((factor * stations + shift[axis]).round(6))
+        chosen = _spaced(places, width(f"{(places[-1:] - places[:1]).sum() / factor:.{decimals}f}") + 2.0)
+        chains = [chosen, chosen[[0, -1]]] if len(chosen) > 2 else [chosen]
+        for row, chain in enumerate(chains, start=1):
+            feet = np.tile(low, (len(chain), 1))
+            feet[:, axis] = chain
+            at = float(low[1 - axis] - row * ROW)
+            sheet.dimensions += [Dimension(a, b, axis, at, 1.0 / factor, decimals) for a, b in pairwise(feet)]
+    places = np.unique((factor * view.levels + shift[1]).round(6))
+    for y in _spaced(places, 2.0 * SMALL).tolist():
+        x, z = float(high[0]) + 3.0, (y - shift[1]) / factor
+        mark = np.array([[x, y], [x + 1.2, y + 2.0], [x - 1.2, y + 2.0]])
         sheet.lines += [
-            Line(np.stack(pair), "PCMC-TEXT") for pair in ((a, b), (a - tick, a + tick), (b - tick, b + tick))
+            Line(mark, "PCMC-DIM", True),
+            Line(np.array([[x - 2.0, y], [x + 18.0, y]]), "PCMC-DIM"),
         ]
-        middle = 0.5 * (a + b)
-        middle[1 - axis] -= SMALL
-        at = (float(middle[0]), float(middle[1]))
-        sheet.texts.append(Text(at, f"{size[axis]:.6g}", align="C", turn=90.0 * axis))
+        text = f"{z:+.{decimals}f}"
+        text = text if float(text) else f"±{abs(z):.{decimals}f}"
+        sheet.texts.append(Text((x + 2.0, y + 0.7 * SMALL), text, layer="PCMC-DIM"))
+
+
+def _spaced(places: Floats, least: float) -> Floats:
+    """Those of ascending numbers that are ``least`` apart: the last, the first if there is room, and others.
+
+    >>> _spaced(np.array([0.0, 1.0, 4.0, 8.5, 10.0]), 2.0).tolist()
+    [0.0, 4.0, 10.0]
+    """
+    chosen: list[float] = []
+    for place in places[:-1].tolist():
+        if places[-1] - place >= least and (not chosen or place - chosen[-1] >= least):
+            chosen.append(place)
+    return np.array([*chosen, *places[-1:]])

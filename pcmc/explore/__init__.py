@@ -71,7 +71,7 @@ def start(
     """Start the server in the background; the Explorer returned has ``.url`` and ``.close()``."""
     from .roof import Roof
 
-    return start_roof(Roof(surface, title, as_units(units)), host, port)
+    return start_roof(Roof.of(surface, title, as_units(units)), host, port)
 
 
 def start_roof(
@@ -110,4 +110,4 @@ def show(surface: Surface, height: int = 680, title: str = "", units: Units | st
     from .roof import Roof
     from .server import View
 
-    return View(Roof(surface, title, as_units(units)), height)
+    return View(Roof.of(surface, title, as_units(units)), height)

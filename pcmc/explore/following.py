@@ -7,7 +7,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from ..base import validate
+from ..base.arrays import Floats
 from ..certificate import Certificate, Verdict
+from ..project.values import single_points, values_of
 from ..solvers import solve
 from ..solvers.result import Progress, Result
 from ..surface import Surface
@@ -16,7 +21,7 @@ from ..surface.wall_pressures import with_pressures
 
 AT_REST = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.SADDLE)
 SMALLEST_STEP = 1.0 / 64.0  # part of the way; settling takes no smaller step
-Values = Mapping[str, Mapping[str, float]]
+Values = Mapping[str, Mapping[str, Any]]  # numbers by kind and name; and points, each [x, y, z]
 
 
 def until(stop: Callable[[], bool], end: float) -> Callable[[], bool]:
@@ -54,7 +59,7 @@ def reach(
     failed = None
     for _ in range(attempts):
         ahead = min(1.0, done + step)
-        aim = between(start, asked, ahead).moved(here.vertices)
+        aim = between(start, asked, ahead).moved(_with_points(here, start, asked, ahead))
         result = attempt(aim, stop, target="stationary", **options)
         ended = result.certify(modes=0)
         if ended.verdict in AT_REST:
@@ -69,6 +74,21 @@ def reach(
     return Reached(here, certificate, failed)
 
 
+def _with_points(here: Surface, start: Surface, asked: Surface, part: float) -> Floats:
+    """(n,3) the vertices of ``here``, its single points moved a part of the way with what is near them."""
+    points, X = single_points(start), here.vertices
+    there = (1.0 - part) * start.vertices[points] + part * asked.vertices[points]
+    for point, step in zip(points.tolist(), there - X[points], strict=True):
+        if step.any():
+            away = np.linalg.norm(X - here.vertices[point], axis=1)
+            others = away[here.held & (away > 0.0)]
+            near = np.clip(1.0 - away / (others.min() if len(others) else away.max()), 0.0, 1.0)
+            near[here.held] = 0.0
+            near[point] = 1.0
+            X = X + near[:, None] ** 2 * step
+    return X
+
+
 def between(start: Surface, end: Surface, part: float) -> Surface:
     """``start`` with its values moved a part of the way to those of ``end``."""
     here, there = all_values(start), all_values(end)
@@ -81,4 +101,9 @@ def between(start: Surface, end: Surface, part: float) -> Surface:
 def wanted(surface: Surface, values: Values) -> Surface:
     """The surface with other values, kinds as in ``values_of``; walls follow the pressures of their rooms."""
     given = {kind: dict(values.get(kind) or {}) for kind in KINDS}
-    return with_pressures(surface, **given)
+    changed, points = with_pressures(surface, **given), values.get("points") or {}
+    known = dict(zip(values_of(surface)["points"], single_points(surface).tolist(), strict=True))
+    X = surface.vertices.copy()
+    for name, place in points.items():
+        X[known[validate.choice("point", name, tuple(known))]] = place
+    return changed if np.array_equal(X, surface.vertices) else changed.moved(X)

@@ -13,11 +13,11 @@ from ..base.arrays import Bools, Floats
 from ..base.errors import SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
-from ..certificate.reactions import reactions, reactions_per_length
-from ..contact.pinching import standing_part
+from ..certificate.reactions import support_forces
 from ..design import Parameter, Target
+from ..design.quantities import MEASURES
+from ..design.targets import NAMED
 from ..energy.curvature import curvature_error, mean_curvature
-from ..energy.functional import patch_areas
 from ..panels.families import families
 from ..project.values import values_of
 from ..quantities import dimension_of
@@ -54,12 +54,16 @@ def outline(surface: Surface) -> tuple[dict[str, Any], Arrays]:
             )
         ],
         "controls": groups,
-        "whole": whole is not None,
+        "whole": 1 if whole is None else round(whole.surface.m / piece.m),
         "mesh": mesh_key(piece, centre(piece)),
         "vertices": surface.n,
         "triangles": surface.m,
         "size": surface.size,
         "up": surface.plane.normal,
+        "origin": centre(piece).tolist(),
+        "axes": surface.plane.axes.tolist(),
+        "foot": surface.plane.point,
+        "mirrors": [[p.point, p.normal] for p, _ in piece.on_planes if p.mirror],
         "ground": float(surface.plane.height(centre(surface))),
     }
     curves = topo.curve_edge | on_cables(surface)
@@ -85,7 +89,7 @@ def control_groups(surface: Surface, values: dict[str, dict[str, float]]) -> lis
     for number, (patch, wall) in enumerate(zip(surface.patches, surface.walls.tolist(), strict=True)):
         kinds = [kind for kind in ("tensions", "pressures", "snows", "weights") if patch.name in values[kind]]
         groups.append({"name": patch.name, "patch": number, "wall": wall, "kinds": kinds})
-    for kind in ("cables", "volumes"):
+    for kind in ("cables", "volumes", "points"):
         groups += [{"name": name, "patch": None, "wall": False, "kinds": [kind]} for name in values[kind]]
     return groups
 
@@ -131,12 +135,13 @@ def fields(state: State, origin: Floats) -> Arrays:
     """Vertices relative to the origin, and the values that colours may show."""
     surface, certificate, whole = state.surface, state.certificate, whole_of(state.surface)
     drawn = surface if whole is None else whole.surface
-    forces = certificate.reactions if whole is None else reactions(standing_part(drawn).surface)
+    acting = support_forces(drawn, certificate.reactions if whole is None else None)
     arrays: Arrays = {
         "vertices": drawn.vertices - origin,
         "curvature": mean_curvature(drawn, "variational"),
         "error": curvature_error(drawn, "cotangent"),
-        "reactions": reactions_per_length(drawn, forces),
+        "reactions": acting.per_length,
+        "points": acting.points,
     }
     if len(certificate.modes) and whole is None:
         arrays["mode"] = certificate.modes[0] / (np.abs(certificate.modes[0]).max() or 1.0)
@@ -166,7 +171,25 @@ def variant_data(variant: Variant) -> dict[str, Any]:
     """A variant for the page's table."""
     verdict = variant.certificate.verdict
     word = verdict.value.partition(": ")[0]
-    return {"name": variant.name, "verdict": verdict.name.lower(), "word": word, "measures": variant.measures}
+    return {"name": variant.name, "verdict": verdict.name.lower(), "word": word, "figures": variant.figures}
+
+
+def target_choices(surface: Surface) -> list[dict[str, Any]]:
+    """The quantities that targets may have on a surface: the names of what each may be of, and "" for all."""
+    roof = surface.roof.tolist()
+    names = {
+        "patch": [p.name for p, kept in zip(surface.patches, roof, strict=True) if kept],
+        "wall": [p.name for p, kept in zip(surface.patches, roof, strict=True) if not kept],
+        "cable": [cable.name for cable in surface.cables],
+        "room": [room.name for room in surface.rooms],
+    }
+    choices = []
+    for quantity in MEASURES:
+        owner = NAMED.get(quantity, "wall" if quantity == "lean" else "patch")
+        if names[owner] and quantity != "height":
+            of = names[owner] if quantity in NAMED else ["", *names[owner]]
+            choices.append({"quantity": quantity, "of": of, "dimension": dimension_of(quantity)})
+    return choices
 
 
 def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[str, Any]:
@@ -177,17 +200,11 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
     }
 
 
-def findings(surface: Surface, certificate: Certificate) -> dict[str, Any]:
-    """Numbers of the surface and its certificate, for the page's table."""
-    height = surface.plane.height(surface.vertices)
-    roof = surface.roof
-    return {
-        **certificate.numbers(),
-        "height": float(height.max()),
-        "area": float(patch_areas(surface)[roof].sum()),
-        "mirrored": list(certificate.symmetric_in),
-        "rooms": certificate.rooms.to_dict(orient="records"),
-    }
+def findings(certificate: Certificate) -> dict[str, Any]:
+    """Numbers and tables of a certificate, for the page."""
+    tables = {"rooms": certificate.rooms, "supports": certificate.supports, "balance": certificate.balance}
+    records = {name: table.to_dict(orient="records") for name, table in tables.items()}
+    return {**certificate.numbers(), "mirrored": list(certificate.symmetric_in), **records}
 
 
 def mesh_findings(check: MeshCheck, units: Units = NO_UNITS) -> dict[str, Any]:

@@ -31,15 +31,22 @@ def session_name(asked: dict[str, Any]) -> str | None:
     return name
 
 
-def values(asked: dict[str, Any]) -> dict[str, dict[str, float]]:
-    """Numbers by kind and name."""
-    given: dict[str, dict[str, float]] = {}
-    for kind in KINDS:
+def values(asked: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Numbers, and points, by kind and name."""
+    given: dict[str, dict[str, Any]] = {}
+    for kind in (*KINDS, "points"):
         listed = asked.get(kind, {})
         if not isinstance(listed, dict):
             raise RequestError(f"{kind}: expected numbers by name")
-        given[kind] = {_name(kind, name): _number(f"{kind}: {name!r}", v) for name, v in listed.items()}
+        of = _place if kind == "points" else _number
+        given[kind] = {_name(kind, name): of(f"{kind}: {name!r}", v) for name, v in listed.items()}
     return given
+
+
+def _place(what: str, value: Any) -> list[float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise RequestError(f"{what}: expected a point [x, y, z], found {value!r:.60}")
+    return [_number(what, x) for x in value]
 
 
 def aims(asked: dict[str, Any]) -> tuple[tuple[Target, ...], tuple[Parameter, ...]]:

@@ -12,13 +12,12 @@ from ..base.errors import FileError, MissingExtra, OptionError
 from ..base.files import atomic_write
 from ..design import Parameter, Target
 from ..design.targets import measure
-from ..project import read_data, surface_of
+from ..project import Project, read_data, surface_of
 from ..project.file import project_of
 from ..project.planning import project_text
-from ..project.rises import take_rises
 from ..project.values import differences, with_values
 from ..surface import Surface
-from .roof import Roof, text_of
+from .roof import Roof
 
 HELD = 1e-6  # relative misfit up to which a surface still meets a target
 FIELDS = ("quantity", "of", "value", "at_most", "at_least")
@@ -60,12 +59,13 @@ def save(
     MissingExtra
         Without tomlkit.
     """
-    path = _place(roof, name)
+    project, path = _place(roof, name)
     text, note, left = project_with(roof, surface, aims, path.stem)
     if path.exists():
-        _check_replaced(roof, path, replace)
+        _check_replaced(project, path, replace)
     with atomic_write(path) as temporary:
-        temporary.write_bytes(text.encode())
+        ends = "\r\n" if project.path.exists() and b"\r\n" in project.path.read_bytes() else "\n"
+        temporary.write_text(text, encoding="utf-8", newline=ends)
         try:  # read back: the file, not what it was made from, is what counts
             saved = surface_of(project_of(temporary, read_data(temporary)[1]))
         except FileError as error:
@@ -78,14 +78,14 @@ def save(
     return path, note
 
 
-def _check_replaced(roof: Roof, path: Path, replace: bool) -> None:
+def _check_replaced(project: Project, path: Path, replace: bool) -> None:
     """Refuse to replace a file without leave, one that is no project, and one that was changed."""
     problem = ""
     if not replace:
         problem = "is there already; check that it may be replaced, or give another name"
-    elif roof.path is not None and path.resolve() == roof.path.resolve():
+    elif path.resolve() == project.path.resolve():
         problem = "was changed since the page read it; save under another name"
-        problem = problem if text_of(path) != roof.text else ""
+        problem = problem if path.read_text(encoding="utf-8-sig") != project.text else ""
     else:
         try:
             read_data(path)
@@ -95,19 +95,19 @@ def _check_replaced(roof: Roof, path: Path, replace: bool) -> None:
         raise FileError(f"{path.name} {problem}", what="name", found=path.name)
 
 
-def _place(roof: Roof, name: str) -> Path:
-    """The path of a file beside the roof's; FileError for one that is elsewhere."""
-    if roof.path is None or not roof.is_project:
+def _place(roof: Roof, name: str) -> tuple[Project, Path]:
+    """The roof's project, and the path of a file beside its; FileError for one that is elsewhere."""
+    if roof.project is None:
         raise FileError("only a project or a drawing can be saved as a project; use Export", what="name")
     name = name if name.lower().endswith(".toml") else f"{name}.toml"
-    folder = roof.path.parent.resolve()
+    folder = roof.project.path.parent.resolve()
     plain = re.fullmatch(r"[^/\\:*?\"<>|.][^/\\:*?\"<>|]{0,100}", name) and name.isprintable()
     if not plain or (folder / name).resolve().parent != folder:
         text = f"{name!r:.60}: a name without folder is needed, such as variant.toml"
         raise FileError(text, what="name", found=name[:60])
     if (folder / name).exists() and not (folder / name).is_file():
         raise FileError(f"{name} is no file; give another name", what="name", found=name)
-    return roof.path.parent / name
+    return roof.project, roof.project.path.parent / name
 
 
 def project_with(
@@ -123,41 +123,49 @@ def project_with(
         import tomlkit
     except ModuleNotFoundError:
         raise MissingExtra("tomlkit", "cad") from None
-    assert roof.path is not None
-    text = roof.text or project_text(roof.path, refer=True)[0]
+    project = roof.project
+    assert project is not None
+    text = project.text or project_text(project.path, refer=True)[0]
     document, data = tomlkit.parse(text), tomllib.loads(text)
-    given, note, dropped = data.get("targets"), "", ""
-    kept: Aims = (roof.targets, roof.vary)
+    given, note, dropped, found = data.get("targets"), "", "", {}
+    kept: Aims = roof.aims
     if aims is not None and aims != kept and _meets(surface, aims[0]):
         kept, points = aims, data["plan"].get("points", {})
         entries = [_target(target, points) for target in aims[0]]
-        data["targets"] = {"meet": entries, "vary": [_parameter(p) for p in aims[1]]}
+        found = {"meet": entries, "vary": [_parameter(p) for p in aims[1]]}
+        data.pop("targets", None)  # until a rise that these replace is a tension
         note = f"with its targets: {', '.join(t.label for t in aims[0])}"
-    elif not _meets(surface, roof.targets):
+    elif not _meets(surface, roof.aims[0]):
         kept = (), ()
-        labels = ", ".join(t.label for t in roof.targets if not _meets(surface, (t,)))
+        labels = ", ".join(t.label for t in roof.aims[0] if not _meets(surface, (t,)))
         if given is not None:
             del data["targets"]
             dropped = tomlkit.dumps({"targets": document["targets"]}).strip()
             note = f"its [targets] as comments, as the surface saved does not meet them ({labels})"
-        elif not take_rises(data)[1]:
+        elif project.drawing is not None and len(project.drawing.heights):
             problem = f"the drawing asks for {labels}, and the surface shown does not meet it"
             raise OptionError(f"{problem}; change the drawing", what="targets")
         else:
             note = f"with tensions instead of heights that the surface saved does not have ({labels})"
     sought = {(f"{p.kind}s", name) for p in kept[1] for name in p.names}
-    left = sought - differences(roof.surface, surface).keys() if kept[0] == roof.targets else set()
-    data = with_values(roof.path, data, surface, left)[0]
-    if stem and stem != roof.path.stem:
+    left = sought - differences(roof.surface, surface).keys() if kept == roof.aims else set()
+    data = with_values(project.path, data, surface, left)[0] | ({"targets": found} if found else {})
+    if stem and stem != project.path.stem:
         output = data.get("output", {})
         for key in OUTPUTS & output.keys():
             names = output[key]
             one = isinstance(names, str)
             output[key] = (
-                _renamed(names, roof.path.stem, stem)
+                _renamed(names, project.path.stem, stem)
                 if one
-                else [_renamed(n, roof.path.stem, stem) for n in names]
+                else [_renamed(n, project.path.stem, stem) for n in names]
             )
+    if found and given is None:
+        document["targets"] = tomlkit.table()
+        for key, entries in found.items():
+            document["targets"][key] = tomlkit.array()
+            for entry in entries:
+                document["targets"][key].append(_item(tomlkit, entry))
     _change(tomlkit, document, data)
     if dropped:
         document.add(tomlkit.nl())

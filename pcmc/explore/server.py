@@ -27,7 +27,7 @@ from urllib.parse import parse_qs, quote, urlsplit
 from ..base.errors import FileWarning, MissingExtra, PcmcError, SurfaceError, unknown
 from ..certificate.certificate import Certificate
 from ..io import FORMATS, write
-from ..project import read_data
+from ..project import load
 from ..project.output import fields as written_fields
 from ..project.values import values_of
 from ..surface import Patch, Surface
@@ -44,13 +44,14 @@ from .page_data import (
     mesh_findings,
     mesh_key,
     outline,
+    target_choices,
     unit_texts,
     variant_data,
 )
 from .requests import RequestError
 from .roof import Roof, signature
 from .session import Session, State, solved_start
-from .variants import measures
+from .variants import figures_data
 from .watching import Watch
 
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
@@ -120,9 +121,9 @@ class Explorer:
         with self._saving:
             surface = session.state().surface  # after all that was asked for before
             path, note = saving.save(self.roof, surface, name, replace, session.aims)
-            if self.roof.path is not None and path == self.roof.path:
-                text = path.read_bytes().decode("utf-8-sig")
-                self.roof = dataclasses.replace(self.roof, text=text, data=read_data(path)[1])
+            if path == self.roof.path:
+                outcome = dataclasses.replace(self.roof.outcome, project=load(path))
+                self.roof = dataclasses.replace(self.roof, outcome=outcome)
                 if self.watch is not None:  # the page shows this already
                     self.watch.seen = signature(path)
         return {"saved": path.name, "note": note}
@@ -308,10 +309,11 @@ class _Handler(BaseHTTPRequestHandler):
             "name": roof.name,
             "units": unit_texts(roof.units),
             "note": roof.note,
-            "note_met": roof.met,
-            "project": roof.is_project and explorer.local,
+            "note_met": roof.outcome.result is not None and roof.outcome.good,
+            "project": roof.project is not None and explorer.local,
             "file": roof.path.name if roof.path is not None else "",
-            "aims": aims_data(*(session.aims or (roof.targets, roof.vary))),
+            "quantities": target_choices(session.surface),
+            "aims": aims_data(*(session.aims or roof.aims)),
             "watching": explorer.watch is not None,
             "version": explorer.version,
         }
@@ -360,8 +362,8 @@ class _Handler(BaseHTTPRequestHandler):
                 "values": {"asked": values_of(state.wanted), "shown": values_of(state.surface)},
                 "verdict": _verdict(state.failure or state.certificate),
                 "at_rest": state.failure is None,
-                "findings": findings(state.surface, state.certificate),
-                "measures": measures(state.surface, state.certificate),
+                "findings": findings(state.certificate),
+                "figures": figures_data(state.surface, state.certificate),
                 "undo": state.undo,
                 "redo": state.redo,
                 "message": state.message,

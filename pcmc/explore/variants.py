@@ -1,7 +1,8 @@
-"""Variants of a roof: what is measured of each, and how far one shape is from another."""
+"""Variants of a roof: the figures of each, and how far one shape is from another."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,10 +11,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
+from ..base.errors import OptionError
 from ..certificate import Certificate
-from ..certificate.reactions import support_forces
-from ..energy.volume_below import volumes_below
+from ..design import Target
+from ..design.targets import measure
 from ..panels.distance import distances
+from ..quantities import Figure, figures
 from ..surface import Surface
 from ..surface.geometry import area_vectors, vertex_sums
 
@@ -29,47 +32,20 @@ class Variant:
     certificate: Certificate
 
     @cached_property
-    def measures(self) -> list[dict[str, Any]]:
-        """``measures`` of it."""
-        return measures(self.surface, self.certificate)
+    def figures(self) -> list[dict[str, Any]]:
+        """Its key figures."""
+        return figures_data(self.surface, self.certificate)
 
 
-def measures(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]:
-    """What a designer reads from a surface: of each patch under pressure, cable and room, and of all.
-
-    A row has ``quantity``, ``of`` ("" for all patches under pressure), ``kind`` of its unit, and ``value``.
-    The apex is the greatest height over Π, the reaction the largest force per length of a support.
-    """
-    height, areas = surface.plane.height(surface.vertices), certificate.patches["area"].to_numpy()
-    acting, volumes = support_forces(surface, certificate.reactions), volumes_below(surface)
-    rows: list[dict[str, Any]] = []
-
-    def add(quantity: str, of: str, kind: str, value: float | None) -> None:
-        rows.append({"quantity": quantity, "of": of, "kind": kind, "value": value})
-
-    roofs = np.flatnonzero(surface.roof)
-    for k in roofs.tolist():
-        name, faces = surface.patches[k].name, surface.patch_of_face == k
-        add("apex", name, "length", float(height[surface.faces[faces]].max()))
-        add("area", name, "area", float(areas[k]))
-        add("volume", name, "volume", float(volumes[k]))
-        add("reaction", name, "tension", acting.largest_per_length(k))
-    add("apex", "", "length", float(height.max()))
-    add("area", "", "area", float(areas[roofs].sum()))
-    add("volume", "", "volume", float(certificate.volume))
-    add("reaction", "", "tension", acting.largest_per_length())
-    for patch, of_roof in zip(surface.patches, surface.roof.tolist(), strict=True):
-        add("tension", patch.name, "tension", patch.tension)
-        if of_roof:
-            add("pressure", patch.name, "pressure", patch.pressure)
-        for kind in ("weight", "snow"):
-            if getattr(patch, kind):
-                add(kind, patch.name, "pressure", getattr(patch, kind))
+def figures_data(surface: Surface, certificate: Certificate) -> list[dict[str, Any]]:
+    """The key figures of a surface as plain data: quantity, of, owner, dimension and value of each."""
+    rows = figures(surface, certificate)
     for cable in surface.cables:
-        add("tension", cable.name, "force", cable.tension)
-    for room in surface.rooms:
-        add("volume", room.name, "volume", room.volume)
-    return rows
+        for quantity in ("length", "sag"):
+            with suppress(OptionError):  # a closed cable has no sag
+                value = measure(surface, Target(quantity, cable.name)).value
+                rows.append(Figure(quantity, cable.name, "cable", value))
+    return [row._asdict() | {"dimension": row.dimension} for row in rows]
 
 
 def difference(surface: Surface, other: Surface) -> Floats:

@@ -24,6 +24,7 @@ from . import evolver_forces
 from .expressions import constant, linear
 from .mesh_data import FIXED, FREE, SLIDING, MeshData
 from .polygons import triangulate
+from .text import numbers
 
 ROUNDING = 1e-12  # of the largest pressure: what is left of differences
 
@@ -359,7 +360,7 @@ def _numbers(
 ) -> Floats:
     """Floats from words: numbers, or expressions of numbers and parameters."""
     try:
-        return np.array(words, dtype=np.float64)
+        return numbers(words)
     except ValueError:
         rows = range(len(words)) if row is None else [row]
         values = [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
+import re
 import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -37,6 +38,8 @@ def linear(expression: str, known: Mapping[str, float], fail: Fail) -> Floats:
     [-0.5, -0.5, 0.0, 1.0]
     """
     source = expression.strip().replace("^", "**")
+    if odd := re.search(r"\b\d[\w.]*_\w*", source):  # a number to Python
+        raise fail(f"{odd[0][:60]!r} is not a number")
     if len(source) > LONGEST:
         raise fail(f"{source[:40]!r}... has {len(source)} characters, more than {LONGEST}")
     try:

@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from ..base.arrays import Floats
 from ..base.errors import FileError, unknown
 from ..base.units import Units
 from ..surface import Surface
@@ -49,6 +50,11 @@ class Format:
     def functions(self) -> Any:
         """The module that reads and writes the format."""
         return import_module(f".{self.module}", __package__)
+
+    def carried(self, surface: Surface, scalars: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Those of a surface's scalars that the format holds."""
+        sizes = {"": (), "vertices": (surface.n,), "both": (surface.n, surface.m)}[self.scalars]
+        return {name: values for name, values in scalars.items() if len(values) in sizes}
 
     def lost(self, surface: Surface, units: Units) -> list[str]:
         """What of a surface the format does not hold, in words."""

@@ -14,18 +14,19 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError
+from ..base.validate import parsed
 from ..surface import Surface
 from .mesh_data import FREE, HELD, MeshData, support_of
 from .metadata import parse_metadata
 from .polygons import triangulate
-from .text import escaped, format_rows
+from .text import escaped, format_rows, numbers
 
 MARK = "# pcmc "
 SPECIAL = "\\"
 VERTEX = re.compile(r"^[^\S\n]*v[^\S\n]+(\S+)[^\S\n]+(\S+)[^\S\n]+(\S+)[^\n]*$", re.M)
 FACE = re.compile(r"^[^\S\n]*f[^\S\n]+([^\n]+)$", re.M)
 POINT = re.compile(r"^[^\S\n]*p[^\S\n]+(\d[\d \t]*)$", re.M)
-CORNER = re.compile(r"[-+]?\d{1,18}(/\S*)?")
+CORNER = re.compile(r"[-+]?[0-9]{1,18}(/\S*)?")
 
 
 def write(path: Path, surface: Surface, metadata: str, **_: Any) -> None:
@@ -80,12 +81,12 @@ def _vertices(text: str) -> Floats:
     lines = len(re.findall(r"^[^\S\n]*v(?=\s)", text, re.M))
     try:
         if len(coordinates) == lines:
-            return np.array(coordinates, dtype=np.float64).reshape(-1, 3)
+            return numbers([c for row in coordinates for c in row]).reshape(-1, 3)
     except ValueError:
         pass
     for line in re.finditer(r"^[^\S\n]*v(?=\s)[^\n]*$", text, re.M):
         try:
-            [float(c) for c in line[0].split()[1:4]][2]
+            [parsed(c) for c in line[0].split()[1:4]][2]
         except (ValueError, IndexError):
             raise _error(text, line.start(), "expected three coordinates", line[0]) from None
     raise FileError("its vertices cannot be read", where="vertices")
@@ -107,7 +108,7 @@ def _faces(text: str, part: str, offset: int, n: int, starts: Callable[[], Ints]
     bare = re.sub(r"/[^\s]*", "", "\n".join(faces)).split("\n") if faces else []
     counts = np.array([len(face.split()) for face in bare], dtype=np.int64)
     try:
-        corner = np.array(" ".join(bare).split(), dtype=np.int64)
+        corner = numbers(" ".join(bare).split(), np.int64)
     except (ValueError, OverflowError):
         lines = list(FACE.finditer(part))
         at = next((m for m in lines if not all(map(CORNER.fullmatch, m[1].split()))), lines[0])

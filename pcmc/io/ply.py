@@ -22,6 +22,7 @@ from ..surface import Surface
 from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
 from .polygons import from_polygons
+from .text import numbers
 
 MARK = "comment pcmc "
 RESERVED = ("x", "y", "z", "support", "patch", "vertex_indices")
@@ -109,7 +110,7 @@ def read(path: Path) -> MeshData:
     elements = _elements(header, kinds)
     if form == "ascii":
         try:
-            data, start = np.array(data[start:].split(), dtype=np.float64).tobytes(), 0
+            data, start = numbers(data[start:].decode("ascii").split()).tobytes(), 0
         except ValueError as error:
             raise FileError(f"its body is not all numbers ({error})", where="body") from None
     tables: dict[str, dict[str, Any]] = {}

@@ -71,6 +71,10 @@ def _complete(path: Path) -> None:
     if data[:5] == b"solid" and b"facet" in data[:2000]:
         lines = data.rstrip().split(b"\n")
         last = lines[-1].strip()[:40].decode()
+        if odd := re.search(rb"^\s*vertex[^\n]*_[^\n]*", data, re.M):
+            line = 1 + data[: odd.start()].count(b"\n")
+            text = f"line {line}: expected three coordinates, found {odd[0].decode().strip()[:60]!r}"
+            raise FileError(text, where=line)
         if not last.startswith("endsolid"):
             text = f"line {len(lines)}: cut off before 'endsolid', found {last!r}"
             raise FileError(text, where=len(lines))

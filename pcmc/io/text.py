@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -14,6 +16,13 @@ def format_rows(template: str, *columns: np.ndarray) -> str:
     'v 0.1 3\\nv 2.0 4\\n'
     """
     return "".join(template % row for row in zip(*(column.tolist() for column in columns), strict=True))
+
+
+def numbers(words: Sequence[str], kind: type = np.float64) -> Any:
+    """The numbers in words; ValueError for another word, and for 1_000, a number to Python alone."""
+    if "_" in "".join(words):
+        raise ValueError("no number has the character _")
+    return np.array(words, dtype=kind)
 
 
 def escaped(name: str, special: str) -> str:

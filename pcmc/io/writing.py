@@ -15,8 +15,9 @@ import numpy.typing as npt
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError
 from ..base.files import atomic_write, check_name, writing
+from ..base.names import checked_name
 from ..base.units import Units, length_factor
-from ..base.validate import choice
+from ..base.validate import choice, refuse
 from ..contact.pinching import standing_part
 from ..surface import Surface, expect_surface
 from .flat_walls import encode_walls
@@ -73,10 +74,11 @@ def write(
     check_name(path)
     form = format_of(path, FORMATS)
     surface, certificate = _unpacked(surface, certificate, form)
+    if not isinstance(scalars, Mapping | None):
+        refuse("scalars", scalars, "arrays by name, such as {'height': [...]}")
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
-    sizes = {"": (), "vertices": (surface.n,), "both": (surface.n, surface.m)}[form.scalars]
     units = as_units(units)
-    lost = [name for name, scalar in scalars.items() if len(scalar) not in sizes]
+    lost = [name for name in scalars if name not in form.carried(surface, scalars)]
     if colour:
         choice("colour", colour, [name for name, scalar in scalars.items() if len(scalar) == surface.n])
         if not form.colours:
@@ -133,7 +135,11 @@ def _values(certificate: Any) -> Mapping[str, Any]:
 
 
 def _scalar(surface: Surface, name: str, value: npt.ArrayLike) -> Floats:
-    array = np.asarray(value, dtype=float)
+    checked_name("scalars", name)
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        refuse("scalars", value, "an array of numbers", where=name)
     if array.shape not in ((surface.n,), (surface.m,)):
         shapes = f"({surface.n},) for vertices or ({surface.m},) for faces"
         text = f"scalars[{name!r}]: expected shape {shapes}, found {array.shape}"

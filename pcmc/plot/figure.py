@@ -59,6 +59,7 @@ def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
     ratios : height / width by axes, one of each row. Titles, labels, scales and legends take the
         space that the layout finds for them. The layout is then final: nothing moves any more.
     """
+    _as_written(figure)
     for _ in range(4):
         figure.draw_without_rendering()
         boxes = {axes: axes.get_window_extent() for axes in ratios}
@@ -68,6 +69,14 @@ def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
         figure.set_figheight(round(figure.get_figheight() * DPI + missing) / DPI)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
+
+
+def _as_written(figure: Any) -> None:
+    """Draw the names in a figure as they are, and no mathematics between two signs $; powers at axes stay."""
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        text.set_parse_math("mathdefault" in text.get_text())
 
 
 def style(axes: Any) -> Any:
@@ -105,6 +114,7 @@ def finish(figure: Any, path: str | os.PathLike[str] | None) -> Image:
     The file has no date and no program's name: the same figure gives the same bytes. In SVG and PDF, text
     and curves are lines, and surfaces are pictures in them.
     """
+    _as_written(figure)
     figure.canvas.draw()
     image = np.ascontiguousarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
     if path is None:

@@ -61,11 +61,11 @@ def _tables(data: Any, section: Section) -> Iterator[tuple[Place, Any]]:
             below = [((*p, step), table[step]) for p, table in found if step in table]
             found = [(p, t) for p, value in below for t in (value if isinstance(value, list) else [value])]
     for place, table in found:
-        if not _is_curve(section, table) if isinstance(table, Mapping) else section.name.endswith("NAME"):
+        if not is_curve(section, table) if isinstance(table, Mapping) else section.name.endswith("NAME"):
             yield place, table
 
 
-def _is_curve(section: Section, table: Mapping[str, Any]) -> bool:
+def is_curve(section: Section, table: Mapping[str, Any]) -> bool:
     """Whether the table of a divider or hole is a curve itself."""
     return section.name in OR_CURVE and "curve" not in table and any(name in CURVES for name in table)
 

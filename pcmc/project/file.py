@@ -6,7 +6,7 @@ import os
 import re
 import tomllib
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PureWindowsPath
@@ -242,8 +242,13 @@ def in_file(path: Path, kind: type[PcmcError] | None = None) -> Iterator[None]:
         raise error.in_file(f"{path}: line {line}" if line else path, kind) from None
 
 
-def project_of(path: Path, data: Mapping[str, Any], text: str = "") -> Project:
-    """The project with the given data, which were read from a text. Errors as in ``load``."""
+def project_of(
+    path: Path, data: Mapping[str, Any], text: str = "", redrawn: Callable[[Plan], Plan] | None = None
+) -> Project:
+    """The project with the given data, which were read from a text. Errors as in ``load``.
+
+    ``redrawn`` is applied to the plan, before heights and named points of it become targets.
+    """
     given, mesh = data, None
     with in_file(path, FileError):
         rises = list[Rise]()
@@ -269,7 +274,8 @@ def project_of(path: Path, data: Mapping[str, Any], text: str = "") -> Project:
         documents.check(units, structure)
         plan, targets, vary = None, list["Target"](), list["Parameter"]()
         if mesh is None:
-            plan, targets, vary = with_rises(plan_from(data["plan"]), rises)
+            plan = plan_from(data["plan"])
+            plan, targets, vary = with_rises(plan if redrawn is None else redrawn(plan), rises)
         misfit = None
         if "targets" in data:
             search = _search(data["targets"], plan)

@@ -195,7 +195,7 @@ class Outcome:
         tolerance = documents.tolerance
         return drawing_set(
             surface,
-            self.units.length,
+            self.units,
             sheet=documents.sheet,
             tolerance=tolerance,
             panel_sheets=documents.panel_sheets,
@@ -230,8 +230,9 @@ class Outcome:
 
     def model(self, structure: Any, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""
-        solved = self.shown.surface if self.whole is not None or self.result is None else self.result
-        return cast("StructuralModel", structure.model(solved, anyway, units=self.units))
+        surface, certificate = self.shown
+        model = structure.model(surface, anyway, certificate=certificate, units=self.units)
+        return cast("StructuralModel", model)
 
     @property
     def mesh_check(self) -> MeshCheck | None:

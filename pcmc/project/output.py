@@ -15,7 +15,7 @@ import numpy as np
 from .. import io
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import FileError, FileWarning, LostWarning, PcmcError, unknown
+from ..base.errors import FileError, FileWarning, PcmcError, unknown
 from ..base.files import atomic_writes, check_name, system_error, writing
 from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
@@ -45,11 +45,10 @@ def fields(surface: Surface, certificate: Certificate) -> dict[str, Floats]:
     }
 
 
-def write_all(works: Works, progress: OnStep | None = None, *, losses: bool = False) -> list[Path]:
+def write_all(works: Works, progress: OnStep | None = None) -> list[Path]:
     """Write files, each by its own function of a path; all of them appear together, or none.
 
-    The functions write to temporary files; errors and warnings name the final ones. ``losses`` warns of what
-    a format cannot hold.
+    The functions write to temporary files; errors and warnings name the final ones.
     """
     report = progress or ignore
     paths = [path for path, _ in works]
@@ -58,7 +57,7 @@ def write_all(works: Works, progress: OnStep | None = None, *, losses: bool = Fa
         for (path, write), temporary in zip(works, temporaries, strict=True):
             report(f"writing {path.name}")
             try:
-                with writing(temporary), defer_interrupts(), _final_name_in_warnings(temporary, path, losses):
+                with writing(temporary), defer_interrupts(), _final_name_in_warnings(temporary, path):
                     write(temporary)
             except PcmcError as error:
                 text = str(error).replace(f"{temporary}: ", "")
@@ -67,15 +66,14 @@ def write_all(works: Works, progress: OnStep | None = None, *, losses: bool = Fa
 
 
 @contextmanager
-def _final_name_in_warnings(temporary: Path, path: Path, losses: bool) -> Iterator[None]:
-    """Warnings name the final file. Losses due to the format are shown only if asked for."""
+def _final_name_in_warnings(temporary: Path, path: Path) -> Iterator[None]:
+    """Warnings name the final file."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FileWarning)
         yield
     for warning in caught:
-        if losses or not issubclass(warning.category, LostWarning):
-            text = str(warning.message).replace(str(temporary), str(path))
-            warnings.warn(text, warning.category, stacklevel=4)
+        text = str(warning.message).replace(str(temporary), str(path))
+        warnings.warn(text, warning.category, stacklevel=4)
 
 
 def paint(

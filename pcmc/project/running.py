@@ -134,12 +134,19 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
     """The files of a roof with all that their formats hold, for ``write_all``.
 
     ``colour`` names the scalar that colours vertices. The fields of a surface that was not solved are those
-    of its file.
+    of its file, and are missed where a format lacks them; fields and certificate of another nobody asked for.
     """
     surface, certificate, data = *outcome.shown, outcome.data
     about: dict[str, Any] = {"units": outcome.units, "colour": colour}
-    if outcome.result is not None or outcome.unfold:
-        about |= {"scalars": fields(surface, certificate), "certificate": certificate}
-    elif data is not None:
-        about |= {"scalars": data.scalars, "certificate": data.certificate or None}
-    return [(Path(file), partial(io.write, surface=surface, **about)) for file in files]
+    if outcome.result is None and not outcome.unfold:
+        about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
+        return [(Path(file), partial(io.write, surface=surface, **about)) for file in files]
+    works: Works = []
+    scalars = fields(surface, certificate)
+    for file in map(Path, files):
+        form = io.FORMATS[file.suffix.lower()]
+        coloured = {name: values for name, values in scalars.items() if name == colour}
+        about["scalars"] = form.carried(surface, scalars) | coloured
+        about["certificate"] = certificate if form.certificate else None
+        works.append((file, partial(io.write, surface=surface, **about)))
+    return works

@@ -11,37 +11,46 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError
 from ..plan import Plan
 from ..surface import Surface
+from ..surface.renewed import KINDS, all_values
 from .file import Project, project_of
 from .rises import RISES, WHOLE
 from .start import surface_of
 
 SAME = 1e-11  # of the largest value of a kind: a difference that counts as none
 DIGITS = 12  # of the values written
-KEYS = {"tensions": "tension", "pressures": "pressure", "snows": "snow", "weights": "weight"}  # of a patch
+KEYS = {kind: field for kind, (parts, field) in KINDS.items() if parts == "patches"}
+LINES = {"outline", "holes", "dividers", "supports", "cables"}  # of a plan: what may pass through a point
+NO_POINTS = ("axes", "weights", "radius")  # of a curve
 Name = tuple[str, str]  # kind and name of a value, such as ("tensions", "west")
 
 
-def values_of(surface: Surface) -> dict[str, dict[str, float]]:
+def values_of(surface: Surface) -> dict[str, dict[str, Any]]:
     """The values of a surface that can be changed, by kind and name.
 
     The pressures around a room of prescribed volume are results, and a wall's follows from its rooms', as its
-    snow does. Pressures are those of the air: snow is not taken off.
+    snow does. Pressures are those of the air: snow is not taken off. Points are [x, y, z].
     """
     result = (surface.room_signs != 0.0).any(axis=0) | surface.walls
+    free = {p.name for p, r in zip(surface.patches, result.tolist(), strict=True) if not r}
+    points = surface.vertices[single_points(surface)].tolist()
     return {
-        "tensions": {p.name: p.tension for p in surface.patches},
-        "pressures": {
-            p.name: p.pressure for p, r in zip(surface.patches, result.tolist(), strict=True) if not r
-        },
+        **(values := all_values(surface)),
+        "pressures": {name: p for name, p in values["pressures"].items() if name in free},
         "snows": {p.name: p.snow for p in surface.patches if p.snow and not p.wall},
-        "weights": {p.name: p.weight for p in surface.patches if p.weight},
-        "cables": {c.name: c.tension for c in surface.cables},
-        "volumes": {r.name: r.volume for r in surface.rooms},
+        "weights": {name: w for name, w in values["weights"].items() if w},
+        "points": {f"point {k}": place for k, place in enumerate(points, 1)},
     }
+
+
+def single_points(surface: Surface) -> Ints:
+    """The vertices that are held alone, such as masts: no vertex beside them is."""
+    edges, alone = surface.topology.edges, surface.pinned.copy()
+    alone[edges[surface.held[edges].all(axis=1)]] = False
+    return np.flatnonzero(alone)
 
 
 def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -> dict[Name, float]:
@@ -51,7 +60,7 @@ def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -
     ------
     OptionError : for surfaces whose patches, cables or rooms are not the same.
     """
-    ours, theirs = _all_values(surface), _all_values(asked)
+    ours, theirs = _by_name(surface), _by_name(asked)
     if ours.keys() != theirs.keys():
         names = sorted({name for _, name in ours.keys() ^ theirs.keys()})
         text = f"the project makes other parts than the surface has: {', '.join(names[:5])}"
@@ -64,15 +73,16 @@ def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -
     }
 
 
-def _all_values(surface: Surface) -> dict[Name, float]:
+def _by_name(surface: Surface) -> dict[Name, float]:
     """Every value by kind and name, also the pressures of walls; not the pressures that are results."""
     result = (surface.room_signs != 0.0).any(axis=0)
-    values = {(kind, p.name): getattr(p, key) for kind, key in KEYS.items() for p in surface.patches}
+    values = {(kind, name): v for kind, named in all_values(surface).items() for name, v in named.items()}
     for p, computed in zip(surface.patches, result.tolist(), strict=True):
         if computed:
             del values["pressures", p.name]
-    values |= {("cables", c.name): c.tension for c in surface.cables}
-    return values | {("volumes", r.name): r.volume for r in surface.rooms}
+    for name, place in values_of(surface)["points"].items():
+        values |= {("points", f"{axis} of {name}"): x for axis, x in zip("xyz", place, strict=True)}
+    return values
 
 
 def with_values(
@@ -118,16 +128,31 @@ def with_values(
             raise OptionError(f"{path.name} cannot hold the {labels} of the surface shown", what="values")
         tried.append(missing)
         # walls that a project leaves open follow its patches, so they come last
-        _put(data["plan"], project, asked, first or missing, shared=len(tried) == 1)
+        if project.mesh is not None:
+            _put_on_mesh(data, missing)
+        else:
+            _put(data["plan"], project, start, asked, first or missing, shared=len(tried) == 1)
 
 
 def _put(
-    plan: dict[str, Any], project: Project, asked: Surface, values: Mapping[Name, float], shared: bool
+    plan: dict[str, Any],
+    project: Project,
+    start: Surface,
+    asked: Surface,
+    values: Mapping[Name, float],
+    shared: bool,
 ) -> None:
     """Write values into the table of a plan; if ``shared``, one for all patches where all have the same."""
     given = {kind: {name: v for (k, name), v in values.items() if k == kind} for kind, _ in values}
     sources = None
     for kind, wanted in given.items():
+        if kind == "points":
+            places = values_of(start)["points"], values_of(asked)["points"]
+            for name in {label.partition(" of ")[2] for label in wanted}:
+                old, new = (asked.plane.to_local(np.array([place[name]]))[0] for place in places)
+                for key in LINES & plan.keys():
+                    plan[key] = _with_point(plan[key], old, [_number(x) for x in new.tolist()], key)
+            continue
         if kind == "volumes":
             for name, value in wanted.items():
                 own = plan.get("patches", {}).get(name, {})
@@ -141,6 +166,15 @@ def _put(
             wanted = {name: value for name, value in wanted.items() if name not in walls}
         if kind != "cables" and wanted:
             _put_on_patches(plan, asked, kind, wanted, shared)
+
+
+def _put_on_mesh(data: dict[str, Any], values: Mapping[Name, float]) -> None:
+    """Write values of patches into the table of a mesh; it holds no others."""
+    mesh = data["mesh"] = {"file": data["mesh"]} if isinstance(data["mesh"], str) else data["mesh"]
+    for (kind, name), value in values.items():
+        if kind in KEYS:
+            mesh.setdefault("patches", {}).setdefault(name, {})[KEYS[kind]] = _number(value)
+            _drop(mesh, RISES if kind == "tensions" else ())
 
 
 def _put_on_patches(
@@ -168,6 +202,19 @@ def _put_on_patches(
         if key == "tension":
             _drop(table, RISES)
         table[key] = _number(value)
+
+
+def _with_point(value: Any, old: Floats, new: list[float], key: str = "") -> Any:
+    """Lines of a plan with another point wherever ``old`` is one of theirs; both in the coordinates of Π."""
+    if isinstance(value, Mapping):
+        return {k: v if k in NO_POINTS else _with_point(v, old, new, k) for k, v in value.items()}
+    if not isinstance(value, list):
+        return value
+    if len(value) in (2, 3) and all(isinstance(x, int | float) for x in value):
+        same = np.allclose(value[:2], old[:2], rtol=0.0, atol=SAME * (1.0 + float(np.abs(old).max())))
+        height = len(value) == 3 or (key == "supports" and new[2] != 0.0)
+        return (new if height else new[:2]) if same else value
+    return [_with_point(item, old, new, key) for item in value]
 
 
 def _drop(table: dict[str, Any], keys: Collection[str]) -> None:
@@ -229,7 +276,7 @@ def _put_on_lines(
     wanted: Mapping[str, float],
 ) -> None:
     """Tensions of walls and cables, in the lines of the plan that carry them."""
-    values = _all_values(asked)
+    values = _by_name(asked)
     for name, value in wanted.items():
         source = sources.get((kind, name))
         if source is None:

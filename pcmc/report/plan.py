@@ -12,7 +12,7 @@ from ..base.arrays import Floats
 from ..base.units import Units, length_factor
 from ..certificate import Certificate
 from ..drawings import views
-from ..drawings.sheet import LAYERS, SMALL, WIDTH, Line, Text
+from ..drawings.sheet import LAYERS, Line, Text, apart, box
 from ..surface import Surface
 
 FORMAT = "A4"
@@ -59,8 +59,11 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
     shift = np.concatenate(drawn or [line.points for line in panels]).min(axis=0) - factor * low
     labels = _labels("J", certificate.junctions)
     labels += zip(certificate.supports["support"], certificate.supports[["x", "y"]].to_numpy(), strict=True)
-    texts = sheet.texts + _apart([(name, factor * at + shift) for name, at in labels], sheet.texts)
-    boxes = np.array([*(_box(text) for text in texts), *(_extent(line) for line in lines)])
+    marks, texts = sheet.drawn()
+    lines += marks[len(sheet.lines) :]
+    places = [(name, (factor * at + shift).tolist()) for name, at in labels]
+    texts += apart([Text((x, y), name, align="C") for name, (x, y) in places], texts)
+    boxes = np.array([*(box(text) for text in texts), *(_extent(line) for line in lines)])
     corner, top = boxes[:, 0].min(axis=0) - AROUND, boxes[:, 1].max(axis=0) + AROUND
     width, height = map(float, top - corner)
     return PaperPlan(
@@ -111,33 +114,5 @@ def _labels(letter: str, table: pd.DataFrame) -> list[tuple[str, Floats]]:
     return [(f"{letter}{k}", at) for k, at in enumerate(middles, start=1)]
 
 
-def _apart(labels: list[tuple[str, Floats]], others: list[Text]) -> list[Text]:
-    """Labels at or beside their places, so that none covers another."""
-    boxes, placed = [_box(text) for text in others], []
-    steps = [(x, y) for r in range(6) for x in range(-r, r + 1) for y in range(-r, r + 1)]
-    steps.sort(key=lambda step: step[0] ** 2 + step[1] ** 2)
-    for name, at in labels:
-        tries = []
-        for x, y in steps:
-            place = at + np.array([0.8 * x, 0.8 * y]) * SMALL
-            tries.append(Text((float(place[0]), float(place[1])), name, align="C"))
-        free = (text for text in tries if not any(_meet(_box(text), box) for box in boxes))
-        text = next(free, tries[0])
-        placed.append(text)
-        boxes.append(_box(text))
-    return placed
-
-
-def _box(text: Text) -> Floats:
-    """(2,2) lower and upper corner of a text that is centred at its place."""
-    half = np.array([0.5 * WIDTH * len(text.text) + 0.3, 0.75]) * text.height
-    half = half[::-1] if text.turn == 90.0 else half
-    return np.array([text.at - half, text.at + half])
-
-
 def _extent(line: Line) -> Floats:
     return np.array([line.points.min(axis=0), line.points.max(axis=0)])
-
-
-def _meet(one: Floats, other: Floats) -> bool:
-    return bool((one[0] < other[1]).all() and (other[0] < one[1]).all())

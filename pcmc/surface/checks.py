@@ -339,8 +339,9 @@ def refuse_rows(
 def refuse_snow(snow: float, patch: str, free: int, edge: Ints) -> NoReturn:
     """Refuse snow as a change of pressure where edges are free; ``edge`` is the first of them."""
     i, j = edge.tolist()
-    text = f"snow: {free} edges are free, the first from vertex {i} to {j}, and there a change of pressure is"
-    text += (
-        f" not the same as snow; give a weight instead, as in retensioned(weights={{{patch!r}: {snow:g}}})"
+    text = (
+        f"snow: {free} edges are free or the end of it, the first from vertex {i} to {j}, and there a change"
     )
+    text += f" of pressure is not the same as snow; give a weight instead (--weight {patch!r}={snow:g}, or"
+    text += f" retensioned(weights={{{patch!r}: {snow:g}}}))"
     raise SurfaceError(text, what="snow", where=(i, j))

@@ -65,12 +65,9 @@ class CaseProcess:
         except (EOFError, OSError, pickle.UnpicklingError):
             kind, text = "failed", self._end()[1]
         if kind == "failed":
-            raise SweepError(
-                f"a worker on {platform.node()} cannot load the case {case!r};"
-                f" install its package where the workers run:\n{text.strip()}",
-                what=case,
-                where=platform.node(),
-            )
+            problem = f"a worker on {platform.node()} cannot load the case {case!r};"
+            problem += f" install its package where the workers run:\n{text.strip()}"
+            raise SweepError(problem, what=case, where=platform.node())
 
     def run(self, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
         """Run one case; the fields of its record from ``status`` on."""

@@ -60,11 +60,8 @@ class Sweep:
     ) -> None:
         for what, values in (("grid", grid), ("fixed", fixed or {})):
             if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
-                raise OptionError(
-                    f"{what}: expected a dict by parameter names, found {values!r:.60}",
-                    what=what,
-                    found=values,
-                )
+                text = f"{what}: expected a dict by parameter names, found {values!r:.60}"
+                raise OptionError(text, what=what, found=values)
         object.__setattr__(self, "case", case if isinstance(case, str) else _path(case))
         object.__setattr__(self, "grid", {name: _axis(name, grid[name]) for name in grid})
         fixed = {name: _plain(value, name) for name, value in (fixed or {}).items()}
@@ -143,11 +140,8 @@ def _function(case: str) -> Callable[..., Any]:
     try:
         function = resolve(case)
     except (ImportError, AttributeError, ValueError) as error:
-        raise OptionError(
-            f"the case {case!r} cannot be found ({error}); expected 'package.module:function'",
-            what="case",
-            found=case,
-        ) from error
+        text = f"the case {case!r} cannot be found ({error}); expected 'package.module:function'"
+        raise OptionError(text, what="case", found=case) from error
     if not callable(function):
         text = f"the case {case!r} is not a function but {function!r:.60}"
         raise OptionError(text, what="case", found=case)
@@ -158,12 +152,9 @@ def _path(function: Callable[..., Any]) -> str:
     module = getattr(function, "__module__", None)
     name = getattr(function, "__qualname__", "<unnamed>")
     if module in (None, "__main__") or "<" in name:
-        raise OptionError(
-            f"the case function {name!r} cannot be imported by a worker; put it at the top level of"
-            " a module (a file of its own) and import it from there",
-            what="case",
-            found=name,
-        )
+        text = f"the case function {name!r} cannot be imported by a worker; put it at the top level of"
+        text += " a module (a file of its own) and import it from there"
+        raise OptionError(text, what="case", found=name)
     return f"{module}:{name}"
 
 

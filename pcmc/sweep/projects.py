@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,10 @@ from typing import Any
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError
+from ..base.units import Units
 from ..solvers import find_method
 from .grid import Sweep
-from .short_table import with_units
-from .solving import row
+from .solving import mesh_columns, row
 
 
 def project_sweep(
@@ -33,7 +33,8 @@ def project_sweep(
     ----------
     path : of a project (``.toml``) or a surface; every worker must be able to open it by this path.
     grid, fixed : as of ``Sweep``, by the names of ``pcmc.project.varied``: ``NAME.tension`` and
-        ``NAME.pressure`` of patches, and the numbers of the file, such as ``plan.edge_length``.
+        ``NAME.pressure`` of patches, the numbers of the file, such as ``plan.edge_length``, and shifts of
+        lines, such as ``wall 1.x``.
     method : replaces the project's method and its options.
     mesh_check : whether to check the mesh of each case, as ``solve_case`` does; the project's own key
         ``solve.mesh_check`` asks for it, too.
@@ -65,14 +66,12 @@ def project_sweep(
     return sweep
 
 
-def column_labels(path: str | os.PathLike[str], names: Iterable[str]) -> dict[str, str]:
-    """The names of columns with the units of a project or a surface; see ``with_units``."""
+def units_of(path: str | os.PathLike[str]) -> Units:
+    """The units of a project or a surface."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the sweep showed them
-        start = projects.start_of(projects.load(path))
-        units, surface = start.units, start.surface
-    cables = {name for cable in surface.cables for name in (cable.name, f"cable {cable.name}")}
-    return with_units(names, units, cables)
+        project = projects.load(path)
+        return project.units if project.plan is not None else projects.start_of(project).units
 
 
 def solve_project(
@@ -94,7 +93,9 @@ def solve_project(
 
     Returns
     -------
-    dict : as of ``solve_case``; and ``targets_met``, if the project has targets.
+    dict : as of ``solve_case``, without numbers of a shape that is not at rest; and ``targets_met``, if the
+        project has targets. With mirror planes it is that of the whole roof if the project has
+        ``whole = true``, and otherwise of the part between them; ``extent`` says which.
 
     Raises
     ------
@@ -102,20 +103,16 @@ def solve_project(
     """
     digest = projects.digest(project)
     if digest != project_digest:
-        raise FileError(
-            f"{project}: has changed since the sweep was begun (its digest was {project_digest:.12}…, now"
-            f" it is {digest:.12}…); undo the change, or begin a new sweep with a new store",
-            what=project,
-            found=digest,
-            expected=project_digest,
-        )
+        text = f"{project}: has changed since the sweep was begun (its digest was {project_digest:.12}…, now"
+        text += f" it is {digest:.12}…); undo the change, or begin a new sweep with a new store"
+        raise FileError(text, what=project, found=digest, expected=project_digest)
     design, start = projects.varied(project, values)
     if method not in (None, design.method):
         design = replace(design, method=method, options={})
     outcome = projects.solve_project(replace(design, search=search), start)
-    answer = row(outcome.solved, ("project", "project_digest", "method", "mesh_check", "search", *values))
+    outcome = replace(outcome, project=design, unfold=design.whole)
+    names = ("project", "project_digest", "method", "mesh_check", "search", *values)
+    answer = row(outcome.solved, names, outcome)
     if mesh_check or design.mesh_check:
-        check = outcome.check_mesh() if outcome.certificate.index is not None else None
-        failed = {"mesh_verdict": "not checked", "mesh_detail": outcome.mesh_failure}
-        answer |= check.numbers() if check else failed if outcome.mesh_failure else {}
+        answer |= mesh_columns(outcome)
     return answer if outcome.design is None else answer | {"targets_met": outcome.design.met}

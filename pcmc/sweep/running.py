@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import threading
 import time
 from collections import Counter
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base import validate
 from ..base.errors import OptionError, SweepError
+from ..base.interrupts import interrupts_handled
 from .grid import Sweep
 from .store import Record, open_store
 from .table import table
@@ -115,7 +115,8 @@ def run(
             on_resume(len(sweep) - len(todo), len(todo))
         if todo:
             finished = SimpleQueue[Future[dict[str, Any]] | None]()
-            stack.enter_context(_interrupts(lambda: finished.put(None)))
+            # Ctrl-C comes out of the queue, not in the middle of a write
+            stack.enter_context(interrupts_handled(lambda *_: finished.put(None)))
             opened = open_workers(sweep.case, time_limit, executor, scheduler, workers)
             pending = stack.enter_context(_submitted(stack.enter_context(opened), todo, finished))
             progress = _progress(records, todo, len(sweep))
@@ -150,23 +151,18 @@ def _check_options(
     if len(names) > 1:
         text = f"{' and '.join(names)} exclude each other; give one of them"
         raise OptionError(text, what=names[0], found=tuple(names))
-    if executor is not None and not isinstance(executor, Executor):
-        raise _wrong_option("executor", executor, "one of concurrent.futures")
-    if scheduler is not None and not isinstance(scheduler, str):
-        raise _wrong_option("scheduler", scheduler, "'tcp://host:8786'")
-    if on_record is not None and not callable(on_record):
-        raise _wrong_option("on_record", on_record, "a function of a Progress")
-    if on_resume is not None and not callable(on_resume):
-        raise _wrong_option("on_resume", on_resume, "a function of two numbers of cases")
+    for name, value, sound, expected in (
+        ("executor", executor, isinstance(executor, Executor), "one of concurrent.futures"),
+        ("scheduler", scheduler, isinstance(scheduler, str), "'tcp://host:8786'"),
+        ("on_record", on_record, callable(on_record), "a function of a Progress"),
+        ("on_resume", on_resume, callable(on_resume), "a function of two numbers of cases"),
+    ):
+        if value is not None and not sound:
+            validate.refuse(name, value, expected)
     if workers is not None:
         validate.integer("workers", workers, least=1)
     if time_limit is not None:
         validate.number("time_limit (seconds; None for no limit)", time_limit, above=0.0, below=LONGEST)
-
-
-def _wrong_option(name: str, value: object, expected: str) -> OptionError:
-    text = f"{name}: expected {expected}, found {value!r:.80}"
-    return OptionError(text, what=name, found=value, expected=expected)
 
 
 def _progress(records: dict[int, Record], todo: dict[int, Any], total: int) -> Callable[[Record], Progress]:
@@ -246,12 +242,9 @@ def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any]:
                 "wall_time": float("nan"),
                 "provenance": {"output": text},
             }
-        raise SweepError(
-            f"the executor failed ({text}); the cases stored so far are safe: run the same sweep"
-            " again to go on from there",
-            what="executor",
-            found=text,
-        ) from error
+        problem = f"the executor failed ({text}); the cases stored so far are safe: run the same sweep"
+        problem += " again to go on from there"
+        raise SweepError(problem, what="executor", found=text) from error
 
 
 def _of_this_version(outcome: dict[str, Any]) -> dict[str, Any]:
@@ -259,28 +252,7 @@ def _of_this_version(outcome: dict[str, Any]) -> dict[str, Any]:
     about = outcome["provenance"]
     found = about.get("pcmc", OWN_VERSION)  # a case that ended its process does not say
     if found != OWN_VERSION:
-        raise SweepError(
-            f"a worker on {about['host']} has pcmc {found}, this is pcmc {OWN_VERSION}; install the"
-            " same version there and run the same sweep again to go on from the cases stored",
-            what="pcmc",
-            where=about["host"],
-            found=found,
-            expected=OWN_VERSION,
-        )
+        text = f"a worker on {about['host']} has pcmc {found}, this is pcmc {OWN_VERSION}; install the"
+        text += " same version there and run the same sweep again to go on from the cases stored"
+        raise SweepError(text, what="pcmc", where=about["host"], found=found, expected=OWN_VERSION)
     return outcome
-
-
-@contextmanager
-def _interrupts(stop: Callable[[], None]) -> Iterator[None]:
-    """Have Ctrl-C call ``stop`` instead of raising in the middle of a write."""
-    if (
-        threading.current_thread() is not threading.main_thread()
-        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
-    ):
-        yield
-        return
-    signal.signal(signal.SIGINT, lambda *_: stop())
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)

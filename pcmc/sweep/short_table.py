@@ -1,8 +1,9 @@
-"""The columns of a sweep that a reader wants first."""
+"""The columns of a sweep that a reader wants first, as a table and as a picture."""
 
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,52 +18,63 @@ if TYPE_CHECKING:
 
     from ..plot.figure import Image
 
-FIRST = ("status", "verdict", "mesh_verdict", "targets_met")
-LAST = ("rise", "roof_area", "largest_reaction")
-RISE = "rise of the certified cases (×: not certified)"
+FIRST = ("status", "verdict", "extent", "mesh_verdict", "targets_met")
+USUAL = ("apex", "rise", "area", "reaction per length")  # the first of each patch, the others of the roof
 GOOD = ("stable", "neutral")
-UNIT_OF = dict.fromkeys(("apex", "rise", "edge_length", "near_curves", "radius"), "length")
-UNIT_OF |= {"roof_area": "area", "largest_reaction": "tension", "volume": "volume", "cable": "force"}
-UNIT_OF |= {"tension": "tension", "wall": "tension", "pressure": "pressure", "snow": "pressure"}
-UNIT_OF |= {"weight": "pressure"}
-"""The kind of unit of a column, by the last word of its name."""
+DIMENSIONS = dict.fromkeys(("edge_length", "near_curves", "radius", "x", "y", "z"), "length")
+DIMENSIONS |= {"wall": "tension"}  # of numbers of a project that are no quantities of a roof
 
 
-def short_table(table: pd.DataFrame, parameters: Sequence[str]) -> pd.DataFrame:
-    """The parameters, how each case ended, the apex of each patch, rise, area, and largest reaction.
+def columns_of(table: pd.DataFrame, name: str, parameters: Container[str] = ()) -> list[str]:
+    """The columns that a name stands for: one of its own, or all those of a quantity, the roof's last.
 
-    Lengths and forces are in the surface's units: the apex is the greatest height of a patch over Π, the rise
-    that of the highest apex over the lowest support, the largest reaction one per length (force/length).
+    >>> import pandas as pd
+    >>> columns_of(pd.DataFrame({"a.apex": [1.0], "b.apex": [2.0], "apex": [2.0]}), "apex")
+    ['a.apex', 'b.apex', 'apex']
+    """
+    columns = [str(column) for column in table.select_dtypes("number") if column not in parameters]
+    columns.sort(key=lambda column: "." not in column)
+    return [c for c in columns if name in (c, c.rpartition(".")[2].replace("_", " "))]
+
+
+def short_table(table: pd.DataFrame, parameters: Sequence[str], show: Sequence[str] = ()) -> pd.DataFrame:
+    """The parameters, how each case ended, and quantities, each as of ``columns_of``.
+
+    By default these are the apex of each patch, the greatest height over Π; and of the roof the rise of the
+    highest apex over the lowest support, the area, and the largest reaction per length. All are in the
+    surface's units.
 
     >>> import pandas as pd
     >>> frame = pd.DataFrame({"a": [1.0], "verdict": ["stable"], "residual": [1e-12], "west.apex": [2.0]})
-    >>> list(short_table(frame, ["a"]))
-    ['a', 'verdict', 'west.apex']
+    >>> list(short_table(frame, ["a"])), list(short_table(frame, ["a"], ["residual"]))
+    (['a', 'verdict', 'west.apex'], ['a', 'verdict', 'residual'])
     """
-    apexes = [name for name in table if str(name).endswith(".apex")]
-    wanted = dict.fromkeys([*parameters, *FIRST, *apexes, *LAST])
+    usual = [*(c for c in columns_of(table, USUAL[0], parameters) if "." in c), *USUAL[1:]]
+    shown = [column for name in show for column in columns_of(table, name, parameters)] if show else usual
+    wanted = dict.fromkeys([*parameters, *FIRST, *shown])
     return table[[name for name in wanted if name in table]]
 
 
-def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) -> dict[str, str]:
+def with_units(names: Iterable[str], units: Units, columns: Container[str] = ()) -> dict[str, str]:
     """The names of numbers with their units in brackets, as far as these are known.
 
     Parameters
     ----------
     units : of the project or surface; nothing is added without one.
-    cables : names whose tension is a force.
+    columns : of the whole table: what has a ``force`` there is a cable, whose tension is a force.
 
-    >>> list(with_units(["west.tension", "hem.tension", "verdict"], Units("m", "kN"), ["hem"]).values())
+    >>> list(with_units(["west.tension", "hem.tension", "verdict"], Units("m", "kN"), ["hem.force"]).values())
     ['west.tension [kN/m]', 'hem.tension [kN]']
     """
-    if not units:
-        return {}
+    from ..quantities import dimension_of  # takes long to import
+
     shown = {}
-    for name in names:
+    for name in names if units else ():
         stem, _, quantity = name.rpartition(".")
-        kind = "force" if quantity == "tension" and stem in cables else UNIT_OF.get(quantity)
-        if kind is not None:
-            shown[name] = f"{name} [{units.behind(kind).strip()}]"
+        cable = quantity == "tension" and f"{stem.removeprefix('cable ')}.force" in columns
+        with suppress(OptionError):
+            dimension = DIMENSIONS.get(quantity) or dimension_of("force" if cable else quantity)
+            shown[name] = f"{name} [{units.behind(dimension).strip()}]"
     return shown
 
 
@@ -71,10 +83,15 @@ def draw_sweep(
     parameters: Sequence[str],
     path: str | os.PathLike[str] | None = None,
     labels: Mapping[str, str] | None = None,
+    show: str = "",
 ) -> Image:
-    """A picture of a sweep: apexes over one varied number, or the rise over two, × where not certified.
+    """A picture of a sweep over one or two varied numbers, × where not certified.
 
-    ``labels`` are the names of columns as they are shown, such as ``with_units`` gives.
+    Parameters
+    ----------
+    labels : the names of columns as they are shown, such as ``with_units`` gives.
+    show : what is drawn, as of ``columns_of``; over two numbers the last of its columns. By default the
+        apexes over one number, the rise over two.
 
     Raises
     ------
@@ -88,27 +105,30 @@ def draw_sweep(
         raise OptionError(
             f"{text}: {', '.join(varied) or 'none'}; fix the others", what="plot", found=len(varied)
         )
-    shown = labels or {}
-    apexes = [str(name) for name in table if str(name).endswith(".apex")]
-    if "rise" not in table or not table["rise"].notna().any():
-        raise OptionError("no case of this sweep has a shape to draw", what="plot", found=0)
-    good = table["verdict"].isin(GOOD)
+    names, good = labels or {}, table["verdict"].isin(GOOD)
+    quantity = show or ("apex" if len(varied) == 1 else "rise")
+    columns = [c for c in columns_of(table, quantity, parameters) if table[c].notna().any()]
+    if not columns:
+        raise OptionError(f"no case of this sweep has a shape with {quantity} to draw", what="plot", found=0)
     if len(varied) == 1:
         x = table[varied[0]].to_numpy(float)
         order = np.argsort(x)
-        heights = {a.removesuffix(".apex"): np.where(good, table[a], np.nan) for a in apexes}
+        heights = {c.rpartition(".")[0] or "roof": np.where(good, table[c], np.nan) for c in columns}
+        if not show:
+            heights.pop("roof", None)  # the highest of the others
         curves = {name: (x[order], y[order]) for name, y in heights.items() if np.isfinite(y).any()}
         if not curves:
             raise OptionError("no case of this sweep is certified; see its table", what="plot", found=0)
-        first = next(iter(curves))
-        unit = shown.get(f"{first}.apex", "").removeprefix(f"{first}.apex")
-        return lines(curves, path, x=shown.get(varied[0], varied[0]), y=f"apex{unit}", markers=True)
+        last = columns[-1]
+        label = names.get(last, last).removeprefix(f"{last.rpartition('.')[0]}.")
+        return lines(curves, path, x=names.get(varied[0], varied[0]), y=label, markers=True)
     across, up = varied
-    rise = table.assign(rise=table["rise"].where(good)).pivot_table("rise", up, across, dropna=False)
+    drawn = columns[-1]
+    value = table.assign(**{drawn: table[drawn].where(good)}).pivot_table(drawn, up, across, dropna=False)
     lost = (~good).groupby([table[up], table[across]]).any().unstack(fill_value=True)
-    marks = {RISE: lost.reindex(index=rise.index, columns=rise.columns, fill_value=True).to_numpy(bool)}
-    tables = {RISE: rise.to_numpy(float)}
-    xs, ys = rise.columns.to_numpy(float), rise.index.to_numpy(float)
-    across, up = (shown.get(name, name) for name in varied)
-    label = shown.get("rise", "")
+    title = f"{drawn} of the certified cases (×: not certified)"
+    marks = {title: lost.reindex(index=value.index, columns=value.columns, fill_value=True).to_numpy(bool)}
+    xs, ys = value.columns.to_numpy(float), value.index.to_numpy(float)
+    tables, label = {title: value.to_numpy(float)}, names.get(drawn, "")
+    across, up = (names.get(name, name) for name in varied)
     return heatmap(xs, ys, tables, path, marks=marks, xlabel=across, ylabel=up, label=label, width=900)

@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from .. import existence, solvers
 from ..base import validate
-from ..base.errors import OptionError, PcmcError, unknown
+from ..base.errors import OptionError, unknown
 from ..energy.functional import gradient
 from ..solvers import find_method
 from ..solvers.result import Result
-from ..surface import Surface
 from .case_script import resolve
 from .grid import checked
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-    from ..accuracy import MeshCheck
     from ..certificate import Certificate
+    from ..project import Outcome
 
 Parts = tuple[Callable[..., Any], dict[str, Any], dict[str, Any]]
 
@@ -34,12 +29,9 @@ def _split(generator: str, method: str, arguments: Mapping[str, Any]) -> Parts:
         build = resolve(generator)
         own = inspect.signature(build).parameters
     except (ImportError, AttributeError, ValueError, TypeError) as error:
-        raise OptionError(
-            f"the generator {generator!r} cannot be found ({error}); expected 'generators:two_caps'"
-            " or 'package.module:function'",
-            what="generator",
-            found=generator,
-        ) from error
+        text = f"the generator {generator!r} cannot be found ({error}); expected 'generators:two_caps'"
+        text += " or 'package.module:function'"
+        raise OptionError(text, what="generator", found=generator) from error
     options = find_method(method).options
     known = [f.name for f in fields(options)]
     for name in arguments:
@@ -80,11 +72,13 @@ def solve_case(
     -------
     dict : ``status`` (the solver's, in small letters), ``verdict`` of the certificate, ``message``;
         ``iterations_taken``, ``evaluations_made``, ``triangles``, ``gradient_squared`` (‖∇E‖², the
-        paper's squared sum); the certificate's numbers; and each number of its tables as
-        ``large.area``, ``junction 0.length``, ``boundary 0.reaction_z``. A number with the name of
-        one of the arguments is called ``name_reached``. With ``mesh_check`` also ``mesh_verdict``,
-        ``mesh_detail``, and of the height, volume, energy, reaction and lowest eigenvalue
-        ``height_error``, ``height_limit``, ``height_limit_error``, ``height_order`` and so on.
+        paper's squared sum); the certificate's numbers; each number of its tables as
+        ``large.area``, ``junction 0.length``, ``boundary 0.reaction_z``; and, of a surface at rest, the
+        key figures of ``pcmc.quantities``: ``large.apex``, and ``rise`` or ``reaction per length`` of the
+        whole roof. A number with the name of one of the arguments is called ``name_reached``. With
+        ``mesh_check`` also ``mesh_verdict``, ``mesh_detail``, and of the height, volume, energy, reaction
+        and lowest eigenvalue ``height_error``, ``height_limit``, ``height_limit_error``, ``height_order`` and
+        so on.
 
     Raises
     ------
@@ -102,70 +96,68 @@ def solve_case(
     result = solve(build(**shape), method, **solver)
     answer = row(result, arguments)
     if mesh_check:
-        from ..accuracy import check_mesh  # needs pandas, which takes long to import
+        from ..project import Outcome  # takes long to import
 
-        answer |= mesh_columns(result, check_mesh)
+        answer |= mesh_columns(Outcome(result))
     return answer
 
 
-def row(result: Result, names: Container[str]) -> dict[str, Any]:
-    """The answer of a case: see ``solve_case``. ``names`` are the names of its parameters."""
-    certificate = result.certificate
+def row(result: Result, names: Container[str], outcome: Outcome | None = None) -> dict[str, Any]:
+    """The answer of a case: see ``solve_case``. ``names`` are the names of its parameters.
+
+    With the ``outcome`` of a project it is that of the roof shown, which may be the whole of one between
+    mirror planes; ``extent`` says so. Where nothing is at rest such a row has no number of the shape.
+    """
+    from ..quantities import figures  # takes long to import
+
+    surface, certificate = result.surface, result.certificate
     numbers = {
         "iterations_taken": result.iterations,
         "evaluations_made": result.evaluations,
-        "triangles": result.surface.m,
-        "gradient_squared": float((gradient(result.surface) ** 2).sum()),
-        **certificate.numbers(),
-        **_cells(certificate.patches, certificate.patches["patch"]),
-        **_heights(result.surface, certificate),
-        **_cells(certificate.rooms, certificate.rooms.get("room", ())),
-        **_cells(certificate.cables, _cable_names(certificate.cables)),
-        **_cells(certificate.junctions, [f"junction {i}" for i in certificate.junctions.index]),
-        **_cells(certificate.boundaries, [f"boundary {i}" for i in certificate.boundaries.index]),
+        "triangles": surface.m,
+        "gradient_squared": float((gradient(surface) ** 2).sum()),
     }
-    words = {
-        "status": result.status.name.lower().replace("_", " "),
-        "verdict": numbers.pop("verdict").replace("_", " "),
-        "message": result.message,
-    }
-    return words | {f"{n}_reached" if n in names else n: v for n, v in numbers.items()}
+    words = {"status": result.status.name.lower().replace("_", " ")}
+    at_rest = certificate.index is not None
+    if at_rest and outcome is not None:
+        surface, certificate = outcome.shown
+        if outcome.whole is not None or any(plane.mirror for plane, _ in surface.on_planes):
+            words["extent"] = "part between mirrors" if outcome.whole is None else "whole"
+    findings = certificate.numbers()
+    words |= {"verdict": findings.pop("verdict").replace("_", " "), "message": result.message}
+    if at_rest or outcome is None:
+        findings |= _tables(certificate)
+    else:
+        findings = {name: findings[name] for name in ("residual", "load_ratio")}
+    if at_rest:
+        known = figures(surface, certificate) if outcome is None else outcome.figures
+        findings |= {".".join(filter(None, (f.of, f.quantity))): f.value for f in known}
+    return words | {f"{n}_reached" if n in names else n: v for n, v in (numbers | findings).items()}
 
 
-def mesh_columns(result: Result, check: Callable[[Result], MeshCheck]) -> dict[str, Any]:
+def mesh_columns(outcome: Outcome) -> dict[str, Any]:
     """What a mesh check adds to the answer of a case; nothing where the surface is not at rest."""
-    if result.certificate.index is None:
+    if outcome.certificate.index is None:
         return {}
-    try:
-        return check(result).numbers()
-    except PcmcError as error:  # the case itself is good without it
-        return {"mesh_verdict": "not checked", "mesh_detail": str(error)}
+    check = outcome.check_mesh()
+    if check is None:  # the case itself is good without it
+        return {"mesh_verdict": "not checked", "mesh_detail": outcome.mesh_failure}
+    return check.numbers()
 
 
-def _heights(surface: Surface, certificate: Certificate) -> dict[str, float]:
-    """The apex of each patch over Π, the rise over the lowest support, the roof's area, and the reactions."""
-    height, walls = surface.plane.height(surface.vertices), surface.walls
-    apex = np.full(len(surface.patches), -np.inf)
-    np.maximum.at(apex, surface.patch_of_face, height[surface.faces].max(axis=1))
-    lowest = height[surface.held].min(initial=height.max()) if surface.held.any() else height.min()
-    roof = ~walls if not walls.all() else walls
-    numbers = {f"{p.name}.apex": float(apex[k]) for k, p in enumerate(surface.patches) if not walls[k]}
-    return numbers | {
-        "rise": float(apex[roof].max() - lowest),
-        "roof_area": float(certificate.patches["area"][roof].sum()),
-        "largest_reaction": float(np.nan_to_num(certificate.largest_reaction)),
-    }
-
-
-def _cable_names(cables: pd.DataFrame) -> list[str]:
-    """The name of each row: that of its cable, numbered where supports cut the cable into several rows."""
-    names = list(cables.get("cable", ()))
-    order = [names[:k].count(name) + 1 for k, name in enumerate(names)]
-    return [f"{n} {k}" if names.count(n) > 1 else n for n, k in zip(names, order, strict=True)]
-
-
-def _cells(frame: pd.DataFrame, names: Iterable[str]) -> dict[str, Any]:
-    """The numbers of a table, each named by its row and column."""
-    numeric = frame.select_dtypes("number")
-    rows = zip(names, numeric.to_dict("records"), strict=True)
-    return {f"{name}.{column}": value for name, row in rows for column, value in row.items()}
+def _tables(certificate: Certificate) -> dict[str, Any]:
+    """The numbers of the certificate's tables, each named by its row and column."""
+    cables = list(certificate.cables.get("cable", ()))  # numbered where supports cut one into several rows
+    order = [cables[:k].count(name) + 1 for k, name in enumerate(cables)]
+    named = [f"{n} {k}" if cables.count(n) > 1 else n for n, k in zip(cables, order, strict=True)]
+    cells: dict[str, Any] = {}
+    for frame, names in (
+        (certificate.patches, certificate.patches["patch"]),
+        (certificate.rooms, certificate.rooms.get("room", ())),
+        (certificate.cables, named),
+        (certificate.junctions, [f"junction {i}" for i in certificate.junctions.index]),
+        (certificate.boundaries, [f"boundary {i}" for i in certificate.boundaries.index]),
+    ):
+        rows = zip(names, frame.select_dtypes("number").to_dict("records"), strict=True)
+        cells |= {f"{name}.{column}": value for name, row in rows for column, value in row.items()}
+    return cells

@@ -87,12 +87,9 @@ class Store:
             self._database.execute("COMMIT")
             self._database.execute("BEGIN IMMEDIATE")
         except sqlite3.Error as error:
-            raise FileError(
-                f"{self.path}: a record could not be written ({error}); the {len(self.records)} cases"
-                " stored before it are safe; make room and run the same sweep again to go on from there",
-                what=str(self.path),
-                found=len(self.records),
-            ) from error
+            text = f"{self.path}: a record could not be written ({error}); the {len(self.records)} cases"
+            text += " stored before it are safe; make room and run the same sweep again to go on from there"
+            raise FileError(text, what=str(self.path), found=len(self.records)) from error
         self.records |= new
 
 
@@ -180,12 +177,8 @@ def _check_file(path: Path) -> None:
     except OSError as error:
         raise system_error(path, "opened", error) from None
     if start.startswith(LINES):
-        raise FileError(
-            f"{path}: is a store of an older pcmc, in lines of JSON; name a new file",
-            what=str(path),
-            found=1,
-            expected=FORMAT,
-        )
+        text = f"{path}: is a store of an older pcmc, in lines of JSON; name a new file"
+        raise FileError(text, what=str(path), found=1, expected=FORMAT)
     if start not in (b"", SQLITE):
         raise FileError(f"{path}: is not the store of a sweep; name another file", what=str(path))
 
@@ -207,11 +200,9 @@ def _lock(path: Path, database: sqlite3.Connection) -> None:
     except sqlite3.OperationalError as error:
         if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
             raise
-        raise FileError(
-            f"{path}: another sweep is writing to it (or its disk has no file locks); wait for it, or"
-            " name another file",
-            what=str(path),
-        ) from error
+        text = f"{path}: another sweep is writing to it (or its disk has no file locks); wait for it, or"
+        text += " name another file"
+        raise FileError(text, what=str(path)) from error
 
 
 def _declared(sweep: Sweep) -> dict[str, Any]:
@@ -229,13 +220,9 @@ def _declaration(path: Path, database: sqlite3.Connection) -> dict[str, Any]:
     (found,) = database.execute("PRAGMA user_version").fetchone()
     written_by, text = database.execute("SELECT version, declaration FROM sweep").fetchone() or ("", "")
     if found != FORMAT:
-        raise FileError(
-            f"{path}: written in store format {found}, this is format {FORMAT}; read it with pcmc"
-            f" {written_by}",
-            what=str(path),
-            found=found,
-            expected=FORMAT,
-        )
+        text = f"{path}: written in store format {found}, this is format {FORMAT}; read it with pcmc"
+        text += f" {written_by}"
+        raise FileError(text, what=str(path), found=found, expected=FORMAT)
     columns = [row[1] for row in database.execute("PRAGMA table_info(cases)")]
     try:
         declared = {**json.loads(text), "version": written_by}
@@ -272,14 +259,9 @@ def _check_declaration(path: Path, stored: dict[str, Any], sweep: Sweep) -> None
             where = next(name for name in [*old, *wanted] if old.get(name) != wanted.get(name))
             was, now = old.get(where, "missing"), wanted.get(where, "missing")
         place = part if part == where else f"{part} {where!r}"
-        raise FileError(
-            f"{path}: written for another sweep (its {place} is {was!r:.60}, this one's is {now!r:.60});"
-            " name a new file, or delete this one",
-            what=str(path),
-            where=where,
-            found=was,
-            expected=now,
-        )
+        text = f"{path}: written for another sweep (its {place} is {was!r:.60}, this one's is {now!r:.60});"
+        text += " name a new file, or delete this one"
+        raise FileError(text, what=str(path), where=where, found=was, expected=now)
 
 
 def _key(value: Any) -> str:

@@ -43,12 +43,8 @@ def open_workers(
 def _cluster(team: str, address: str) -> Iterator[Executor]:
     """An executor on the workers of a Dask scheduler, each with the same version of pcmc."""
     if not re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^/]+:\d+/?", address):
-        raise OptionError(
-            f"scheduler: expected 'tcp://host:8786', found {address!r}",
-            what="scheduler",
-            found=address,
-            expected="tcp://host:8786",
-        )
+        text = f"scheduler: expected 'tcp://host:8786', found {address!r}"
+        raise OptionError(text, what="scheduler", found=address, expected="tcp://host:8786")
     try:
         from distributed import Client
     except ImportError:
@@ -56,20 +52,14 @@ def _cluster(team: str, address: str) -> Iterator[Executor]:
     try:
         client = Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise SweepError(
-            f"no Dask scheduler answers at {address!r} ({error}); start one with: dask scheduler",
-            what="scheduler",
-            found=address,
-        ) from error
+        text = f"no Dask scheduler answers at {address!r} ({error}); start one with: dask scheduler"
+        raise SweepError(text, what="scheduler", found=address) from error
     with client:
         try:
             client.wait_for_workers(1, timeout=CONNECT)
         except TimeoutError as error:
-            raise SweepError(
-                f"the Dask scheduler at {address!r} has no workers; start one with: dask worker {address}",
-                what="scheduler",
-                found=address,
-            ) from error
+            text = f"the Dask scheduler at {address!r} has no workers; start one with: dask worker {address}"
+            raise SweepError(text, what="scheduler", found=address) from error
         _same_version(client)
         try:
             yield client.get_executor(pure=False)
@@ -83,14 +73,9 @@ def _same_version(client: Any) -> None:
     """Refuse a cluster whose workers have no pcmc, or another version of it."""
     for worker, found in client.run(version, "pcmc", on_error="return").items():
         if found != OWN_VERSION:
-            raise SweepError(
-                f"the Dask worker {worker} has pcmc {found}, this is pcmc {OWN_VERSION}; install"
-                " the same version there",
-                what="pcmc",
-                where=worker,
-                found=found,
-                expected=OWN_VERSION,
-            )
+            text = f"the Dask worker {worker} has pcmc {found}, this is pcmc {OWN_VERSION}; install"
+            text += " the same version there"
+            raise SweepError(text, what="pcmc", where=worker, found=found, expected=OWN_VERSION)
 
 
 def _processors() -> int:

@@ -1,12 +1,13 @@
 // The page: it sends one request at a time to the server and shows the answers.
 
 import {
-  arrowsOf, COLOURS, fieldOf, showCheck, showFindings, showLegend, showPatches, showVerdict,
+  arrowsOf, COLOURS, fieldOf, showCheck, showFindings, showLegend, showParts, showSupports, showVerdict,
 } from "./findings.js";
 import { digits, Panel } from "./panel.js";
 import { addSaving } from "./saving.js";
 import { ask, fetchFile } from "./server.js";
 import { Targets } from "./targets.js";
+import { Tools } from "./tools.js";
 import { Variants } from "./variants.js";
 import { Viewer } from "./viewer.js";
 import { follow } from "./watching.js";
@@ -48,15 +49,16 @@ class Page {
     find("#units").textContent = this.units.given
       ? `Tension in ${this.units.tension}, pressure in ${this.units.pressure}.`
       : "Any consistent units. With metres and kilonewtons: tension kN/m, pressure kN/m², curvature 1/m.";
-    if (header.whole) {
-      find("#units").textContent += " The surface is a piece between mirror planes: the picture shows the whole, the numbers are those of the piece.";
-    }
+    const piece = { 1: "", 2: "the half", 4: "the quarter" }[header.whole] ?? "the piece";
+    find("#piece").hidden = !piece;
+    find("#piece").textContent = `All numbers are of ${piece} between the mirror planes; the picture shows the whole.`;
     this.underPressure = new Uint8Array(header.vertices);
     arrays.sheet_patch.forEach((p, i) => {
       if (!header.patches[p].wall) this.underPressure[arrays.sheet_vertex[i]] = 1;
     });
     this.sway(false);
     this.viewer?.setMesh(header, arrays);
+    this.tools?.begin(header);
     this.panel = new Panel(find("#patches"), header, find("#together"), (final) => this.request(final));
     this.targets = new Targets(find("#targets"), header, (aims) => this.send("meet", aims, true), () => this.act("stop"));
     if (header.note && opened) this.targets.say(header.note, header.note_met ? "met" : "missed");
@@ -82,6 +84,8 @@ class Page {
         const unit = this.units?.given ? ` ${this.units.length}` : "";
         find("#scale").textContent = spacing ? `grid ${digits(spacing)}${unit}` : "";
       });
+      this.tools = new Tools(this.viewer, document, (of) => this.targets.add({ quantity: "height", of }).focus(),
+        (name, place, final) => this.panel.movePoint(name, place, final));
     } catch (error) {
       find("#canvas").hidden = true;
       find("#no-graphics").hidden = false;
@@ -188,8 +192,9 @@ class Page {
     this.header = header;
     this.arrays = { ...arrays, underPressure: this.underPressure };
     showVerdict(find("#verdict"), header);
-    showFindings(find("#findings tbody"), header.findings, this.units);
-    showPatches(find("#by-patch"), header.measures, this.units);
+    showFindings(find("#findings tbody"), header.findings, header.figures, this.units);
+    showParts(find("#parts"), header.figures, this.units);
+    showSupports(find("#supports"), header.findings, this.units);
     this.variants.show(header, this.units);
     find("#check-result").hidden = true; // it was about the last surface
     find("#check").disabled = !header.at_rest;
@@ -204,6 +209,7 @@ class Page {
       this.sway(false);
       this.viewer?.setVertices(arrays.vertices);
     }
+    this.tools?.show(header.values.shown.points);
     if (header.compared !== this.compared) {
       this.compared = header.compared;
       this.choice = header.compared === null ? "patches" : "difference";
@@ -343,9 +349,16 @@ class Page {
       if (this.swaying) this.viewer.setVertices(this.arrays.vertices);
       this.sway(!this.swaying);
     });
-    for (const button of document.querySelectorAll("#views button")) {
+    for (const button of document.querySelectorAll("#views [data-view]")) {
       button.addEventListener("click", () => this.viewer?.camera.look(button.dataset.view));
     }
+    find("#theme").addEventListener("click", () => {
+      const { style } = document.documentElement;
+      const dark = style.colorScheme || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+      style.colorScheme = dark === "dark" ? "light" : "dark";
+      this.viewer?.setOptions({});
+    });
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.viewer?.setOptions({}));
     addEventListener("keydown", (event) => {
       if (!(event.ctrlKey || event.metaKey) || event.target.type === "number") return;
       const key = event.key.toLowerCase();
@@ -375,6 +388,7 @@ function download(body, name) {
 }
 
 const page = new Page();
+window.pcmc = page; // for the console, and for tests
 page.open().catch((error) => {
   find("#verdict .word").textContent = "Cannot open";
   find("#verdict .sentence").textContent = error.message;

@@ -102,19 +102,41 @@ export class Camera {
     return m;
   }
 
-  /** Mouse, touch and keys on an element. */
-  attach(element) {
+  /** The eye, and the direction through a place of the picture, x and y from -1 to 1. */
+  ray(x, y) {
+    const [right, upward, back] = this.axes();
+    const tall = Math.tan(this.angle / 2);
+    return [this.eye, plus(scaled(right, x * tall * this.aspect), scaled(upward, y * tall), scaled(back, -1))];
+  }
+
+  /** Where a point is in the picture, x and y from -1 to 1, and how far before the eye. */
+  seen(point) {
+    const [right, upward, back] = this.axes();
+    const from = plus(point, scaled(this.eye, -1));
+    const depth = -dot(from, back);
+    const tall = Math.tan(this.angle / 2) * depth;
+    return [dot(from, right) / (tall * this.aspect), dot(from, upward) / tall, depth];
+  }
+
+  /** Mouse, touch and keys on an element. `grab(event)` may take a drag: it returns what a move calls. */
+  attach(element, grab) {
     const held = new Map();
+    let dragged = null;
     const span = () => {
       const [a, b] = [...held.values()];
       return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, apart: Math.hypot(a.x - b.x, a.y - b.y) };
     };
     element.addEventListener("pointerdown", (event) => {
       element.setPointerCapture(event.pointerId);
+      dragged = held.size ? null : grab(event);
       held.set(event.pointerId, { x: event.clientX, y: event.clientY });
     });
     element.addEventListener("pointermove", (event) => {
       if (!held.has(event.pointerId)) return;
+      if (dragged) {
+        dragged(event, false);
+        return;
+      }
       const before = held.get(event.pointerId);
       const old = held.size === 2 ? span() : null;
       held.set(event.pointerId, { x: event.clientX, y: event.clientY });
@@ -130,7 +152,11 @@ export class Camera {
       }
     });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
-      element.addEventListener(end, (event) => held.delete(event.pointerId));
+      element.addEventListener(end, (event) => {
+        held.delete(event.pointerId);
+        dragged?.(event, true);
+        dragged = null;
+      });
     }
     element.addEventListener("contextmenu", (event) => event.preventDefault());
     element.addEventListener("dblclick", () => this.look("diagonal"));
@@ -140,15 +166,15 @@ export class Camera {
       this.closer(Math.exp(-0.0012 * lines * event.deltaY));
     }, { passive: false });
     const keys = {
-      ArrowLeft: () => this.turn(-0.1, 0), ArrowRight: () => this.turn(0.1, 0),
-      ArrowUp: () => this.turn(0, 0.1), ArrowDown: () => this.turn(0, -0.1),
+      ArrowLeft: (go) => go(-0.1, 0), ArrowRight: (go) => go(0.1, 0),
+      ArrowUp: (go) => go(0, 0.1), ArrowDown: (go) => go(0, -0.1),
       "+": () => this.closer(1.15), "=": () => this.closer(1.15), "-": () => this.closer(1 / 1.15),
       Home: () => this.look("diagonal"),
     };
     element.addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey || !keys[event.key]) return;
       event.preventDefault();
-      keys[event.key]();
+      keys[event.key]((x, y) => (event.shiftKey ? this.move(0.3 * x, 0.3 * y) : this.turn(x, y)));
     });
   }
 }

@@ -7,6 +7,8 @@ export function element(tag, kind = "", text = "") {
   return made;
 }
 
+export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
 export function input(type, name, attributes = {}) {
   const made = element("input");
   made.type = type;

@@ -1,7 +1,7 @@
 // The verdict, the numbers of the surface, and the fields that colours show.
 
 import { colourOf, diverging, sequential } from "./colours.js";
-import { element, tableRow, term } from "./elements.js";
+import { capital, element, tableRow, term } from "./elements.js";
 import { familyField, showClasses } from "./families.js";
 import { digits } from "./panel.js";
 
@@ -43,15 +43,14 @@ function drawn({ asked, shown }) {
   return `Shown: the last surface at rest, ${listed}`;
 }
 
-const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
-
 /** Numbers of the surface shown. */
-export function showFindings(body, findings, units) {
+export function showFindings(body, findings, figures, units) {
+  const of = (name) => figures.find(({ owner, quantity }) => owner === "roof" && quantity === name)?.value;
   const measured = (x, kind, count) => digits(x, count) + (units.given && x !== null ? ` ${units[kind]}` : "");
   const percent = (x) => (x === null ? "–" : x < 1e-6 ? "below 0.0001 %" : `${digits(100 * x, 3)} %`);
   const rows = [
-    ["Rise above the plane", measured(findings.height, "length"), `The largest height above the plane Π, ${units.length}.`],
-    ["Area under pressure", measured(findings.area, "area"), `Of all patches except walls, ${units.area}.`],
+    ["Rise above the plane", measured(of("apex"), "length"), `The largest height above the plane Π, ${units.length}.`],
+    ["Area under pressure", measured(of("area"), "area"), `Of all patches except walls, ${units.area}.`],
     ["Volume", measured(findings.volume, "volume"), `Between the patches with pressure and the plane Π, ${units.volume}.`],
     ["Energy", measured(findings.energy, "energy", 6), `Σ α A − Σ p V, ${units.energy}. A surface at rest has no nearby shape of other first-order energy; a stable one has the least.`],
     ["Morse index", findings.index ?? "–", "How many independent changes of shape lower the energy. 0: stable, every small push is resisted. 1 or more: a saddle, which a small push moves away from."],
@@ -75,28 +74,55 @@ export function showFindings(body, findings, units) {
   }));
 }
 
-/** Apex, area, volume and largest reaction of each patch. */
-export function showPatches(table, measures, units) {
-  const columns = [["apex", "Apex", "length"], ["area", "Area", "area"], ["volume", "Volume", "volume"],
-    ["reaction", "Reaction", "tension"]];
+const COLUMNS = { // of the parts of a roof, in the order of their tables
+  patch: ["apex", "area", "volume", "reaction per length", "snow", "net pressure"],
+  wall: ["area", "lean"], cable: ["force", "length", "sag"], room: ["volume"],
+};
+const SHORT = { "reaction per length": "Reaction", "net pressure": "Net p" };
+
+/** A table for the patches, the walls, the cables and the rooms, each with those of its quantities that are known. */
+export function showParts(root, figures, units) {
+  root.replaceChildren(...Object.entries(COLUMNS).flatMap(([owner, wanted]) => {
+    const own = figures.filter((one) => one.owner === owner || (owner === "patch" && one.owner === "roof"));
+    const parts = [...new Set(own.map(({ of }) => of))];
+    if (parts.filter(Boolean).length < 1) return [];
+    if (parts.length === 2 && parts.includes("")) parts.splice(parts.indexOf(""), 1); // the only patch is all
+    const columns = wanted.filter((name) => own.some(({ quantity }) => quantity === name));
+    const value = (of, name) => own.find((one) => one.of === of && one.quantity === name)?.value;
+    return [tableOf(`${capital(owner)}${owner === "patch" ? "es" : "s"}`, columns.map((name) => {
+      const { dimension } = own.find(({ quantity }) => quantity === name);
+      return [SHORT[name] ?? capital(name), units.given ? units[dimension] : ""];
+    }), parts.map((of) => [of || "all", columns.map((name) => digits(value(of, name)))]))];
+  }));
+}
+
+/** The forces of the supports, whose rows add up to the loads. */
+export function showSupports(root, { supports, balance }, units) {
+  const rows = [...supports, ...balance.filter(({ of }) => of !== "supports")];
+  const axes = ["x", "y", "z"];
+  const most = Math.max(...rows.flatMap((row) => axes.map((axis) => Math.abs(row[`force_${axis}`]))));
+  const force = (x) => digits(Math.abs(x) > 1e-9 * most ? x : 0, 3);
+  root.replaceChildren(...(supports.length ? [tableOf("Forces of the supports",
+    [["Length", units.given ? units.length : ""], ...axes.map((axis) => [axis, units.given ? units.force : ""])],
+    rows.map((row) => [row.of ? capital(row.of) : `${row.support} ${row.name === row.support ? row.kind : row.name}`, [
+      row.length ? digits(row.length, 3) : "",
+      ...axes.map((axis) => force(row[`force_${axis}`]))]]))] : []));
+}
+
+/** A table with a heading; columns are [name, unit], rows [name, texts]. */
+function tableOf(title, columns, rows) {
+  const table = element("table", "parts");
   const head = element("tr");
-  head.append(element("td"), ...columns.map(([, name, kind]) => {
+  head.append(element("td"), ...columns.map(([name, unit]) => {
     const th = element("th", "", name);
     th.scope = "col";
-    if (kind === "volume") th.title = "Between the patch and the plane Π, straight below it; the volumes of all patches add up to the volume of the roof";
-    if (units.given) th.append(element("span", "unit", units[kind]));
+    if (unit) th.append(element("span", "unit", unit));
     return th;
   }));
-  table.tHead.replaceChildren(head);
-  const rows = new Map();
-  for (const { quantity, of, value } of measures) {
-    if (!columns.some(([name]) => name === quantity)) continue;
-    if (quantity === "apex") rows.set(of, {});
-    if (rows.has(of)) rows.get(of)[quantity] = value;
-  }
-  if (rows.size === 2) rows.delete(""); // the only patch is all
-  table.tBodies[0].replaceChildren(...[...rows].map(([of, row]) => tableRow(of || "all",
-    columns.map(([name]) => digits(row[name])))));
+  table.createCaption().textContent = title;
+  table.createTHead().append(head);
+  table.createTBody().append(...rows.map(([name, texts]) => tableRow(name, texts)));
+  return table;
 }
 
 /** The answer of the mesh check. */
@@ -136,11 +162,9 @@ export function fieldOf(choice, arrays) {
   }
   if (choice === "family") return familyField(arrays.family);
   if (choice === "reactions") {
-    const values = new Float32Array(arrays.reactions.length / 3);
-    for (let v = 0; v < values.length; v++) {
-      values[v] = Math.hypot(...arrays.reactions.subarray(3 * v, 3 * v + 3));
-    }
-    return { values, limits: [0, ends(values)[1] || 1], map: sequential, linesOnly: true };
+    const sizes = (all) => Float32Array.from({ length: all.length / 3 }, (_, v) => Math.hypot(...all.subarray(3 * v, 3 * v + 3)));
+    const [values, points] = [sizes(arrays.reactions), sizes(arrays.points)];
+    return { values, points, limits: [0, ends(values)[1] || 1], map: sequential, linesOnly: true };
   }
   let [low, high] = ends(arrays.curvature, arrays.underPressure);
   if (high - low <= 1e-5 * Math.max(Math.abs(low), Math.abs(high))) {
@@ -160,15 +184,15 @@ function ends(values, chosen = null) {
   return low <= high ? [low, high] : [0, 1];
 }
 
-/** Arrows of the reactions per length, the longest an eighth of the surface's size. */
+/** Arrows of the reactions per length, and blue ones of forces at points; the longest of each an eighth of the size. */
 export function arrowsOf(arrays, field, size) {
   const arrows = [];
-  const stretch = (0.125 * size) / field.limits[1];
-  field.values.forEach((x, v) => {
-    if (!Number.isFinite(x) || x <= 0.005 * field.limits[1]) return;
-    const vector = Array.from(arrays.reactions.subarray(3 * v, 3 * v + 3), (c) => c * stretch);
-    arrows.push([v, vector, colourOf(field.map, x, ...field.limits)]);
+  const add = (sizes, vectors, most, colour) => sizes.forEach((x, v) => {
+    if (!(x > 0.005 * most)) return;
+    arrows.push([v, Array.from(vectors.subarray(3 * v, 3 * v + 3), (c) => (0.125 * size * c) / most), colour(x)]);
   });
+  add(field.values, arrays.reactions, field.limits[1], (x) => colourOf(field.map, x, ...field.limits));
+  add(field.points, arrays.points, ends(field.points)[1], () => [0.13, 0.4, 0.67]);
   return arrows;
 }
 
@@ -177,7 +201,9 @@ export function showLegend(root, choice, field, units, than) {
   root.hidden = !field;
   if (!field) return;
   const [low, high] = field.limits;
-  root.querySelector(".name").textContent = field.name ?? COLOURS[choice].name(units, than);
+  const most = ends(field.points ?? [])[1];
+  const points = field.points?.some((x) => x > 0) ? `; blue: at points, up to ${digits(most, 3)} ${units.force}` : "";
+  root.querySelector(".name").textContent = (field.name ?? COLOURS[choice].name(units, than)) + points;
   showClasses(root.querySelector("ul"), field.scale);
   for (const part of [".bar", ".ends"]) root.querySelector(part).hidden = Boolean(field.scale);
   root.querySelector(".bar").style.background = field.map.css;

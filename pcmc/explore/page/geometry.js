@@ -36,3 +36,46 @@ export function roundBelow(x) {
   const ten = 10 ** Math.floor(Math.log10(x));
   return ten * (x / ten >= 5 ? 5 : x / ten >= 2 ? 2 : 1);
 }
+
+const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const vertexOf = (X, v) => [X[3 * v], X[3 * v + 1], X[3 * v + 2]];
+
+/** The first point of a ray on triangles (flat indices) that is not cut away, and its triangle; or null. */
+export function hit(X, triangles, [eye, way], cut) {
+  let nearest = Infinity;
+  let found = null;
+  for (let f = 0; f < triangles.length; f += 3) {
+    const [a, b, c] = [0, 1, 2].map((k) => vertexOf(X, triangles[f + k]));
+    const [u, w, from] = [minus(b, a), minus(c, a), minus(eye, a)];
+    const across = cross(way, w);
+    const volume = dot(u, across);
+    if (!volume) continue;
+    const s = dot(from, across) / volume;
+    const turned = cross(from, u);
+    const t = dot(way, turned) / volume;
+    const far = dot(w, turned) / volume;
+    if (s < 0 || t < 0 || s + t > 1 || far <= 0 || far >= nearest) continue;
+    const point = eye.map((x, k) => x + far * way[k]);
+    if (dot(cut, point) > cut[3]) continue;
+    nearest = far;
+    found = { point, corners: [a, b, c] };
+  }
+  return found;
+}
+
+/** The line in which triangles (flat indices) meet a plane: flat places of the ends of its pieces. */
+export function sectionOf(X, triangles, cut) {
+  const ends = [[], []];
+  for (let f = 0; f < triangles.length; f += 3) {
+    const corners = [0, 1, 2].map((k) => vertexOf(X, triangles[f + k]));
+    const above = corners.map((p) => dot(cut, p) - cut[3]);
+    const met = [0, 1, 2].filter((k) => above[k] > 0 !== above[(k + 1) % 3] > 0);
+    met.forEach((k, end) => {
+      const part = above[k] / (above[k] - above[(k + 1) % 3]);
+      ends[end].push(...corners[k].map((x, i) => x + part * (corners[(k + 1) % 3][i] - x)));
+    });
+  }
+  return ends;
+}

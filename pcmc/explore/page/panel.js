@@ -4,6 +4,7 @@ import { element, input } from "./elements.js";
 
 const STEPS = 1000;
 const ROOM = 2; // times a value beyond the slider's end: where it ends then
+const AXES = ["x", "y", "z"];
 const QUANTITIES = {
   tensions: { label: "Tension α", unit: "tension" },
   pressures: { label: "Pressure p", unit: "pressure" },
@@ -82,8 +83,32 @@ export class Panel {
     }
     head.append(element("span", "name", group.name), target);
     legend.append(head);
-    card.append(legend, ...group.kinds.map((kind) => this.row(group, index, kind, asked[kind][group.name], target)));
+    card.append(legend, ...group.kinds.map((kind) => (kind === "points" ? this.point(group, asked)
+      : this.row(group, index, kind, asked[kind][group.name], target))));
     return card;
+  }
+
+  /** A single held point: three numbers, which dragging it in the picture changes, too. */
+  point(group, asked) {
+    const row = element("div", "point");
+    const entry = { group, kind: "points", value: asked.points[group.name] };
+    entry.numbers = AXES.map((axis, k) => {
+      const number = input("number", `${axis} of ${group.name}`, { step: "any" });
+      number.addEventListener("change", () => {
+        const place = entry.value.map((x, i) => (i === k && Number.isFinite(number.valueAsNumber) ? number.valueAsNumber : x));
+        this.movePoint(group.name, place, true);
+      });
+      return number;
+    });
+    row.append(...entry.numbers.flatMap((number, k) => [element("span", "", AXES[k]), number]));
+    this.rows.push(entry);
+    this.put(entry, entry.value);
+    return row;
+  }
+
+  movePoint(name, place, final) {
+    this.put(this.rows.find((row) => row.kind === "points" && row.group.name === name), place);
+    this.changed(final);
   }
 
   row(group, index, kind, value, target) {
@@ -135,6 +160,10 @@ export class Panel {
 
   put(entry, value, moving = false) {
     entry.value = value;
+    if (entry.numbers) {
+      entry.numbers.forEach((number, k) => { number.value = digits(value[k], 6); });
+      return;
+    }
     if (!moving) {
       entry.range.widen(value);
       entry.slider.value = entry.range.place(value);
@@ -155,6 +184,7 @@ export class Panel {
       const has = shown[entry.kind][entry.group.name];
       if (wanted === undefined || has === undefined) continue; // a patch without pressure has become a wall
       if (all) this.put(entry, wanted);
+      if (entry.numbers) continue;
       const part = entry.range.place(has) / STEPS;
       entry.shown.hidden = Math.abs(has - wanted) <= 1e-9 * Math.abs(wanted);
       entry.shown.style.left = `calc(8px + ${part} * (100% - 16px) - 1px)`;

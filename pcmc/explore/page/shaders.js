@@ -20,12 +20,14 @@ void main() {
 const surfaceFragment = `${HEAD}
 uniform vec3 eye, sun, up;
 uniform bool smooth_, coloured;
+uniform vec4 cut;
 uniform vec2 limits;
 uniform sampler2D map;
 in vec3 place, upright, tint;
 in vec2 known;
 out vec4 result;
 void main() {
+  if (dot(cut.xyz, place) > cut.w) discard;
   vec3 flat_ = normalize(cross(dFdx(place), dFdy(place)));
   vec3 towards = normalize(eye - place);
   vec3 n = smooth_ ? normalize(upright) : flat_;
@@ -49,6 +51,7 @@ in vec3 from_, to_;
 in vec4 shade;
 in vec2 width;
 out vec4 tint;
+out vec3 place;
 void main() {
   vec4 a = view * vec4(from_, 1.0), b = view * vec4(to_, 1.0);
   vec2 along = (b.xy / b.w - a.xy / a.w) * screen;
@@ -56,15 +59,21 @@ void main() {
   bool end = (gl_VertexID & 1) == 1;
   float side = (gl_VertexID & 2) == 2 ? 1.0 : -1.0;
   gl_Position = end ? b : a;
+  place = end ? to_ : from_;
   gl_Position.xy += side * across * (end ? width.y : width.x) / screen * gl_Position.w;
   gl_Position.z -= lift * gl_Position.w;
   tint = shade;
 }`;
 
 const lineFragment = `${HEAD}
+uniform vec4 cut;
 in vec4 tint;
+in vec3 place;
 out vec4 result;
-void main() { result = tint; }`;
+void main() {
+  if (dot(cut.xyz, place) > cut.w) discard;
+  result = tint;
+}`;
 
 // Supports: squares that hold, discs that slide.
 const dotVertex = `${HEAD}
@@ -72,9 +81,11 @@ uniform mat4 view;
 uniform float size, lift;
 in vec3 position;
 in float sliding;
+uniform vec4 cut;
 out float disc;
 void main() {
-  gl_Position = view * vec4(position, 1.0);
+  bool away = dot(cut.xyz, position) > cut.w;
+  gl_Position = away ? vec4(2.0, 2.0, 2.0, 1.0) : view * vec4(position, 1.0);
   gl_Position.z -= lift * gl_Position.w;
   gl_PointSize = size;
   disc = sliding;

@@ -1,24 +1,20 @@
 // Targets: quantities and the values wanted for them, and the tensions that may change for these.
 
-import { button, element, input, select } from "./elements.js";
+import { button, capital, element, input, select } from "./elements.js";
 import { digits } from "./panel.js";
 
-const UNITS = {
-  apex: "length", area: "area", volume: "volume", reaction: "tension", height: "length", curvature: "curvature",
-  pressure: "pressure", lean: "angle", sag: "length", length: "length", force: "force",
-};
+const WORDS = { "reaction per length": "Largest reaction", pressure: "Pressure of a room", length: "Length of a cable", force: "Force in a cable" };
 const LIMITS = [["value", "="], ["at_most", "at most"], ["at_least", "at least"]];
 
 export class Targets {
   /** `meet(aims)` is called to meet them, `stop()` to give up. */
-  constructor(root, { controls, aims, units }, meet, stop) {
-    Object.assign(this, { root, units, meet });
-    this.patches = controls.filter((g) => g.patch !== null && !g.wall).map((g) => g.name);
+  constructor(root, { controls, quantities, aims, units }, meet, stop) {
+    Object.assign(this, { root, units, meet, choices: quantities });
     this.list = root.querySelector(".list");
     this.message = root.querySelector(".message");
     this.list.replaceChildren();
     this.rows = [];
-    const given = aims.targets.length ? aims.targets : [{ quantity: "apex", of: this.patches[0] ?? null }];
+    const given = aims.targets.length ? aims.targets : [{ quantity: "apex", of: quantities[0].of[1] }];
     given.forEach((target) => this.add(target));
     const tensions = controls.filter((g) => g.kinds.includes("tensions") || g.kinds.includes("cables"));
     const possible = tensions.map(({ name, patch, wall }) => ({
@@ -58,34 +54,43 @@ export class Targets {
     }
   }
 
+  /** A row for a target; returns its first control. The height at a point is picked in the picture. */
   add(target) {
     const row = element("div", "target-row");
-    const known = { apex: "Apex", area: "Area", volume: "Volume", reaction: "Largest reaction" };
-    const fixed = !(target.quantity in known); // such as the height at a point: kept as it is
-    const quantity = fixed ? element("span", "fixed", target.label) : select("Quantity", Object.entries(known));
-    const of = select("Of", [["", "all"], ...this.patches.map((name) => [`=${name}`, name])]);
+    const point = target.quantity === "height";
+    const quantity = point
+      ? element("span", "fixed", target.label ?? `height at (${target.of.join(", ")})`)
+      : select("Quantity", this.choices.map((one) => [one.quantity, WORDS[one.quantity] ?? capital(one.quantity)]));
+    const of = select("Of", []);
     const limit = select("Relation", LIMITS);
     const number = input("number", "Value wanted", { step: "any", required: "" });
     const unit = element("span", "unit");
-    const entry = { row, target, fixed, quantity, of, limit, number };
+    const entry = { row, target, point, quantity, of, limit, number };
     const remove = button("×", () => {
       this.rows.splice(this.rows.indexOf(entry), 1);
       row.remove();
     }, "Remove this target");
-    const label = () => { unit.textContent = this.units.given ? this.units[UNITS[quantity.value ?? target.quantity]] ?? "" : ""; };
-    if (!fixed) {
+    const choose = () => {
+      const { of: names, dimension } = this.choices.find((one) => one.quantity === quantity.value)
+        ?? { of: [], dimension: "length" };
+      const before = of.value;
+      of.replaceChildren(...names.map((name) => new Option(name || "all", `=${name}`)));
+      if (names.includes(before.slice(1))) of.value = before;
+      unit.textContent = this.units.given ? this.units[dimension] ?? "" : "";
+    };
+    if (!point) {
       quantity.value = target.quantity;
-      of.value = target.of === null || target.of === undefined ? "" : `=${target.of}`;
-      quantity.addEventListener("change", label);
+      quantity.addEventListener("change", choose);
     }
+    choose();
+    if (target.of !== undefined) of.value = `=${target.of ?? ""}`;
     const [key] = LIMITS.find(([name]) => typeof target[name] === "number") ?? ["value"];
     limit.value = key;
     if (typeof target[key] === "number") number.value = digits(target[key], 10);
-    label();
-    row.append(quantity, ...(fixed ? [] : [of]), limit, number, unit, remove);
+    row.append(quantity, ...(point ? [] : [of]), limit, number, unit, remove);
     this.list.append(row);
     this.rows.push(entry);
-    return fixed ? number : quantity;
+    return point ? number : quantity;
   }
 
   say(text, state = "") {
@@ -110,9 +115,9 @@ export class Targets {
       this.say("Choose at least one tension that may change.", "missed");
       return;
     }
-    const targets = this.rows.map(({ target, fixed, quantity, of, limit, number }) => ({
-      quantity: fixed ? target.quantity : quantity.value,
-      of: fixed ? target.of : of.value.slice(1) || null,
+    const targets = this.rows.map(({ target, point, quantity, of, limit, number }) => ({
+      quantity: point ? "height" : quantity.value,
+      of: point ? target.of : of.value.slice(1) || null,
       name: target.name ?? "",
       [limit.value]: number.valueAsNumber,
     }));

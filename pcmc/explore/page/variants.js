@@ -1,12 +1,7 @@
 // Variants: surfaces kept side by side, their numbers, and the differences from one of them.
 
-import { button, element, tableRow } from "./elements.js";
+import { button, capital, element, tableRow } from "./elements.js";
 import { digits } from "./panel.js";
-
-const NAMES = {
-  apex: "Apex", area: "Area", volume: "Volume", reaction: "Reaction",
-  tension: "Tension", pressure: "Pressure", weight: "Weight", snow: "Snow",
-};
 
 /** The row that begins the rows of a patch, or of all, across the table. */
 function heading(text, kind = "part") {
@@ -49,23 +44,23 @@ export class Variants {
 
   show(header, units) {
     this.header = header;
-    const { variants, compared, measures } = header;
+    const { variants, compared, figures } = header;
     this.root.querySelector("ul").replaceChildren(...variants.map((variant, k) => this.item(variant, k, compared)));
     const table = this.root.querySelector("table");
     table.hidden = compared === null;
     if (compared === null) return;
     const other = variants[compared];
     table.querySelector("caption").textContent = `Differences from ${other.name}`;
-    const key = (row) => `${row.quantity} ${row.of}`;
-    const before = new Map(other.measures.map((row) => [key(row), row.value]));
-    const rows = measures.filter((row) => before.has(key(row)) && row.value !== null && before.get(key(row)) !== null);
+    const key = (row) => `${row.quantity} ${row.of} ${row.owner}`;
+    const before = new Map(other.figures.map((row) => [key(row), row.value]));
+    const rows = figures.filter((row) => before.has(key(row)) && row.value !== null && before.get(key(row)) !== null);
     const changed = rows.filter((row) => digits(row.value) !== digits(before.get(key(row))));
     const difference = (row) => {
       const then = before.get(key(row));
       const change = row.value - then;
       const signed = (x) => `${x > 0 ? "+" : ""}${digits(x, 2)}`;
-      const head = element("span", "", NAMES[row.quantity]);
-      if (units.given) head.append(element("span", "unit", ` ${units[row.kind]}`));
+      const head = element("span", "", capital(row.quantity));
+      if (units.given) head.append(element("span", "unit", ` ${units[row.dimension]}`));
       return tableRow(head, [
         digits(then), digits(row.value), signed(change), then ? signed((100 * change) / Math.abs(then)) : "",
       ]);
@@ -85,7 +80,7 @@ export class Variants {
     const picture = this.pictures.get(variant.name);
     if (picture) item.append(Object.assign(element("img"), { src: picture, alt: "", width: 80 }));
     const words = element("div", "words");
-    const all = new Map(variant.measures.filter((row) => !row.of).map((row) => [row.quantity, row.value]));
+    const all = new Map(variant.figures.filter((row) => !row.of).map((row) => [row.quantity, row.value]));
     words.append(
       element("b", "", variant.name),
       element("p", "", `${variant.word}; apex ${digits(all.get("apex"))}, area ${digits(all.get("area"))}, volume ${digits(all.get("volume"))}`),

@@ -1,13 +1,14 @@
 // Draws a surface with WebGL 2: sheets, mesh, curves, supports, the plane's grid and arrows.
 
 import { Camera } from "./camera.js";
-import { boxOf, normals, roundBelow, span } from "./geometry.js";
+import { boxOf, hit, normals, roundBelow, sectionOf, span } from "./geometry.js";
 import { programs } from "./shaders.js";
 
-const PAPER = [0.957, 0.961, 0.965];
-const CURVE = [0.17, 0.2, 0.25, 1];
 const MESH = [0.12, 0.16, 0.2, 0.3];
 const GRID = [0.55, 0.6, 0.65, 0.35];
+const MARK = [0.85, 0.1, 0.45, 1];
+const WHOLE = [0, 0, 0, 1e30]; // a section that cuts nothing away: (normal, offset)
+const NEAR = 14; // pixels from a point that is meant
 
 export class Viewer {
   /** Throws if the browser has no WebGL 2. `gridChanged` is called with the grid's spacing. */
@@ -18,8 +19,10 @@ export class Viewer {
     if (!this.gl) throw new Error("no WebGL 2");
     this.options = { mesh: true, supports: true, walls: true, smooth: false, grid: true };
     this.waiting = false;
+    this.cut = WHOLE;
+    this.marks = [];
     this.camera = new Camera(() => this.redraw());
-    this.camera.attach(canvas);
+    this.camera.attach(canvas, (event) => this.grab?.(event));
     this.prepare();
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => { this.prepare(); this.refill(); });
@@ -33,7 +36,7 @@ export class Viewer {
     this.elements = gl.createBuffer();
     this.dots = this.parts([3, 1]);
     this.lines = {};
-    for (const name of ["grid", "mesh", "curves", "arrows"]) {
+    for (const name of ["grid", "mesh", "curves", "arrows", "section", "marks"]) {
       this.lines[name] = this.parts([3, 3, 4, 2], true);
     }
     this.map = gl.createTexture();
@@ -118,6 +121,66 @@ export class Viewer {
     this.fillArrows();
   }
 
+  /** Cut away what is beyond a plane, (normal, offset); null shows the whole. */
+  setCut(cut) {
+    this.cut = cut ?? WHOLE;
+    this.fillMarks();
+  }
+
+  /** Points to mark, and a line from one to the next. */
+  setMarks(points) {
+    this.marks = points;
+    this.fillMarks();
+  }
+
+  fillMarks() {
+    if (!this.X) return;
+    const [from, to] = [[], []];
+    const arm = 0.012 * this.mesh.header.size;
+    for (const point of this.marks) {
+      for (const k of [0, 1, 2]) {
+        from.push(...point.map((x, i) => x - (i === k ? arm : 0)));
+        to.push(...point.map((x, i) => x + (i === k ? arm : 0)));
+      }
+    }
+    this.marks.slice(1).forEach((point, k) => { from.push(...this.marks[k]); to.push(...point); });
+    this.placeLines("marks", from, to, () => MARK, () => [1.2, 1.2]);
+    const line = this.cut === WHOLE ? [[], []] : sectionOf(this.X, this.triangles, this.cut);
+    this.placeLines("section", ...line, () => MARK, () => [1.4, 1.4]);
+    this.redraw();
+  }
+
+  /** From -1 to 1 in the picture. */
+  placeOf(event) {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    return [(2 * (event.clientX - left)) / width - 1, 1 - (2 * (event.clientY - top)) / height];
+  }
+
+  /** Pixels between a point and a place in the picture. */
+  away(point, [x, y]) {
+    const [u, v] = this.camera.seen(point);
+    return Math.hypot((u - x) * this.canvas.clientWidth, (v - y) * this.canvas.clientHeight) / 2;
+  }
+
+  /** The point of the surface at a place in the picture, a vertex if one is near; or null. */
+  pick(place) {
+    const found = hit(this.X, this.triangles, this.camera.ray(...place), this.cut);
+    return found && (found.corners.find((corner) => this.away(corner, place) < NEAR) ?? found.point);
+  }
+
+  /** The name of the point, of [name, place], that is near a place in the picture; or undefined. */
+  near(points, place) {
+    return points.find(([, point]) => this.away(point, place) < NEAR)?.[0];
+  }
+
+  /** How a drag over the picture moves a point, parallel to the screen. */
+  shifted(point, from, to) {
+    const [right, upward] = this.camera.axes();
+    const tall = Math.tan(this.camera.angle / 2) * this.camera.seen(point)[2];
+    const [x, y] = [(to[0] - from[0]) * tall * this.camera.aspect, (to[1] - from[1]) * tall];
+    return point.map((p, k) => p + x * right[k] + y * upward[k]);
+  }
+
   setOptions(options) {
     Object.assign(this.options, options);
     if (this.X) this.refill();
@@ -141,6 +204,7 @@ export class Viewer {
       }
     }
     this.chosen = new Uint32Array(chosen);
+    this.triangles = this.chosen.map((corner) => vertex[corner]);
     gl.bindVertexArray(null);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.elements);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this.chosen, gl.STATIC_DRAW);
@@ -175,7 +239,8 @@ export class Viewer {
     this.fill(this.dots, 0, dots);
     this.dots.count = this.held.length;
     this.fillLines("mesh", this.shownEdges, MESH, 0.5);
-    this.fillLines("curves", this.shownCurves, CURVE, 1.1);
+    this.fillLines("curves", this.shownCurves, this.colour("color"), 1.1);
+    this.fillMarks();
     this.fillGrid();
     this.fillArrows();
     this.redraw();
@@ -207,6 +272,12 @@ export class Viewer {
     }
     this.fill(part, 2, shades);
     this.fill(part, 3, widths);
+  }
+
+  /** A colour of the page's theme, as the canvas has it. */
+  colour(property) {
+    const parts = getComputedStyle(this.canvas)[property].match(/[\d.]+/g).map(Number);
+    return [...parts.slice(0, 3).map((x) => x / 255), 1];
   }
 
   fillGrid() {
@@ -303,7 +374,7 @@ export class Viewer {
       canvas.height = height;
     }
     gl.viewport(0, 0, width, height);
-    gl.clearColor(...PAPER, 1);
+    gl.clearColor(...this.colour("backgroundColor"));
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     if (!this.X) return;
     camera.aspect = width / height;
@@ -314,6 +385,8 @@ export class Viewer {
     if (spacing > 5) this.drawLines("mesh", view, width, height, 1e-4);
     this.drawLines("curves", view, width, height, 3e-4);
     this.drawLines("arrows", view, width, height, 6e-4);
+    this.drawLines("section", view, width, height, 6e-4);
+    this.drawLines("marks", view, width, height, 2e-3);
     if (!this.arrows) this.drawDots(view, Math.min(9, 0.62 * spacing) * ratio);
   }
 
@@ -325,6 +398,7 @@ export class Viewer {
     gl.useProgram(made);
     gl.uniformMatrix4fv(uniforms.view, false, view);
     gl.uniform3fv(uniforms.eye, camera.eye);
+    gl.uniform4fv(uniforms.cut, this.cut);
     gl.uniform3fv(uniforms.sun, sun);
     gl.uniform3fv(uniforms.up, camera.up);
     gl.uniform1i(uniforms.smooth_, this.options.smooth ? 1 : 0);
@@ -347,6 +421,7 @@ export class Viewer {
     gl.uniformMatrix4fv(uniforms.view, false, view);
     gl.uniform2f(uniforms.screen, width, height);
     gl.uniform1f(uniforms.lift, lift);
+    gl.uniform4fv(uniforms.cut, ["grid", "section", "marks"].includes(name) ? WHOLE : this.cut);
     gl.enable(gl.BLEND);
     gl.bindVertexArray(part.array);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, part.count);
@@ -361,6 +436,7 @@ export class Viewer {
     gl.uniformMatrix4fv(uniforms.view, false, view);
     gl.uniform1f(uniforms.size, size);
     gl.uniform1f(uniforms.lift, 4e-4);
+    gl.uniform4fv(uniforms.cut, this.cut);
     gl.bindVertexArray(this.dots.array);
     gl.drawArrays(gl.POINTS, 0, this.dots.count);
   }

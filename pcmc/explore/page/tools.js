@@ -1,0 +1,116 @@
+// What the picture is asked for: measures between its points, a section, and single points that are moved.
+
+import { button, element } from "./elements.js";
+import { dot } from "./geometry.js";
+import { digits } from "./panel.js";
+
+const STILL = 5; // pixels that a click may move
+const STEPS = 1000;
+
+export class Tools {
+  /** `addHeight(point)` adds a target for the height there; `move(name, place, final)` moves a single point. */
+  constructor(viewer, root, addHeight, move) {
+    Object.assign(this, { viewer, addHeight, move, picked: [], points: {} });
+    const [measure, axis, place] = [".measure", "#section select", "#section input"].map((one) => root.querySelector(one));
+    this.told = document.querySelector("#measured");
+    measure.onclick = () => {
+      this.measuring = !this.measuring;
+      measure.setAttribute("aria-pressed", String(this.measuring));
+      viewer.canvas.classList.toggle("picking", this.measuring);
+      this.pick(null);
+      if (this.measuring) this.told.textContent = "Click a point of the surface, then another; or turn it with the arrow keys and press Enter for the point in the middle.";
+    };
+    this.section = () => this.cut(axis.value, place);
+    axis.onchange = this.section;
+    place.oninput = this.section;
+    viewer.grab = (event) => this.grab(event);
+    viewer.canvas.addEventListener("keydown", (event) => {
+      if (event.key === "Enter" && this.measuring) this.pick(viewer.pick([0, 0]));
+    });
+  }
+
+  /** Another mesh: its frame and units. */
+  begin({ origin, axes, foot, mirrors, units }) {
+    Object.assign(this, { origin, axes, foot, mirrors, unit: units.given ? ` ${units.length}` : "" });
+    this.pick(null);
+    this.section();
+  }
+
+  /** The single points of the surface shown, by name. */
+  show(points) {
+    this.points = points;
+    this.section();
+  }
+
+  /** In the coordinates of Π: along it, and the height above it. */
+  local(point) {
+    const from = point.map((x, k) => x + this.origin[k] - this.foot[k]);
+    return this.axes.map((axis) => dot(axis, from));
+  }
+
+  /** The place on the piece itself of a point that is on one of its mirror images. */
+  folded(point) {
+    return this.mirrors.reduce((place, [foot, normal]) => {
+      const beyond = (at) => dot(normal, at.map((x, k) => x + this.origin[k] - foot[k]));
+      const far = beyond(place) * beyond([0, 0, 0]) < 0 ? 2 * beyond(place) : 0;
+      return place.map((x, k) => x - far * normal[k]);
+    }, point);
+  }
+
+  /** A press on the picture: it drags a single point, or marks one where it does not move. */
+  grab(event) {
+    const { viewer } = this;
+    const from = viewer.placeOf(event);
+    const handles = Object.entries(this.points).map(([name, p]) => [name, p.map((x, k) => x - this.origin[k])]);
+    const name = this.measuring ? undefined : viewer.near(handles, from);
+    if (name !== undefined) {
+      const start = handles.find(([one]) => one === name)[1];
+      return (now, final) => {
+        const place = viewer.shifted(start, from, viewer.placeOf(now));
+        this.move(name, place.map((x, k) => x + this.origin[k]), final);
+      };
+    }
+    if (this.measuring) {
+      viewer.canvas.addEventListener("pointerup", (now) => {
+        const still = Math.hypot(now.clientX - event.clientX, now.clientY - event.clientY) < STILL;
+        if (still) this.pick(viewer.pick(viewer.placeOf(now)));
+      }, { once: true });
+    }
+    return null;
+  }
+
+  /** Mark a point of the surface; two are measured, and null takes the marks away. */
+  pick(point) {
+    this.picked = point ? [...(this.picked.length < 2 ? this.picked : []), point] : [];
+    this.viewer.setMarks(this.picked);
+    this.told.replaceChildren();
+    if (!point) return;
+    const [last, first] = this.picked.map((one) => this.local(one)).reverse();
+    const shown = (x) => `${digits(x)}${this.unit}`;
+    if (!first) {
+      this.told.append(element("span", "", `Height ${shown(last[2])} at (${digits(last[0])}, ${digits(last[1])})`),
+        button("Target here", () => this.addHeight(
+          this.local(this.folded(point)).slice(0, 2).map((x) => Number(x.toPrecision(6))))));
+      return;
+    }
+    const [x, y, z] = last.map((one, k) => one - first[k]);
+    this.told.textContent = `Distance ${shown(Math.hypot(x, y, z))}, in plan ${shown(Math.hypot(x, y))}, in height ${shown(z)}`;
+  }
+
+  cut(axis, place) {
+    const { viewer } = this;
+    place.disabled = axis === "";
+    if (axis === "" || !viewer.X) {
+      viewer.setCut(null);
+      return;
+    }
+    const normal = this.axes[Number(axis)];
+    const across = viewer.camera.corners().map((corner) => dot(normal, corner));
+    const [low, high] = [Math.min(...across), Math.max(...across)];
+    const offset = low + (high - low) * (place.value / STEPS + 1e-4); // beside a wall in the middle
+    const shown = this.local(normal.map((x) => offset * x))[Number(axis)];
+    place.setAttribute("aria-valuetext", `${digits(shown)}${this.unit}`);
+    place.title = `${"xyz"[Number(axis)]} = ${digits(shown)}${this.unit}`;
+    viewer.setCut([...normal, offset]);
+  }
+}
