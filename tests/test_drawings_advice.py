@@ -11,9 +11,9 @@ from ezdxf import units
 from refusals import refused
 
 from pcmc import cli, project
+from pcmc.advice.advice import chosen_values
 from pcmc.base.errors import FileError, FileWarning
 from pcmc.plan.proposal import _rounded
-from pcmc.project.advice import chosen_values
 
 SEAM = ("line", "divider seam", (5, 0), (5, 6))
 
