@@ -15,7 +15,7 @@ from .. import io
 from ..base.errors import OptionError, unknown
 from ..energy.rooms import refuse_varied_pressure
 from ..surface import Surface
-from ..surface.renewed import KINDS
+from ..surface.renewed import KINDS, all_values
 from ..surface.wall_pressures import with_pressures
 from .checking import is_curve
 from .drawn import files_of, is_drawing
@@ -25,7 +25,6 @@ from .mesh import mesh_file
 from .shifts import AXES, shifted
 from .start import start_of
 
-QUANTITIES = ("tension", "pressure", "weight", "snow")  # of a patch
 CABLE = "cable "  # before the name of a cable, where a patch has the same
 NUMERIC = ("a number", "a whole number", WALL)  # kinds of keys
 KeyPath = tuple[str | int, ...]
@@ -217,9 +216,8 @@ def _retensioned(source: _Source, surface: Surface, values: Mapping[str, float])
 def _names(surface: Surface) -> dict[str, tuple[str, str]]:
     """The names of what may vary besides numbers of the file: the kind of each, and its patch, cable or
     room."""
-    patches = [patch.name for patch in surface.patches]
-    names = {f"{name}.{what}": (f"{what}s", name) for what in QUANTITIES for name in patches}
-    names |= {f"{room.name}.volume": ("volumes", room.name) for room in surface.rooms}
-    cables = [cable.name for cable in surface.cables]
-    short = {f"{name}.tension": ("cables", name) for name in cables}
-    return {f"{CABLE}{name}.tension": ("cables", name) for name in cables} | short | names
+    values = reversed(
+        all_values(surface).items()
+    )  # where a patch and a cable share a name, the patch comes last
+    names = {f"{name}.{KINDS[kind][1]}": (kind, name) for kind, named in values for name in named}
+    return {f"{CABLE}{cable.name}.tension": ("cables", cable.name) for cable in surface.cables} | names
