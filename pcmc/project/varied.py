@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 from .. import io
 from ..base.errors import OptionError, unknown
+from ..base.files import read_bytes
 from ..energy.rooms import refuse_varied_pressure
 from ..surface import Surface
 from ..surface.renewed import KINDS, all_values
@@ -162,7 +163,7 @@ def digest(path: PathLike) -> str:
     if is_project(path):
         sha = hashlib.sha256(read_data(Path(path))[0].encode())
         for drawing in files_of(path)[0 if is_drawing(Path(path)) else 1 :]:
-            sha.update(drawing.read_bytes())
+            sha.update(read_bytes(drawing))
         return sha.hexdigest()
     surface = io.read_bare(path)[0]
     about = [list(map(vars, surface.patches)), surface.plane, surface.rooms]
