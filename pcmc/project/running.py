@@ -10,7 +10,7 @@ from typing import Any
 from .. import io
 from ..base.files import folder as made
 from ..structure import write_structure
-from ..surface import Surface
+from ..surface import Surface, unfolded
 from . import cache
 from .documents import schedule_works
 from .file import PathLike, Project, in_file, load
