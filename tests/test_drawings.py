@@ -21,9 +21,9 @@ from pcmc.base.units import Units
 from pcmc.cli import main
 from pcmc.drawings import FORMATS, drawing_set, pdf
 from pcmc.drawings.panel_sheets import panel_sheets
-from pcmc.drawings.sections import section
 from pcmc.drawings.sheet import LAYERS, box, corner, room
 from pcmc.surface.geometry import cross_2d, edge_vectors
+from pcmc.surface.sections import section
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -17,6 +17,7 @@ from tests.test_hostile_files import TRIANGLE, V, ply
 from tests.test_io_foreign import expected
 
 SUFFIXES = [*FORMATS, ".toml"]
+READ = [suffix for suffix, form in FORMATS.items() if form.reads]
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -24,9 +25,11 @@ def test_pipes_and_devices_are_not_opened(tmp_path, suffix, capsys):
     os.mkfifo(tmp_path / f"pipe{suffix}")
     (tmp_path / f"device{suffix}").symlink_to("/dev/zero")
     for name in ("pipe", "device"):
-        path = tmp_path / f"{name}{suffix}"
-        assert cli.main(["certify", str(path)]) == 2
-        assert capsys.readouterr().err.count("is no regular file but a pipe or a device") == 1
+        path, project = tmp_path / f"{name}{suffix}", tmp_path / "roof.toml"
+        project.write_text(f'mesh = "{path.name}"\n')
+        for file in (path, project) if suffix in READ else (path,):
+            assert cli.main(["certify", str(file)]) == 2
+            assert capsys.readouterr().err.count("is no regular file but a pipe or a device") == 1
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

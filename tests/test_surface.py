@@ -188,9 +188,12 @@ def test_plane_heights_and_projection():
     assert along[0].tolist() == pytest.approx([1 - 3 * 0.6, 2, 3 - 3 * 0.8])
 
 
-def test_nothing_held_warns():
+def test_nothing_held_warns_once():
     with pytest.warns(FreeSurfaceWarning, match="translations are free"):
-        octahedron(fixed=())
+        loose = octahedron(fixed=())
+    loose.rebuilt(faces=loose.faces[:, ::-1])  # a warning would be an error here
+    with pytest.warns(FreeSurfaceWarning, match="translations are free"):
+        octahedron().rebuilt(fixed=())
 
 
 def test_supports_as_masks_indices_or_ranges():

@@ -18,8 +18,8 @@ from rich.console import Console
 from tables import same
 
 from pcmc.base.errors import FileError, SweepError
+from pcmc.cli.progress import sweeping
 from pcmc.sweep import Sweep, provenance, read_store, run, running, table, write_table
-from pcmc.sweep.bar import bar
 
 CHAOS = Sweep(
     "sweep_cases:chaos", {"rate": np.linspace(3.6, 4.0, 4), "seed": (0.1, 0.2, 0.3)}, {"pause": 0.0}
@@ -216,7 +216,7 @@ def test_an_executor_that_breaks_stops_the_sweep(tmp_path):
 
 def test_the_bar_shows_counts():
     console = Console(file=io.StringIO(), record=True, width=100)
-    with bar(console) as draw:
+    with sweeping(console) as draw:
         run(CHAOS, workers=1, on_record=draw)
     text = console.export_text()
     assert "12/12" in text

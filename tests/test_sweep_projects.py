@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pydoc
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -117,7 +118,7 @@ def test_lines_and_points_are_shifted_as_they_are(roof):
     ("name", "message"),
     [
         ("eye.x", "several lines; type divider eye.x or hole eye.x"),
-        ("wal 1.x", "unknown number 'wal 1.x'; did you mean 'wall 1.x'"),
+        ("wal 1.x", "unknown number 'wal 1.x'; did you mean 'divider wall 1.x'"),
         ("wall 1.z", "only its place in plan counts"),
         ("crown.z", "only its place in plan counts"),
     ],
@@ -247,7 +248,9 @@ def test_the_digest_is_of_what_the_file_says(roof, tmp_path):
     pcmc.write(tmp_path / "a.pcmc", surface)
     pcmc.write(tmp_path / "b.pcmc", surface.retensioned({"left": 9.0}))
     pcmc.write(tmp_path / "c.pcmc", surface.moved(surface.vertices * (1.0 + 1e-15)))
-    assert len({digest(tmp_path / f"{name}.pcmc") for name in "abc"}) == 3
+    wall = [replace(patch, wall=True) for patch in surface.patches]
+    pcmc.write(tmp_path / "d.pcmc", surface.rebuilt(patches=wall))
+    assert len({digest(tmp_path / f"{name}.pcmc") for name in "abcd"}) == 4
 
 
 BAD = [
@@ -470,6 +473,17 @@ def test_a_number_that_the_targets_find_is_not_swept(roof, name):
     roof.write_text(plain + AIMED.replace("west", "patch 1"), encoding="utf-8")
     with refused(OptionError, what="plan.tension"):
         project_sweep("roof.toml", {"plan.tension": [3, 4]})
+
+
+def test_a_tension_that_the_rise_of_a_mesh_finds_is_not_swept(roof):
+    pcmc.write("roof.obj", varied(roof, {})[1])
+    text = '[mesh]\nfile = "roof.obj"\nrise = 1.0\n[mesh.patches.east]\nweight = 0.1\n'
+    roof.write_text(text, encoding="utf-8")
+    for name in ("west.tension", "mesh.tension", "mesh.patches.east.tension"):
+        with pytest.raises(PcmcError, match="is found by the search"):
+            project_sweep("roof.toml", {name: [3, 4]})
+    others = {"mesh.patches.east.weight": [0.1, 0.2], "mesh.rise": [1.0, 1.1]}
+    assert len(project_sweep("roof.toml", others)) == 4
 
 
 def test_the_table_and_the_picture_of_a_sweep_have_the_units_of_the_project(roof, capsys, monkeypatch):

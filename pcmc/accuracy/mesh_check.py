@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,7 @@ import pandas as pd
 
 from ..base import validate
 from ..base.arrays import Ints
-from ..base.errors import FreeSurfaceWarning, OptionError, SurfaceError
+from ..base.errors import OptionError, SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
 from ..meshing.held_curves import curve_doubt, held_corners, smooth_midpoints
@@ -221,9 +220,7 @@ def _refined(surface: Surface, boundary: str | Projection, corners: Ints) -> Sur
     """The surface on a mesh with four times as many triangles."""
     named: dict[str, Projection] = {"smooth": lambda _: smooth_midpoints(surface, corners=corners)}
     project = named.get(boundary) if isinstance(boundary, str) else boundary
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FreeSurfaceWarning)  # given with the first surface
-        return refine(surface, 1, project)
+    return refine(surface, 1, project)
 
 
 def _solved(start: Surface, callback: Callback | None) -> Result:

@@ -51,6 +51,12 @@ def check_regular(path: Path) -> None:
     raise FileError(text, what=str(path), found=kind, expected="a regular file")
 
 
+def read_bytes(path: Path) -> bytes:
+    """The bytes of a regular file; others are refused as in ``check_regular``."""
+    check_regular(path)
+    return path.read_bytes()
+
+
 def check_name(path: Path) -> None:
     """Refuse a name that no file can have."""
     if "\0" in str(path):

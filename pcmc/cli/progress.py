@@ -6,7 +6,11 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 @contextmanager
@@ -29,16 +33,34 @@ def working() -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def sweeping() -> Iterator[Any]:
-    """The progress bar of a sweep; None if there is no terminal."""
-    from ..sweep.bar import bar
+def sweeping(console: Console | None = None) -> Iterator[Callable[[Any], None] | None]:
+    """A function of a sweep's Progress that draws cases, time left and verdicts; None without a terminal.
 
-    if not _live():
+    ``console`` is where to draw; by default stderr.
+    """
+    if console is None and not _live():
         yield None
         return
+    from rich import progress
     from rich.console import Console
+    from rich.table import Column
 
-    with bar(Console(stderr=True)) as draw:
+    rest = Column(ratio=1, no_wrap=True, overflow="ellipsis")
+    columns = (
+        progress.BarColumn(20),
+        progress.MofNCompleteColumn(table_column=Column(no_wrap=True, min_width=9)),
+        progress.TextColumn("{task.fields[left]} left", table_column=Column(min_width=12)),
+        progress.TextColumn("{task.description}", markup=False, table_column=rest),
+    )
+    with progress.Progress(*columns, console=console or Console(stderr=True), expand=True) as bar:
+        task = bar.add_task("", total=None, left="?")
+
+        def draw(state: Any) -> None:
+            counts = sorted(state.counts.items(), key=lambda item: (-item[1], item[0]))
+            text = " · ".join(f"{verdict} {count}" for verdict, count in counts)
+            left = timedelta(seconds=round(state.seconds_left))
+            bar.update(task, total=state.total, completed=state.done, left=str(left), description=text)
+
         yield draw
 
 

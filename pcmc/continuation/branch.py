@@ -200,8 +200,9 @@ def follow(
     parameter : a patch's name for its tension; a ``Parameter``, whose bounds are ignored; or a
         ``Direction``, for several tensions and pressures that change together; or a ``BoundaryMotion``,
         which moves the fixed vertices.
-    stop : end where the parameter has this value. The branch starts towards it.
-    until : end where one of ``parameter``, ``energy``, ``volume`` or ``height`` has the value given.
+    stop : end where the parameter has exactly this value. The branch starts towards it.
+    until : end where one of ``parameter``, ``energy``, ``volume`` or ``height`` has the value given: the
+        parameter exactly, the others, which are results, to rounding.
     callback : called with a Progress after each point. Raise StopIteration in it to stop.
     options : fields of ``FollowOptions``.
 

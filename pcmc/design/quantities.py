@@ -83,13 +83,13 @@ def _area(surface: Surface, of: str | None) -> Measurement:
     """A_i, length²."""
     one = _chosen_patches(surface, of)
     areas, _, slope = weighted(surface, one)
-    return Measurement(float(one @ areas), slope)
+    return Measurement(float(areas[one != 0.0].sum()), slope)
 
 
 def _volume(surface: Surface, of: str | None) -> Measurement:
     """V_i as in ``volumes_below``, of one patch or of the roof, length³."""
     one = _chosen_patches(surface, of)
-    return Measurement(float(one @ volumes_below(surface)), volume_below_gradient(surface, one))
+    return Measurement(float(volumes_below(surface)[one != 0.0].sum()), volume_below_gradient(surface, one))
 
 
 def _curvature(surface: Surface, of: str) -> Measurement:

@@ -61,7 +61,8 @@ def meet(
     Parameters
     ----------
     surface : where to start; it need not be at rest.
-    targets : one or several, each with a value or limits.
+    targets : one or several, each with a value or limits. An apex above a held point that is the highest
+        now is sought by raising the middle of the roof, until that is the highest.
     vary : the parameters, or names of patches for their tensions. All others stay the same.
     tolerance : largest relative misfit of a target that counts as met.
     solves : largest number of solves.

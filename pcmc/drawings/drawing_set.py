@@ -21,10 +21,10 @@ from ..certificate import Certificate
 from ..certificate.required import certified, warning_mark
 from ..panels import Panels, panels
 from ..surface import Surface, expect_surface
+from ..surface.sections import Polyline, section
 from . import dxf, pdf, views
 from .panel_sheets import flat_panels
 from .panel_sheets import panel_sheets as panels_at_true_size
-from .sections import Polyline, section
 from .sheet import FORMATS, Sheet, add_frames, table_sheets
 
 SUFFIXES = (".dxf", ".pdf", ".svg")

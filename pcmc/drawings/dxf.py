@@ -14,7 +14,7 @@ from ..base.arrays import Floats
 from ..base.errors import MissingExtra
 from ..base.units import TABLE
 from ..surface import Surface
-from .sections import Polyline
+from ..surface.sections import Polyline
 from .sheet import LAYERS, SMALL, Dimension, Sheet
 from .views import Curve, section_layer
 

@@ -1,69 +1,83 @@
-"""Sheets as the pages of a PDF file, of their true size, with texts that can be searched."""
+"""Lines and texts on the pages of a PDF file, of their true size, with texts that can be searched."""
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ..base.arrays import Floats
 from ..base.errors import MissingExtra
-from .sheet import LAYERS, Line, Sheet
+from .sheet import LAYERS, Line, Sheet, Text
 
-INCH = 25.4  # mm
-POINT = INCH / 72.0  # mm
+FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 CAPITAL = 0.73  # height of a capital in the size of its font
-ALIGN: dict[str, Any] = {"L": "left", "C": "center", "R": "right"}
-COLORS = {1: "#D00000", 3: "#008000", 5: "#0040C0", 6: "#A000A0", 7: "#000000", 8: "#808080"}
+COLORS = {1: "#D00000", 3: "#008000", 5: "#0040C0", 6: "#A000A0", 7: "#000000", 8: "#909090"}
+
+
+def register_fonts() -> None:
+    """Make matplotlib's letters known to reportlab: they have Greek, Cyrillic and the signs of units.
+
+    Raises
+    ------
+    MissingExtra : reportlab or matplotlib is not installed.
+    """
+    try:
+        from reportlab.pdfbase import pdfmetrics, ttfonts
+    except ImportError:
+        raise MissingExtra("reportlab", "report") from None
+    try:
+        from matplotlib import get_data_path
+    except ImportError:
+        raise MissingExtra("matplotlib", "plot") from None
+    for name in (FONT, BOLD):
+        if name not in pdfmetrics.getRegisteredFontNames():
+            file = Path(get_data_path(), "fonts", "ttf", f"{name}.ttf")
+            pdfmetrics.registerFont(ttfonts.TTFont(name, file))
 
 
 def write_pdf(sheets: Sequence[Sheet], path: Path) -> None:
     """A page per sheet; the file has no date, so the same sheets give the same bytes."""
-    try:
-        from matplotlib.backends.backend_pdf import FigureCanvasPdf, PdfPages
-        from matplotlib.collections import LineCollection
-        from matplotlib.figure import Figure
-        from matplotlib.text import Text
-    except ImportError:
-        raise MissingExtra("matplotlib", "plot") from None
+    register_fonts()
+    from reportlab.lib.units import mm
+    from reportlab.pdfgen.canvas import Canvas
 
-    with PdfPages(path, metadata={"CreationDate": None}) as pages:
-        for sheet in sheets:
-            width, height = sheet.size
-            figure = Figure(figsize=(width / INCH, height / INCH))
-            FigureCanvasPdf(figure)
-            axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, width), ylim=(0.0, height))
-            axes.set_axis_off()
-            lines_of_sheet, texts = sheet.drawn()
-            for layer, lines in _by_layer(lines_of_sheet).items():
-                look = LAYERS[layer]
-                points = look.weight / 100.0 / POINT
-                axes.add_collection(LineCollection(lines, colors=COLORS[look.color], linewidths=points))
-            for text in texts:
-                figure.add_artist(
-                    Text(
-                        *text.at,
-                        text.text,
-                        transform=axes.transData,
-                        color=COLORS[LAYERS[text.layer].color],
-                        fontsize=text.height / CAPITAL / POINT,
-                        horizontalalignment=ALIGN[text.align],
-                        verticalalignment="center_baseline",
-                        rotation=text.turn,
-                        rotation_mode="anchor",
-                        parse_math=False,
-                    )
-                )
-            pages.savefig(figure)
+    canvas = Canvas(str(path), invariant=1)
+    for sheet in sheets:
+        canvas.setPageSize([side * mm for side in sheet.size])
+        paint(canvas, *sheet.drawn())
+        canvas.showPage()
+    canvas.save()
 
 
-def _by_layer(drawn: Sequence[Line]) -> dict[str, list[Floats]]:
-    """The lines of each layer, closed ones with their first point at the end too."""
-    lines = defaultdict(list)
-    for line in drawn:
-        points = np.append(line.points, line.points[:1], axis=0) if line.closed else line.points
-        lines[line.layer].append(points)
-    return lines
+def paint(canvas: Any, lines: Sequence[Line], texts: Sequence[Text], boxed: bool = False) -> None:
+    """Draw on a canvas of reportlab, from its origin; ``boxed`` texts hide what is behind them."""
+    from reportlab.lib.colors import HexColor
+    from reportlab.lib.units import mm
+
+    canvas.setLineJoin(1)
+    for line in lines:
+        look = LAYERS[line.layer]
+        canvas.setStrokeColor(HexColor(COLORS[look.color]))
+        canvas.setLineWidth(look.weight / 100.0 * mm)
+        path = canvas.beginPath()
+        first, *others = (line.points * mm).tolist()
+        path.moveTo(*first)
+        for point in others:
+            path.lineTo(*point)
+        if line.closed:
+            path.close()
+        canvas.drawPath(path)
+    for text in texts:
+        canvas.saveState()
+        canvas.translate(text.at[0] * mm, text.at[1] * mm)
+        canvas.rotate(text.turn)
+        high, size = text.height * mm, text.height / CAPITAL * mm
+        if boxed:
+            wide = canvas.stringWidth(text.text, FONT, size) + 0.4 * high
+            canvas.setFillColor(HexColor("#FFFFFF"))
+            canvas.rect(-0.5 * wide, -0.7 * high, wide, 1.4 * high, stroke=0, fill=1)
+        canvas.setFillColor(HexColor(COLORS[LAYERS[text.layer].color]))
+        canvas.setFont(FONT, size)
+        ways = {"L": canvas.drawString, "C": canvas.drawCentredString, "R": canvas.drawRightString}
+        ways[text.align](0.0, -0.5 * high, text.text)
+        canvas.restoreState()

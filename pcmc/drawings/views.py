@@ -14,7 +14,7 @@ from ..base.errors import OptionError
 from ..surface import Surface
 from ..surface.curve_kinds import curves_by_kind
 from ..surface.geometry import area_vectors
-from .sections import Polyline
+from ..surface.sections import Polyline
 from .sheet import (
     FORMATS,
     SCALES,

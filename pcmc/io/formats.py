@@ -12,7 +12,6 @@ from ..base.arrays import Floats
 from ..base.errors import FileError, unknown
 from ..base.units import Units
 from ..surface import Surface
-from .metadata import PARTS
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ LOST = {
 """The parts of a surface that a format may lose, in words."""
 
 FORMATS = {
-    ".pcmc": Format("native", scalars="both", certificate=True, shared=True, own=PARTS),
+    ".pcmc": Format("native", scalars="both", certificate=True, shared=True),
     ".fe": Format("evolver", shared=True, loses=("lines", "unit")),
     ".dmp": Format("evolver", shared=True, loses=("lines", "unit")),
     ".obj": Format("obj"),

@@ -73,29 +73,23 @@ def checked(data: MeshData) -> MeshData:
     Files may have any numbers: readers and libraries do not all check them, and indices out of range would
     reach numpy.
     """
-    X = _numeric(data.vertices, "vertices", "fiu", (None, 3)).astype(np.float64)
+    X = numeric(data.vertices, "vertices", "fiu", (None, 3)).astype(np.float64)
     checks.positions(X)
     n, m = len(X), len(data.faces)
-    F = within(_numeric(data.faces, "faces", "iu", (None, 3)), "faces", n)
-    patch = _numeric(data.patch_of_face, "patch_of_face", "iu", (m,))
+    F = within(numeric(data.faces, "faces", "iu", (None, 3)), "faces", n)
+    patch = numeric(data.patch_of_face, "patch_of_face", "iu", (m,))
     support = data.support
     if support is not None:
-        support = support_kinds(_numeric(support, "support", "iu", (n,)))
+        support = support_kinds(numeric(support, "support", "iu", (n,)))
     for name, values in data.scalars.items():
         if np.shape(values) != (m,):
-            _numeric(values, f"scalar {name}", "fiub", (n,))
-    for _, along in data.lines:
-        _numeric(along, "on_line", "b", (n,))
-    for cable in data.cables:
-        within(cable.edges, f"cable {cable.name}", n)
-    for _, mask in data.planes:
-        _numeric(mask, "on_planes", "b", (n,))
+            numeric(values, f"scalar {name}", "fiub", (n,))
     patch = within(patch, "patch_of_face", len(data.patches))
     scalars = {name: np.asarray(values, dtype=np.float64) for name, values in data.scalars.items()}
     return replace(data, vertices=X, faces=F, patch_of_face=patch, support=support, scalars=scalars)
 
 
-def _numeric(values: Any, name: str, kinds: str, shape: tuple[int | None, ...]) -> Any:
+def numeric(values: Any, name: str, kinds: str, shape: tuple[int | None, ...]) -> Any:
     """The array if its dtype is one of these kinds and its shape this one; None stands for any length > 0."""
     array = np.asarray(values)
     fits = array.ndim == len(shape) and all(
@@ -191,7 +185,6 @@ def _selected(data: MeshData, keep: Ints, place: Ints) -> MeshData:
         faces=place[data.faces],
         support=None if data.support is None else data.support[keep],
         scalars={k: v[keep] if len(v) == n else v for k, v in data.scalars.items()},
-        lines=tuple((line, along[keep]) for line, along in data.lines),
         planes=tuple((plane, mask[keep]) for plane, mask in data.planes),
         cables=tuple(filter(None, (cable.carried(place) for cable in data.cables))),
     )

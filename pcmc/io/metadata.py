@@ -160,7 +160,7 @@ class _Placed:
         support = data.support
         if support is not None and planes and what not in self.lost:
             support = support.copy()
-            for kind, where in zip((FREE, SLIDING), parts["slides"], strict=True):
+            for kind, where in zip((FREE, SLIDING), parts.get("slides", ()), strict=False):
                 if len(where) and (own := self.groups(where, what)) is not None:
                     support[np.isin(self.group, own)] = kind
         self.result = replace(

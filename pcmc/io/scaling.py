@@ -11,26 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import OptionError
-from ..base.units import MICROMETRES, NO_UNITS, Units, conversion_note, length_factor
+from ..base.units import Units, conversion_note, length_factor
 from ..surface import Circle, Line, Patch, Plane, Room, Surface
 from .mesh_data import MeshData
-
-
-def as_units(value: Any) -> Units:
-    """Units from a unit of length, or Units themselves; None is no unit.
-
-    >>> as_units("mm").length
-    'mm'
-    """
-    if value is None:
-        return NO_UNITS
-    if isinstance(value, Units):
-        return value
-    if isinstance(value, str):
-        return Units(value)
-    text = f"units: expected a unit of length such as 'mm', or Units, found {value!r:.40}"
-    raise OptionError(text, what="units", found=value, expected=tuple(MICROMETRES))
 
 
 def scaled(value: Any, factor: float) -> Any:

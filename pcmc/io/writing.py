@@ -16,14 +16,14 @@ from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError
 from ..base.files import atomic_write, check_name, writing
 from ..base.names import checked_name
-from ..base.units import Units, length_factor
+from ..base.units import Units, as_units, length_factor
 from ..base.validate import choice, refuse
 from ..contact.pinching import standing_part
 from ..surface import Surface, expect_surface
 from .flat_walls import encode_walls
 from .formats import FORMATS, Format, format_of
 from .metadata import metadata_text
-from .scaling import as_units, scaled_surface
+from .scaling import scaled_surface
 
 
 class Solved(Protocol):
@@ -77,7 +77,7 @@ def write(
     if not isinstance(scalars, Mapping | None):
         refuse("scalars", scalars, "arrays by name, such as {'height': [...]}")
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
-    units = as_units(units)
+    units = as_units("" if units is None else units)
     lost = [name for name in scalars if name not in form.carried(surface, scalars)]
     if colour:
         choice("colour", colour, [name for name, scalar in scalars.items() if len(scalar) == surface.n])

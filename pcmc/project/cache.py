@@ -23,7 +23,7 @@ import pandas as pd
 
 from .. import io
 from ..base.errors import FileError, LostWarning, PcmcError
-from ..base.files import atomic_write
+from ..base.files import atomic_write, read_bytes
 from ..base.units import Units
 from ..io.mesh_data import to_surface
 from ..solvers.result import Result, Status
@@ -147,7 +147,7 @@ def _path(project: Project) -> Path | None:
             for part in _pieces(getattr(project, name)):
                 sha.update(part)
         if project.mesh is not None:
-            sha.update((project.path.parent / project.mesh.file).read_bytes())
+            sha.update(read_bytes(project.path.parent / project.mesh.file))
             sha.update(repr(project.units).encode())
     except (TypeError, OSError):  # a value without a text of its own; a mesh that cannot be read
         return None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,37 +24,27 @@ def shifted(plan: Plan, shifts: Mapping[str, Mapping[str, float]]) -> Plan:
     >>> shifted(plan, {"wall 1": {"x": 1.0}}).dividers[0].curve.at(0.0).tolist()
     [[5.0, 0.0]]
     """
-    movable, changed = list(_movable(plan)), dict[str, Any]()
+    labels: dict[tuple[str, Any], str] = {("points", name): f"point {name}" for name in plan.points}
+    labels |= {("dividers", k): f"divider {part.name}" for k, part in enumerate(plan.dividers)}
+    labels |= {("holes", k): re.sub("['\"]", "", part.name) for k, part in enumerate(plan.holes)}
+    labels |= {("supports", k): f"support {k + 1}" for k in range(len(plan.supports))}
+    changed: dict[str, Any] = {}
     for name, by in shifts.items():
-        found = [(field, key) for field, key, names in movable if name in names]
-        what = f"{name}.{next(iter(by))}"
-        if not found:
-            known = (f"{names[0]}.{axis}" for _, _, names in movable for axis in by)
-            raise OptionError(unknown("number", what, known), what=what)
-        if len(found) > 1:
-            several = " or ".join(f"{field[:-1]} {what}" for field, _ in found)
-            raise OptionError(f"{name} is the name of several lines; type {several}", what=what)
+        found = [at for at, label in labels.items() if name in (label, label.partition(" ")[2])]
+        axis = next(iter(by))
+        if len(found) != 1:
+            several = " or ".join(f"{labels[at]}.{axis}" for at in found)
+            lost = unknown("number", f"{name}.{axis}", (f"{label}.{axis}" for label in labels.values()))
+            text = f"{name} is the name of several lines; type {several}" if found else lost
+            raise OptionError(text, what=f"{name}.{axis}")
         field, key = found[0]
         given = getattr(plan, field)
         parts = changed.setdefault(field, dict(given) if isinstance(given, Mapping) else list(given))
         try:
             parts[key] = _moved(parts[key], [by.get(axis, 0.0) for axis in AXES], plan.plane)
         except OptionError as error:
-            raise OptionError(f"{what}: {error}", what=what) from None
+            raise OptionError(f"{name}: {error}", what=f"{name}.{axis}") from None
     return replace(plan, **changed)
-
-
-def _movable(plan: Plan) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
-    """The field of the plan, key or index in it, and names of each line and point that can be shifted."""
-    for name in plan.points:
-        yield "points", name, (name, f"point {name}")
-    for k, divider in enumerate(plan.dividers):
-        yield "dividers", k, (divider.name, f"divider {divider.name}", f"divider {k + 1}")
-    for k, hole in enumerate(plan.holes):
-        name = hole.name.removeprefix("hole ").strip("'\"")
-        yield "holes", k, (name, f"hole {name}", f"hole {k + 1}")
-    for k in range(len(plan.supports)):
-        yield "supports", k, (f"support {k + 1}",)
 
 
 def _moved(part: Any, by: Sequence[float], plane: Plane) -> Any:

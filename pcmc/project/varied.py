@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 
 from .. import io
 from ..base.errors import OptionError, unknown
+from ..base.files import read_bytes
 from ..energy.rooms import refuse_varied_pressure
 from ..surface import Surface
-from ..surface.renewed import KINDS
+from ..surface.renewed import KINDS, all_values
 from ..surface.wall_pressures import with_pressures
 from .checking import is_curve
 from .drawn import files_of, is_drawing
@@ -25,7 +26,6 @@ from .mesh import mesh_file
 from .shifts import AXES, shifted
 from .start import start_of
 
-QUANTITIES = ("tension", "pressure", "weight", "snow")  # of a patch
 CABLE = "cable "  # before the name of a cable, where a patch has the same
 NUMERIC = ("a number", "a whole number", WALL)  # kinds of keys
 KeyPath = tuple[str | int, ...]
@@ -118,11 +118,12 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
 def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
     """Refuse every name and value that ``varied`` refuses; the file is read once.
 
-    The plan is meshed once for the names of patches, cables and rooms, and not at all without them.
+    A plan is meshed once for the names of patches, cables and rooms, and not at all without them.
     """
     source = _source(path)
-    project, surface = _project(source, {}), None
-    sought = _sought(project)
+    project = _project(source, {})
+    start = start_of(project) if project.mesh is not None else None
+    sought = _sought(project if start is None else start.project)
     for name, given in values.items():
         if name in sought:
             text = f"{path}: {name}: the {sought[name]} is found by the search for the targets, so the roof"
@@ -133,8 +134,8 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
                 text = f"{path}: {name} must be a finite number, found {value!r}"
                 raise OptionError(text, what=name, found=value)
             if source.is_load(name):
-                surface = start_of(project).surface if surface is None else surface
-                _retensioned(source, surface, {name: value})
+                start = start or start_of(project)
+                _retensioned(source, start.surface, {name: value})
             else:
                 _project(source, {name: value})
 
@@ -146,9 +147,10 @@ def _sought(project: Project) -> dict[str, str]:
         for one in parameter.names:
             bare = one.removeprefix(CABLE) if parameter.kind == "cable" else one
             kind = "tension" if parameter.kind == "cable" else parameter.kind
-            names = [f"{bare}.{kind}", f"{CABLE}{bare}.{kind}", f"plan.patches.{bare}.{kind}"]
-            if project.plan is not None and not project.plan.patches:
-                names.append(f"plan.{kind}")
+            table = "mesh" if project.plan is None else "plan"
+            names = [f"{bare}.{kind}", f"{CABLE}{bare}.{kind}", f"{table}.patches.{bare}.{kind}"]
+            if project.plan is None or not project.plan.patches:
+                names.append(f"{table}.{kind}")
             sought |= dict.fromkeys(names, parameter.label)
     return sought
 
@@ -161,7 +163,7 @@ def digest(path: PathLike) -> str:
     if is_project(path):
         sha = hashlib.sha256(read_data(Path(path))[0].encode())
         for drawing in files_of(path)[0 if is_drawing(Path(path)) else 1 :]:
-            sha.update(drawing.read_bytes())
+            sha.update(read_bytes(drawing))
         return sha.hexdigest()
     surface = io.read_bare(path)[0]
     about = [list(map(vars, surface.patches)), surface.plane, surface.rooms]
@@ -215,9 +217,8 @@ def _retensioned(source: _Source, surface: Surface, values: Mapping[str, float])
 def _names(surface: Surface) -> dict[str, tuple[str, str]]:
     """The names of what may vary besides numbers of the file: the kind of each, and its patch, cable or
     room."""
-    patches = [patch.name for patch in surface.patches]
-    names = {f"{name}.{what}": (f"{what}s", name) for what in QUANTITIES for name in patches}
-    names |= {f"{room.name}.volume": ("volumes", room.name) for room in surface.rooms}
-    cables = [cable.name for cable in surface.cables]
-    short = {f"{name}.tension": ("cables", name) for name in cables}
-    return {f"{CABLE}{name}.tension": ("cables", name) for name in cables} | short | names
+    values = reversed(
+        all_values(surface).items()
+    )  # where a patch and a cable share a name, the patch comes last
+    names = {f"{name}.{KINDS[kind][1]}": (kind, name) for kind, named in values for name in named}
+    return {f"{CABLE}{cable.name}.tension": ("cables", cable.name) for cable in surface.cables} | names

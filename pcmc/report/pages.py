@@ -5,16 +5,14 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
-from ..base.errors import MissingExtra
-from . import plan as plans
+from ..drawings.pdf import BOLD, FONT, paint, register_fonts
+from .plan import PaperPlan
 from .tables import Table
 
 INK, GREY, RED = "#202020", "#707070", "#C00000"
-FONT, BOLD = "pcmc", "pcmc-bold"
 SIDE, TOP, BOTTOM = 18.0, 20.0, 17.0  # mm: margins of a page
 TEXT, CELL = 9.0, 7.5  # points
 WIDEST = 118.0  # mm: height of a picture at most
@@ -99,7 +97,7 @@ def picture(title: str, png: bytes) -> list[Any]:
     return [KeepTogether([*([_title(title)] if title else []), image])]
 
 
-def plan(drawing: plans.PaperPlan) -> Any:
+def plan(drawing: PaperPlan) -> Any:
     """A plan to scale, in the middle between the margins."""
     from reportlab.lib.units import mm
     from reportlab.platypus import Flowable
@@ -111,7 +109,7 @@ def plan(drawing: plans.PaperPlan) -> Any:
             return drawing.size[0] * mm, drawing.size[1] * mm
 
         def draw(self) -> None:
-            plans.draw(drawing, self.canv, FONT)
+            paint(self.canv, drawing.lines, drawing.texts, boxed=True)
 
     return _Plan()
 
@@ -214,24 +212,3 @@ def _style(font: str, size: float, before: float, after: float, keep: bool, righ
         alignment=TA_RIGHT if right else TA_LEFT,
         splitLongWords=True,
     )
-
-
-def register_fonts() -> None:
-    """Make matplotlib's letters known to reportlab: they have Greek, Cyrillic and the signs of units.
-
-    Raises
-    ------
-    MissingExtra : reportlab or matplotlib is not installed.
-    """
-    try:
-        from reportlab.pdfbase import pdfmetrics, ttfonts
-    except ImportError:
-        raise MissingExtra("reportlab", "report") from None
-    try:
-        from matplotlib import get_data_path
-    except ImportError:
-        raise MissingExtra("matplotlib", "plot") from None
-    folder = Path(get_data_path(), "fonts", "ttf")
-    for name, file in ((FONT, "DejaVuSans.ttf"), (BOLD, "DejaVuSans-Bold.ttf")):
-        if name not in pdfmetrics.getRegisteredFontNames():
-            pdfmetrics.registerFont(ttfonts.TTFont(name, folder / file))

@@ -101,10 +101,13 @@ class Surface:
 
     def __post_init__(self) -> None:
         vars(self).update(checked_parts(**{name: getattr(self, name) for name in PARTS}))
+        self._warn_if_free(stacklevel=4)
+
+    def _warn_if_free(self, stacklevel: int) -> None:
         if not (self.held.any() or self.rooms):
             message = "no vertex is fixed or on the plane: translations are free, so only closed surfaces"
             message += " have an equilibrium; pass fixed= or on_plane= to hold it"
-            warnings.warn(message, FreeSurfaceWarning, stacklevel=3)
+            warnings.warn(message, FreeSurfaceWarning, stacklevel=stacklevel)
 
     @property
     def n(self) -> int:
@@ -291,7 +294,8 @@ class Surface:
         """The surface with other parts, checked anew; all others as they were given to this one.
 
         Parts with an entry per vertex (``fixed``, ``on_plane``, ``on_line``, ``on_planes``, ``cables``)
-        must be among the changes where the vertices are others.
+        must be among the changes where the vertices are others. Of a surface that nothing holds the user was
+        warned when it was made, and not again.
 
         Raises
         ------
@@ -305,8 +309,12 @@ class Surface:
         >>> over.faces.tolist(), over.fixed.all()
         ([[0, 2, 1]], np.True_)
         """
-        parts = {name: getattr(self, name) for name in PARTS}
-        return Surface(**parts | self.given_supports._asdict() | changes)
+        given = {name: getattr(self, name) for name in PARTS} | self.given_supports._asdict() | changes
+        made = object.__new__(Surface)
+        vars(made).update(given | checked_parts(**given))
+        if self.held.any() or self.rooms:
+            made._warn_if_free(stacklevel=3)
+        return made
 
     def retensioned(
         self,

@@ -7,6 +7,7 @@ on exactly two curve edges lies on a curve, one on a single or on three or more 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -169,30 +170,11 @@ class Topology:
         return components(self.edges, self.vertex_count)
 
     def _curves(self, mask: Bools, stop: Bools) -> tuple[Curve, ...]:
-        from scipy.sparse.csgraph import depth_first_order
-
         chosen = np.flatnonzero(mask)
-        if not len(chosen):
-            return ()
-        split, original = _split_at(self.edges[chosen], stop, self.vertex_count)
-        count = len(original)
-        label = components(split, count)
         sheets = self._sheets_of_edges(chosen)
-        degree = np.bincount(split.ravel(), minlength=count)
-        members = np.flatnonzero(degree)
-        members = members[np.lexsort((degree[members] != 1, label[members]))]  # part by part, its ends first
-        starts = members[np.unique(label[members], return_index=True)[1]]
-        # one search for all parts, from a vertex more that leads to the start of each
-        links = np.stack([np.full(len(starts), count), starts], axis=1)
-        graph = _adjacency(np.concatenate([split, links]), count + 1)
-        order = depth_first_order(graph, count, directed=False)[0][1:]
-        order = order[np.argsort(label[order], kind="stable")]
-        parts, first_edge = np.unique(label[split[:, 0]], return_index=True)
-        pieces = np.split(original[order], np.searchsorted(label[order], parts)[1:])
-        closed = degree[starts] != 1
         return tuple(
-            Curve(piece, bool(loop), sheets[edge])
-            for piece, loop, edge in zip(pieces, closed, first_edge, strict=True)
+            Curve(vertices, closed, sheets[edge])
+            for vertices, closed, edge in joined(self.edges[chosen], stop, self.vertex_count)
         )
 
     def _sheets_of_edges(self, chosen: Ints) -> list[tuple[int, ...]]:
@@ -217,6 +199,37 @@ def topology(faces: Ints, patch_of_face: Ints, vertex_count: int) -> Topology:
     corners = np.ascontiguousarray(faces, dtype=np.int32)
     edges, edge_of_face, valence = _number_edges(corners, vertex_count)
     return Topology(faces, patch_of_face, vertex_count, edges, edge_of_face, valence)
+
+
+def joined(pairs: Ints, stop: Bools, vertex_count: int) -> Iterator[tuple[Ints, bool, int]]:
+    """Pairs (k,2) of vertices joined to curves that end at the vertices ``stop`` (n,).
+
+    For each curve its vertices in order, whether it is closed, and the first of its pairs.
+
+    >>> import numpy as np
+    >>> curves = joined(np.array([[5, 3], [3, 9], [1, 2]]), np.zeros(10, dtype=bool), 10)
+    >>> [(vertices.tolist(), closed) for vertices, closed, _ in curves]
+    [([1, 2], False), ([5, 3, 9], False)]
+    """
+    from scipy.sparse.csgraph import depth_first_order
+
+    if not len(pairs):
+        return
+    split, original = _split_at(pairs, stop, vertex_count)
+    count = len(original)
+    label = components(split, count)
+    degree = np.bincount(split.ravel(), minlength=count)
+    members = np.flatnonzero(degree)
+    members = members[np.lexsort((degree[members] != 1, label[members]))]  # part by part, its ends first
+    starts = members[np.unique(label[members], return_index=True)[1]]
+    # one search for all parts, from a vertex more that leads to the start of each
+    links = np.stack([np.full(len(starts), count), starts], axis=1)
+    graph = _adjacency(np.concatenate([split, links]), count + 1)
+    order = depth_first_order(graph, count, directed=False)[0][1:]
+    order = order[np.argsort(label[order], kind="stable")]
+    parts, first_edge = np.unique(label[split[:, 0]], return_index=True)
+    pieces = np.split(original[order], np.searchsorted(label[order], parts)[1:])
+    yield from zip(pieces, (degree[starts] != 1).tolist(), first_edge.tolist(), strict=True)
 
 
 def vertex_kind(ends: Ints, vertex_count: int) -> Ints:

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
-from ..surface import Surface
-from ..surface.topology import components
+from ..base.arrays import Floats
+from .surface import Surface
+from .topology import joined
 
 
 class Polyline(NamedTuple):
@@ -47,43 +47,13 @@ def section(surface: Surface, point: Floats, normal: Floats) -> list[Polyline]:
         sides = topo.edge_of_face[surface.patch_of_face == patch]
         crossing = cut[sides]
         links = sides[crossing.any(axis=1)][crossing[crossing.any(axis=1)]].reshape(-1, 2)
-        for chain, closed in chains(links):
-            points = without_repeats(at[chain], closed)
+        nodes, local = np.unique(links, return_inverse=True)
+        nowhere = np.zeros(len(nodes), dtype=bool)
+        for chain, closed, _ in joined(local.reshape(-1, 2), nowhere, len(nodes)):
+            points = without_repeats(at[nodes[chain]], closed)
             if len(points) > 1:
                 lines.append(Polyline(points, closed, patch))
     return lines
-
-
-def chains(links: Ints) -> list[tuple[Ints, bool]]:
-    """Links (k,2) between numbered nodes, at most two at a node, joined: nodes in order, and whether closed.
-
-    >>> [(nodes.tolist(), closed) for nodes, closed in chains(np.array([[5, 3], [3, 9], [1, 2]]))]
-    [([1, 2], False), ([5, 3, 9], False)]
-    """
-    if not len(links):
-        return []
-    nodes, local = np.unique(links, return_inverse=True)
-    local = local.reshape(-1, 2)
-    beside: list[list[int]] = [[] for _ in nodes]
-    for one, other in local.tolist():
-        beside[one].append(other)
-        beside[other].append(one)
-    label = components(local, len(nodes))
-    degree = np.array([len(each) for each in beside])
-    joined = []
-    for part in range(label.max() + 1):
-        members = np.flatnonzero(label == part)
-        ends = members[degree[members] == 1]
-        start = int(ends[0] if len(ends) else members[0])
-        path, before = [start], -1
-        while True:
-            ahead = [node for node in beside[path[-1]] if node != before]
-            if not ahead or ahead[0] == start:
-                break
-            before = path[-1]
-            path.append(ahead[0])
-        joined.append((nodes[path], not len(ends)))
-    return joined
 
 
 def without_repeats(points: Floats, closed: bool) -> Floats:

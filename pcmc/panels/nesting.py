@@ -1,0 +1,81 @@
+"""Panels laid flat side by side, to be cut from sheets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from ..base.arrays import Floats
+
+SPACE, ROUNDING = 6.0, 1e-9  # mm: between panels; of their places
+TURNS = np.radians(np.arange(180.0))  # in which a panel is tried that does not fit as it lies
+
+
+def packed(panels: Iterable[Floats], wide: float, high: float) -> Iterator[tuple[int, Floats]]:
+    """The page of each panel (3,2), mm, and the panel placed on it: rows below one another, from y = 0 down.
+
+    >>> panel = np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]])
+    >>> [(page, placed[0].tolist()) for page, placed in packed([panel] * 3, 30.0, 12.0)]
+    [(0, [0.0, -10.0]), (0, [16.0, 0.0]), (1, [0.0, -10.0])]
+    """
+    page, y, depth = 0, 0.0, 0.0  # of the row that is filled: its top below the page's, and its height
+    row: list[Floats] = []
+    for panel in panels:
+        size, placed = np.ptp(panel, axis=0), _beside(row, panel)
+        if placed[:, 0].max() > wide + ROUNDING or y + size[1] > high + ROUNDING:
+            y, depth, row = y + depth + SPACE, 0.0, []
+            if y + size[1] > high + ROUNDING:
+                page, y = page + 1, 0.0
+            placed = _beside(row, panel)
+        row.append(placed)
+        depth = max(depth, float(size[1]))
+        yield page, placed - [0.0, y]
+
+
+def _beside(row: list[Floats], panel: Floats) -> Floats:
+    """The panel (3,2) to the right of those of a row, one side up or the other, as far left as possible.
+
+    Its highest point has y = 0, at the left end of a row its leftmost one x = 0.
+    """
+    ways = []
+    for way in (panel, -panel):
+        at = way - np.array([way[:, 0].min(), way[:, 1].max()])
+        shift = max((_gap(other, at) + SPACE for other in row[-3:]), default=0.0)
+        ways.append(at + np.array([max(shift, 0.0), 0.0]))
+    return min(ways, key=lambda way: float(way[:, 0].max()))
+
+
+def _gap(left: Floats, right: Floats) -> float:
+    """How far the right triangle must move along x until it only touches the left one.
+
+    Both sides are convex, so a corner of one of the two touches.
+    """
+    low, high = max(left[:, 1].min(), right[:, 1].min()), min(left[:, 1].max(), right[:, 1].max())
+    levels = np.clip(np.append(left[:, 1], right[:, 1]), low, high)
+    return float((_reach(left, levels).max(axis=0) - _reach(right, levels).min(axis=0)).max())
+
+
+def _reach(triangle: Floats, levels: Floats) -> Floats:
+    """(2,k) the least and the largest x of a triangle at each level y."""
+    x = []
+    for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+        low, high = sorted((a, b), key=lambda point: float(point[1]))
+        inside = (levels >= low[1]) & (levels <= high[1])
+        rise = high[1] - low[1]
+        share = (levels - low[1]) / rise if rise > 0.0 else np.zeros_like(levels)
+        at = low[0] + share * (high[0] - low[0])
+        x += [np.where(inside, at, np.nan), np.where(inside & (rise == 0.0), high[0], np.nan)]
+    return np.stack([np.nanmin(x, axis=0), np.nanmax(x, axis=0)])
+
+
+def turned_to_fit(corners: Floats, wide: float, high: float) -> Floats | None:
+    """A triangle (3,2) as it lies, or turned so that it is as low as possible; None if it fits in no way."""
+    if (np.ptp(corners, axis=0) <= np.array([wide, high]) + ROUNDING).all():
+        return corners
+    cosine, sine = np.cos(TURNS), np.sin(TURNS)
+    turn = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
+    ways = corners @ turn.transpose(0, 2, 1)
+    sizes = np.ptp(ways, axis=1)
+    fit = np.flatnonzero((sizes <= np.array([wide, high]) + ROUNDING).all(axis=1))
+    return ways[fit[sizes[fit, 1].argmin()]] if len(fit) else None
