@@ -330,7 +330,9 @@ def test_points_are_measured_by_mouse_and_keys_and_a_section_follows_its_slider(
     until(lambda: page.text("#measured").startswith("Height "), "the height")
     top = float(page.text("#measured").split()[1])
     assert top == pytest.approx(running.start.surface.vertices[:, 2].max(), rel=0.05)
-    page.find("#canvas").send_keys(Keys.ARROW_LEFT, Keys.SHIFT + Keys.ARROW_UP + Keys.ARROW_UP + Keys.NULL, Keys.ENTER)
+    page.find("#canvas").send_keys(
+        Keys.ARROW_LEFT, Keys.SHIFT + Keys.ARROW_UP + Keys.ARROW_UP + Keys.NULL, Keys.ENTER
+    )
     told = until(
         lambda: page.text("#measured").startswith("Distance ") and page.text("#measured"), "the distance"
     )
