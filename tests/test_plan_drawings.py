@@ -218,7 +218,7 @@ def raise_for_overwriting(path):
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        project.run_project(_project(path, None, [path], None))
+        project.run_project(_project(path, None, [path], None, ""))
 
 
 def test_the_least_tension_is_that_of_the_paper_for_round_and_long_plans():

@@ -70,9 +70,9 @@ BAD_LINES = {
 @pytest.mark.parametrize("case", BAD_LINES)
 def test_errors_of_the_plan_name_the_layer_and_the_entity(tmp_path, case):
     kind, *arguments, where = BAD_LINES[case]
-    loaded = project.load(drawing(tmp_path, (kind, "divider north", *arguments)))
+    file = drawing(tmp_path, (kind, "divider north", *arguments))
     with refused(PlanError, what="divider 'north'", where=where) as caught:
-        project.surface_of(loaded)
+        project.surface_of(project.load(file))
     assert f"layer 'divider north': {'LWPOLYLINE' if kind == 'lwpolyline' else 'LINE'}" in str(caught.value)
 
 

@@ -2,13 +2,15 @@
 
 import builtins
 import sys
+import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from refusals import refused
 
 from pcmc.base.errors import MissingExtra, OptionError, PlanError, SurfaceError
-from pcmc.plan import Area, Plan, plan_from
+from pcmc.plan import Area, Plan, patch_names, plan_from
 from pcmc.plan.curves import circle, curve, polyline
 from tests.test_plan import BOX, vertices_of
 
@@ -27,6 +29,9 @@ def tension(changes):
     return {} if "patches" in changes else {"tension": 5.0}
 
 
+COMB = [[[x, 0], [x, 12]] for x in np.linspace(1, 19, 200)] + [
+    [[0, y], [20, y]] for y in np.linspace(1, 11, 200)
+]
 FLAT = {"tension": 1, "at": [1, 1]}
 ONE, OUTLINE = "divider 'wall 1'", "the outline"
 SLOPED = {
@@ -67,6 +72,9 @@ SLOPED = {
         ({"edge_length": 1e-4}, {"what": "edge_length", "found": 1e-4}),
         ({"rise": 1e6}, {"what": "rise", "found": 1e6}),
         ({"holes": [circle([17, 5], 1e-9)]}, {"what": "hole 1"}),
+        ({"dividers": [WALL, [[10, 6], [10.1, 12]]]}, {"what": "edge_length", "found": pytest.approx(0.3)}),
+        ({"edge_length": 0.01}, {"what": "edge_length", "found": 0.01}),
+        ({"dividers": COMB}, {"what": "dividers", "found": 200 * 202 + 2 * 200}),
     ],
 )
 def test_wrong_plans_are_refused(changes, fields):
@@ -97,6 +105,10 @@ def test_a_divider_that_ends_inside_a_patch_names_the_nearest_line():
         ({"patches": [Area("a", 1.0), Area("a", 1.0)]}, {"what": "name", "found": "a"}),
         ({"patches": {"a": {"tension": 1.0}}, "tension": 2.0}, {"what": "tension"}),
         ({"outline": [["0", "0"], ["8", "0"], ["8", "4"]]}, {"what": "outline"}),
+        ({"patches": [Area(f"{k}", 1.0) for k in range(200_000)]}, {"what": "patches", "found": 200_000}),
+        ({"dividers": [WALL] * 2001}, {"what": "dividers", "found": 2001}),
+        ({"points": {"a\nb": [1, 1]}}, {"what": "points"}),
+        ({"dividers": [{"curve": WALL, "name": "a\nb"}]}, {"what": "name"}),
     ],
 )
 def test_wrong_values_are_refused_at_once(changes, fields):
@@ -131,7 +143,7 @@ def test_a_plan_needs_an_outline():
 
 
 def test_a_short_divider_between_edges_still_gets_a_wall():
-    surface = Plan(BOX, [[[19, 0], [20, 1]]], tension=5.0, edge_length=2.0).surface()
+    surface = Plan(BOX, [[[18, 0], [20, 2]]], tension=5.0, edge_length=2.2).surface()
     assert len(vertices_of(surface, "wall 1")) == 4
 
 
@@ -156,3 +168,50 @@ def test_without_shapely_the_extra_is_named(monkeypatch):
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(MissingExtra, match=r"pcmc-surfaces\[plan\]"):
         plan.surface()
+
+
+def test_a_hole_keeps_its_name_however_often_the_plan_is_changed():
+    plan = Plan(BOX, holes=[{**COURT, "name": "court"}], tension=5.0)
+    for _ in range(3):
+        plan = replace(plan, edge_length=0.5 * plan.edge_length)
+    assert [hole.name for hole in plan.holes] == ["hole 'court'"]
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_line_with_loops_is_refused_where_it_crosses_itself(closed):
+    turn = np.linspace(0.0, 34.0 * np.pi, 20_000)
+    radius = 5.0 + 2.0 * np.sin(2.37 * turn)
+    loops = polyline(np.stack([10 + radius * np.cos(turn), 6 + 0.5 * radius * np.sin(turn)], axis=1), closed)
+    changes = {"outline": loops} if closed else {"dividers": [loops]}
+    with refused(PlanError, what=OUTLINE if closed else ONE) as caught:
+        plan_from({"outline": BOX, "tension": 5.0, **changes}).surface()
+    near = np.linalg.norm(loops.at(loops.dense) - caught.value.where, axis=1)
+    assert np.count_nonzero(near < 0.02) > 2  # two stretches pass there
+
+
+def star(corners):
+    turn = np.arange(corners) * 2.0 * np.pi / corners
+    radius = 10.0 + (-1.0) ** np.arange(corners) * 10.0 / corners
+    return Plan(np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1), tension=5.0)
+
+
+def comb(dividers):
+    places = np.linspace(0.0, 20.0, dividers + 2)[1:-1]
+    return Plan(BOX, [[[x, 0], [x, 12]] for x in places], tension=5.0, edge_length=4.0)
+
+
+@pytest.mark.parametrize(("plan", "few"), [(star, 2000), (comb, 50)])
+def test_the_cost_of_a_plan_grows_as_its_lines_do(plan, few):
+    """Four times as many lines take at most 8 times the work; 16 times if each is compared with each."""
+
+    def work(count):
+        made, times = plan(count), []
+        for _ in range(3):
+            begin = time.process_time()
+            made = replace(made)
+            assert len(patch_names(made)) == (count + 1 if plan is comb else 1)
+            times.append(time.process_time() - begin)
+        return min(times)
+
+    work(few // 4)  # loads what is compiled
+    assert work(4 * few) < 10.0 * work(few)

@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, unknown
 from ..surface import Plane
-from .pieces import Piece
+from .pieces import Alike, Piece
 
 CORNER = math.radians(10.0)  # a joint that turns by more is a corner
 NEAR = 0.5  # of the edge length: an extreme nearer to another stop than this becomes no vertex
@@ -44,13 +44,26 @@ class Curve:
         """(n,d) points at parameters t (n,)."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
         piece = np.clip(np.floor(t).astype(int), 0, len(self.pieces) - 1)
-        ends, straight = self._straight
-        s = (t - piece)[:, None]
-        points = (1.0 - s) * ends[piece, 0] + s * ends[piece, 1]
-        for number in np.unique(piece[~straight[piece]]):
-            chosen = piece == number
-            points[chosen] = self.pieces[number].at(t[chosen] - number)
+        points = np.empty((len(t), self.pieces[0].points.shape[1]))
+        for place, alike in self._groups:
+            chosen = np.flatnonzero(place[piece] >= 0)
+            if len(chosen):
+                points[chosen] = alike.at(place[piece[chosen]], (t - piece)[chosen])
         return points
+
+    @cached_property
+    def _groups(self) -> list[tuple[Ints, Alike]]:
+        """The pieces by their kind, and (p,) the place of each piece among those, -1 for another kind."""
+        kinds: dict[tuple[bool, int, bool], list[int]] = {}
+        for number, piece in enumerate(self.pieces):
+            kind = (piece.sweep != 0.0, len(piece.points), piece.weights is not None)
+            kinds.setdefault(kind, []).append(number)
+        groups = []
+        for numbers in kinds.values():
+            place = np.full(len(self.pieces), -1)
+            place[numbers] = np.arange(len(numbers))
+            groups.append((place, Alike.of([self.pieces[k] for k in numbers])))
+        return groups
 
     @cached_property
     def _straight(self) -> tuple[Floats, Bools]:

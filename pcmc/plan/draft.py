@@ -13,12 +13,15 @@ from ..surface.topology import components
 from .arrangement import Arrangement, arrange, hole_points
 from .curves import Curve
 from .edges import Boundary, boundary, check_lines
-from .lines import SNAP, Kind, Line, LineTree
+from .lines import SNAP, Kind, Line, LineTree, point_text
 from .parts import PlanData
-from .pieces import to_local
-from .planar import PlanarMesh, triangulate
+from .pieces import to_local, two_digits
+from .planar import PlanarMesh, signed_areas, triangulate
 
-MAX_TRIANGLES = 5_000_000
+MAX_TRIANGLES = 500_000  # of a plan's mesh, which takes about a minute; finer ones are made by remeshing
+MAX_POINTS = 1_000_000  # of all lines, where they are measured
+AT_EDGES = 3  # triangles for each edge of a line, about, where these are shorter than the others
+SMALLEST = 0.4  # of the edge length squared: a triangle of these edges is larger
 MAX_EDGES = 200_000  # along a line
 MAX_RISE = 10.0  # of the initial surface, over the size of the plan
 
@@ -54,11 +57,13 @@ def drafted(plan: PlanData) -> Draft:
     """
     lines, on_edge, drawn = _arranged(plan)
     edges = np.concatenate([chain.edges for chain in drawn.chains])
+    _check_count(plan, _area(plan), len(edges))
     try:
         mesh = triangulate(drawn.points, edges, plan.edge_length, hole_points(drawn, lines))
     except SurfaceError as error:
         problem = f"lines of the plan are too close to each other for edges of length {plan.edge_length:g}"
         raise PlanError(f"{problem}: {error}", what="edge_length", found=plan.edge_length) from None
+    _check_parts(plan, mesh)
     return Draft(plan, lines, on_edge, drawn, mesh, boundary(plan, lines, on_edge, drawn))
 
 
@@ -95,13 +100,15 @@ def _check_size(plan: PlanData) -> None:
     def error(key: str, value: float, problem: str) -> PlanError:
         return PlanError(f"{key}={value:g} {problem}", what=key, found=value)
 
-    x, y = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2].T
-    area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
-    count = area / math.sqrt(0.1875) / plan.edge_length / plan.edge_length  # its square may be 0 or infinite
-    size = float(np.hypot(np.ptp(x), np.ptp(y)))
-    if count > MAX_TRIANGLES:
-        problem = f"would make about {count:.2g} triangles; at most {MAX_TRIANGLES} are allowed"
-        raise error("edge_length", plan.edge_length, problem)
+    curves = [plan.outline, *(part.curve for part in (*plan.holes, *plan.dividers, *plan.cables))]
+    curves += [support for support in plan.supports if isinstance(support, Curve)]
+    points = sum(len(curve.dense) for curve in curves)
+    if points > MAX_POINTS:
+        problem = f"the lines of the plan have {points} points; at most {MAX_POINTS} are read: draw them with"
+        raise PlanError(f"{problem} fewer", what="outline", found=points, expected=MAX_POINTS)
+    _check_count(plan, _area(plan), 0)
+    xy = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2]
+    size = float(np.linalg.norm(np.ptp(xy, axis=0)))
     if plan.edge_length > size:
         problem = f"is longer than the plan, {size:.4g} from corner to corner; use a smaller one"
         raise error("edge_length", plan.edge_length, problem)
@@ -124,6 +131,44 @@ def _check_size(plan: PlanData) -> None:
             problem = f"is only {extent:g} wide, too little for edges of length {plan.edge_length:g}"
             problem += "; leave it out, or use a smaller edge_length"
             raise PlanError(f"{hole.name} {problem}", what=hole.name, found=extent)
+
+
+def _area(plan: PlanData) -> float:
+    """The area in the outline, holes not left out."""
+    x, y = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2].T
+    return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
+
+
+def _check_count(plan: PlanData, area: float, edges: int) -> None:
+    """Refuse a mesh of more triangles than are allowed, before it is made."""
+    h, short = plan.edge_length, AT_EDGES * edges
+    count = short + area / math.sqrt(0.1875) / h / h  # the square of h may be 0 or infinite
+    if count > MAX_TRIANGLES:
+        least = math.sqrt(area / math.sqrt(0.1875) / max(MAX_TRIANGLES - short, 1))
+        change = f"use {two_digits(least):g} or more, and refine the roof by [[remesh]]"
+        if short > MAX_TRIANGLES / 2:
+            change = f"draw the lines with fewer points, they have {edges} edges"
+        problem = (
+            f"edge_length={h:g} would make about {count:.2g} triangles; at most {MAX_TRIANGLES} are allowed"
+        )
+        raise PlanError(f"{problem}: {change}", what="edge_length", found=h)
+
+
+def _check_parts(plan: PlanData, mesh: PlanarMesh) -> None:
+    """Refuse parts of the plan that are smaller than a triangle: lines that just miss each other."""
+    areas = signed_areas(mesh.points, mesh.triangles)
+    part = np.bincount(mesh.region, areas)
+    least = int(np.argmin(part))
+    if part[least] < SMALLEST * plan.edge_length**2:
+        own, area = mesh.region == least, part[least]
+        middle = mesh.points[mesh.triangles[own]].mean(axis=1).T @ areas[own] / area
+        finer = two_digits(math.sqrt(area), math.floor)
+        problem = f"the part of the plan around {point_text(middle)} has the area {area:.3g}, less than a"
+        problem += (
+            f" triangle with edges of {plan.edge_length:g}; if its lines should meet in one point, draw"
+        )
+        problem += f" them so, otherwise use edge_length = {finer:g} or less"
+        raise PlanError(problem, what="edge_length", where=tuple(middle.tolist()), found=float(area))
 
 
 def _lines(plan: PlanData) -> tuple[list[Line], list[Curve]]:

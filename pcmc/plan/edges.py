@@ -147,9 +147,13 @@ def edge_cables(edges: Boundary, held: Bools, numbers: count[int]) -> list[Cable
 
 
 def usual_cable(plan: PlanData) -> float:
-    """A tension of cables with which the edges of a sail bend moderately, two digits: 1.5 α × size."""
+    """A tension of cables with which the edges of a sail bend moderately; see ``cable_for``."""
     tension = max(area.tension for area in plan.patches) if plan.tension is None else plan.tension
-    outline = plan.outline.local(plan.plane)
+    return cable_for(plan.outline.local(plan.plane), tension)
+
+
+def cable_for(outline: Curve, tension: float) -> float:
+    """1.5 α × the size of the outline, two digits."""
     return float(f"{1.5 * tension * np.ptp(outline.at(outline.dense)[:, :2], axis=0).max():.2g}")
 
 

@@ -1,4 +1,4 @@
-"""Dividers whose ends just miss the lines that they should reach, extended to them."""
+"""Lines whose ends just miss each other, or the lines that they should reach, moved to meet."""
 
 from __future__ import annotations
 
@@ -6,44 +6,66 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
+from ..surface.topology import components
 from .curves import Curve
-from .lines import Kind, Line
+from .lines import Kind, Line, LineTree
 from .paths import bent
+
+EXACT = 1e-9  # of the tolerance: what is nearer than this meets already
 
 
 def extended(
-    dividers: Mapping[str, Curve], edges: Sequence[Curve], tolerance: float
+    curves: Mapping[str, Curve], edges: Sequence[Curve], tolerance: float, what: str = "dividers"
 ) -> tuple[dict[str, Curve], str]:
-    """The dividers with each end that is within ``tolerance`` of another line moved onto it, and a note.
+    """The curves with ends moved that just miss each other or a line, and a note; ``what`` names them.
 
-    Only the course in plan counts.
+    Ends within ``tolerance`` of each other meet in one point, or in a corner of an edge that is as near.
+    This point, and each other end, is moved onto the nearest line that it just misses. Only the course in
+    plan counts.
     """
-    lines = {name: Line(f"divider {name!r}", Kind.DIVIDER, curve) for name, curve in dividers.items()}
-    others = [Line("an edge", Kind.OUTLINE, edge) for edge in edges if np.ptp(edge.at(edge.dense)[:, :2])]
-    result: dict[str, Curve] = {}
-    largest = 0.0
-    moved = 0
-    for name, curve in dividers.items():
-        steps = np.zeros((2, 3))
-        for end in () if curve.closed else (0, 1):
-            point = curve.at([float(end * len(curve.pieces))])[0, :2]
-            near = [line for key, line in lines.items() if key != name and np.ptp(line.xy, axis=0).any()]
-            found = [(line, *line.nearest(point[None])) for line in (*others, *near)]
-            line, t, gap = min(((line, t[0], gap[0]) for line, t, gap in found), key=lambda entry: entry[2])
-            if 1e-9 * tolerance < gap <= tolerance:
-                steps[end, :2] = line.curve.at([t])[0, :2] - point
-                largest, moved = max(largest, gap), moved + 1
-        result[name] = _with_ends(curve, steps)
-    note = (
-        f"{moved} ends of dividers moved by up to {largest:.3g} to the lines that they meet" if moved else ""
-    )
-    return result, note
+    names = [name for name, curve in curves.items() if not curve.closed]
+    if not names:
+        return dict(curves), ""
+    rims = [Line("an edge", Kind.OUTLINE, edge) for edge in edges if _extent(edge)]
+    corners = np.concatenate([np.zeros((0, 2)), *(rim.corners for rim in rims)])
+    drawn = np.concatenate([curves[name].at([0.0, len(curves[name].pieces)]) for name in names])[:, :2]
+    points = np.concatenate([drawn, corners])
+    group = components(cKDTree(points).query_pairs(tolerance, output_type="ndarray"), len(points))
+    members: list[list[int]] = [[] for _ in range(int(group.max()) + 1)]
+    for k, number in enumerate(group.tolist()):
+        members[number].append(k)
+    place = np.array([points[own[-1:] if own[-1] >= len(drawn) else own].mean(axis=0) for own in members])
+    settled = [own[-1] >= len(drawn) for own in members]  # in a corner
+    result = dict(curves)
+    for others in ((), tuple(curves)):  # onto the edges first, then onto each other
+        lines = [*rims, *(Line("a line", Kind.DIVIDER, result[k]) for k in others if _extent(result[k]))]
+        owners = [None] * len(rims) + [name for name in others if _extent(result[name])]
+        for number, passing in enumerate(LineTree(lines).at(place, tolerance) if lines else ()):
+            own = {names[k // 2] for k in members[number] if k < len(drawn)}
+            reached = [lines[i].curve.at([t])[0, :2] for i, t in passing if owners[i] not in own]
+            if reached and not settled[number]:
+                place[number] = min(reached, key=lambda xy: float(np.linalg.norm(xy - place[number])))
+        steps = place[group[: len(drawn)]] - drawn
+        steps[np.linalg.norm(steps, axis=1) <= EXACT * tolerance] = 0.0
+        for name, both in zip(names, steps.reshape(-1, 2, 2), strict=True):
+            result[name] = _with_ends(curves[name], np.pad(both, ((0, 0), (0, 1))))
+    lengths = np.linalg.norm(steps, axis=1)
+    moved = np.count_nonzero(lengths)
+    note = f"{moved} end{'s' if moved > 1 else ''} of {what} moved by up to {lengths.max():.3g} to the lines"
+    return result, f"{note} that they meet" if moved else ""
+
+
+def _extent(curve: Curve) -> bool:
+    return bool(np.ptp(curve.at(curve.dense)[:, :2], axis=0).any())
 
 
 def _with_ends(curve: Curve, steps: Floats) -> Curve:
     """The curve with its two ends moved by these vectors."""
+    if not steps.any():
+        return curve
     pieces = list(curve.pieces)
     pieces[0] = bent(pieces[0], steps[0], np.zeros(3))
     pieces[-1] = bent(pieces[-1], np.zeros(3), steps[1])

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import OptionError, unknown
+from ..base.names import checked_name
 from ..surface import Plane
 from .curves import Curve, curve
 
@@ -172,9 +173,18 @@ def hole_of(spec: Any, number: int) -> Hole:
     what = f"hole {number}"
     part = _part_of(Hole, spec, what)
     validate.choice(f"edge of {what}", part.edge, EDGES)
-    name = f"hole {part.name!r}" if part.name else what
+    name = hole_label(checked_name(f"{what}.name", part.name, empty=True)) if part.name else what
     cable = edge_cable(part.edge, part.cable, name)
     return Hole(curve_of(part.curve, what, closed=True), part.edge, name, cable)
+
+
+def hole_label(name: str) -> str:
+    """The name of a hole in messages; that of a hole which has one already stays.
+
+    >>> hole_label("oculus"), hole_label("hole 'oculus'")
+    ("hole 'oculus'", "hole 'oculus'")
+    """
+    return name if name.startswith("hole ") else f"hole {name!r}"
 
 
 def edge_cable(edge: str, cable: Any, what: str) -> float | None:

@@ -61,11 +61,11 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> Joined:
     ends = np.concatenate([curve.at([0.0, float(len(curve.pieces))]) for curve in curves])
     node = components(cKDTree(ends).query_pairs(tolerance, output_type="ndarray"), len(ends))
     places = _places(curves, ends, node)
-    apart = np.linalg.norm(ends - places[node], axis=1)
-    gaps = np.zeros(len(places))
-    for k in np.flatnonzero(apart > EXACT * tolerance):
-        others = ends[node == node[k]]
-        gaps[node[k]] = np.linalg.norm(others[:, None] - others[None], axis=2).max()
+    low, high = np.full((2, len(places), 3), np.inf) * [[[1.0]], [[-1.0]]]
+    np.minimum.at(low, node, ends)
+    np.maximum.at(high, node, ends)
+    gaps = np.linalg.norm(high - low, axis=1)
+    gaps[gaps <= EXACT * tolerance] = 0.0
     moved = [_moved(curve, places[node[2 * k : 2 * k + 2]]) for k, curve in enumerate(curves)]
     paths = _walk(moved, [stroke.label for stroke in once], node.reshape(-1, 2))
     return Joined(paths, int(np.count_nonzero(gaps)), float(gaps.max()), doubles)
@@ -73,21 +73,30 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> Joined:
 
 def _once(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Stroke], tuple[str, ...]]:
     """The strokes without those that repeat another, and the labels of these; no stroke without length."""
-    kept: list[Stroke] = []
-    marks: list[Floats] = []
-    doubles = []
-    for stroke in strokes:
-        curve = stroke.curve
-        if curve is None or curve.length <= tolerance:
-            doubles += [] if curve is None else [stroke.label]
-            continue
-        mark = curve.at(curve.parameter(curve.length * np.array([0.0, 0.25, 0.5, 0.75, 1.0])))
-        if any(min(np.abs(mark - m).max(), np.abs(mark[::-1] - m).max()) <= tolerance for m in marks):
+    drawn = [stroke for stroke in strokes if stroke.curve is not None]
+    short = np.array([stroke.curve.length <= tolerance for stroke in drawn if stroke.curve is not None])
+    marks = np.array([_marks(stroke) for stroke in drawn]).reshape(len(drawn), -1)
+    shared, first, which = np.unique(
+        np.round(marks / tolerance, 3), axis=0, return_index=True, return_inverse=True
+    )
+    which = which.reshape(-1)
+    tree, turned = cKDTree(marks[first]), marks[first].reshape(-1, 5, 3)[:, ::-1].reshape(len(first), -1)
+    alike = [tree.query_ball_point(way, tolerance, p=np.inf) for way in (marks[first], turned)]
+    kept, taken, doubles = [], np.zeros(len(shared), dtype=bool), []
+    for k, stroke in enumerate(drawn):
+        if short[k] or taken[[*alike[0][which[k]], *alike[1][which[k]]]].any():
             doubles.append(stroke.label)
         else:
             kept.append(stroke)
-            marks.append(mark)
+            taken[which[k]] = True
     return kept, tuple(doubles)
+
+
+def _marks(stroke: Stroke) -> Floats:
+    """(5,3) points at the quarters of a stroke."""
+    curve = stroke.curve
+    assert curve is not None
+    return curve.at(curve.parameter(curve.length * np.linspace(0.0, 1.0, 5)))
 
 
 def _places(curves: Sequence[Curve], ends: Floats, node: Ints) -> Floats:
@@ -153,8 +162,10 @@ def _walk(curves: Sequence[Curve], labels: Sequence[str], nodes: Ints) -> list[J
                 pieces += (curves[k] if forward else curves[k].reversed()).pieces
                 names.append(labels[k])
                 node = int(nodes[k, 1] if forward else nodes[k, 0])
+                if node == begin or count[node] != 2:
+                    break
                 following = [other for other in at_node[node] if other in left]
-                if node == begin or count[node] != 2 or not following:
+                if not following:
                     break
                 k = following[0]
             path = Curve(tuple(pieces), closed=node == begin)

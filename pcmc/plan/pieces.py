@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Ints
 from ..surface import Plane
 
 SAME = 1e-9  # of a curve's size or parameter: differences up to this are none
@@ -33,17 +34,10 @@ class Piece:
 
     def at(self, t: Floats) -> Floats:
         """(n,d) points at t (n,) in 0..1."""
-        if self.sweep:
-            centre, u, v = self.points
-            angle = (self.sweep * t)[:, None]
-            return centre + np.cos(angle) * u + np.sin(angle) * v
-        if self.weights is None:
-            return _casteljau(self.points, t)
-        last = _casteljau(self._homogeneous, t)
-        return last[:, :-1] / last[:, -1:]
+        return Alike.of([self]).at(np.zeros(len(t), dtype=np.int64), t)
 
     @property
-    def _homogeneous(self) -> Floats:
+    def homogeneous(self) -> Floats:
         """(k,d+1) control points times their weights, and the weights."""
         weights = np.ones(len(self.points)) if self.weights is None else self.weights
         return np.column_stack([self.points * weights[:, None], weights])
@@ -75,7 +69,7 @@ class Piece:
         steps = np.diff(self.points[:, axis])
         if (steps >= 0.0).all() or (steps <= 0.0).all():  # then the curve goes one way, too
             return np.empty(0)
-        control = self._homogeneous[:, [axis, -1]]
+        control = self.homogeneous[:, [axis, -1]]
         control = control / control[:, 1].max()
 
         def rate(t: Floats) -> Floats:
@@ -121,9 +115,41 @@ class Piece:
         return Piece(local, self.sweep, self.weights)
 
 
+@dataclass(frozen=True, eq=False)
+class Alike:
+    """Pieces of one kind, evaluated together.
+
+    Attributes
+    ----------
+    points : (p,k,d) as of a Piece; homogeneous, (p,k,d+1), if they are rational.
+    sweep : (p,) of arcs, 0 of others.
+    rational : whether they are rational Bézier curves.
+    """
+
+    points: Floats
+    sweep: Floats
+    rational: bool
+
+    @classmethod
+    def of(cls, pieces: Sequence[Piece]) -> Alike:
+        """The pieces, which have one kind and number of points."""
+        rational = pieces[0].weights is not None
+        points = [piece.homogeneous if rational else piece.points for piece in pieces]
+        return cls(np.array(points), np.array([piece.sweep for piece in pieces]), rational)
+
+    def at(self, number: Ints, t: Floats) -> Floats:
+        """(n,d) points of the pieces with these numbers (n,) at t (n,) in 0..1."""
+        if self.sweep[0]:
+            centre, u, v = self.points[number].transpose(1, 0, 2)
+            angle = (self.sweep[number] * t)[:, None]
+            return np.asarray(centre + np.cos(angle) * u + np.sin(angle) * v)
+        last = _casteljau(self.points[number], t)
+        return last[:, :-1] / last[:, -1:] if self.rational else last
+
+
 def _casteljau(control: Floats, t: Floats) -> Floats:
-    """(n,d) the polynomial with Bernstein coefficients (k,d) at t (n,)."""
-    level = np.broadcast_to(control, (len(t), *control.shape))
+    """(n,d) polynomials with Bernstein coefficients (k,d), or (n,k,d) one for each, at t (n,)."""
+    level = np.broadcast_to(control, (len(t), *control.shape[-2:]))
     s = t[:, None, None]
     while level.shape[1] > 1:
         level = (1.0 - s) * level[:, :-1] + s * level[:, 1:]
@@ -147,3 +173,13 @@ def _first_step(control: Floats) -> Floats:
     steps = control[1:] - control[0]
     moved = np.flatnonzero((steps != 0.0).any(axis=1))
     return steps[moved[0]] if len(moved) else steps[0]
+
+
+def two_digits(value: float, rounded: Callable[[float], int] = math.ceil) -> float:
+    """A number > 0 rounded up to two digits, or down with ``math.floor``.
+
+    >>> two_digits(0.3001), two_digits(0.3001, math.floor)
+    (0.31, 0.3)
+    """
+    step = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return float(f"{rounded(value / step + (1e-9 if rounded is math.ceil else 0.0)) * step:.2g}")

@@ -12,6 +12,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError
+from ..base.names import checked_name
 from ..surface import Plane, Surface
 from .curves import Curve
 from .parts import (
@@ -31,6 +32,16 @@ from .parts import (
 )
 from .pieces import to_local, to_space
 from .summary import summary
+
+MOST = {
+    "dividers": 2000,
+    "holes": 2000,
+    "cables": 2000,
+    "mirrors": 100,
+    "supports": 10_000,
+    "patches": 10_000,
+}
+"""How many of its parts a plan may have."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -104,6 +115,10 @@ class Plan(PlanData):
     """
 
     def __post_init__(self) -> None:
+        for key, most in MOST.items():
+            if len(getattr(self, key)) > most:
+                problem = f"{key}: {len(getattr(self, key))} are too many for a plan; at most {most} are read"
+                raise OptionError(problem, what=key, found=len(getattr(self, key)), expected=most)
         parsed = {
             "outline": curve_of(self.outline, "outline", closed=True),
             "dividers": tuple(divider_of(d, k) for k, d in enumerate(self.dividers, 1)),
@@ -136,10 +151,15 @@ class Plan(PlanData):
         names = [d.name for d in self.dividers if d.wall is not None] + [a.name for a in self.patches]
         names += [d.name for d in self.dividers if d.wall is None and d.cable is not None]
         names += dict.fromkeys(c.name for c in self.cables if c.name)
-        for place, name in enumerate(names):
-            if name in names[:place]:
+        for what, texts in (("name", names), ("points", self.points), ("rooms", self.rooms)):
+            for text in texts:
+                checked_name(what, text)
+        taken: set[str] = set()
+        for name in names:
+            if name in taken:
                 problem = f"the name {name!r} is used twice; each patch, wall and cable needs its own"
                 raise OptionError(problem, what="name", found=name)
+            taken.add(name)
 
     def __repr__(self) -> str:
         """Size, outline, patches, dividers and holes, a line each."""

@@ -14,9 +14,11 @@ from ..base.errors import OptionError, PlanError, unknown
 from ..surface.wall_tensions import balanced_wall
 from .corners import most_in_corners
 from .curves import Curve
-from .drawing import Drawing, Label
+from .drawing import Drawing
+from .edges import cable_for
 from .lines import Kind, Line
-from .parts import Area, Divider, Hole, PlanData, check_keys
+from .parts import Area, CableLine, Divider, Hole, PlanData, check_keys
+from .texts import Label
 
 TRIANGLES = 1500  # of a first roof, about
 FINEST = 6000  # triangles at most, where a part is small
@@ -24,6 +26,7 @@ ACROSS = 2.5  # edges from the middle of the smallest part to its edge, at least
 ROOM = 1.6  # tension, over the least at which a roof over the plan exists
 SAMPLES = 16  # points of a divider at which its neighbours are looked up
 SMALL_HOLE = 0.05  # of the plan's area; smaller holes change its least tension little
+MANY, ROUGH = 4000, 1e-5  # curves of more points are simplified, by so much of their length
 NEAR = 1e-4  # of the plan's size: a part this near to a point of a divider is beside it
 
 
@@ -61,14 +64,18 @@ def roof_area(drawing: Drawing, smallest: float = 0.0) -> Any:
 
 
 def _area(outline: Curve, holes: Sequence[Curve], smallest: float) -> Any:
-    whole = shapely.make_valid(shapely.Polygon(outline.at(outline.dense)[:, :2]))
+    whole = shapely.make_valid(_polygon(outline))
     area = whole
     for curve in holes:
-        hole = shapely.make_valid(shapely.Polygon(curve.at(curve.dense)[:, :2]))
+        hole = shapely.make_valid(_polygon(curve))
         level = curve.pieces[0].points.shape[1] == 2  # a raised one carries the roof
         if not level or hole.area > smallest * whole.area:
             area = shapely.difference(area, hole)
     return area
+
+
+def _polygon(curve: Curve) -> Any:
+    return shapely.Polygon(_line(curve).coords)
 
 
 def _line(curve: Curve, further: float = 0.0) -> Any:
@@ -77,7 +84,8 @@ def _line(curve: Curve, further: float = 0.0) -> Any:
     if further and not curve.closed:
         out = [curve.reversed().pieces[-1].direction(1), curve.pieces[-1].direction(1)]
         xy = np.concatenate([[xy[0] + further * out[0][:2]], xy, [xy[-1] + further * out[1][:2]]])
-    return shapely.LineString(xy)
+    line = shapely.LineString(xy)
+    return shapely.simplify(line, ROUGH * line.length, preserve_topology=False) if len(xy) > MANY else line
 
 
 def largest_circle(area: Any) -> tuple[tuple[float, float], float]:
@@ -126,20 +134,40 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     PlanError, OptionError : for a name that the drawing does not have, or has outside the plan.
     """
     values = dict(given or {})
+    sail = drawing.loose or bool(drawing.cables) or values.get("edge") in ("free", "cable")
     parts = parts_of(drawing)
     areas = _areas(parts, drawing, values.pop("patches", {}), values.pop("tension", None))
     tensions = [area["tension"] for area in areas]
     edge_length = values.setdefault("edge_length", edge_length_for(parts, drawing))
-    outline = Line("the outline", Kind.OUTLINE, drawing.outline)
+    outline, tree = (
+        Line("the outline", Kind.OUTLINE, drawing.outline),
+        shapely.STRtree([p.area for p in parts]),
+    )
+    cable = cable_for(drawing.outline, max(tensions))
+    if drawing.loose and values.setdefault("edge", "cable") == "cable":
+        values.setdefault("cable", cable)
+    cables = _changed(drawing.cables, values.pop("cables", []), "cable", CableLine)
+    for entry in cables:
+        if isinstance(entry, dict) and entry.get("name") in drawing.cables:
+            entry.setdefault("tension", cable)
     dividers = _changed(drawing.dividers, values.pop("dividers", []), "divider", Divider)
     for entry in dividers:
         if isinstance(entry, dict) and entry.get("name") in drawing.dividers:
-            entry.setdefault("bottom", "held" if drawing.flat else "sloped")
-            most = most_in_corners(entry["curve"], outline, edge_length)
-            entry.setdefault("wall", wall_tension(entry["curve"], parts, tensions, most))
+            name, curve = entry["name"], entry["curve"]
+            upright = entry.setdefault("upright", True) if name in drawing.upright else False
+            if sail or name in drawing.ridges:
+                entry.setdefault("wall", False)
+            else:
+                entry.setdefault("bottom", "held" if drawing.flat else "sloped")
+                most = most_in_corners(curve, outline, edge_length)
+                entry.setdefault("wall", wall_tension(curve, tree, tensions, most, upright))
+            if name in drawing.ridges:
+                entry.setdefault("cable", cable)
     patches: dict[str, dict[str, Any]] = {}
     for area in areas:
         name = area.pop("name")
+        if sail:  # an edge that nothing holds closes no space for a pressure
+            area.setdefault("pressure", 0.0)
         if name in patches:  # several parts of one name are one patch
             patches[name]["at"] = [*_as_points(patches[name]["at"]), *_as_points(area["at"])]
         else:
@@ -152,6 +180,10 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
         "supports": [*drawing.supports, *values.pop("supports", [])],
         "patches": patches,
     }
+    if cables:
+        plan["cables"] = cables
+    if drawing.mirrors:
+        plan["mirrors"] = [*drawing.mirrors, *values.pop("mirrors", [])]
     if drawing.level != 0.0:
         plan["plane"] = {"point": [0.0, 0.0, drawing.level]}
     return plan | values
@@ -247,12 +279,13 @@ def _changed(drawn: Mapping[str, Curve], given: Sequence[Any], what: str, kind: 
     return [*entries.values(), *more]
 
 
-def wall_tension(curve: Curve, parts: Sequence[Part], tensions: Sequence[float], most: float) -> float:
-    """The tension of a wall along a curve; see ``balanced_wall``."""
-    size = sum(part.area.length for part in parts)
-    neighbours = []
-    for t in (len(curve.pieces) * (k + 0.5) / SAMPLES for k in range(SAMPLES)):
-        point = shapely.Point(curve.at([t])[0, :2])
-        beside = [part.area.distance(point) <= NEAR * size for part in parts]
-        neighbours.append([tension for tension, there in zip(tensions, beside, strict=True) if there])
-    return balanced_wall(neighbours, most)
+def wall_tension(
+    curve: Curve, parts: shapely.STRtree, tensions: Sequence[float], most: float, upright: bool = False
+) -> float:
+    """The tension of a wall along a curve; see ``balanced_wall``. An upright one needs no difference."""
+    size = sum(part.length for part in parts.geometries)
+    points = shapely.points(curve.at(len(curve.pieces) * (np.arange(SAMPLES) + 0.5) / SAMPLES)[:, :2])
+    neighbours: list[list[float]] = [[] for _ in points]
+    for point, part in zip(*parts.query(points, predicate="dwithin", distance=NEAR * size), strict=True):
+        neighbours[point].append(tensions[part])
+    return balanced_wall([[min(near)] if upright and near else near for near in neighbours], most)

@@ -10,7 +10,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -98,20 +97,18 @@ def _strokes(entity: Mapping[str, Any]) -> list[Stroke]:
         return [Stroke(layer, label, point=point, text=None if text is None else _plain(text))]
     pieces = [piece for raw in entity["pieces"] for piece in _pieces(raw, layer, label)]
     runs: list[list[Piece]] = []
+    before = np.zeros(3)
     for piece in pieces:
-        ends = piece.at(np.array([0.0, 1.0]))
+        ends = piece.at(np.array([0.0, 1.0])) if piece.sweep else piece.points[[0, -1]]
         size = float(np.linalg.norm(piece.points, axis=1).max())
         if not piece.sweep and np.ptp(piece.points, axis=0).max() <= 1e-14 * size:
             continue  # a point drawn twice in a polyline
-        if runs and _gap(runs[-1][-1], ends[0]) <= ROUNDING * (size + 1.0):
+        if runs and np.linalg.norm(before - ends[0]) <= ROUNDING * (size + 1.0):
             runs[-1].append(piece)
         else:
             runs.append([piece])
+        before = ends[1]
     return [Stroke(layer, label, Curve(tuple(run))) for run in runs]
-
-
-def _gap(piece: Piece, point: Floats) -> float:
-    return float(np.linalg.norm(piece.at(np.array([1.0]))[0] - point))
 
 
 def _plain(text: str) -> str:
@@ -164,25 +161,19 @@ def bezier_spans(degree: int, knots: Floats, points: Floats, weights: Floats) ->
     [[[0.0, 0.0], [1.0, 2.0], [1.5, 1.0]], [[1.5, 1.0], [2.0, 0.0], [3.0, 2.0]]]
     """
     control = np.column_stack([points * weights[:, None], weights])
-    spans = []
-    for last, (a, b) in enumerate(pairwise(knots.tolist())):
-        if a == b or not degree <= last < len(points):
-            continue
-        values = [
-            _blossom(degree, last, knots, control, [a] * (degree - i) + [b] * i) for i in range(degree + 1)
-        ]
-        homogeneous = np.array(values)
-        weight = homogeneous[:, -1]
-        spans.append((homogeneous[:, :-1] / weight[:, None], weight))
-    return spans
-
-
-def _blossom(degree: int, last: int, knots: Floats, control: Floats, at: list[float]) -> Floats:
-    """The blossom of the span that begins at the knot ``last``."""
-    d = control[last - degree : last + 1].copy()
-    for r in range(1, degree + 1):
-        for k in range(degree, r - 1, -1):
-            low, high = knots[k + last - degree], knots[k + 1 + last - r]
-            share = (at[r - 1] - low) / (high - low)
-            d[k] = (1.0 - share) * d[k - 1] + share * d[k]
-    return d[degree]
+    first = np.arange(degree, len(points))
+    first = first[knots[first] < knots[first + 1]]  # the knots at which the spans begin
+    ends = knots[first], knots[first + 1]
+    values = []
+    for i in range(degree + 1):
+        d = control[first[:, None] + np.arange(-degree, 1)]
+        for r in range(1, degree + 1):
+            at = ends[r > degree - i]
+            for k in range(degree, r - 1, -1):
+                low, high = knots[k + first - degree], knots[k + 1 + first - r]
+                share = ((at - low) / (high - low))[:, None]
+                d[:, k] = (1.0 - share) * d[:, k - 1] + share * d[:, k]
+        values.append(d[:, degree])
+    homogeneous = np.stack(values, axis=1)
+    weight = homogeneous[:, :, -1]
+    return list(zip(homogeneous[:, :, :-1] / weight[:, :, None], weight, strict=True))

@@ -31,7 +31,10 @@ def check_keys(text: str, data: Mapping[str, Any]) -> None:
     targets = target_sections() if "targets" in data else ()
     drawn = isinstance(data.get("plan"), Mapping) and "drawing" in data["plan"]
     for section in (*below, solve_section(str(method)), *targets):
-        if drawn and section.name in OR_CURVE:  # the drawing may have the curve of that name
+        if drawn and section.name in (
+            *OR_CURVE,
+            "plan.cables",
+        ):  # the drawing may have the curve of that name
             keys = (replace(key, default=None) if key.name == "curve" else key for key in section.keys)
             section = replace(section, keys=tuple(keys))
         for place, table in _tables(data, section):

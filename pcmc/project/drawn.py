@@ -61,11 +61,15 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
 
 @dataclass(frozen=True)
 class Chosen:
-    """What neither a project nor its drawing says: tensions of patches, walls, edge length."""
+    """What neither a project nor its drawing says: tensions of patches, walls and cables, edge length.
+
+    The cable without a name is that of the outline.
+    """
 
     tensions: Mapping[str, float] = field(default_factory=dict)
     walls: Mapping[str, float] = field(default_factory=dict)
     edge_length: float | None = None
+    cables: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def text(self) -> str:
@@ -74,10 +78,14 @@ class Chosen:
         >>> Chosen({"nave": 5.4}, {"chancel": 1.6}).text.split(" (")[0]
         "chosen for what the project leaves open: tension 5.4 for 'nave'; wall 1.6 for 'chancel'"
         """
-        values = {"tension": self.tensions, "wall": self.walls}
+        values = {"tension": self.tensions, "wall": self.walls, "cable": self.cables}
         parts = [_by_value(what, named) for what, named in values.items() if named]
         keys = [f'"{name}" = {{tension = ...}} under [plan.patches]' for name in list(self.tensions)[:1]]
         keys += [f'[[plan.dividers]] name = "{name}", wall = ...' for name in list(self.walls)[:1]]
+        for name in list(self.cables)[:1]:
+            keys.append(
+                f'[[plan.cables]] name = "{name}", tension = ...' if name else "cable = ... under [plan]"
+            )
         if self.edge_length is not None:
             parts.append(f"edges of {self.edge_length:g}")
             keys.append("edge_length = ... under [plan]")
@@ -90,7 +98,7 @@ def _by_value(what: str, named: Mapping[str, float]) -> str:
     """Names with their values, those of one value together."""
     groups: dict[float, list[str]] = {}
     for name, value in named.items():
-        groups.setdefault(value, []).append(repr(name))
+        groups.setdefault(value, []).append(repr(name) if name else "the outline")
     return "; ".join(f"{what} {value:g} for {', '.join(names)}" for value, names in groups.items())
 
 
@@ -102,11 +110,15 @@ def _chosen(given: Mapping[str, Any], full: Mapping[str, Any], drawing: Drawing)
         e["name"] for e in given.get("dividers", []) if isinstance(e, Mapping) and "wall" in e and "name" in e
     }
     areas = {} if "tension" in given else full["patches"]
+    tensioned = {e["name"] for e in given.get("cables", []) if "tension" in e and "name" in e}
+    cables = {e["name"]: e["tension"] for e in full.get("cables", []) if e.get("name") in drawing.cables}
+    outline = {"": full["cable"]} if "cable" in full and "cable" not in given else {}
     own = [e for e in full["dividers"] if isinstance(e, Mapping) and e.get("name") in drawing.dividers]
     return Chosen(
         {name: area["tension"] for name, area in areas.items() if name not in said},
-        {entry["name"]: entry["wall"] for entry in own if entry["name"] not in walled},
+        {e["name"]: e["wall"] for e in own if e["name"] not in walled and e["wall"] is not False},
         None if "edge_length" in given else full["edge_length"],
+        outline | {name: tension for name, tension in cables.items() if name not in tensioned},
     )
 
 

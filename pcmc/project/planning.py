@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import FileError, MissingExtra
+from ..plan import plan_from
 from ..plan.curves import Curve
 from .drawn import FALLBACK, LENGTHS, read
 from .file import Project
+from .start import surface_of
 
 if TYPE_CHECKING:
     from ..plan.drawing import Drawing
@@ -72,6 +75,9 @@ def project_text(
     name = drawing_reference(path, project) if refer else ""
     drawing = read(path, units, gap)
     values = proposed(drawing)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # no project is written that cannot be meshed
+        surface_of(Project(path, plan_from(values), drawing=drawing))
     document = tomlkit.document()
     document.add(tomlkit.comment(f"The roof of {drawing.path.name}, written by pcmc plan"))
     for note in drawing.notes:
@@ -96,14 +102,19 @@ def project_text(
         plan["outline"] = _curve(tomlkit, values["outline"], outline=True)
         if values["supports"]:
             plan["supports"] = _list(tomlkit, [_curve(tomlkit, s) for s in values["supports"]])
+        if "mirrors" in values:
+            plan["mirrors"] = _list(tomlkit, [_curve(tomlkit, m) for m in values["mirrors"]])
+        if "edge" in values:
+            plan["edge"], plan["cable"] = values["edge"], values["cable"]
+            plan["cable"].comment("tension of the cables along the outline, between its supports")
     plan.add(tomlkit.nl())
     patches = tomlkit.table()
     patches.comment("a larger tension gives a flatter roof")
     for name, area in values["patches"].items():
         patches[name] = _inline(tomlkit, {k: v for k, v in area.items() if not (refer and k == "at")})
     plan["patches"] = patches
-    for kind in ("holes", "dividers"):
-        if values[kind]:
+    for kind in ("holes", "dividers", "cables"):
+        if values.get(kind):
             plan[kind] = _entries(tomlkit, values[kind], refer)
     document["plan"] = plan
     if len(drawing.heights) and not refer:
@@ -162,7 +173,7 @@ def _entries(tomlkit: Any, entries: Any, refer: bool) -> Any:
         for key, value in entry.items():
             if key not in ("name", "curve") and DEFAULTS.get(key) != value:
                 table[key] = value
-                if key == "wall":
+                if key == "wall" and value:
                     table[key].comment("tension of the wall; more gives a sharper valley")
         array.append(table)
     return array
