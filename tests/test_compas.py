@@ -288,7 +288,6 @@ def service(tmp_path_factory):
     """What Proxy needs to call the service in a process of its own, and the folder that it may use."""
     home = tmp_path_factory.mktemp("home")
     folder = home / "roofs"
-    folder.mkdir()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("HOME", str(home))
         patch.setenv("USERPROFILE", str(home))
@@ -489,7 +488,8 @@ def test_settings_are_the_owners_and_a_new_secret_counts_at_once(service, monkey
         path.touch(0o600)
         path.write_text(kept)
     for options, expected in {
-        ("--folder", str(path)): "is no folder",
+        ("--folder", str(path)): "cannot be the folder",
+        ("--folder", str(path / "missing" / "a")): "cannot be the folder",
         ("--port", str(old["port"])): "cannot be opened",
         ("--port", "99999999"): "cannot be opened",
     }.items():

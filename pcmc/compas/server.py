@@ -99,14 +99,16 @@ def settings_path() -> Path:
 
 
 def set_up(folder: str | os.PathLike[str]) -> Path:
-    """Let the service read and write a folder; make a new secret. The port stays. Returns the file written.
+    """Let the service read and write a folder, made if it is missing; return the file of the settings.
 
-    A service that runs goes on with the new settings.
+    They have a new secret, and the port that they had. A service that runs goes on with the new settings.
     """
     place = Path(os.path.realpath(Path(folder).expanduser()))
-    if not place.is_dir():
-        text = f"{place}: is no folder; make it, or name another"
-        raise FileError(text, what=str(place))
+    try:
+        place.mkdir(exist_ok=True)
+    except OSError as error:
+        text = f"{place}: cannot be the folder ({error.strerror or error}); name another"
+        raise FileError(text, what=str(place)) from None
     path = settings_path()
     try:
         port = read_settings().port

@@ -10,7 +10,7 @@ from typing import Any
 from .. import io
 from ..base.files import folder as made
 from ..structure import write_structure
-from ..surface import Surface
+from ..surface import Surface, unfolded
 from . import cache
 from .documents import schedule_works
 from .file import PathLike, Project, in_file, load
@@ -138,8 +138,13 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
     """
     surface, certificate, data = *outcome.shown, outcome.data
     about: dict[str, Any] = {"units": outcome.units, "colour": colour}
-    if outcome.result is None and not outcome.unfold:
+    if outcome.result is None:
         about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
+        if outcome.unfold:
+            unfold, half = unfolded(outcome.surface), outcome.surface
+            place = {half.m: unfold.face, half.n: unfold.vertex}
+            carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
+            about |= {"scalars": carried, "certificate": None}
         return [(Path(file), partial(io.write, surface=surface, **about)) for file in files]
     works: Works = []
     scalars = fields(surface, certificate)
