@@ -15,6 +15,7 @@ continuation existence     branches of equilibria; whether there is one at all
 accuracy                   error bars from finer meshes, and meshes for an accuracy
 compas panels structure    COMPAS; families of panels; structural models
 drawings plot report       sheets, pictures, and pages for those who build
+advice                     first tensions for a rise, and what to type where a roof fails
 project                    a whole design in one file
 sweep explore cli          many cases; the page; the command
 =========================  ==========================================================================

@@ -10,9 +10,9 @@ import tomlkit
 from drawn import drawing
 
 from pcmc import cli, project
+from pcmc.advice.masts import point_masts, with_rings
 from pcmc.base.errors import FileWarning, PlanWarning
 from pcmc.plan import Plan
-from pcmc.project.masts import point_masts, with_rings
 
 SQUARE = "[plan]\nedge_length = 1.2\noutline = [[0, 0], [20, 0], [20, 12], [0, 12]]\n"
 TENT = (

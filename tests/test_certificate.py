@@ -11,7 +11,7 @@ from generators import spherical_cap_exact
 from pcmc import Patch, Surface, certify, curvature_error, energy, gradient, mean_curvature, solve
 from pcmc.certificate import Verdict
 from pcmc.certificate.curve_tables import conormal_sum
-from pcmc.certificate.reactions import reactions_per_length
+from pcmc.certificate.reactions import support_forces
 from pcmc.contact.pinching import standing_part
 from pcmc.energy.functional import patch_areas, volume
 from pcmc.meshing.quality import triangle_quality
@@ -207,7 +207,7 @@ def test_the_standing_part_is_computed_once_for_each_surface():
     assert part.surface.m < surface.m
     with mock.patch("pcmc.contact.pinching.find_walls", side_effect=AssertionError):
         certify(surface)
-        reactions_per_length(surface)
+        support_forces(surface)
         assert standing_part(surface) is part
     moved = surface.moved(two_squares(6, alpha_aux=3.0).vertices)
     assert standing_part(moved).surface is moved

@@ -11,9 +11,9 @@ from ezdxf import units
 from refusals import refused
 
 from pcmc import cli, project
+from pcmc.advice.advice import chosen_values
 from pcmc.base.errors import FileError, FileWarning
 from pcmc.plan.proposal import _rounded
-from pcmc.project.advice import chosen_values
 
 SEAM = ("line", "divider seam", (5, 0), (5, 6))
 
@@ -43,7 +43,7 @@ def test_tensions_and_walls_that_are_chosen_for_a_drawing_are_printed(tmp_path):
     def chosen(plan):
         path.write_text(f'[plan]\ndrawing = "{file.name}"\n{plan}')
         loaded = project.load(path)
-        return chosen_values(loaded, project.surface_of(loaded)), loaded
+        return chosen_values(loaded.plan, loaded.chosen.text, project.surface_of(loaded)), loaded
 
     (text,), loaded = chosen('[plan.patches]\n"patch 1" = {tension = 9}\n')
     tension, wall = loaded.plan.patches[1].tension, loaded.plan.dividers[0].wall

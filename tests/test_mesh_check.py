@@ -273,8 +273,8 @@ def test_solve_prints_the_check_unless_told_not_to(hall, capsys):
 
 
 def test_large_surfaces_are_checked_on_request_only(hall, capsys, monkeypatch):
-    for module in ("cli.checking", "project.outcome"):
-        monkeypatch.setattr(f"pcmc.{module}.MOST_CHECKED", 10)
+    for room in ("project.outcome", "cli.checking"):
+        monkeypatch.setattr(f"pcmc.{room}.MOST_CHECKED", 10)
     assert cli.main(["solve", "hall.toml"]) == 0
     assert "mesh check left out above 10 triangles" in capsys.readouterr().out
     assert cli.main(["solve", "hall.toml", "--mesh-check"]) == 0

@@ -2,6 +2,7 @@
 
 import os
 import warnings
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -170,6 +171,24 @@ def test_a_pipe_and_deep_toml_are_refused(folder, capsys):
     for name in ("pipe.toml", "deep.toml"):
         assert cli.main(["convert", name, "a.obj"]) == 2
         assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_notes_of_remeshing_and_of_targets_stay_where_an_accuracy_is_asked_for(folder, monkeypatch):
+    from pcmc.project import solving
+
+    asked = []
+
+    def accurate(given, surface, report):
+        asked.append(surface.m)
+        return solving._solve_or_meet(replace(given, targets=()), surface, report)
+
+    monkeypatch.setattr(solving, "_solve_to_accuracy", accurate)
+    text = WITH_UNITS + "[solve]\naccuracy = {height = 1e-2}\n[remesh]\nedge_length = 0.8\n"
+    text += '[targets]\nmeet = [{quantity = "apex", value = 0.5}]\nvary = ["roof"]\n'
+    Path("roof.toml").write_text(text, encoding="utf-8")
+    roof = project.designed("roof.toml")
+    assert len(asked) == 1
+    assert any("targets met on the first mesh" in note for note in roof.notes)
 
 
 # -- a mesh as a project -----------------------------------------------------------------------------

@@ -79,7 +79,10 @@ class SupportForces(NamedTuple):
 
     @property
     def per_length(self) -> Floats:
-        """(n,3) ``along`` over ``lengths``, force/length; NaN where there is no line."""
+        """(n,3) ``along`` over ``lengths``, force/length; NaN where there is no line.
+
+        Each end of an edge gets half of its length.
+        """
         share = self.lengths[:, None]
         return np.divide(self.along, share, out=np.full(self.along.shape, np.nan), where=share > 0.0)
 
@@ -102,6 +105,12 @@ def support_forces(surface: Surface, forces: Floats | None = None) -> SupportFor
 
     A vertex on several planes divides its force among them: Σ c_i n_i of their normals. Where a fixed vertex
     lies in mirror planes, these take the part across them.
+
+    >>> from pcmc import Patch
+    >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
+    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+    >>> (3 * support_forces(square).per_length).round(9)[1].tolist()  # tension -1, 1; a third of p A = 2
+    [-1.5, 1.5, -1.0]
     """
     standing = standing_part(surface).surface
     forces = reactions(standing) if forces is None else forces
@@ -143,22 +152,6 @@ def support_forces(surface: Surface, forces: Floats | None = None) -> SupportFor
         by_plane,
         cables,
     )
-
-
-def reactions_per_length(surface: Surface, forces: Floats | None = None) -> Floats:
-    """(n,3) the reactions over the length of the held lines at each vertex; NaN where there is none.
-
-    Each end of an edge gets half of its length. ``forces`` (n,3) are by default the reactions of the part of
-    the surface that stands. Forces at single points, those of cables that end on a line, and the pull of
-    images in mirror planes are left out; see ``support_forces``.
-
-    >>> from pcmc import Patch
-    >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
-    ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
-    >>> (3 * reactions_per_length(square)).round(9)[1].tolist()  # tension -1, 1; a third of p A = 2
-    [-1.5, 1.5, -1.0]
-    """
-    return support_forces(surface, forces).per_length
 
 
 def at_both_ends(mask: Bools, edges: Ints) -> Bools:

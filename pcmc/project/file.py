@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..advice.masts import mast_note
+from ..advice.rises import Rise, take_rises, with_rises
 from ..base import validate
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
 from ..base.files import check_name, check_regular, system_error
@@ -24,11 +26,9 @@ from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys, line_with
 from .documents import Documents, documents_of
 from .drawn import Chosen, is_drawing, with_drawing
-from .masts import mast_note
 from .mesh import MeshFile, mesh_file, mesh_of
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
-from .rises import Rise, take_rises, with_rises
 from .structure import Structure
 
 if TYPE_CHECKING:

@@ -10,6 +10,8 @@ from inspect import cleandoc
 from typing import Any
 
 from ..accuracy.adaptive import ACCURACY_OF
+from ..advice.rises import RISES
+from ..advice.rises import WHOLE as WHOLE_RISES
 from ..base.units import FORCES, LENGTHS
 from ..drawings import FORMATS
 from ..plan import Area, CableLine, Divider, Hole, Plan
@@ -21,8 +23,6 @@ from .documents import Documents
 from .mesh import PATCH_KEYS, MeshFile
 from .output import COLOURS
 from .remeshing import WHEN, Remeshing
-from .rises import RISES
-from .rises import WHOLE as WHOLE_RISES
 from .structure import Structure
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..advice.rises import RISES, Rise, first_tension, taken
 from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError
@@ -19,7 +20,6 @@ from ..io.mesh_data import MeshData
 from ..surface import Patch, Surface
 from ..surface.geometry import area_vectors, segment_lengths
 from .drawn import check_beside
-from .rises import RISES, Rise, first_tension, taken
 
 if TYPE_CHECKING:
     from ..design import Parameter, Target

@@ -9,15 +9,17 @@ from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from .. import solvers
+from ..advice.advice import Task, advice, chosen_values
+from ..advice.aims import aims_below_supports
 from ..base.errors import BalanceWarning, OptionError
 from ..certificate.balance import unbalanced
 from ..contact.pinching import standing_part
 from ..existence import solve
 from ..meshing.remeshing import remesh, size_note
+from ..plan import Plan
 from ..solvers.result import Progress, Result, Status
 from ..surface import Surface
-from .advice import advice, chosen_values
-from .aims import aims_below_supports
+from .accuracy import AccuracyWanted
 from .file import Project, in_file
 from .outcome import EXTENSIVE, Outcome
 from .output import OnStep, ignore, metres_note
@@ -43,7 +45,9 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
         raise OptionError(f"{text}, or give the plan mirrors", what="whole")
     _check_balance(surface)
     solved = solve_project(project, surface, report)
-    notes = [*chosen_values(project, surface), *solved.notes]
+    notes = [*solved.notes]
+    if project.has_file:  # a drawing alone is proposed as a whole
+        notes = [*chosen_values(project.plan, project.chosen.text, surface), *notes]
     if project.drawing is not None:
         notes += metres_note(project.files, start.units.length)
     if project.whole and any(target.quantity in EXTENSIVE for target in project.targets):
@@ -55,7 +59,17 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
         return outcome
     notes += aims_below_supports(project.plan, surface, project.targets, start.units)
     report("looking for advice")
-    return replace(outcome, advice=advice(project, given.surface, surface, outcome, solve_project))
+    drawing = "" if project.drawing is None else project.drawing.path.name
+    names = ("rises", "targets", "vary", "method", "options", "units")
+    task = Task(project.plan, project.path.name, drawing, *(getattr(project, name) for name in names))
+
+    def try_plan(plan: Plan, surface: Surface, targets: Sequence[Target]) -> Outcome:
+        wanted = AccuracyWanted()
+        return solve_project(
+            replace(project, plan=plan, targets=targets, remeshing=(), wanted=wanted), surface
+        )
+
+    return replace(outcome, advice=advice(task, given.surface, surface, outcome, try_plan))
 
 
 def _check_balance(surface: Surface) -> None:

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..advice.rises import RISES, WHOLE
 from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError
 from ..plan import Plan
 from ..surface import Surface
 from ..surface.renewed import KINDS, all_values
 from .file import Project, project_of
-from .rises import RISES, WHOLE
 from .start import surface_of
 
 SAME = 1e-11  # of the largest value of a kind: a difference that counts as none

@@ -4,67 +4,102 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ..base.errors import PcmcError
+from ..base.units import Units
 from ..certificate.balance import strained_junction
+from ..certificate.certificate import Certificate
 from ..certificate.proof import Fold, Overload
 from ..certificate.verdict import Verdict
 from ..contact.pinching import standing_part
 from ..existence import solve
 from ..plan import Divider, Plan
 from ..plan.parts import BALANCED
-from ..solvers.result import Status
+from ..solvers.result import Result, Status
 from ..surface import Surface
-from .accuracy import AccuracyWanted
-from .file import Project
 from .masts import SHARES, point_masts, ring_lines, with_rings
-from .outcome import Outcome
-from .rises import net_pressures
+from .rises import Rise, net_pressures
 from .sails import as_sail, sail_lines
 
 if TYPE_CHECKING:
-    from ..design import Parameter
+    from ..design import Design, Parameter, Target
 
 BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of it
 FARTHEST = 20.0  # times the tensions: a fold beyond has another reason, such as an end that slips
 TRIES = 3  # plans tried
 TRIANGLES = 5000  # of the meshes that these are tried on, at most about
 INFLATED = (Overload, Fold)
-Trial = Callable[[Project, Surface], Outcome]  # solves a project from a surface
 
 
-def chosen_values(project: Project, surface: Surface) -> list[str]:
-    """The tensions and walls that the project leaves open, a line each for the drawing's and the plan's."""
-    if project.plan is None or project.path.suffix.lower() != ".toml":
-        return []  # a drawing alone is proposed as a whole
-    drawn = [project.chosen.text] if project.chosen.text else []
-    left_open = [divider for divider in project.plan.dividers if divider.wall == BALANCED]
+class Ended(Protocol):
+    """How a project was solved, by its outcome."""
+
+    @property
+    def certificate(self) -> Certificate: ...
+    @property
+    def design(self) -> Design | None: ...
+    @property
+    def solved(self) -> Result: ...
+    @property
+    def good(self) -> bool: ...
+
+
+Trial = Callable[[Plan, Surface, Sequence["Target"]], Ended]  # solves a plan from a surface, with targets
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a project asks for.
+
+    Attributes
+    ----------
+    plan : of its roof; None for a mesh.
+    file, drawing : the names of its file and of the drawing of its plan; ``drawing`` is empty without one.
+    rises, targets, vary : heights instead of tensions, which are the last targets; all targets; what varies.
+    method, options : of the solver.
+    units : of its numbers.
+    """
+
+    plan: Plan | None
+    file: str
+    drawing: str
+    rises: Sequence[Rise]
+    targets: Sequence[Target]
+    vary: Sequence[Parameter]
+    method: str
+    options: Mapping[str, Any]
+    units: Units
+
+
+def chosen_values(plan: Plan | None, drawn: str, surface: Surface) -> list[str]:
+    """The tensions and walls that a project leaves open, a line each for the drawing's and the plan's."""
+    if plan is None:
+        return []
+    left_open = [divider for divider in plan.dividers if divider.wall == BALANCED]
     chosen = [p for p in surface.patches if any(_is_wall_of(divider, p.name) for divider in left_open)]
-    if not chosen:
-        return drawn
     values = ", ".join(f"{patch.name!r} {patch.tension:g}" for patch in chosen)
-    return [
-        *drawn,
-        f"walls balanced with their neighbours: {values} (to choose one, type wall = under its divider)",
-    ]
+    balanced = (
+        f"walls balanced with their neighbours: {values} (to choose one, type wall = under its divider)"
+    )
+    return [*filter(None, [drawn]), *([balanced] if chosen else [])]
 
 
-def advice(
-    project: Project, given: Surface, start: Surface, outcome: Outcome, try_project: Trial
-) -> list[str]:
+def advice(task: Task, given: Surface, start: Surface, ended: Ended, try_plan: Trial) -> list[str]:
     """What to type so that a project, or a surface, comes to rest and meets its targets: a heading, and a
     line for each change.
 
     Parameters
     ----------
     given, start : the start shape of the project, and the one that was solved, with the command's tensions.
-    try_project : solves another project, with its targets.
+    ended : how that ended.
+    try_plan : solves another plan from a surface, with targets.
     """
-    plan = project.plan
-    if outcome.certificate.certified and (plan is None or outcome.design is None or outcome.design.met):
+    plan, certificate = task.plan, ended.certificate
+    if certificate.certified and (plan is None or ended.design is None or ended.design.met):
         return []
     if plan is None or start is not given:
         strained = strained_junction(start, standing_part(start).walls.pinchable)
@@ -73,27 +108,27 @@ def advice(
         return ["add to the command:", f"--tension {strained.remedy[0]!r}={strained.remedy[1]:g}"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the project's own warnings were shown
-        if outcome.certificate.certified:
-            base, reshaping, better, rests = plan, Reshaping(), plan, True
+        result, reshaping = ended.solved, Reshaping()
+        if certificate.certified:
+            base, better, rests = plan, plan, True
         else:
-            base, reshaping, outcome = _reshaped(project, plan, outcome)
-            better, rests = _tried(project, base, outcome)
-        if reshaping.sail and project.rises:
-            project = replace(project, targets=project.targets[: -len(project.rises)])
+            base, reshaping, result = _reshaped(task, plan, result)
+            better, rests = _tried(task, base, result)
+        targets = task.targets[: -len(task.rises)] if reshaping.sail and task.rises else task.targets
         met, reached = False, ""
-        if rests and project.targets:
-            better, met, reached = _with_targets(project, better, outcome, try_project)
+        if rests and targets:
+            better, met, reached = _with_targets(task, better, result, targets, try_plan)
         lines = _lines(base, better)
     if not (lines or reshaping.lines):
         return []
     tried = "which was tried and comes to rest" if rests else "as a first step"
     if met:
         tried = "which was tried, comes to rest and meets the targets"
-    elif rests and project.targets:
+    elif rests and targets:
         tried = "which was tried without the targets and comes to rest"
     ending = [f"with them, the targets are {reached}"] if reached else []
     return [
-        f"{reshaping.cause}{_where(project, reshaping, lines)}, {tried}:",
+        f"{reshaping.cause}{_where(task, reshaping, lines)}, {tried}:",
         *reshaping.lines,
         *lines,
         *ending,
@@ -120,79 +155,78 @@ class Reshaping:
         return f"the cause is {' and '.join(causes)}; " if causes else ""
 
 
-def _where(project: Project, reshaping: Reshaping, lines: Sequence[str]) -> str:
+def _where(task: Task, reshaping: Reshaping, lines: Sequence[str]) -> str:
     """Where to make the changes: in the project, or in its drawing."""
-    if project.drawing is None or not reshaping.rings:
-        return f"type in {project.path.with_suffix('.toml').name}"
+    toml = Path(task.file).with_suffix(".toml").name
+    if not task.drawing or not reshaping.rings:
+        return f"type in {toml}"
     typed = lines or reshaping.sail
-    drawn = f"draw in {project.drawing.path.name}"
-    return f"{drawn} and type in {project.path.with_suffix('.toml').name}" if typed else drawn
+    drawn = f"draw in {task.drawing}"
+    return f"{drawn} and type in {toml}" if typed else drawn
 
 
-def _reshaped(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, Reshaping, Outcome]:
-    """The plan as a sail, if edges are free, with rings instead of single points, and its outcome.
+def _reshaped(task: Task, plan: Plan, result: Result) -> tuple[Plan, Reshaping, Result]:
+    """The plan as a sail, if edges are free, with rings instead of single points, and its result.
 
     The rings are the smallest with which the roof comes to rest; the plan itself where nothing does.
     """
-    sail, masts = as_sail(plan, project.rises), point_masts(plan)
+    sail, masts = as_sail(plan, task.rises), point_masts(plan)
     base = plan if sail is None else sail
     shares = SHARES if masts else () if sail is None else (0.0,)
     for share in shares:
         changed = with_rings(base, masts, share) if masts else base
         try:
-            result = solve(_coarse(changed, outcome).surface(), project.method, **project.options)
+            other = solve(_coarse(changed, result).surface(), task.method, **task.options)
         except PcmcError:  # such as a patch whose point is in the ring
             continue
-        if result.certificate.certified:
-            typed = [] if sail is None else sail_lines(plan, sail, project.rises)
-            rings = ring_lines(masts, share, drawn=project.drawing is not None)
-            return changed, Reshaping(typed, rings), Outcome(result)
-    return plan, Reshaping(), outcome
+        if other.certificate.certified:
+            typed = [] if sail is None else sail_lines(plan, sail, task.rises)
+            rings = ring_lines(masts, share, drawn=bool(task.drawing))
+            return changed, Reshaping(typed, rings), other
+    return plan, Reshaping(), result
 
 
-def _tried(project: Project, plan: Plan, outcome: Outcome) -> tuple[Plan, bool]:
+def _tried(task: Task, plan: Plan, result: Result) -> tuple[Plan, bool]:
     """The plan mended until it comes to rest, on a mesh that is not fine; and whether it does."""
-    if outcome.certificate.certified:
+    if result.certificate.certified:
         return plan, True
     for _ in range(TRIES):
-        better = mended(plan, outcome)
+        better = mended(plan, result)
         if not _lines(plan, better):
             break
         plan = better
         try:
-            result = solve(_coarse(plan, outcome).surface(), project.method, **project.options)
+            result = solve(_coarse(plan, result).surface(), task.method, **task.options)
         except PcmcError:  # too coarse for this plan
             break
-        outcome = Outcome(result)
-        if outcome.certificate.certified:
+        if result.certificate.certified:
             return plan, True
         if result.status is Status.STOPPED:  # by Ctrl-C, which ends the command
             raise KeyboardInterrupt
     return plan, False
 
 
-def _coarse(plan: Plan, outcome: Outcome) -> Plan:
+def _coarse(plan: Plan, result: Result) -> Plan:
     """The plan with a mesh that is not fine."""
-    return replace(plan, edge_length=plan.edge_length * max(1.0, math.sqrt(outcome.surface.m / TRIANGLES)))
+    return replace(plan, edge_length=plan.edge_length * max(1.0, math.sqrt(result.surface.m / TRIANGLES)))
 
 
 def _with_targets(
-    project: Project, plan: Plan, outcome: Outcome, try_project: Trial
+    task: Task, plan: Plan, result: Result, targets: Sequence[Target], try_plan: Trial
 ) -> tuple[Plan, bool, str]:
     """The first plan that meets the targets, and whether one does; else the plan, and what it reaches."""
-    plain = replace(project, remeshing=(), wanted=AccuracyWanted())
-    looser, reached = _loosened(plan, project.vary), ""
+    looser, reached = _loosened(plan, task.vary), ""
     for candidate in (plan, looser):
-        if candidate is project.plan or candidate is None:  # tried already, or nothing to loosen
+        if candidate is task.plan or candidate is None:  # tried already, or nothing to loosen
             continue
         try:
-            trial = try_project(replace(plain, plan=candidate), _coarse(candidate, outcome).surface())
+            trial = try_plan(candidate, _coarse(candidate, result).surface(), targets)
         except PcmcError:  # such as a target that the coarse mesh cannot measure
             continue
         if trial.good:
             return candidate, True, ""
         if trial.design is not None:
-            reached = reached or trial.design.text(project.units)
+            reached = reached or trial.design.text(task.units)
     return plan, False, reached
 
 
@@ -211,12 +245,12 @@ def _loosened(plan: Plan, vary: Sequence[Parameter]) -> Plan | None:
     return replace(_with_dividers(plan, walls, wall=BALANCED), patches=areas)
 
 
-def mended(plan: Plan, outcome: Outcome) -> Plan:
+def mended(plan: Plan, result: Result) -> Plan:
     """The plan with the tensions and supports that remove what its certificate complains of."""
-    certificate = outcome.certificate
+    certificate = result.certificate
     grew = any(isinstance(proof, INFLATED) for proof in certificate.proofs)
     if grew or certificate.verdict is Verdict.RAN_AWAY:
-        plan = _stiffer(plan, outcome)
+        plan = _stiffer(plan, result)
     sliding = {divider.name for divider in plan.dividers if divider.bottom == "sliding"}
     plan = _with_dividers(plan, sliding, bottom="held")  # only the mesh holds the ends of their junctions
     if certificate.verdict is Verdict.WALL_DOWN:
@@ -224,13 +258,13 @@ def mended(plan: Plan, outcome: Outcome) -> Plan:
     return _balanced(plan)
 
 
-def _stiffer(plan: Plan, outcome: Outcome) -> Plan:
+def _stiffer(plan: Plan, result: Result) -> Plan:
     """All tensions at least at those with which a first roof succeeds, and well beyond a fold."""
     from ..plan.proposal import ROOM, least_tension, plan_area  # needs shapely
 
     pressures = [abs(p) for p in net_pressures(plan).values()] or [abs(plan.pressure - plan.snow)]
     least = ROOM * least_tension(plan_area(plan), max(pressures))
-    folds = [1.0 / proof.value for proof in outcome.certificate.proofs if isinstance(proof, Fold)]
+    folds = [1.0 / proof.value for proof in result.certificate.proofs if isinstance(proof, Fold)]
     factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
 
     def raised(tension: float) -> float:
