@@ -22,6 +22,8 @@ from pcmc.cli import main
 from pcmc.drawings import FORMATS, drawing_set, pdf
 from pcmc.drawings.panel_sheets import panel_sheets
 from pcmc.drawings.sheet import LAYERS, box, corner, room
+from pcmc.plan import Plan
+from pcmc.surface import mirrored
 from pcmc.surface.geometry import cross_2d, edge_vectors
 from pcmc.surface.sections import section
 
@@ -359,6 +361,15 @@ def test_what_is_known_of_a_surface_is_not_computed_again(monkeypatch, squares, 
     lower = squares.retensioned({"left": 3.7})
     with refused(SurfaceError, what="certificate"):
         pcmc.panels(lower, 0.01, certificate=certificate)
+
+
+def test_sheets_of_a_half_say_so_and_the_whole_is_twice_as_wide():
+    outline = [[0, 0], [4, 0], [4, 6], [0, 6]]
+    half = Plan(outline, mirrors=[[[0, 0], [0, 6]]], tension=3.0, edge_length=1.0).surface()
+    for surface, part, across in ((half, True, "4.000"), (mirrored(half), False, "8.000")):
+        plan = drawing_set(surface, "m", sheet="A3", anyway=True).sheets[0]
+        assert any("behind its mirror planes" in text.text for text in plan.texts) is part
+        assert plan.dimensions[0].text == across
 
 
 def test_a_certified_surface_has_no_mark(drawings):

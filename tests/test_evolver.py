@@ -25,6 +25,7 @@ SURFACES = {
     "two squares": lambda: shaken(two_squares(4)),
     "two caps": lambda: shaken(two_caps()),
     "four fans": lambda: shaken(four_fans()),
+    "names that are commands": lambda: tent(names=("\\ */ 屋 /* \\", "VERTICES", 'quit; exec "q" \\')),
 }
 
 

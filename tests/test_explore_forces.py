@@ -24,7 +24,7 @@ def test_cables_weights_and_rooms_have_values_that_move_the_surface():
         fixed=[0, 1, 2, 3],
         cables=[pcmc.Cable("edge", 3.0, [[0, 5], [5, 1]]), pcmc.Cable("inner", 0.0, [[0, 4]])],
     )
-    about, arrays = outline(square.retensioned(cables={"inner": 0.1}))
+    about, arrays = outline(square.retensioned(cables={"inner": 0.1}), np.zeros(3))
     assert [group["kinds"] for group in about["controls"]] == [
         ["tensions", "pressures", "weights"],
         ["cables"],

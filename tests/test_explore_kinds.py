@@ -12,6 +12,8 @@ from pcmc.design import Target
 from pcmc.design.targets import measure
 from pcmc.explore import saving
 from pcmc.explore.roof import read_roof
+from pcmc.io import write
+from pcmc.plan import Plan
 from pcmc.project.values import differences, single_points, values_of
 
 HALL = "[plan]\nedge_length = 1.0  # coarse\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
@@ -54,6 +56,21 @@ def written(kind, folder):
     path = folder / "hall.toml"
     path.write_text(TEXTS[kind])
     return path
+
+
+def test_a_project_of_a_mesh_is_saved_with_its_patches(tmp_path):
+    hall = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], tension=4.0, edge_length=1.0).surface()
+    write(tmp_path / "hall.obj", hall)
+    (tmp_path / "roof.toml").write_text('units = "m"\nmesh = "hall.obj"  # scanned\n')
+    roof = read_roof(tmp_path / "roof.toml", start_shape=True)
+    surface = changed(roof.surface, "tensions", roof.surface.patches[0].name)
+    path, _ = saving.save(roof, surface, "other", False)
+    assert not differences(read_roof(path, start_shape=True).surface, surface)
+    moved = surface.retensioned(
+        weights={surface.patches[0].name: 0.1}, pressures={surface.patches[0].name: 1.2}
+    )
+    again, _ = saving.save(roof, moved, "heavy", False)
+    assert tomllib.loads(again.read_text())["mesh"]["patches"]["patch 1"]["weight"] == 0.1
 
 
 def draw(path):

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from browsing import Explored, browser, changed, needs_browser, until
 from explore_cases import HALL_TOML, followed
 from pictures import near
@@ -315,3 +316,75 @@ def test_without_webgl_the_page_says_so_in_one_line_and_works(explorer, tmp_path
         assert page.text("#findings") != words
     finally:
         running.quit()
+
+
+def test_points_are_measured_by_mouse_and_keys_and_a_section_follows_its_slider(driver):
+    from selenium.webdriver.common.keys import Keys
+    from selenium.webdriver.support.select import Select
+
+    running = explore.start(CAP)
+    page = Explored(driver, running.url)
+    page.find("#views [data-view=plan]").click()
+    page.find("#views .measure").click()
+    page.find("#canvas").click()
+    until(lambda: page.text("#measured").startswith("Height "), "the height")
+    top = float(page.text("#measured").split()[1])
+    assert top == pytest.approx(running.start.surface.vertices[:, 2].max(), rel=0.05)
+    page.find("#canvas").send_keys(
+        Keys.ARROW_LEFT, Keys.SHIFT + Keys.ARROW_UP + Keys.ARROW_UP + Keys.NULL, Keys.ENTER
+    )
+    told = until(
+        lambda: page.text("#measured").startswith("Distance ") and page.text("#measured"), "the distance"
+    )
+    distance, plan, height = (float(part.split()[-1]) for part in told.split(","))
+    assert distance == pytest.approx(np.hypot(plan, height), rel=2e-3)
+    assert distance > 0.0
+    page.find("#views .measure").click()
+    assert not page.text("#measured")
+    whole = page.picture()
+    place = page.find("#section input")
+    assert not place.is_enabled()
+    Select(page.find("#section select")).select_by_value("0")
+    page.idle()
+    half = page.picture()
+    assert changed(whole, half) > 0.05
+    place.send_keys(*[Keys.ARROW_RIGHT] * 100)
+    page.idle()
+    assert changed(half, page.picture()) > 0.01
+    assert place.get_attribute("aria-valuetext")
+    Select(page.find("#section select")).select_by_value("")
+    page.idle()
+    assert changed(whole, page.picture()) == 0.0
+    assert page.complaints() == []
+    running.close()
+
+
+def test_colours_are_light_or_dark_as_the_system_or_the_user_wants(page):
+    def ground():
+        page.idle()
+        return page.picture()[0, 0].mean()
+
+    def system(scheme):
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+    light = ground()
+    page.find("#theme").click()
+    assert ground() < 0.2 < light
+    page.find("#theme").click()
+    assert ground() == light
+    page.driver.refresh()
+    system("dark")
+    assert ground() < 0.2
+    system("light")
+    assert page.complaints() == []
+
+
+def test_every_control_has_a_name_and_is_reached_by_keys(page):
+    unnamed = page.driver.execute_script(
+        "const named = (one) => one.ariaLabel || one.textContent.trim() || one.labels?.length;"
+        "return [...document.querySelectorAll('button, input, select, summary, canvas')]"
+        ".filter((one) => one.tabIndex < 0 || !named(one)).map((one) => one.outerHTML)"
+    )
+    assert unnamed == []
+    assert page.find("#verdict").get_attribute("aria-live") == "polite"

@@ -13,6 +13,7 @@ from starts import stationary, two_squares
 from structures import FABRIC, LOADS, model_of, pyramid, square
 
 import pcmc
+from generators import hypar_roof
 from pcmc import Material, Patch, SelfWeight, Snow, StructuralModel, Surface, Wind, cli
 from pcmc.base.errors import FileError, OptionError, SurfaceError
 from pcmc.base.units import Units
@@ -52,7 +53,7 @@ def test_nodes_and_elements_are_the_vertices_and_faces(tmp_path):
     np.testing.assert_array_equal(elements - 1, np.column_stack([range(4), surface.faces]))
     assert found["*BOUNDARY"] == [["FIXED", "1", "3"]]
     assert found["*NSET, NSET=FIXED"] == [["1", "2", "3", "4"]]
-    assert found["*NSET, NSET=SUPPORT_1"] == [["1", "2", "3", "4"]]
+    assert found["*NSET, NSET=SUPPORT_B1"] == [["1", "2", "3", "4"]]
     found.pop("*HEADING")
     assert all(len(field) <= 20 for rows in found.values() for row in rows for field in row)
 
@@ -238,6 +239,18 @@ def test_self_weight_is_the_same_force_in_all_units(tmp_path, units, metres, new
     assert f"masses in {'slug' if metres == 0.3048 else 't'}, times in s" in text
     fixed = model_of(surface, **given | {"loads": [SelfWeight(2.0)]}, units=Units(*units.split()))
     assert fixed.steps[1].gravity == 2.0
+
+
+def test_supports_are_named_by_kind_and_number(tmp_path):
+    sail = pcmc.solve(hypar_roof(4)).surface
+    model = model_of(sail, cable_area=1e-4)
+    pcmc.write_structure(tmp_path / "sail.inp", model)
+    text = (tmp_path / "sail.inp").read_text()
+    found = sections(tmp_path / "sail.inp")
+    for label, x, y, z in model.certificate.supports[["support", *"xyz"]].to_numpy().tolist():
+        (node,) = found[f"*NSET, NSET=SUPPORT_{label}"][0]
+        np.testing.assert_array_equal(sail.vertices[int(node) - 1], [x, y, z])
+        assert f"** SUPPORT_{label}: point, {label}\n" in text
 
 
 def test_without_units_the_model_says_that_it_takes_metres():

@@ -273,7 +273,7 @@ def test_files_tables_and_pictures_show_a_sail_as_roof(tmp_path):
     np.testing.assert_array_equal(patch_colors(hall)[:2], [rgb(color) for color in SHEETS[:2]])
     rows = patch_table(hall, certificate, Units("m")).rows
     assert [row[1] for row in rows] == ["roof", "roof", "wall"]
-    assert [patch["wall"] for patch in outline(hall)[0]["patches"]] == [False, False, True]
+    assert [patch["wall"] for patch in outline(hall, np.zeros(3))[0]["patches"]] == [False, False, True]
     assert [group["wall"] for group in control_groups(hall, values_of(hall))] == [False, False, True]
     assert pcmc.panels(hall, 0.1, anyway=True).area == pytest.approx(patch_areas(hall)[:2].sum())
     drawn = [c.vertices for c in drawing_set(hall, "m", anyway=True).curves if c.layer == "PCMC-WALL"]

@@ -49,19 +49,34 @@ def support_table(surface: Surface, forces: Floats | None = None) -> pd.DataFram
     ``length``, 0 for points; ``x``, ``y``, ``z``, the middle; ``force_x``, …, of the support on the surface;
     ``moment_x``, …, that of these forces about the middle; ``per_length_max``, the largest force per length.
     """
-    acting = support_forces(surface, forces)
-    parts = [*_held_lines(acting), *_mirrors(acting), *_inner_lines(acting), *_planes(acting)]
-    rows, count = [], {"B": 0, "S": 0, "C": 0}
-    size = surface.size
-    for part in (*parts, *_points(acting), *_ends_of_cables(acting)):
-        letter = {"point": "S", "cable end": "C"}.get(part.kind, "B")
-        count[letter] += 1
+    rows, size = [], surface.size
+    for label, part in _labelled(surface, forces):
         at = np.where(np.abs(part.place) <= 1e-12 * size, 0.0, part.place)
         moment = np.cross(surface.vertices[part.vertices] - at, part.forces).sum(axis=0)
-        label = f"{letter}{count[letter]}"
         numbers = [part.length, *at, *part.forces.sum(axis=0), *moment, part.per_length]
         rows.append([label, part.name or label, part.kind, *map(float, numbers)])
     return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def support_vertices(surface: Surface, forces: Floats | None = None) -> dict[str, Ints]:
+    """The vertices (k,) of each support, by its number in the table of the same surface and forces.
+
+    >>> from pcmc import Patch
+    >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], fixed=range(3))
+    >>> {label: sorted(vertices.tolist()) for label, vertices in support_vertices(flat).items()}
+    {'B1': [0, 1, 2]}
+    """
+    return {label: part.vertices for label, part in _labelled(surface, forces)}
+
+
+def _labelled(surface: Surface, forces: Floats | None) -> Iterator[tuple[str, _Part]]:
+    """Each support with its number."""
+    acting, count = support_forces(surface, forces), {"B": 0, "S": 0, "C": 0}
+    parts = [*_held_lines(acting), *_mirrors(acting), *_inner_lines(acting), *_planes(acting)]
+    for part in (*parts, *_points(acting), *_ends_of_cables(acting)):
+        letter = {"point": "S", "cable end": "C"}.get(part.kind, "B")
+        count[letter] += 1
+        yield f"{letter}{count[letter]}", part
 
 
 def boundary_view(supports: pd.DataFrame) -> pd.DataFrame:

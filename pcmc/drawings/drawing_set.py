@@ -68,11 +68,9 @@ class DrawingSet:
         for path in map(Path, paths):
             suffix = check_suffix(path)
             if document is None:
-                shown = self.surface, self.curves, self.sections, self.points, self.marks, self.flat
-                model = dxf.Model(*shown, length_factor(self.units, "mm"))
-                document = dxf.document(model, self.units, self.sheets)
+                document = dxf.document(self)
             if suffix == ".dxf":
-                works.append((path, partial(dxf.write_dxf, document)))
+                works.append((path, document.saveas))
             elif suffix == ".pdf":
                 works.append((path, partial(pdf.write_pdf, self.sheets)))
             else:
@@ -237,21 +235,15 @@ def _setting_out(curves: Sequence[views.Curve]) -> pd.DataFrame:
 
 def _levels(surface: Surface, heights: Sequence[float] | None) -> list[tuple[float, list[Polyline]]]:
     """Each height with the lines of its section."""
-    z = surface.vertices[:, 2]
-    if heights is None:
-        low, high = float(z.min()), float(z.max())
-        chosen = [low + part * (high - low) for part in (0.25, 0.5, 0.75)] if high > low else []
-        cuts = [(h, _cut(surface, [0.0, 0.0, h], [0.0, 0.0, 1.0])) for h in chosen]
-        return [cut for cut in cuts if cut[1]]
-    levels = []
-    for height in heights:
-        h = validate.number("heights", height)
-        found = _cut(surface, [0.0, 0.0, h], [0.0, 0.0, 1.0])
-        if not found:
-            text = f"heights: z = {h:g} misses the roof, which lies between {z.min():g} and {z.max():g}"
-            raise OptionError(text, what="heights", found=h, expected=(float(z.min()), float(z.max())))
-        levels.append((h, found))
-    return levels
+    low, high = float(surface.vertices[:, 2].min()), float(surface.vertices[:, 2].max())
+    given = [low + part * (high - low) for part in (0.25, 0.5, 0.75)] if heights is None else heights
+    chosen = [validate.number("heights", height) for height in given]
+    cuts = [(h, section(surface, np.array([0.0, 0.0, h]), np.array([0.0, 0.0, 1.0]))) for h in chosen]
+    for h, found in cuts:
+        if not found and heights is not None:
+            text = f"heights: z = {h:g} misses the roof, which lies between {low:g} and {high:g}"
+            raise OptionError(text, what="heights", found=h, expected=(low, high))
+    return [cut for cut in cuts if cut[1]]
 
 
 def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[views.View, list[Polyline]]]:
@@ -268,18 +260,12 @@ def _profiles(surface: Surface, lines: Sequence[Ends] | None) -> list[tuple[view
         if not (np.isfinite(ends).all() and length > 0.0):
             validate.refuse("lines", line, "two different points (x, y)")
         along /= length
-        found = _cut(surface, [*ends[0], 0.0], [-along[1], along[0], 0.0])
-        start, end = (f"({x:.6g}, {y:.6g})" for x, y in ends)
-        title = f"from {start} towards {end}"
+        found = section(surface, np.append(ends[0], 0.0), np.array([-along[1], along[0], 0.0]))
+        title = "from ({:.6g}, {:.6g}) towards ({:.6g}, {:.6g})".format(*ends.ravel())
         if not found:
-            text = f"lines: the section {title} misses the roof"
-            raise OptionError(text, what="lines", found=line)
+            raise OptionError(f"lines: the section {title} misses the roof", what="lines", found=line)
         profiles.append((views.profile(surface, title, ends[0], along, found), found))
     return profiles
-
-
-def _cut(surface: Surface, point: Sequence[float], normal: Sequence[float]) -> list[Polyline]:
-    return section(surface, np.array(point), np.array(normal))
 
 
 def _families(schedule: Panels) -> pd.DataFrame:

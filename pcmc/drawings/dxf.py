@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra
-from ..base.units import TABLE
-from ..surface import Surface
-from ..surface.sections import Polyline
+from ..base.units import TABLE, length_factor
 from .sheet import LAYERS, SMALL, Dimension, Sheet
-from .views import Curve, section_layer
+from .views import section_layer
 
 VERSION = "R2018"
 MODEL_TEXT = 0.004  # height of letters in the model, in its size
@@ -24,39 +20,19 @@ DIMENSION = {"dimtxt": SMALL, "dimtxsty": "PCMC", "dimtad": 1, "dimgap": 0.6, "d
 DIMENSION |= {"dimexe": 1.0, "dimtix": 1, "dimtoh": 0, "dimtih": 0, "dimdsep": ord("."), "dimzin": 0}
 
 
-class Model(NamedTuple):
-    """What is drawn in three dimensions: see ``DrawingSet``.
-
-    ``marks`` are the supports of one point, by name; ``flat`` the panels at true size, mm, for the ground
-    beside the roof, and ``millimetres`` those in the unit of the roof.
-    """
-
-    surface: Surface
-    curves: Sequence[Curve]
-    sections: Sequence[Polyline]
-    points: pd.DataFrame
-    marks: Sequence[tuple[str, Floats]]
-    flat: Sheet | None
-    millimetres: float
-
-
-def _ezdxf() -> Any:
-    try:
-        import ezdxf
-    except ImportError:
-        raise MissingExtra("ezdxf", "cad") from None
-    return ezdxf
-
-
-def document(model: Model, units: str, sheets: Sequence[Sheet]) -> Any:
-    """The model, in the surface's unit, and a layout per sheet, in millimetres, with its title as its name.
+def document(drawings: Any) -> Any:
+    """The model of a ``DrawingSet``, in its unit, and a layout per sheet, in mm, with its title as name.
 
     The model has ridges, rims, wall lines, cables and sections as polylines, each a whole curve with the
     name of its patches or its cable (XDATA of "PCMC"), panels as 3D faces, setting-out points and supports
     of one point, each on the layer of its kind; beside the roof the panels flat at true size.
     """
-    ezdxf = _ezdxf()
-    doc = ezdxf.new(VERSION)
+    try:
+        import ezdxf
+    except ImportError:
+        raise MissingExtra("ezdxf", "cad") from None
+    doc: Any = ezdxf.new(VERSION)
+    units = drawings.units
     doc.units = TABLE[units].dxf
     doc.header["$MEASUREMENT"] = int(units not in ("ft", "in"))
     doc.styles.add("PCMC", font="LiberationSans-Regular.ttf")
@@ -65,9 +41,9 @@ def document(model: Model, units: str, sheets: Sequence[Sheet]) -> Any:
     for name, layer in LAYERS.items():
         entry = doc.layers.add(name, color=layer.color, lineweight=layer.weight)
         entry.description = layer.about
-    _add_model(doc.modelspace(), model)
+    _add_model(doc.modelspace(), drawings)
     taken = {"model"}
-    for number, sheet in enumerate(sheets, start=1):
+    for number, sheet in enumerate(drawings.sheets, start=1):
         name = layout_name(sheet.title, taken)
         if number == 1:
             doc.layouts.rename("Layout1", name)
@@ -91,7 +67,7 @@ def layout_name(title: str, taken: set[str]) -> str:
     return name
 
 
-def _add_model(space: Any, model: Model) -> None:
+def _add_model(space: Any, model: Any) -> None:
     surface = model.surface
     roof = surface.roof[surface.patch_of_face]
     for corners in surface.vertices[surface.faces[roof]].tolist():
@@ -112,9 +88,10 @@ def _add_model(space: Any, model: Model) -> None:
         text.set_placement((at[0] + 0.3 * height, at[1] + 0.3 * height, at[2]))
     if model.flat is not None:
         low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
-        every = np.concatenate([line.points for line in model.flat.lines]) / model.millimetres
+        millimetres = length_factor(model.units, "mm")
+        every = np.concatenate([line.points for line in model.flat.lines]) / millimetres
         place = np.array([high[0] + 0.1 * surface.size, low[1]]) - every.min(axis=0)
-        _add_sheet(space, model.flat, 1.0 / model.millimetres, place)
+        _add_sheet(space, model.flat, 1.0 / millimetres, place)
 
 
 def _add_sheet(space: Any, sheet: Sheet, scale: float = 1.0, shift: Floats | float = 0.0) -> None:
@@ -147,30 +124,16 @@ def _add_dimension(layout: Any, dimension: Dimension) -> None:
     ).render()
 
 
-def write_dxf(doc: Any, path: Path) -> None:
-    """The document as a DXF file."""
-    doc.saveas(path)
-
-
 def write_svg(doc: Any, number: int, path: Path) -> None:
     """A sheet, counted from 0, as an SVG file of its true size."""
     from ezdxf.addons.drawing import Frontend, RenderContext, layout, svg
-
-    backend = svg.SVGBackend()
-    sheet = _layouts(doc)[number]
-    Frontend(RenderContext(doc), backend, config=_configuration()).draw_layout(sheet)
-    width, height = sheet.dxf.paper_width, sheet.dxf.paper_height
-    page = layout.Page(width, height, layout.Units.mm, layout.Margins.all(0.0))
-    text = backend.get_string(page, settings=layout.Settings(scale=1.0, fit_page=False))
-    path.write_text(text, encoding="utf-8")
-
-
-def _layouts(doc: Any) -> list[Any]:
-    """The layouts of the sheets, in order."""
-    return [doc.layouts.get(name) for name in doc.layouts.names_in_taborder() if name != "Model"]
-
-
-def _configuration() -> Any:
     from ezdxf.addons.drawing.config import BackgroundPolicy, ColorPolicy, Configuration
 
-    return Configuration(background_policy=BackgroundPolicy.WHITE, color_policy=ColorPolicy.COLOR)
+    backend, sheet = svg.SVGBackend(), doc.layouts.get(doc.layouts.names_in_taborder()[number + 1])
+    look = Configuration(background_policy=BackgroundPolicy.WHITE, color_policy=ColorPolicy.COLOR)
+    Frontend(RenderContext(doc), backend, config=look).draw_layout(sheet)
+    page = layout.Page(
+        sheet.dxf.paper_width, sheet.dxf.paper_height, layout.Units.mm, layout.Margins.all(0.0)
+    )
+    text = backend.get_string(page, settings=layout.Settings(scale=1.0, fit_page=False))
+    path.write_text(text, encoding="utf-8")

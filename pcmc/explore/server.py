@@ -352,7 +352,7 @@ class _Handler(BaseHTTPRequestHandler):
         drawn: dict[str, Any] = {}
         origin = self.server.explorer.origin
         if first is not None:
-            about, drawn = outline(state.surface)
+            about, drawn = outline(state.surface, origin)
             header |= {**about, **first}
         if not header["superseded"]:
             header |= {

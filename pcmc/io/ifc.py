@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import uuid
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -19,19 +19,20 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import FileError, MissingExtra
-from ..base.units import Units, length_factor
+from ..base.units import NEWTONS, TABLE, Units, length_factor
 from ..energy.functional import patch_areas
 from ..surface import Cable, Surface
 from ..surface.colours import patch_colors
 from ..surface.origin import file_origin
-from .ifc_units import assigned_units
 from .libraries import load_library
-from .mesh_data import MeshData, support_of, within
+from .mesh_data import MeshData, support_of
 from .metadata import parse_metadata
 from .reading_process import read_arrays
 
 SPACE = uuid.UUID("6fb0c1f4-5b0c-5f0b-9d5a-0b4c2f6f7a10")  # of our identifiers
 TIME = "2000-01-01T00:00:00"
+NAMES = {name: unit.ifc for name, unit in TABLE.items()}
+NAMES |= {"N": "", "kN": "KILO", "MN": "MEGA", "lbf": "pound-force", "kip": "kip"}
 NUMBERS = {  # in the property set of the certificate, by the name there
     "Residual": "residual",
     "CurvatureError": "curvature_error",
@@ -253,6 +254,50 @@ class _Model:
         return self.add("IfcText", value)
 
 
+def assigned_units(add: Callable[..., Any], units: Units) -> Any:
+    """Units of length and angle; areas and volumes in m², m³; and the units of tensions and pressures.
+
+    ``add`` makes an entity.
+    """
+    length = _unit(add, "LENGTHUNIT", "METRE", units.length, (1, 0, 0), length_factor(units.length, "m"))
+    listed = [
+        length,
+        add("IfcSIUnit", UnitType="AREAUNIT", Name="SQUARE_METRE"),
+        add("IfcSIUnit", UnitType="VOLUMEUNIT", Name="CUBIC_METRE"),
+        add("IfcSIUnit", UnitType="PLANEANGLEUNIT", Name="RADIAN"),
+    ]
+    if units.force:
+        force = _unit(add, "FORCEUNIT", "NEWTON", units.force, (1, 1, -2), NEWTONS[units.force])
+        listed.append(force)
+        for kind, power in (("LINEARFORCEUNIT", -1), ("PLANARFORCEUNIT", -2)):
+            factors = [
+                add("IfcDerivedUnitElement", Unit=force, Exponent=1),
+                add("IfcDerivedUnitElement", Unit=length, Exponent=power),
+            ]
+            listed.append(add("IfcDerivedUnit", Elements=factors, UnitType=kind))
+    return add("IfcUnitAssignment", Units=listed)
+
+
+def _unit(
+    add: Callable[..., Any], kind: str, name: str, unit: str, powers: tuple[int, int, int], factor: float
+) -> Any:
+    """A unit of the SI with its prefix, or one that is a multiple of it."""
+    prefix = NAMES[unit] if NAMES[unit].isupper() else None
+    plain = add("IfcSIUnit", UnitType=kind, Prefix=prefix, Name=name)
+    if prefix or not NAMES[unit]:
+        return plain
+    exponents = add("IfcDimensionalExponents", *powers, 0, 0, 0, 0)
+    measure = "IfcLengthMeasure" if kind == "LENGTHUNIT" else "IfcForceMeasure"
+    one = add("IfcMeasureWithUnit", ValueComponent=add(measure, factor), UnitComponent=plain)
+    return add(
+        "IfcConversionBasedUnit",
+        Dimensions=exponents,
+        UnitType=kind,
+        Name=NAMES[unit],
+        ConversionFactor=one,
+    )
+
+
 def read(path: Path) -> MeshData:
     """The surface in a file that pcmc wrote; other .ifc files are refused."""
     if find_spec("ifcopenshell") is None:
@@ -262,16 +307,8 @@ def read(path: Path) -> MeshData:
         text = "pcmc reads only .ifc files that it wrote; export the mesh of the roof as .obj or .3dm"
         raise FileError(text, where="Pcmc_Surface")
     metadata = parse_metadata(arrays["text"])
-    X, F, support, patch, names, start = [], [], [], [], [], 0
-    for k, part in enumerate(arrays["parts"]):
-        X.append(part["points"])
-        F.append(within(part["faces"], f"corners of {part['name']!r}", len(part["points"])) + start)
-        patch.append(np.full(len(F[-1]), k))
-        support.append(np.array(list(map(int, part["supports"])), dtype=np.int8))
-        names.append(part["name"])
-        start += len(part["points"])
-    faces = np.concatenate(F)
+    meshes = [(part["name"], part["points"], part["faces"]) for part in arrays["parts"]]
     if metadata.counts is not None:  # a vertex of two patches is in both, so vertices count for nothing
-        metadata.check_counts(metadata.counts[0], len(faces))
-    about = {"support": np.concatenate(support), "walls": arrays["walls"]}
-    return metadata.mesh_data(np.concatenate(X), faces, np.concatenate(patch), names, **about)
+        metadata.check_counts(metadata.counts[0], sum(len(faces) for *_, faces in meshes))
+    support = np.array(list(map(int, "".join(part["supports"] for part in arrays["parts"]))), dtype=np.int8)
+    return metadata.of_meshes(meshes, support=support, walls=arrays["walls"])

@@ -5,11 +5,8 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
-
-from ..base.errors import FileError, MissingExtra
-from .mesh_data import MeshData, within
+from ..base.errors import MissingExtra
+from .mesh_data import MeshData
 from .metadata import Metadata
 from .reading_process import read_arrays
 
@@ -17,21 +14,9 @@ from .reading_process import read_arrays
 def read(path: Path) -> MeshData:
     """Every mesh of the file; meshes of one name are one patch."""
     require_meshlab()
-    X, F, named = [], [], []
-    start = 0
-    for number, mesh in enumerate(read_arrays("meshlab", path)["meshes"], 1):
-        faces = np.asarray(mesh["faces"]).reshape(-1, 3)
-        if not len(faces):
-            continue
-        X.append(np.asarray(mesh["points"], dtype=np.float64).reshape(-1, 3))
-        F.append(within(faces, f"faces of mesh {number}", len(X[-1])) + start)
-        named += [Path(mesh["name"]).stem or f"mesh {number}"] * len(faces)
-        start += len(X[-1])
-    if not X:
-        raise FileError("the file has no triangles", where="faces", found=0)
-    patch, names = pd.factorize(np.array(named, dtype=object))
-    listed = [path.stem] if len(names) == 1 else names.tolist()
-    return Metadata().mesh_data(np.concatenate(X), np.concatenate(F), patch, listed)
+    found = enumerate(read_arrays("meshlab", path)["meshes"], 1)
+    meshes = [(Path(m["name"]).stem or f"mesh {k}", m["points"], m["faces"]) for k, m in found]
+    return Metadata().of_meshes(meshes, path.stem)
 
 
 def require_meshlab() -> None:

@@ -7,11 +7,12 @@ has a mesh per patch.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
@@ -92,6 +93,25 @@ class Metadata:
         patches = tuple(self.patches.get(name) or Patch(found[name], 1.0) for name in names)
         about = {"plane": self.plane, "units": self.units, "parts": self.parts} | more
         return MeshData(X, F, patch, patches, notes=(*notes, *filter(None, (changed,))), **about)
+
+    def of_meshes(self, meshes: Iterable[tuple[str, Any, Any]], default: str = "", **more: Any) -> MeshData:
+        """Meshes of a name, points (n,3) and triangles (m,3) each; those of one name are one patch.
+
+        ``default`` is the name of the only patch, if it is to have another.
+        """
+        X, F, named, start = [], [], list[str](), 0
+        for name, points, faces in meshes:
+            if len(faces):
+                X.append(np.asarray(points, dtype=np.float64).reshape(-1, 3))
+                local = np.asarray(faces).reshape(-1, 3)
+                F.append(within(local, f"faces of {name!r}", len(X[-1])) + start)
+                named += [name] * len(local)
+                start += len(X[-1])
+        if not X:
+            raise FileError("the file has no triangles", where="faces", found=0)
+        patch, names = pd.factorize(np.array(named, dtype=object))
+        listed = [default] if default and len(names) == 1 else names.tolist()
+        return self.mesh_data(np.concatenate(X), np.concatenate(F), patch, listed, **more)
 
     def check_counts(self, vertices: int, faces: int) -> None:
         """Raise FileError when the file lacks some of the mesh that was written."""

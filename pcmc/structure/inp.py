@@ -12,6 +12,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats, Ints
 from ..base.files import atomic_write, check_name, suffix_of, writing
+from ..certificate.supports import support_vertices
 from ..io.text import format_rows
 from ..surface.geometry import area_vectors
 from . import cables
@@ -43,8 +44,8 @@ def write_structure(path: str | os.PathLike[str], model: StructuralModel) -> Non
 
     Vertex i is node i + 1, face f element f + 1: membranes of three nodes (``M3D3``) or shells (``S3``). Each
     starts with the stress α/t in its plane (``*INITIAL CONDITIONS, TYPE=STRESS``). Sets: ``PATCH_k``
-    (elements), ``NODES_k`` of patch k, ``FIXED``, ``SLIDING`` and ``SUPPORT_k``, the k-th held boundary curve
-    of ``pcmc.certify``.
+    (elements), ``NODES_k`` of patch k, ``FIXED``, ``SLIDING`` and ``SUPPORT_B1``, ``SUPPORT_S1`` and so on,
+    by the numbers in ``Certificate.supports``.
 
     Parameters
     ----------
@@ -72,6 +73,9 @@ def _sections(model: StructuralModel) -> Iterator[str]:
     yield f"*HEADING\npcmc structural model, {verdict}\n"
     yield f"** {model.note}\n" if model.note else ""
     yield "".join(f"** PATCH_{k}: {_line(patch.name)}\n" for k, patch in enumerate(surface.patches, 1))
+    assert model.certificate is not None  # a model has that of its surface
+    supports = model.certificate.supports[["support", "kind", "name"]].to_numpy().tolist()
+    yield "".join(f"** SUPPORT_{label}: {kind}, {_line(name)}\n" for label, kind, name in supports)
     yield "".join(f"** step {k}: {_line(step.name)}\n" for k, step in enumerate(model.steps, 1))
     yield "*NODE, NSET=NALL\n"
     yield format_rows(f"%d,{FIELD},{FIELD},{FIELD}\n", nodes + 1, *surface.vertices[nodes].T)
@@ -115,13 +119,13 @@ def _material(name: str, material: Material) -> str:
 
 def _supports(model: StructuralModel) -> Iterator[str]:
     """Node sets of the supports, and what these hold, in axes of their own where they slide."""
-    surface, held = model.standing, model.held
+    held = model.held
     yield _set("HELD", np.flatnonzero(held))
     yield _set("FIXED", np.flatnonzero(held & (model.freedom == 0)))
     yield _set("SLIDING", np.flatnonzero(held & (model.freedom > 0)))
-    curves = [c.vertices for c in surface.topology.boundary_loops if surface.held[c.vertices].any()]
-    for k, vertices in enumerate(curves, 1):
-        yield _set(f"SUPPORT_{k}", vertices[held[vertices]])
+    assert model.certificate is not None  # a model has that of its surface
+    for label, vertices in support_vertices(model.surface, model.certificate.reactions).items():
+        yield _set(f"SUPPORT_{label}", vertices[held[vertices]])
     if (held & (model.freedom == 0)).any():
         yield "*BOUNDARY\nFIXED,1,3\n"
     sliding = np.flatnonzero(held & (model.freedom > 0))

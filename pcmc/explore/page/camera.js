@@ -41,8 +41,10 @@ export class Camera {
     this.changed();
   }
 
+  /** Move by parts of the picture's height. */
   move(right, up) {
-    this.shift = [this.shift[0] + right, this.shift[1] + up];
+    const tall = 2 * Math.tan(this.angle / 2);
+    this.shift = [this.shift[0] + tall * right, this.shift[1] + tall * up];
     this.changed();
   }
 
@@ -143,10 +145,10 @@ export class Camera {
       const part = 1 / element.clientHeight;
       if (old) {
         const now = span();
-        this.move(0.5 * (now.x - old.x) * part, 0.5 * (old.y - now.y) * part);
+        this.move((now.x - old.x) * part, (old.y - now.y) * part);
         this.closer(now.apart / Math.max(old.apart, 1));
       } else if (event.shiftKey || event.buttons & 6) {
-        this.move(0.5 * (event.clientX - before.x) * part, 0.5 * (before.y - event.clientY) * part);
+        this.move((event.clientX - before.x) * part, (before.y - event.clientY) * part);
       } else {
         this.turn(5 * (event.clientX - before.x) * part, 5 * (event.clientY - before.y) * part);
       }

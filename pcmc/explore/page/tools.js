@@ -25,7 +25,7 @@ export class Tools {
     place.oninput = this.section;
     viewer.grab = (event) => this.grab(event);
     viewer.canvas.addEventListener("keydown", (event) => {
-      if (event.key === "Enter" && this.measuring) this.pick(viewer.pick([0, 0]));
+      if (event.key === "Enter" && this.measuring) this.mark([0, 0]);
     });
   }
 
@@ -73,10 +73,16 @@ export class Tools {
     if (this.measuring) {
       viewer.canvas.addEventListener("pointerup", (now) => {
         const still = Math.hypot(now.clientX - event.clientX, now.clientY - event.clientY) < STILL;
-        if (still) this.pick(viewer.pick(viewer.placeOf(now)));
+        if (still) this.mark(viewer.placeOf(now));
       }, { once: true });
     }
     return null;
+  }
+
+  mark(place) {
+    const point = this.viewer.pick(place);
+    if (point) this.pick(point);
+    else this.told.textContent = "There is no point of the surface.";
   }
 
   /** Mark a point of the surface; two are measured, and null takes the marks away. */
