@@ -84,6 +84,13 @@ def test_without_the_token_of_its_address_nothing_is_answered(explorer, method, 
     assert asked(explorer, "GET", f"/?token={explorer.token}", **{"X-Token": ""})[0].status == 200
 
 
+@pytest.mark.parametrize("headers", [{"Host": "evil.example"}, {"Host": ""}, {"Origin": "null"}])
+def test_a_refusal_does_not_tell_the_token(explorer, headers):
+    answer, content = asked(explorer, "GET", "/", **{"X-Token": "", **headers})
+    assert answer.status == 403
+    assert explorer.token not in content.decode() + str(answer.getheaders())
+
+
 @pytest.mark.parametrize(
     ("headers", "status"),
     [

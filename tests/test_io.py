@@ -39,7 +39,9 @@ def turned(face):
 
 
 @pytest.mark.parametrize("suffix", READ)
-@pytest.mark.parametrize("names", [("west side", "east", "wall"), ("Süd/Ost", "a.b", "κ_1 (2)")])
+@pytest.mark.parametrize(
+    "names", [("west side", "east", "wall"), ("Süd/Ost", "a.b", "κ_1 (2)"), ("a\\", "$x$", "ü" * 100)]
+)
 def test_round_trip(tmp_path, suffix, names):
     surface = tent(names=names)
     path = tmp_path / f"roof one{suffix}"

@@ -240,7 +240,8 @@ class _Handler(BaseHTTPRequestHandler):
         except ValueError as error:
             raise RequestError(f"a broken address: {error}") from None
         if explorer.local and name not in LOOPBACK:
-            raise RequestError(f"open this page at {explorer.url}", HTTPStatus.FORBIDDEN)
+            text = "open the address that pcmc explore printed: the page has no other name"
+            raise RequestError(text, HTTPStatus.FORBIDDEN)  # without the address: it has the token
         if source is not None and source != host:
             raise RequestError("requests from pages of other sites are refused", HTTPStatus.FORBIDDEN)
         parts = urlsplit(self.path)

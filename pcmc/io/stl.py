@@ -70,7 +70,7 @@ def _complete(path: Path) -> None:
     data = path.read_bytes()
     if data[:5] == b"solid" and b"facet" in data[:2000]:
         lines = data.rstrip().split(b"\n")
-        last = lines[-1].strip()[:40].decode()
+        last = lines[-1].decode().strip()[:40]
         if odd := re.search(rb"^\s*vertex[^\n]*_[^\n]*", data, re.M):
             line = 1 + data[: odd.start()].count(b"\n")
             text = f"line {line}: expected three coordinates, found {odd[0].decode().strip()[:60]!r}"
