@@ -15,7 +15,8 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
 from ..surface.topology import components
 from .curves import Curve
-from .lines import SNAP, Kind, Line, LineTree, Places, check_holes, check_line, inside, overlap, point_text
+from .lines import SNAP, Kind, Line, LineTree, Places, check_holes, check_line, inside, overlap
+from .pieces import point_text
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,9 @@ from ..surface.topology import components
 from .arrangement import Arrangement, arrange, hole_points
 from .curves import Curve
 from .edges import Boundary, boundary, check_lines
-from .lines import SNAP, Kind, Line, LineTree, point_text
+from .lines import SNAP, Kind, Line, LineTree
 from .parts import PlanData
-from .pieces import to_local, two_digits
+from .pieces import point_text, to_local, two_digits
 from .planar import PlanarMesh, signed_areas, triangulate
 
 MAX_TRIANGLES = 500_000  # of a plan's mesh, which takes about a minute; finer ones are made by remeshing

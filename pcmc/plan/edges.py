@@ -14,9 +14,9 @@ from ..base.errors import PlanError
 from ..surface import Cable, Patch, Plane
 from .arrangement import Arrangement
 from .curves import Curve
-from .lines import SNAP, Kind, Line, LineTree, point_text
+from .lines import SNAP, Kind, Line, LineTree
 from .parts import EDGES, PlanData
-from .pieces import to_local, to_space
+from .pieces import point_text, to_local, to_space
 
 MIRROR, HELD = "mirror", "held"
 STATES = (*EDGES, MIRROR, HELD)  # of an edge of the boundary; held is a free one along a support
