@@ -12,8 +12,8 @@ from ..base.arrays import Floats
 from ..base.errors import PlanError
 from ..base.names import checked_name
 from ..base.units import MICROMETRES, length_factor
+from ..curves.pieces import point_text
 from .layers import Layer
-from .pieces import point_text
 from .strokes import Stroke
 
 NUMBER = r"\d+(?:[.,]\d+)?"
