@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
+from ..curves.curves import Curve
 from ..surface.topology import components
-from .curves import Curve
 from .lines import SNAP, Kind, Line, LineTree, Places, check_holes, check_line, inside, overlap, point_text
 
 

@@ -12,8 +12,11 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, PlanWarning, SurfaceError
+from ..curves.pieces import to_space
 from ..energy.rooms import check_rooms
 from ..meshing.angles import improve_angles
+from ..meshing.planar import SIDES, PlanarMesh, signed_areas
+from ..meshing.walls import UpperEdge, WallMesh, build_walls
 from ..surface import Cable, Patch, Plane, Room, Surface
 from ..surface.geometry import segment_lengths
 from ..surface.wall_tensions import balanced_wall
@@ -33,9 +36,6 @@ from .edges import (
 from .heights import dome, harmonic_heights
 from .lines import SNAP, Kind
 from .parts import BALANCED, PlanData
-from .pieces import to_space
-from .planar import SIDES, PlanarMesh, signed_areas
-from .walls import UpperEdge, WallMesh, build_walls
 
 SHARE = 0.6  # of p R, R of the smallest part beside a wall: more would pull a flat roof down
 GOOD_ANGLE = 28.0  # degrees; the slope makes triangles sharper than they are in plan

@@ -13,11 +13,11 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PlanError
-from .curves import Curve, polyline
+from ..curves.curves import Curve, polyline
+from ..curves.pieces import two_digits
 from .layers import Layer, layer_of, left_out, listed, understood
 from .parts import hole_label
 from .paths import JoinedPath, join_strokes
-from .pieces import two_digits
 from .strokes import Stroke, Strokes
 from .texts import point_text
 

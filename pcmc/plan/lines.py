@@ -13,8 +13,8 @@ import shapely
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
+from ..curves.curves import Curve
 from ..surface.geometry import cross_2d
-from .curves import Curve
 
 SNAP = 0.01  # of the edge length: lines nearer to each other than this meet
 SAG = 1e-3  # of a curve's length: no curve is farther from the chords between its dense points
