@@ -1,6 +1,7 @@
 """The documentation's settings, and the pages that are generated at each build.
 
-Generated: the tutorial (copies of the notebooks), the keys of a project file, and the reference.
+Generated: the tutorial (copies of the notebooks), the picture of the page on drawings, the keys of a project
+file, and the reference.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import importlib.metadata
 import json
 import pkgutil
 import shutil
+import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -22,6 +24,9 @@ from sphinx.util.docutils import SphinxTranslator
 
 import pcmc
 from pcmc.project import reference
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from drawing_layers import picture
 
 DOCS = Path(__file__).resolve().parent
 HOME = DOCS.parent
@@ -126,6 +131,7 @@ def generate() -> None:
     for path in sorted((HOME / "notebooks").glob("*.ipynb")):
         copy_notebook(path, DOCS / "tutorial")
     shutil.copy(HOME / "notebooks" / "roof.toml", DOCS / "tutorial")
+    picture(DOCS / "how-to" / "drawing-layers.png")
     keys = "# The keys of a project file\n\n" + reference()
     (DOCS / "how-to" / "project-keys.md").write_text(keys, encoding="utf-8")
     write_reference(DOCS / "reference" / "generated")

@@ -4,8 +4,9 @@ The rooms of the package, from the ground up; a room imports only from those abo
 
 =========================  ==========================================================================
 base                       errors, arrays, files, units, checks of input
-surface energy             what a surface is; E with its derivatives, and its curvature
-contact meshing            walls that pinch; better, finer and new triangles
+surface curves             what a surface is; lines, arcs and Béziers as objects
+energy                     E with its derivatives, and its curvature
+contact meshing            walls that pinch; triangulation, walls of a mesh, better and finer triangles
 io plan                    surfaces from and to files; surfaces from the lines of a plan
 stability certificate      lowest modes and Morse index; the verdict on a finished surface
 quantities                 what is measured on a roof: names, units, key figures

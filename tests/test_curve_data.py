@@ -7,9 +7,9 @@ import pytest
 from refusals import refused
 
 from pcmc.base.errors import OptionError
+from pcmc.curves.curve_data import curve_data
+from pcmc.curves.curves import arc
 from pcmc.plan import bezier, circle, curve, ellipse, join, polyline
-from pcmc.plan.curve_data import curve_data
-from pcmc.plan.curves import arc
 from pcmc.plan.strokes import bezier_spans
 
 

@@ -6,8 +6,8 @@ from refusals import refused
 
 from pcmc import Plane
 from pcmc.base.errors import OptionError
-from pcmc.plan.curves import arc, bezier, circle, curve, join, polyline
-from pcmc.plan.pieces import to_local, to_space
+from pcmc.curves.curves import arc, bezier, circle, curve, join, polyline
+from pcmc.curves.pieces import to_local, to_space
 
 
 def test_lengths_in_closed_form():

@@ -10,6 +10,7 @@ import pytest
 
 import pcmc
 from generators import spherical_cap
+from pcmc.plan.layers import MEANINGS
 from pcmc.project import reference, run, sections
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -87,3 +88,12 @@ def test_the_list_of_rooms_is_that_of_the_folders_and_of_their_order():
     assert set(floor) == folders
     floors = [floor[room] for room in listed]
     assert floors == sorted(floors)
+
+
+def test_the_drawings_in_the_picture_of_layers_are_certified(tmp_path, monkeypatch):
+    """And every layer that a drawing may have is in the table of the page."""
+    monkeypatch.syspath_prepend(DOCS)
+    layers = pytest.importorskip("drawing_layers")
+    assert [outcome.good for outcome in layers.roofs()] == [True, True]
+    page = (DOCS / "how-to" / "from-a-drawing.md").read_text(encoding="utf-8")
+    assert [name for name in MEANINGS if f"`{name}`" not in page] == []

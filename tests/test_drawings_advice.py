@@ -93,7 +93,7 @@ def test_the_unit_named_for_a_plan_of_an_unlikely_size_is_right(tmp_path):
 def test_metres_are_assumed_for_a_drawing_without_a_unit(tmp_path, capsys):
     file = drawing(tmp_path, unit=0)
     assert cli.main(["solve", str(file), "-o", str(tmp_path / "hall.glb"), "--no-mesh-check"]) == 0
-    assert "hall.glb: the drawing has no unit of length, so metres are assumed" in capsys.readouterr().out
+    assert "hall.glb: there is no unit of length, so metres are assumed" in capsys.readouterr().out
     assert cli.main(["solve", str(file), "-o", str(tmp_path / "hall.obj"), "--no-mesh-check"]) == 0
     assert "metres are" not in capsys.readouterr().out
 

@@ -97,6 +97,20 @@ def test_a_mesh_without_a_unit_says_so_and_takes_the_one_given(tmp_path):
         np.testing.assert_allclose(surface.vertices, factor * bare.vertices)
 
 
+@pytest.mark.parametrize("command", ["convert", "repair", "solve"])
+def test_commands_say_that_metres_are_assumed(tmp_path, capsys, command):
+    pcmc.write(tmp_path / "told.obj", pcmc.read(write_obj(tmp_path / "plain.obj"), tensions=4.0))
+    for units, said in (([], True), (["--units", "mm"], False)):
+        out = tmp_path / "a.glb"
+        more = {
+            "convert": [str(out)],
+            "repair": ["-o", str(out)],
+            "solve": ["-o", str(out), "--no-mesh-check"],
+        }
+        assert cli.main([command, str(tmp_path / "told.obj"), *more[command], *units]) == 0
+        assert ("a.glb: there is no unit of length, so metres are assumed" in capsys.readouterr().out) == said
+
+
 def test_files_that_pcmc_wrote_give_no_warning(tmp_path):
     upright = pcmc.read(write_obj(tmp_path / "good.obj"))
     lying = upright.moved(upright.vertices[:, [2, 0, 1]])

@@ -7,14 +7,14 @@ import pytest
 
 from pcmc import Plane, Surface, Verdict, solve
 from pcmc.base.errors import PlanWarning
+from pcmc.curves.curves import arc, bezier, circle, join, polyline
+from pcmc.curves.pieces import to_local
 from pcmc.energy.functional import patch_areas
+from pcmc.meshing.planar import triangulate
 from pcmc.meshing.quality import edge_lengths, minimum_angle
 from pcmc.plan import Area, Divider, Hole, Plan, draft, patch_names, plan_from
-from pcmc.plan.curves import arc, bezier, circle, join, polyline
 from pcmc.plan.draft import drafted
 from pcmc.plan.heights import dome, harmonic_heights
-from pcmc.plan.pieces import to_local
-from pcmc.plan.planar import triangulate
 from pcmc.surface.topology import POINT
 
 BOX = [[0, 0], [20, 0], [20, 12], [0, 12]]

@@ -10,8 +10,8 @@ import pytest
 from refusals import refused
 
 from pcmc.base.errors import MissingExtra, OptionError, PlanError, SurfaceError
+from pcmc.curves.curves import circle, curve, polyline
 from pcmc.plan import Area, Plan, patch_names, plan_from
-from pcmc.plan.curves import circle, curve, polyline
 from tests.test_plan import BOX, vertices_of
 
 COURT = {"curve": circle([17, 5], 2)}

@@ -5,7 +5,7 @@ import pytest
 from refusals import refused
 
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.plan.planar import locate, signed_areas, triangulate
+from pcmc.meshing.planar import locate, signed_areas, triangulate
 
 
 def ring(corners, h):

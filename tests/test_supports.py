@@ -68,6 +68,19 @@ def wedge():
     return cut(cut(spherical_cap(0.3, alpha=0.6), planes[0]), planes[1])
 
 
+def against_glass(slope=0.0):
+    """Half a cap whose edge slides on a wall of glass."""
+    half = cut(spherical_cap(0.3, alpha=0.6), Plane(normal=(0, 1, 0), mirror=True))
+    X = half.vertices + slope * np.outer(half.vertices[:, 2], [0.0, 1.0, 0.0])
+    ((plane, edge),) = half.on_planes
+    up = np.sign(half.vertices[:, 1].sum())
+    return half.rebuilt(vertices=X, on_planes={Plane(plane.point, (0.0, up, -up * slope), "glass"): edge})
+
+
+def against_a_slope():
+    return against_glass(0.2)
+
+
 CASES = {  # how many supports there are of each kind
     hall_of_upright_walls: {"line": 6, "upright plane": 3},
     half_with_mirror: {"line": 3, "mirror": 3},
@@ -75,6 +88,8 @@ CASES = {  # how many supports there are of each kind
     cables_between_walls: {"line": 2, "point": 1, "cable end": 2},
     resting: {"line": 2, "ground": 2},
     wedge: {"line": 1, "mirror": 2},
+    against_glass: {"line": 1, "upright plane": 1},
+    against_a_slope: {"line": 1, "plane": 1},
 }
 
 

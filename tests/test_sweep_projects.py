@@ -19,7 +19,7 @@ from pcmc.base.errors import FileError, OptionError, PcmcError
 from pcmc.project import check_varied, designed, digest, run, varied
 from pcmc.sweep import draw_sweep, read_store
 from pcmc.sweep import run as run_sweep
-from pcmc.sweep.projects import project_sweep, solve_project
+from pcmc.sweep.projects import column_labels, project_sweep, solve_project
 
 NUMBERS = ["west.apex", "east.apex", "rise", "area", "reaction per length"]
 TEXT = """
@@ -484,6 +484,16 @@ def test_a_tension_that_the_rise_of_a_mesh_finds_is_not_swept(roof):
             project_sweep("roof.toml", {name: [3, 4]})
     others = {"mesh.patches.east.weight": [0.1, 0.2], "mesh.rise": [1.0, 1.1]}
     assert len(project_sweep("roof.toml", others)) == 4
+
+
+def test_the_tension_of_a_cable_is_a_force_also_where_nothing_is_at_rest(roof):
+    text = 'units = "m"\nforce = "kN"\n[plan]\nedge = "cable"\ncable = 9.0\ntension = 1.0\npressure = 0.0\n'
+    text += "outline = [[0, 0], [9, 0], [9, 9], [0, 9]]\nsupports = [[0, 0], [9, 0], [9, 9], [0, 9]]\n"
+    text += 'cables = [{name = "hem", tension = 4.0, curve = [[0, 0], [9, 0]]}]\n'
+    roof.write_text(text, encoding="utf-8")
+    names = ["cable 1.tension", "hem.tension", "plan.cables.hem.tension", "plan.cable", "patch 1.tension"]
+    labels = column_labels(roof, [*names, "support 1.z", "verdict"])
+    assert [label.rpartition(" ")[2] for label in labels.values()] == [*["[kN]"] * 4, "[kN/m]", "[m]"]
 
 
 def test_the_table_and_the_picture_of_a_sweep_have_the_units_of_the_project(roof, capsys, monkeypatch):

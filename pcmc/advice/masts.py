@@ -13,8 +13,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
+from ..curves.curves import Curve
 from ..plan import Divider, Hole, Plan
-from ..plan.curves import Curve
 from ..plan.lines import SNAP, Kind, Line
 
 SHARES = (0.06, 0.12, 0.25)  # of the way from a point to the nearest line: the radii of rings that are tried

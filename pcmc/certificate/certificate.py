@@ -24,7 +24,6 @@ from ..energy.functional import energy_and_gradient, patch_areas
 from ..energy.loose_parts import islands, ratios, relative_forces, rounding_left, squared_forces
 from ..energy.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
 from ..energy.rigid_motions import rigid_modes, rigid_motions
-from ..energy.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..energy.volume_below import volume_below
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
@@ -34,7 +33,7 @@ from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
 from .balance import FORCE, MOMENT, balance_sentence, balance_table, load, load_ratio, pressures_left_over
 from .cables import cable_end_table, cable_table
-from .curve_tables import junction_table
+from .curve_tables import junction_table, room_table
 from .leaning import lean_table, lean_texts
 from .proof import Proof
 from .reactions import reactions
@@ -382,22 +381,6 @@ def _patch_table(surface: Surface, standing: Surface, areas: Floats, quality: Fl
         row["quality"] = float(quality[faces].min(initial=1.0))
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def room_table(surface: Surface) -> pd.DataFrame:
-    """A row per room of prescribed volume; see ``Certificate.rooms``."""
-    if not surface.rooms:
-        return pd.DataFrame()
-    wanted, reached = prescribed_volumes(surface), room_volumes(surface)
-    return pd.DataFrame(
-        {
-            "room": [room.name for room in surface.rooms],
-            "volume": reached,
-            "prescribed": wanted,
-            "difference": (reached - wanted) / np.abs(wanted),
-            "pressure": room_pressures(surface),
-        }
-    )
 
 
 def _largest(values: pd.Series) -> float:

@@ -1,4 +1,4 @@
-"""The table of junctions: where each curve is, and the forces along it."""
+"""The tables of junctions, with where each is and the forces along it, and of rooms."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats, Ints
+from ..energy.rooms import prescribed_volumes, room_pressures, room_volumes
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.topology import Curve
@@ -57,6 +58,22 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def room_table(surface: Surface) -> pd.DataFrame:
+    """A row per room of prescribed volume; see ``Certificate.rooms``."""
+    if not surface.rooms:
+        return pd.DataFrame()
+    wanted, reached = prescribed_volumes(surface), room_volumes(surface)
+    return pd.DataFrame(
+        {
+            "room": [room.name for room in surface.rooms],
+            "volume": reached,
+            "prescribed": wanted,
+            "difference": (reached - wanted) / np.abs(wanted),
+            "pressure": room_pressures(surface),
+        }
+    )
 
 
 def middle(surface: Surface, curve: Curve) -> dict[str, float]:

@@ -89,31 +89,38 @@ def boundary_view(supports: pd.DataFrame) -> pd.DataFrame:
 
 
 def held_curves(surface: Surface) -> tuple[Curve, ...]:
-    """The curves of the held boundary, but for those in mirror planes, each along one patch."""
+    """The curves of the held boundary but for mirror planes, each along one patch and one support."""
     topo = surface.topology
     boundary = topo.boundary_edge & ~surface.mirror_edge
     held = boundary & at_both_ends(surface.held, topo.edges)
     stop = vertex_kind(topo.edges[boundary], surface.n) == POINT
-    patch = _patch_of_edge(surface)
-    for p in np.unique(patch[held]):
-        there = np.zeros((2, surface.n), dtype=bool)
-        there[0, topo.edges[held & (patch == p)]] = there[1, topo.edges[held & (patch != p)]] = True
-        stop |= there.all(axis=0)
+    for keys in (_patch_of_edge(surface), _support_of_edge(surface)):
+        for key in np.unique(keys[held]):
+            there = np.zeros((2, surface.n), dtype=bool)
+            there[0, topo.edges[held & (keys == key)]] = there[1, topo.edges[held & (keys != key)]] = True
+            stop |= there.all(axis=0)
     return topo.chains(topo.edges[held], stop)
 
 
+def _support_of_edge(surface: Surface) -> Ints:
+    """(e,) what holds an edge: -2 where it cannot move, -1 for Π, else the number in ``on_planes``."""
+    edges = surface.topology.edges
+    support = np.where(at_both_ends(surface.pinned, edges), -2, -1)
+    support[~at_both_ends(surface.pinned | surface.on_ground, edges)] = len(surface.on_planes)
+    for k, (plane, mask) in enumerate(surface.on_planes):
+        if not plane.mirror:
+            support[(support > k) & at_both_ends(mask, edges)] = k
+    return support
+
+
 def _held_lines(acting: SupportForces) -> Iterator[_Part]:
-    """The held boundary; its kind is that of the longer part."""
+    """The held boundary."""
     surface, curves = acting.surface, held_curves(acting.surface)
+    support = _support_of_edge(surface)
+    planes = [_kind(surface, plane) for plane, _ in surface.on_planes]
+    kinds = [*planes, "plane", "line", "ground"]  # -2 and -1 count from the end
     for curve, forces in zip(curves, _shared(acting.along, [c.vertices for c in curves]), strict=True):
-        lengths = segment_lengths(surface.vertices, curve.pairs)
-        fixed = acting.clamped[curve.pairs].all(axis=1)
-        on_ground = _on_ground(acting)[curve.pairs].all(axis=1)
-        kinds = {"line": fixed, "ground": on_ground & ~fixed}
-        kind = max(kinds, key=lambda kind: float(lengths[kinds[kind]].sum()))
-        if not (fixed | on_ground).any():
-            planes = (plane for plane, mask in surface.on_planes if mask[curve.vertices].all())
-            kind = _kind(surface, next(planes, surface.plane))
+        kind = kinds[support[surface.topology.edge_numbers(curve.pairs[:1])[0]]]
         yield _line(acting, kind, curve, forces, _names(surface, curve.sheets))
 
 

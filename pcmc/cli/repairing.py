@@ -10,7 +10,7 @@ import typer
 from .. import project as projects
 from ..base.errors import FileError
 from ..base.interrupts import defer_interrupts
-from ..io import write
+from ..io import metres_note, write
 from ..io.repairing import HOLES, repair
 from . import OK, arguments
 from .arguments import number, option
@@ -50,6 +50,5 @@ def repair_(
         repaired = repair(file, weld=weld, holes=holes, edge_length=edge_length, units=units, up=up)
     with defer_interrupts():
         write(output, repaired.surface, units=repaired.units)
-    print(repaired)
-    print(f"written: {output}")
+    print(repaired, *metres_note([output], repaired.units.length), f"written: {output}", sep="\n")
     return OK

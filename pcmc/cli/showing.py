@@ -11,6 +11,7 @@ import typer
 
 from .. import project as projects
 from ..base.errors import OptionError, unknown
+from ..io import metres_note
 from ..project import Outcome
 from ..surface import Surface
 from . import NOT_CERTIFIED, OK, arguments
@@ -72,7 +73,7 @@ def convert(
     if roof is None:
         return NOT_CERTIFIED
     projects.write_all(projects.surface_files(roof, [output], colour))
-    print(f"written: {output}")
+    print(*metres_note([output], roof.units.length), f"written: {output}", sep="\n")
     return OK
 
 

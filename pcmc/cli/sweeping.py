@@ -68,11 +68,10 @@ def sweep(
       pcmc sweep roof.toml corner.tension=6,6.2 "wall 1.tension=1,2" --csv roof.csv
       pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
     """
-    from ..base.units import NO_UNITS
     from ..quantities import dimension_of
     from ..sweep import draw_sweep, run, short_table, write_table
-    from ..sweep.projects import units_of
-    from ..sweep.short_table import columns_of, with_units
+    from ..sweep.projects import column_labels
+    from ..sweep.short_table import columns_of
     from ..sweep.store import FAILED
     from ..sweep.table import TABLES
 
@@ -109,8 +108,7 @@ def sweep(
     first = short_table(table, list(grid), show or ())
     if csv is not None:
         write_table(csv, table if every else first)
-    units = NO_UNITS if ":" in what and not Path(what).exists() else units_of(what)
-    labels = with_units(map(str, table), units, table)
+    labels = {} if ":" in what and not Path(what).exists() else column_labels(what, map(str, table))
     if plot is not None:
         draw_sweep(table, list(grid), plot, labels, *(show or ())[:1])
     print(first.rename(columns=labels).to_string(float_format=lambda x: f"{x:.5g}", na_rep=""))

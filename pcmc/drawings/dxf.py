@@ -104,7 +104,8 @@ def _add_sheet(space: Any, sheet: Sheet, scale: float = 1.0, shift: Floats | flo
     for text in sheet.texts:
         align = {"L": "MIDDLE_LEFT", "C": "MIDDLE_CENTER", "R": "MIDDLE_RIGHT"}[text.align]
         look = {"layer": text.layer, "style": "PCMC", "rotation": text.turn}
-        entity = space.add_text(text.text, height=scale * text.height, dxfattribs=look)
+        plain = text.text.replace("%%", 2 * "%%%").replace("^", "^ ")  # else %%c is ⌀, and ^J a line break
+        entity = space.add_text(plain, height=scale * text.height, dxfattribs=look)
         entity.set_placement((scale * np.array(text.at) + shift).tolist(), align=TextEntityAlignment[align])
     for dimension in sheet.dimensions:
         _add_dimension(space, dimension)

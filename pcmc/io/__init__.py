@@ -3,8 +3,8 @@
 Gives ``read``, ``write`` and ``load``. May import ``meshing`` and the rooms below it.
 """
 
-from .formats import FORMATS, READ_ONLY
+from .formats import FORMATS, READ_ONLY, metres_note
 from .reading import load, read, read_bare
 from .writing import write
 
-__all__ = ["FORMATS", "READ_ONLY", "load", "read", "read_bare", "write"]
+__all__ = ["FORMATS", "READ_ONLY", "load", "metres_note", "read", "read_bare", "write"]

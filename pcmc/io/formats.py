@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -96,6 +97,8 @@ FORMATS = {
     ".ifc": Format("ifc", certificate=True, separate=True),
 }
 """The formats by suffix."""
+METRES = (".glb", ".gltf", ".3dm", ".ifc", ".usda")
+"""Formats whose lengths are metres without a unit."""
 READ_ONLY = {suffix: Format("meshlab") for suffix in (".off", ".3ds", ".dae", ".x3d")}
 """Formats that are read, by MeshLab, but not written."""
 
@@ -108,3 +111,16 @@ def format_of(path: Path, known: Mapping[str, Format]) -> Format:
         text = f"{path}: {readable}{unknown('suffix', suffix, known)}"
         raise FileError(text, what=str(path), found=suffix, expected=list(known))
     return known[suffix]
+
+
+def metres_note(files: Iterable[str | os.PathLike[str]], unit: str) -> list[str]:
+    """That files which are in metres take numbers without a unit as they are.
+
+    >>> metres_note(["hall.obj", "hall.glb"], "")[0].split(";")[0]
+    'hall.glb: there is no unit of length, so metres are assumed'
+    """
+    named = [Path(file).name for file in files if Path(file).suffix.lower() in METRES]
+    if unit or not named:
+        return []
+    text = f"{', '.join(named)}: there is no unit of length, so metres are assumed"
+    return [f'{text}; if the numbers are mm, type --units mm, or units = "mm" in a project']

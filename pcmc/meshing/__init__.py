@@ -1,4 +1,4 @@
-"""Triangles: their quality, redistribution along the shape, refinement and remeshing.
+"""Triangles: of a plane domain, walls of a mesh, their quality, redistribution, refinement and remeshing.
 
 Gives these to plans, solvers and the certificate. Imports ``contact`` and the rooms below it.
 """

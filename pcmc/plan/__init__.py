@@ -1,17 +1,17 @@
 """A Surface with walls, from the lines of a plan or from a mesh with labelled faces.
 
-``plan`` holds Plan, ``curves`` its curves, ``parts`` dividers, holes, patches and cables; ``build`` makes the
-Surface from the ``draft`` (``lines``, their ``arrangement``, ``edges``, the ``planar`` mesh), its ``areas``,
-``heights`` and ``walls``.
+``plan`` holds Plan, ``parts`` dividers, holes, patches and cables; ``build`` makes the Surface from the
+``draft`` (``lines``, their ``arrangement``, ``edges``), its ``areas`` and ``heights``, by ``curves`` and
+``meshing``.
 ``drawing`` reads CAD files (``strokes``, joined to ``paths``), ``proposal`` chooses what they do not say.
 May import ``io`` and the rooms below it.
 """
 
-from .curves import Curve, arc, bezier, circle, curve, ellipse, join, polyline
-from .labelled import surface_from_labels
+from ..curves.curves import Curve, arc, bezier, circle, curve, ellipse, join, polyline
+from ..meshing.labelled import surface_from_labels
+from ..meshing.walls import add_walls
 from .parts import Area, CableLine, Divider, Hole
 from .plan import Plan, patch_names, plan_from
-from .walls import add_walls
 
 __all__ = [
     "Area",

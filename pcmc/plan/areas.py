@@ -8,9 +8,9 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import PlanError
+from ..meshing.planar import PlanarMesh, locate, signed_areas
 from ..surface import Patch
 from .parts import Area, PlanData
-from .planar import PlanarMesh, locate, signed_areas
 
 
 def patches_of(plan: PlanData, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:

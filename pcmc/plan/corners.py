@@ -7,7 +7,7 @@ import math
 import numpy as np
 import shapely
 
-from .curves import Curve
+from ..curves.curves import Curve
 from .lines import Line
 
 WEDGE = 1.5  # edges from a corner, where the width of the sheets there is taken

@@ -8,15 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.arrays import Floats
 from ..base.errors import PlanError, SurfaceError
+from ..curves.curves import Curve
+from ..curves.pieces import point_text, to_local, two_digits
+from ..meshing.planar import PlanarMesh, signed_areas, triangulate
 from ..surface.topology import components
 from .arrangement import Arrangement, arrange, hole_points
-from .curves import Curve
 from .edges import Boundary, boundary, check_lines
-from .lines import SNAP, Kind, Line, LineTree, point_text
+from .lines import SNAP, Kind, Line, LineTree
 from .parts import PlanData
-from .pieces import to_local, two_digits
-from .planar import PlanarMesh, signed_areas, triangulate
 
 MAX_TRIANGLES = 500_000  # of a plan's mesh, which takes about a minute; finer ones are made by remeshing
 MAX_POINTS = 1_000_000  # of all lines, where they are measured
@@ -57,7 +58,7 @@ def drafted(plan: PlanData) -> Draft:
     """
     lines, on_edge, drawn = _arranged(plan)
     edges = np.concatenate([chain.edges for chain in drawn.chains])
-    _check_count(plan, _area(plan), len(edges))
+    _check_count(plan, _area(lines[0].xy), len(edges))
     try:
         mesh = triangulate(drawn.points, edges, plan.edge_length, hole_points(drawn, lines))
     except SurfaceError as error:
@@ -106,8 +107,8 @@ def _check_size(plan: PlanData) -> None:
     if points > MAX_POINTS:
         problem = f"the lines of the plan have {points} points; at most {MAX_POINTS} are read: draw them with"
         raise PlanError(f"{problem} fewer", what="outline", found=points, expected=MAX_POINTS)
-    _check_count(plan, _area(plan), 0)
     xy = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2]
+    _check_count(plan, _area(xy), 0)
     size = float(np.linalg.norm(np.ptp(xy, axis=0)))
     if plan.edge_length > size:
         problem = f"is longer than the plan, {size:.4g} from corner to corner; use a smaller one"
@@ -133,9 +134,9 @@ def _check_size(plan: PlanData) -> None:
             raise PlanError(f"{hole.name} {problem}", what=hole.name, found=extent)
 
 
-def _area(plan: PlanData) -> float:
-    """The area in the outline, holes not left out."""
-    x, y = plan.outline.local(plan.plane).at(plan.outline.dense)[:, :2].T
+def _area(xy: Floats) -> float:
+    """The area in an outline (k,2)."""
+    x, y = xy.T
     return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
 
 

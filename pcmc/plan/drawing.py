@@ -12,10 +12,10 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import PlanError
 from ..base.units import conversion_note, length_factor, size_note
-from .curves import Curve
+from ..curves.curves import Curve
+from ..curves.pieces import Piece
 from .drawn_parts import FLAT, DrawnParts
 from .parts import hole_label
-from .pieces import Piece
 from .strokes import Stroke, read_strokes
 from .texts import Label, heights_of, labels_of
 

@@ -11,12 +11,13 @@ import shapely
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
+from ..curves.curves import Curve
+from ..curves.pieces import point_text, to_local, to_space
+from ..meshing.walls import EDGES
 from ..surface import Cable, Patch, Plane
 from .arrangement import Arrangement
-from .curves import Curve
-from .lines import SNAP, Kind, Line, LineTree, point_text
-from .parts import EDGES, PlanData
-from .pieces import to_local, to_space
+from .lines import SNAP, Kind, Line, LineTree
+from .parts import PlanData
 
 MIRROR, HELD = "mirror", "held"
 STATES = (*EDGES, MIRROR, HELD)  # of an edge of the boundary; held is a free one along a support

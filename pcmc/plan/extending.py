@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
+from ..curves.curves import Curve
 from ..surface.topology import components
-from .curves import Curve
 from .lines import Kind, Line, LineTree
 from .paths import bent
 

@@ -8,7 +8,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
-from .planar import signed_areas
+from ..meshing.planar import signed_areas
 
 RISE = 0.3  # of the radius of the largest circle without supports: a shallow dome
 FULLNESS = 0.75  # power of the membrane's height; below 1 the dome is steeper at its edge

@@ -11,10 +11,10 @@ import numpy as np
 from ..base import validate
 from ..base.errors import OptionError, unknown
 from ..base.names import checked_name
+from ..curves.curves import Curve, curve
+from ..meshing.walls import EDGES
 from ..surface import Plane
-from .curves import Curve, curve
 
-EDGES = ("fixed", "sliding", "free", "cable")
 BOTTOMS = ("sliding", "held", "sloped")
 BALANCED = "balanced"  # in place of a wall's tension: chosen from those of its neighbours
 

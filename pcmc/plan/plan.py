@@ -13,10 +13,11 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError
 from ..base.names import checked_name
+from ..curves.curves import Curve
+from ..curves.pieces import to_local, to_space
+from ..meshing.walls import EDGES
 from ..surface import Plane, Surface
-from .curves import Curve
 from .parts import (
-    EDGES,
     PlanData,
     areas_of,
     cable_of,
@@ -30,7 +31,6 @@ from .parts import (
     rooms_of,
     support_of,
 )
-from .pieces import to_local, to_space
 from .summary import summary
 
 MOST = {

@@ -11,9 +11,9 @@ import numpy as np
 import shapely
 
 from ..base.errors import OptionError, PlanError, unknown
+from ..curves.curves import Curve
 from ..surface.wall_tensions import balanced_wall
 from .corners import most_in_corners
-from .curves import Curve
 from .drawing import Drawing
 from .edges import cable_for
 from .lines import Kind, Line

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..curves.curves import Curve
 from ..surface.summary import listed
-from .curves import Curve
 from .parts import Area, Divider, PlanData
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import FileError, unknown
-from ..plan.curves import CURVES
+from ..curves.curves import CURVES
 from .keys import KINDS, REQUIRED, Section, main_sections, solve_section, target_sections
 
 OR_CURVE = ("plan.dividers", "plan.holes")  # sections in place of which a curve may stand

@@ -14,8 +14,9 @@ from ..advice.rises import RISES
 from ..advice.rises import WHOLE as WHOLE_RISES
 from ..base.units import FORCES, LENGTHS
 from ..drawings import FORMATS
+from ..meshing.walls import EDGES
 from ..plan import Area, CableLine, Divider, Hole, Plan
-from ..plan.parts import BALANCED, BOTTOMS, EDGES, RoomData
+from ..plan.parts import BALANCED, BOTTOMS, RoomData
 from ..solvers import METHODS, find_method
 from ..surface import Plane
 from .accuracy import AccuracyWanted

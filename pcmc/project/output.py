@@ -28,7 +28,6 @@ PathLike = str | os.PathLike[str]
 Works = list[tuple[Path, Callable[[Path], Any]]]  # each file with the function that writes it
 OnStep = Callable[[str], object]  # called with a few words at each step of a project
 COLOURS = ("patches", "curvature", "error", "reactions")
-METRES = (".glb", ".gltf", ".3dm", ".ifc", ".usda")  # formats whose lengths are metres without a unit
 
 
 def ignore(step: str) -> None:
@@ -124,19 +123,6 @@ def _check_view(view: Any) -> None:
         angles = view if isinstance(view, Sequence) and len(view) == 2 else [math.nan]
         if not all(isinstance(angle, int | float) and math.isfinite(angle) for angle in angles):
             validate.refuse("view", view, "a name or two angles in degrees")
-
-
-def metres_note(files: Iterable[PathLike], unit: str) -> list[str]:
-    """That files which are in metres take the numbers of a drawing without a unit as they are.
-
-    >>> metres_note(["hall.obj", "hall.glb"], "")[0].split(";")[0]
-    'hall.glb: the drawing has no unit of length, so metres are assumed'
-    """
-    named = [Path(file).name for file in files if Path(file).suffix.lower() in METRES]
-    if unit or not named:
-        return []
-    text = f"{', '.join(named)}: the drawing has no unit of length, so metres are assumed"
-    return [f'{text}; if its numbers are mm, set its unit in CAD, or type units = "mm" in a project']
 
 
 def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> None:

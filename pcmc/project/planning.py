@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import FileError, MissingExtra
+from ..curves.curves import Curve
 from ..plan import plan_from
-from ..plan.curves import Curve
 from .drawn import FALLBACK, LENGTHS, read
 from .file import Project
 from .start import surface_of
@@ -181,7 +181,7 @@ def _entries(tomlkit: Any, entries: Any, refer: bool) -> Any:
 
 def _curve(tomlkit: Any, curve: Any, outline: bool = False) -> Any:
     """A curve as plain data, a line for each of its parts."""
-    from ..plan.curve_data import curve_data
+    from ..curves.curve_data import curve_data
 
     data = curve_data(curve) if isinstance(curve, Curve) else [float(f"{x:.12g}") for x in curve]
     if outline and isinstance(data, Mapping) and data.get("closed"):

@@ -15,6 +15,7 @@ from ..base.errors import BalanceWarning, OptionError
 from ..certificate.balance import unbalanced
 from ..contact.pinching import standing_part
 from ..existence import solve
+from ..io import metres_note
 from ..meshing.remeshing import remesh, size_note
 from ..plan import Plan
 from ..solvers.result import Progress, Result, Status
@@ -22,7 +23,7 @@ from ..surface import Surface
 from .accuracy import AccuracyWanted
 from .file import Project, in_file
 from .outcome import EXTENSIVE, Outcome
-from .output import OnStep, ignore, metres_note
+from .output import OnStep, ignore
 from .start import start_of
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     notes = [*solved.notes]
     if project.has_file:  # a drawing alone is proposed as a whole
         notes = [*chosen_values(project.plan, project.chosen.text, surface), *notes]
-    if project.drawing is not None:
+    if project.drawing is not None or start.data is not None:
         notes += metres_note(project.files, start.units.length)
     if project.whole and any(target.quantity in EXTENSIVE for target in project.targets):
         notes.append("targets of areas and volumes are those of the part between the mirror planes")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,9 @@ from typing import Any
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError
-from ..base.units import Units
 from ..solvers import find_method
 from .grid import Sweep
+from .short_table import with_units
 from .solving import mesh_columns, row
 
 
@@ -66,12 +66,14 @@ def project_sweep(
     return sweep
 
 
-def units_of(path: str | os.PathLike[str]) -> Units:
-    """The units of a project or a surface."""
+def column_labels(path: str | os.PathLike[str], names: Iterable[str]) -> dict[str, str]:
+    """The names of columns with the units of a project or a surface; see ``with_units``."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the sweep showed them
-        project = projects.load(path)
-        return project.units if project.plan is not None else projects.start_of(project).units
+        start = projects.start_of(projects.load(path))
+    cables = {cable.name for cable in start.surface.cables}
+    mine = cables - {patch.name for patch in start.surface.patches}
+    return with_units(names, start.units, mine | {f"cable {name}" for name in cables})
 
 
 def solve_project(

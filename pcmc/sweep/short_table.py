@@ -55,15 +55,15 @@ def short_table(table: pd.DataFrame, parameters: Sequence[str], show: Sequence[s
     return table[[name for name in wanted if name in table]]
 
 
-def with_units(names: Iterable[str], units: Units, columns: Container[str] = ()) -> dict[str, str]:
+def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) -> dict[str, str]:
     """The names of numbers with their units in brackets, as far as these are known.
 
     Parameters
     ----------
     units : of the project or surface; nothing is added without one.
-    columns : of the whole table: what has a ``force`` there is a cable, whose tension is a force.
+    cables : names whose tension is a force.
 
-    >>> list(with_units(["west.tension", "hem.tension", "verdict"], Units("m", "kN"), ["hem.force"]).values())
+    >>> list(with_units(["west.tension", "hem.tension", "verdict"], Units("m", "kN"), ["hem"]).values())
     ['west.tension [kN/m]', 'hem.tension [kN]']
     """
     from ..quantities import dimension_of  # takes long to import
@@ -71,7 +71,7 @@ def with_units(names: Iterable[str], units: Units, columns: Container[str] = ())
     shown = {}
     for name in names if units else ():
         stem, _, quantity = name.rpartition(".")
-        cable = quantity == "tension" and f"{stem.removeprefix('cable ')}.force" in columns
+        cable = quantity == "tension" and (stem in cables or stem.startswith("plan.cables."))
         with suppress(OptionError):
             dimension = DIMENSIONS.get(quantity) or dimension_of("force" if cable else quantity)
             shown[name] = f"{name} [{units.behind(dimension).strip()}]"

@@ -11,9 +11,9 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..meshing.angles import improve_angles
 from ..surface.geometry import angles, cross_2d, segment_lengths
 from ..surface.topology import components
+from .angles import improve_angles
 
 CLEARANCE = 0.62  # of the edge length: distance of free points from the segments
 CROWDED = 0.6  # of the edge length: free points nearer to another point are removed

@@ -10,14 +10,15 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError, unknown
-from ..meshing.quality import edge_lengths
+from ..curves.pieces import to_space
 from ..surface import Patch, Plane, Surface
 from ..surface.geometry import bounding_size
 from ..surface.topology import Curve
-from .pieces import to_space
 from .planar import triangulate
+from .quality import edge_lengths
 
 BOTTOMS = ("sliding", "held")
+EDGES = ("fixed", "sliding", "free", "cable")
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,9 +15,8 @@ from ..base.errors import OptionError, SurfaceError, unknown
 from ..surface import Patch, Plane, Surface, checks
 from ..surface.geometry import area_vectors
 from ..surface.topology import components, topology
-from .parts import EDGES
 from .planar import SIDES, twins
-from .walls import add_walls
+from .walls import EDGES, add_walls
 
 
 def surface_from_labels(
