@@ -21,7 +21,7 @@ from ..energy.curvature import curvature_error, mean_curvature
 from ..panels.families import families
 from ..project.values import values_of
 from ..quantities import dimension_of
-from ..surface import Surface
+from ..surface import Patch, Surface
 from ..surface.colours import patch_colors
 from ..surface.geometry import edge_vectors
 from ..surface.mirroring import Whole, unfolded
@@ -166,11 +166,25 @@ def family_of_face(surface: Surface) -> Floats:
     return family
 
 
+def patch_data(patches: tuple[Patch, ...]) -> list[dict[str, Any]]:
+    """The tensions and pressures of patches, for the card."""
+    return [
+        {"name": p.name, "tension": p.tension, "pressure": p.pressure, "target": p.target_curvature}
+        for p in patches
+    ]
+
+
+def verdict_data(certificate: Certificate) -> dict[str, str]:
+    """The verdict as a code, ``name``, and in words."""
+    word, _, rest = certificate.verdict.value.partition(": ")
+    name = certificate.verdict.name.lower()
+    return {"name": name, "word": word, "sentence": rest, "detail": certificate.detail}
+
+
 def variant_data(variant: Variant) -> dict[str, Any]:
     """A variant for the page's table."""
-    verdict = variant.certificate.verdict
-    word = verdict.value.partition(": ")[0]
-    return {"name": variant.name, "verdict": verdict.name.lower(), "word": word, "figures": variant.figures}
+    word = verdict_data(variant.certificate)["word"]
+    return {"name": variant.name, "word": word, "figures": variant.figures}
 
 
 def target_choices(surface: Surface) -> list[dict[str, Any]]:

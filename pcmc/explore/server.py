@@ -25,12 +25,11 @@ from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
 from ..base.errors import FileWarning, MissingExtra, PcmcError, SurfaceError, unknown
-from ..certificate.certificate import Certificate
 from ..io import FORMATS, write
 from ..project import load
 from ..project.output import fields as written_fields
 from ..project.values import values_of
-from ..surface import Patch, Surface
+from ..surface import Surface
 from . import requests, saving
 from .listening import LOOPBACK, Listener, listen
 from .messages import pack, plain
@@ -44,9 +43,11 @@ from .page_data import (
     mesh_findings,
     mesh_key,
     outline,
+    patch_data,
     target_choices,
     unit_texts,
     variant_data,
+    verdict_data,
 )
 from .requests import RequestError
 from .roof import Roof, signature
@@ -116,7 +117,7 @@ class Explorer:
     def save(self, session: Session, name: str, replace: bool) -> dict[str, Any]:
         """Save the surface of a session as a project beside the file that was opened."""
         if not self.local:
-            text = f"only a page of this machine saves files; here the server listens on {self.url}"
+            text = "only a page of this machine saves files; this server listens for others, too"
             raise RequestError(text, HTTPStatus.FORBIDDEN)
         with self._saving:
             surface = session.state().surface  # after all that was asked for before
@@ -240,7 +241,7 @@ class _Handler(BaseHTTPRequestHandler):
         except ValueError as error:
             raise RequestError(f"a broken address: {error}") from None
         if explorer.local and name not in LOOPBACK:
-            raise RequestError(f"open this page at {explorer.url}", HTTPStatus.FORBIDDEN)
+            raise RequestError("open the address that pcmc explore printed", HTTPStatus.FORBIDDEN)
         if source is not None and source != host:
             raise RequestError("requests from pages of other sites are refused", HTTPStatus.FORBIDDEN)
         parts = urlsplit(self.path)
@@ -357,10 +358,10 @@ class _Handler(BaseHTTPRequestHandler):
         if not header["superseded"]:
             header |= {
                 "mesh": mesh_key(state.surface, origin),
-                "asked": _patches(state.asked),
-                "shown": _patches(state.surface.patches),
+                "asked": patch_data(state.asked),
+                "shown": patch_data(state.surface.patches),
                 "values": {"asked": values_of(state.wanted), "shown": values_of(state.surface)},
-                "verdict": _verdict(state.failure or state.certificate),
+                "verdict": verdict_data(state.failure or state.certificate),
                 "at_rest": state.failure is None,
                 "findings": findings(state.certificate),
                 "figures": figures_data(state.surface, state.certificate),
@@ -412,16 +413,3 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(body)
-
-
-def _patches(patches: tuple[Patch, ...]) -> list[dict[str, Any]]:
-    return [
-        {"name": p.name, "tension": p.tension, "pressure": p.pressure, "target": p.target_curvature}
-        for p in patches
-    ]
-
-
-def _verdict(certificate: Certificate) -> dict[str, str]:
-    word, _, rest = certificate.verdict.value.partition(": ")
-    name = certificate.verdict.name.lower()
-    return {"name": name, "word": word, "sentence": rest, "detail": certificate.detail}
