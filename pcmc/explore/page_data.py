@@ -134,7 +134,7 @@ def fields(state: State, origin: Floats) -> Arrays:
     """Vertices relative to the origin, and the values that colours may show."""
     surface, certificate, whole = state.surface, state.certificate, whole_of(state.surface)
     drawn = surface if whole is None else whole.surface
-    acting = support_forces(drawn, certificate.reactions if whole is None else None)
+    acting = certificate.acting if whole is None else support_forces(drawn)
     arrays: Arrays = {
         "vertices": drawn.vertices - origin,
         "curvature": mean_curvature(drawn, "variational"),
