@@ -104,8 +104,6 @@ class Certificate:
     walls_quality: float
     patches: pd.DataFrame
     junctions: pd.DataFrame
-    supports: pd.DataFrame
-    balance: pd.DataFrame
     load: float
     support: float
     acting: SupportForces
@@ -117,6 +115,16 @@ class Certificate:
     rooms: pd.DataFrame = field(default_factory=pd.DataFrame)
     symmetric_in: tuple[str, ...] = ()
     leaning: pd.DataFrame = field(default_factory=pd.DataFrame)
+
+    @cached_property
+    def supports(self) -> pd.DataFrame:
+        """The table of supports, made when first asked for."""
+        return support_table(self.acting)
+
+    @cached_property
+    def balance(self) -> pd.DataFrame:
+        """The balance of loads and supports, made when first asked for."""
+        return balance_table(self.acting.standing, self.supports)
 
     @property
     def reactions(self) -> Floats:
@@ -259,7 +267,6 @@ def certify(
 
     patches = _patch_table(surface, standing, areas, qualities)
     ratio, acting = load_ratio(standing), support_forces(surface, standing=standing)
-    supports = support_table(acting)
     notes = _pulled_off(unheld), pressures_left_over(standing)
     findings = Findings(
         surface=surface,
@@ -293,8 +300,6 @@ def certify(
         walls_quality=float(qualities[in_wall].min(initial=1.0)),
         patches=patches,
         junctions=junction_table(standing, left),
-        supports=supports,
-        balance=balance_table(standing, supports),
         load=load(standing),
         support=float((acting.forces @ np.array(surface.plane.normal)).sum()),
         acting=acting,

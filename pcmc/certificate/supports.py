@@ -61,7 +61,8 @@ def support_table(acting: SupportForces) -> pd.DataFrame:
 def support_vertices(acting: SupportForces) -> dict[str, Ints]:
     """The vertices (k,) of each support, by its number in the table.
 
-    >>> from pcmc import Patch
+    >>> from pcmc import Patch, Surface
+    >>> from pcmc.certificate.reactions import support_forces
     >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], fixed=range(3))
     >>> {name: sorted(on.tolist()) for name, on in support_vertices(support_forces(flat)).items()}
     {'B1': [0, 1, 2]}

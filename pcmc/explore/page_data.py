@@ -213,9 +213,11 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
     }
 
 
-def findings(certificate: Certificate) -> dict[str, Any]:
-    """Numbers and tables of a certificate, for the page."""
-    tables = {"rooms": certificate.rooms, "supports": certificate.supports, "balance": certificate.balance}
+def findings(certificate: Certificate, moving: bool = False) -> dict[str, Any]:
+    """Numbers and tables of a certificate, for the page; while a slider moves, without those of supports."""
+    tables = {"rooms": certificate.rooms}
+    if not moving:
+        tables |= {"supports": certificate.supports, "balance": certificate.balance}
     rows = {name: _rows(table) for name, table in tables.items()}
     return {**certificate.numbers(), "mirrored": list(certificate.symmetric_in), **rows}
 
