@@ -221,6 +221,7 @@ def test_other_sites_may_not_ask(client):
         answer, body = client.raw("POST", "/api/open", "{}", **headers)
         assert answer.status == 403
         assert "error" in json.loads(body)
+        assert client.explorer.token.encode() not in body  # nor does the page of another name learn it
     port = client.explorer.port
     for headers in ({"Host": f"localhost:{port}"}, {"Origin": f"http://127.0.0.1:{port}"}):
         assert client.raw("POST", "/api/open", "{}", **headers)[0].status == 200

@@ -7,10 +7,13 @@ from motion_cases import SURFACES, TILTED
 from shapes import disc, pyramid, rotation, shaken, three_patches
 from starts import double_bubble, sphere, two_squares
 
+import pcmc
+from generators import four_fans
 from pcmc import Patch, Surface, hessian
 from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.energy.pattern import Pattern
 from pcmc.energy.rigid_motions import rigid_modes, rigid_motions
+from pcmc.stability import modes
 from pcmc.stability.factorisation import factoriser
 from pcmc.stability.modes import lowest, negatives_without, stiffness
 
@@ -185,3 +188,24 @@ def test_index_does_not_count_rigid_motions():
     assert system_of(surface).negative == 1
     everything = np.zeros((len(system_of(surface).mass), 0))
     assert system_of(surface, rigid=everything).negative >= 1
+
+
+def test_modes_of_equal_eigenvalues_do_not_depend_on_rounding(monkeypatch):
+    """The cross of walls leans sideways in two directions alike: any mixture of both is a mode."""
+    surface = pcmc.solve(four_fans(rings=7), target="stationary").surface
+    eigsh, found = modes.eigsh, []
+    for angle in (0.0, 0.4, 2.0):
+
+        def turned(*given, _angle=angle, **options):
+            values, vectors = eigsh(*given, **options)
+            pair = np.flatnonzero(values < 0.0)
+            turn = np.array([[np.cos(_angle), -np.sin(_angle)], [np.sin(_angle), np.cos(_angle)]])
+            vectors[:, pair] = vectors[:, pair] @ turn
+            return values, vectors
+
+        monkeypatch.setattr(modes, "eigsh", turned)
+        found.append(pcmc.certify(surface))
+    assert found[0].index == 2
+    for other in found[1:]:
+        np.testing.assert_allclose(other.modes, found[0].modes, atol=1e-6 * np.abs(found[0].modes).max())
+        assert other.detail == found[0].detail

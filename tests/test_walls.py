@@ -9,6 +9,7 @@ from generators import hypar_roof, lens, two_squares
 from pcmc import Plane, Surface
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
+from pcmc.continuation import Direction
 from pcmc.drawings import drawing_set
 from pcmc.energy.functional import patch_areas
 from pcmc.explore.page_data import control_groups, outline
@@ -263,6 +264,14 @@ def test_a_sail_is_roof_and_what_hangs_below_a_junction_is_a_wall():
     heavy = squares.retensioned(pressures={"left": 0.0, "right": 0.0}, weights={"left": -1.0, "right": -1.0})
     assert walls(heavy) == ["wall"]
     assert walls(squares.retensioned(pressures={"left": 0.0, "right": 0.0})) == []  # three films
+
+
+def test_a_sail_that_is_inflated_stays_a_roof_and_its_wall_follows():
+    hall = sail_hall()
+    line = Direction(pressures={"sail": 1.0}, relative=True).line(hall)
+    half = line.surface_at(hall, 0.5)
+    assert half.pressures.tolist() == pytest.approx([1.0, 0.5, 0.5])
+    assert [patch.wall for patch in half.patches] == [False, False, True]
 
 
 def test_files_tables_and_pictures_show_a_sail_as_roof(tmp_path):

@@ -175,6 +175,12 @@ def _first_step(control: Floats) -> Floats:
     return steps[moved[0]] if len(moved) else steps[0]
 
 
+def point_text(point: Floats) -> str:
+    """A point (2,) or (3,), for messages; its height where that is not 0."""
+    shown = point if point[2:].any() else point[:2]
+    return f"({', '.join(f'{value:.6g}' for value in shown)})"
+
+
 def two_digits(value: float, rounded: Callable[[float], int] = math.ceil) -> float:
     """A number > 0 rounded up to two digits, or down with ``math.floor``.
 

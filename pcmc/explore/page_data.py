@@ -21,7 +21,7 @@ from ..energy.curvature import curvature_error, mean_curvature
 from ..panels.families import families
 from ..project.values import values_of
 from ..quantities import dimension_of
-from ..surface import Surface
+from ..surface import Patch, Surface
 from ..surface.colours import patch_colors
 from ..surface.geometry import edge_vectors
 from ..surface.mirroring import Whole, unfolded
@@ -134,7 +134,7 @@ def fields(state: State, origin: Floats) -> Arrays:
     """Vertices relative to the origin, and the values that colours may show."""
     surface, certificate, whole = state.surface, state.certificate, whole_of(state.surface)
     drawn = surface if whole is None else whole.surface
-    acting = support_forces(drawn, certificate.reactions if whole is None else None)
+    acting = certificate.acting if whole is None else support_forces(drawn)
     arrays: Arrays = {
         "vertices": drawn.vertices - origin,
         "curvature": mean_curvature(drawn, "variational"),
@@ -166,11 +166,25 @@ def family_of_face(surface: Surface) -> Floats:
     return family
 
 
+def patch_data(patches: tuple[Patch, ...]) -> list[dict[str, Any]]:
+    """The tensions and pressures of patches, for the card."""
+    return [
+        {"name": p.name, "tension": p.tension, "pressure": p.pressure, "target": p.target_curvature}
+        for p in patches
+    ]
+
+
+def verdict_data(certificate: Certificate) -> dict[str, str]:
+    """The verdict as a code, ``name``, and in words."""
+    word, _, rest = certificate.verdict.value.partition(": ")
+    name = certificate.verdict.name.lower()
+    return {"name": name, "word": word, "sentence": rest, "detail": certificate.detail}
+
+
 def variant_data(variant: Variant) -> dict[str, Any]:
     """A variant for the page's table."""
-    verdict = variant.certificate.verdict
-    word = verdict.value.partition(": ")[0]
-    return {"name": variant.name, "verdict": verdict.name.lower(), "word": word, "figures": variant.figures}
+    word = verdict_data(variant.certificate)["word"]
+    return {"name": variant.name, "word": word, "figures": variant.figures}
 
 
 def target_choices(surface: Surface) -> list[dict[str, Any]]:
@@ -199,9 +213,11 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
     }
 
 
-def findings(certificate: Certificate) -> dict[str, Any]:
-    """Numbers and tables of a certificate, for the page."""
-    tables = {"rooms": certificate.rooms, "supports": certificate.supports, "balance": certificate.balance}
+def findings(certificate: Certificate, moving: bool = False) -> dict[str, Any]:
+    """Numbers and tables of a certificate, for the page; while a slider moves, without those of supports."""
+    tables = {"rooms": certificate.rooms}
+    if not moving:
+        tables |= {"supports": certificate.supports, "balance": certificate.balance}
     rows = {name: _rows(table) for name, table in tables.items()}
     return {**certificate.numbers(), "mirrored": list(certificate.symmetric_in), **rows}
 

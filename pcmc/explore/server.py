@@ -25,12 +25,11 @@ from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
 from ..base.errors import FileWarning, MissingExtra, PcmcError, SurfaceError, unknown
-from ..certificate.certificate import Certificate
 from ..io import FORMATS, write
 from ..project import load
 from ..project.output import fields as written_fields
 from ..project.values import values_of
-from ..surface import Patch, Surface
+from ..surface import Surface
 from . import requests, saving
 from .listening import LOOPBACK, Listener, listen
 from .messages import pack, plain
@@ -44,9 +43,11 @@ from .page_data import (
     mesh_findings,
     mesh_key,
     outline,
+    patch_data,
     target_choices,
     unit_texts,
     variant_data,
+    verdict_data,
 )
 from .requests import RequestError
 from .roof import Roof, signature
@@ -116,7 +117,7 @@ class Explorer:
     def save(self, session: Session, name: str, replace: bool) -> dict[str, Any]:
         """Save the surface of a session as a project beside the file that was opened."""
         if not self.local:
-            text = f"only a page of this machine saves files; here the server listens on {self.url}"
+            text = "only a page of this machine saves files; this server listens for others, too"
             raise RequestError(text, HTTPStatus.FORBIDDEN)
         with self._saving:
             surface = session.state().surface  # after all that was asked for before
@@ -240,8 +241,7 @@ class _Handler(BaseHTTPRequestHandler):
         except ValueError as error:
             raise RequestError(f"a broken address: {error}") from None
         if explorer.local and name not in LOOPBACK:
-            text = "open the address that pcmc explore printed: the page has no other name"
-            raise RequestError(text, HTTPStatus.FORBIDDEN)  # without the address: it has the token
+            raise RequestError("open the address that pcmc explore printed", HTTPStatus.FORBIDDEN)
         if source is not None and source != host:
             raise RequestError("requests from pages of other sites are refused", HTTPStatus.FORBIDDEN)
         parts = urlsplit(self.path)
@@ -292,7 +292,8 @@ class _Handler(BaseHTTPRequestHandler):
         else:
             arguments = requests.ACTS[act](asked)
             more = (self._gone,) if act == "meet" else ()
-            self._send_state(session, getattr(session, act)(*arguments, *more))
+            state = getattr(session, act)(*arguments, *more)
+            self._send_state(session, state, moving=act == "follow")
 
     def _gone(self) -> bool:
         """Whether the page has closed the connection, and waits for no answer."""
@@ -347,8 +348,10 @@ class _Handler(BaseHTTPRequestHandler):
     def _send_header(self, header: dict[str, Any]) -> None:
         self._send(pack(header, {}), "application/octet-stream")
 
-    def _send_state(self, session: Session, state: State, first: dict[str, Any] | None = None) -> None:
-        """A state; with ``first``, what the page learns once, and the mesh."""
+    def _send_state(
+        self, session: Session, state: State, first: dict[str, Any] | None = None, *, moving: bool = False
+    ) -> None:
+        """A state; with ``first``, what the page learns once, and the mesh; ``moving`` with a slider."""
         header: dict[str, Any] = {"superseded": state.superseded and first is None}
         drawn: dict[str, Any] = {}
         origin = self.server.explorer.origin
@@ -358,12 +361,12 @@ class _Handler(BaseHTTPRequestHandler):
         if not header["superseded"]:
             header |= {
                 "mesh": mesh_key(state.surface, origin),
-                "asked": _patches(state.asked),
-                "shown": _patches(state.surface.patches),
+                "asked": patch_data(state.asked),
+                "shown": patch_data(state.surface.patches),
                 "values": {"asked": values_of(state.wanted), "shown": values_of(state.surface)},
-                "verdict": _verdict(state.failure or state.certificate),
+                "verdict": verdict_data(state.failure or state.certificate),
                 "at_rest": state.failure is None,
-                "findings": findings(state.certificate),
+                "findings": findings(state.certificate, moving),
                 "figures": figures_data(state.surface, state.certificate),
                 "undo": state.undo,
                 "redo": state.redo,
@@ -413,16 +416,3 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(body)
-
-
-def _patches(patches: tuple[Patch, ...]) -> list[dict[str, Any]]:
-    return [
-        {"name": p.name, "tension": p.tension, "pressure": p.pressure, "target": p.target_curvature}
-        for p in patches
-    ]
-
-
-def _verdict(certificate: Certificate) -> dict[str, str]:
-    word, _, rest = certificate.verdict.value.partition(": ")
-    name = certificate.verdict.name.lower()
-    return {"name": name, "word": word, "sentence": rest, "detail": certificate.detail}

@@ -14,8 +14,9 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
 from ..curves.curves import Curve
+from ..curves.pieces import point_text
 from ..surface.topology import components
-from .lines import SNAP, Kind, Line, LineTree, Places, check_holes, check_line, inside, overlap, point_text
+from .lines import SNAP, Kind, Line, LineTree, Places, check_holes, check_line, inside, overlap
 
 
 @dataclass(frozen=True, eq=False)

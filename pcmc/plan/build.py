@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import count, groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -227,20 +227,19 @@ def _walls(draft: Draft, roof: _Roof) -> tuple[WallMesh, list[Patch], list[_Side
     for (vertices, number), faces in zip(walled, beside, strict=True):
         kinds.setdefault((number, _sides(roof, *faces)), []).append((vertices, faces[faces >= 0]))
     kinds = dict(sorted(kinds.items(), key=lambda kind: kind[0][0]))
-    alike: dict[int, list[_Sides]] = {}
-    for number, sides in kinds:
-        alike.setdefault(number, []).append(sides)
-    faces_at: dict[int, list[Ints]] = {}
-    for (number, _), chains in kinds.items():
-        faces_at.setdefault(number, []).extend(faces for _, faces in chains)
-    radii, tops, patches = _radii(draft.mesh), [], []
-    for label, ((number, sides), chains) in enumerate(kinds.items()):
-        divider = plan.dividers[number]
-        tops += [UpperEdge(vertices, label, divider.bottom != "sliding") for vertices, _ in chains]
-        suffix = f"-{alike[number].index(sides) + 1}" if len(alike[number]) > 1 else ""
-        balanced = divider.wall == BALANCED
-        tension = _balanced(draft, roof, number, faces_at[number], radii) if balanced else divider.wall
-        patches.append(Patch(divider.name + suffix, tension, sides.pressure, wall=True, snow=sides.snow))
+    radii, tops = _radii(draft.mesh), list[UpperEdge]()
+    patches: list[Patch] = []
+    for number, group in groupby(kinds, key=lambda kind: kind[0]):
+        divider, alike = plan.dividers[number], list(group)
+        own = [kinds[kind] for kind in alike]
+        tension = divider.wall
+        if tension == BALANCED:
+            faces = [beside for chains in own for _, beside in chains]
+            tension = _balanced(draft, roof, number, faces, radii)
+        for k, ((_, sides), chains) in enumerate(zip(alike, own, strict=True), start=1):
+            tops += [UpperEdge(v, len(patches), divider.bottom != "sliding") for v, _ in chains]
+            name = f"{divider.name}-{k}" if len(alike) > 1 else divider.name
+            patches.append(Patch(name, tension, sides.pressure, wall=True, snow=sides.snow))
     walls = build_walls(X, tops, plan.edge_length, plan.plane, roof.fixed, floor)
     return walls, patches, [sides._replace(divider=number) for number, sides in kinds]
 

@@ -11,12 +11,12 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.errors import PlanError, SurfaceError
 from ..curves.curves import Curve
-from ..curves.pieces import to_local, two_digits
+from ..curves.pieces import point_text, to_local, two_digits
 from ..meshing.planar import PlanarMesh, signed_areas, triangulate
 from ..surface.topology import components
 from .arrangement import Arrangement, arrange, hole_points
 from .edges import Boundary, boundary, check_lines
-from .lines import SNAP, Kind, Line, LineTree, point_text
+from .lines import SNAP, Kind, Line, LineTree
 from .parts import PlanData
 
 MAX_TRIANGLES = 500_000  # of a plan's mesh, which takes about a minute; finer ones are made by remeshing

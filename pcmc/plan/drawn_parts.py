@@ -14,12 +14,11 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import PlanError
 from ..curves.curves import Curve, polyline
-from ..curves.pieces import two_digits
+from ..curves.pieces import point_text, two_digits
 from .layers import Layer, layer_of, left_out, listed, understood
 from .parts import hole_label
 from .paths import JoinedPath, join_strokes
 from .strokes import Stroke, Strokes
-from .texts import point_text
 
 GAP = 1e-3  # of the diagonal of the outline: gaps up to this are closed
 ALONG = 2e-3  # of that diagonal: lines on an edge are compared with it at points so far apart

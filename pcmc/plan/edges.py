@@ -12,11 +12,11 @@ import shapely
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
 from ..curves.curves import Curve
-from ..curves.pieces import to_local, to_space
+from ..curves.pieces import point_text, to_local, to_space
 from ..meshing.walls import EDGES
 from ..surface import Cable, Patch, Plane
 from .arrangement import Arrangement
-from .lines import SNAP, Kind, Line, LineTree, point_text
+from .lines import SNAP, Kind, Line, LineTree
 from .parts import PlanData
 
 MIRROR, HELD = "mirror", "held"

@@ -14,6 +14,7 @@ import shapely
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
 from ..curves.curves import Curve
+from ..curves.pieces import point_text
 from ..surface.geometry import cross_2d
 
 SNAP = 0.01  # of the edge length: lines nearer to each other than this meet
@@ -171,11 +172,6 @@ class LineTree:
                 s, t = crossing(self.lines[i], s, self.lines[j], t)
             places.append([(i, s), (j, t)])
         return places
-
-
-def point_text(xy: Floats) -> str:
-    """A point, for messages."""
-    return f"({xy[0]:.6g}, {xy[1]:.6g})"
 
 
 def overlap(one: Line, other: Line, where: str) -> PlanError:

@@ -12,6 +12,7 @@ from ..base.arrays import Floats
 from ..base.errors import PlanError
 from ..base.names import checked_name
 from ..base.units import MICROMETRES, length_factor
+from ..curves.pieces import point_text
 from .layers import Layer
 from .strokes import Stroke
 
@@ -26,12 +27,6 @@ class Label:
     name: str
     point: tuple[float, float]
     tension: float | None = None
-
-
-def point_text(point: Floats) -> str:
-    """A point, for messages; its height where that is not 0."""
-    shown = point if point[2] else point[:2]
-    return f"({', '.join(f'{value:.6g}' for value in shown)})"
 
 
 def heights_of(strokes: Sequence[Stroke], drawn: str, units: str) -> Floats:

@@ -7,6 +7,7 @@ number of negative λ is the Morse index; it is counted by inertia, without comp
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -29,6 +30,7 @@ from .factorisation import Factor, SingularMatrix, factoriser
 
 STRONG = 1e-6  # of the largest tension: where all are at least this, factors need no units
 TINY = float(np.finfo(float).tiny)
+ALIKE = 1e-7  # of the largest eigenvalue that was computed: a difference of equal ones
 SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
 
 
@@ -208,6 +210,22 @@ def all_modes(system: Stiffness) -> tuple[Floats, Floats]:
     return values, across @ vectors
 
 
+def _settled(values: Floats, vectors: Floats, inverse: Callable[[Floats], Floats]) -> Floats:
+    """The eigenvectors (n,k), those of equal eigenvalues as the projections of fixed vectors.
+
+    Any basis of their space is as good, and rounding alone would choose one: a symmetric saddle would lean
+    to another side on each processor.
+    """
+    vectors, ends = vectors.copy(), np.flatnonzero(np.diff(values) > ALIKE * np.abs(values).max()) + 1
+    for group in np.split(np.arange(len(values)), ends):
+        if len(group) > 1:
+            waves = np.cos(np.outer(np.arange(len(vectors)), 1.618 + group - group[0]))
+            shares = vectors[:, group].T @ np.column_stack([inverse(wave) for wave in waves.T])
+            basis, upper = np.linalg.qr(shares)
+            vectors[:, group] = vectors[:, group] @ (basis * np.where(np.diag(upper) < 0.0, -1.0, 1.0))
+    return vectors
+
+
 def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, ascending, and their modes (k,n,3).
 
@@ -237,6 +255,7 @@ def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
         if np.count_nonzero(values < 0.0) >= system.negative or 2 * k >= size:
             break
         k *= 2  # a strongly negative one may be farther from zero than positive ones
-    order = np.argsort(values)[:count]
-    fields = [system.space.to_vectors(vectors[:, i] / root) for i in order]
-    return values[order], np.array(fields).reshape(len(order), len(system.space.dimension), 3)
+    order = np.argsort(values)
+    values, vectors = values[order], _settled(values[order], vectors[:, order], inverse)
+    fields = [system.space.to_vectors(vector / root) for vector in vectors.T[:count]]
+    return values[:count], np.array(fields).reshape(len(fields), len(system.space.dimension), 3)

@@ -1,10 +1,11 @@
 // What the picture is asked for: measures between its points, a section, and single points that are moved.
 
 import { button, element } from "./elements.js";
-import { dot } from "./geometry.js";
+import { dot, hit } from "./geometry.js";
 import { digits } from "./panel.js";
 
 const STILL = 5; // pixels that a click may move
+const NEAR = 14; // pixels from a point that is meant
 const STEPS = 1000;
 
 export class Tools {
@@ -57,30 +58,62 @@ export class Tools {
     }, point);
   }
 
+  /** From -1 to 1 in the picture. */
+  placeOf(event) {
+    const { left, top, width, height } = this.viewer.canvas.getBoundingClientRect();
+    return [(2 * (event.clientX - left)) / width - 1, 1 - (2 * (event.clientY - top)) / height];
+  }
+
+  /** Pixels between a point and a place in the picture. */
+  away(point, [x, y]) {
+    const [u, v] = this.viewer.camera.seen(point);
+    return Math.hypot((u - x) * this.viewer.canvas.clientWidth, (v - y) * this.viewer.canvas.clientHeight) / 2;
+  }
+
+  /** The point of the surface at a place in the picture, a vertex if one is near; or null. */
+  at(place) {
+    const { X, triangles, camera, cut } = this.viewer;
+    const found = hit(X, triangles, camera.ray(...place), cut);
+    return found && (found.corners.find((corner) => this.away(corner, place) < NEAR) ?? found.point);
+  }
+
+  /** The name of the point, of [name, place], that is near a place in the picture; or undefined. */
+  near(points, place) {
+    return points.find(([, point]) => this.away(point, place) < NEAR)?.[0];
+  }
+
+  /** How a drag over the picture moves a point, parallel to the screen. */
+  shifted(point, from, to) {
+    const [right, upward] = this.viewer.camera.axes();
+    const tall = Math.tan(this.viewer.camera.angle / 2) * this.viewer.camera.seen(point)[2];
+    const [x, y] = [(to[0] - from[0]) * tall * this.viewer.camera.aspect, (to[1] - from[1]) * tall];
+    return point.map((p, k) => p + x * right[k] + y * upward[k]);
+  }
+
   /** A press on the picture: it drags a single point, or marks one where it does not move. */
   grab(event) {
     const { viewer } = this;
-    const from = viewer.placeOf(event);
+    const from = this.placeOf(event);
     const handles = Object.entries(this.points).map(([name, p]) => [name, p.map((x, k) => x - this.origin[k])]);
-    const name = this.measuring ? undefined : viewer.near(handles, from);
+    const name = this.measuring ? undefined : this.near(handles, from);
     if (name !== undefined) {
       const start = handles.find(([one]) => one === name)[1];
       return (now, final) => {
-        const place = viewer.shifted(start, from, viewer.placeOf(now));
+        const place = this.shifted(start, from, this.placeOf(now));
         this.move(name, place.map((x, k) => x + this.origin[k]), final);
       };
     }
     if (this.measuring) {
       viewer.canvas.addEventListener("pointerup", (now) => {
         const still = Math.hypot(now.clientX - event.clientX, now.clientY - event.clientY) < STILL;
-        if (still) this.mark(viewer.placeOf(now));
+        if (still) this.mark(this.placeOf(now));
       }, { once: true });
     }
     return null;
   }
 
   mark(place) {
-    const point = this.viewer.pick(place);
+    const point = this.at(place);
     if (point) this.pick(point);
     else this.told.textContent = "There is no point of the surface.";
   }

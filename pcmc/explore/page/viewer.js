@@ -1,14 +1,13 @@
 // Draws a surface with WebGL 2: sheets, mesh, curves, supports, the plane's grid and arrows.
 
 import { Camera } from "./camera.js";
-import { boxOf, hit, normals, roundBelow, sectionOf, span } from "./geometry.js";
+import { boxOf, normals, roundBelow, sectionOf, span } from "./geometry.js";
 import { programs } from "./shaders.js";
 
 const MESH = [0.12, 0.16, 0.2, 0.3];
 const GRID = [0.55, 0.6, 0.65, 0.35];
 const MARK = [0.85, 0.1, 0.45, 1];
 const WHOLE = [0, 0, 0, 1e30]; // a section that cuts nothing away: (normal, offset)
-const NEAR = 14; // pixels from a point that is meant
 
 export class Viewer {
   /** Throws if the browser has no WebGL 2. `gridChanged` is called with the grid's spacing. */
@@ -148,37 +147,6 @@ export class Viewer {
     const line = this.cut === WHOLE ? [[], []] : sectionOf(this.X, this.triangles, this.cut);
     this.placeLines("section", ...line, () => MARK, () => [1.4, 1.4]);
     this.redraw();
-  }
-
-  /** From -1 to 1 in the picture. */
-  placeOf(event) {
-    const { left, top, width, height } = this.canvas.getBoundingClientRect();
-    return [(2 * (event.clientX - left)) / width - 1, 1 - (2 * (event.clientY - top)) / height];
-  }
-
-  /** Pixels between a point and a place in the picture. */
-  away(point, [x, y]) {
-    const [u, v] = this.camera.seen(point);
-    return Math.hypot((u - x) * this.canvas.clientWidth, (v - y) * this.canvas.clientHeight) / 2;
-  }
-
-  /** The point of the surface at a place in the picture, a vertex if one is near; or null. */
-  pick(place) {
-    const found = hit(this.X, this.triangles, this.camera.ray(...place), this.cut);
-    return found && (found.corners.find((corner) => this.away(corner, place) < NEAR) ?? found.point);
-  }
-
-  /** The name of the point, of [name, place], that is near a place in the picture; or undefined. */
-  near(points, place) {
-    return points.find(([, point]) => this.away(point, place) < NEAR)?.[0];
-  }
-
-  /** How a drag over the picture moves a point, parallel to the screen. */
-  shifted(point, from, to) {
-    const [right, upward] = this.camera.axes();
-    const tall = Math.tan(this.camera.angle / 2) * this.camera.seen(point)[2];
-    const [x, y] = [(to[0] - from[0]) * tall * this.camera.aspect, (to[1] - from[1]) * tall];
-    return point.map((p, k) => p + x * right[k] + y * upward[k]);
   }
 
   setOptions(options) {
