@@ -159,6 +159,12 @@ def test_rigid_motions_that_supports_leave_free(fixed, sliding, left):
     assert np.linalg.matrix_rank(motions.reshape(left, 6), tol=1e-6) == left
 
 
+def test_a_roof_of_one_unknown_has_one_mode():
+    values, vectors = lowest(system_of(pyramid()), 1)
+    assert values.shape == (1,)
+    assert np.count_nonzero(np.linalg.norm(vectors[0], axis=1)) == 1
+
+
 def test_an_ordinary_roof_has_no_rigid_motion():
     for surface in (pyramid(), two_squares(3), three_patches(plane=TILTED)):
         assert len(rigid_motions(surface)) == 0

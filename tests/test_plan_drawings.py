@@ -13,7 +13,7 @@ from refusals import refused
 
 import pcmc
 from pcmc import cli, project
-from pcmc.base.errors import FileError, FileWarning, PlanError
+from pcmc.base.errors import FileError, FileWarning, OptionError, PlanError
 from pcmc.curves.curve_data import curve_data
 from pcmc.io.reading_process import read_arrays
 from pcmc.plan import plan_from
@@ -97,6 +97,8 @@ def test_small_gaps_are_closed_and_said_and_arcs_stay_arcs(tmp_path):
         read_drawing(tmp_path / "nave.dxf", gap=0.001)
     assert caught.value.found == pytest.approx(0.01)
     assert len(caught.value.where) == 2
+    with refused(OptionError, what="gap", found=1e-320):
+        read_drawing(tmp_path / "nave.dxf", gap=1e-320)
 
 
 def test_ends_of_dividers_that_just_miss_their_line_are_moved_to_it(tmp_path):

@@ -236,6 +236,14 @@ def test_formats_of_meshlab_are_read(tmp_path, suffix, content):
     assert cli.main(["solve", str(path), "-o", str(path)]) == 2
 
 
+def test_a_hard_link_to_the_mesh_is_not_written_over(tmp_path, capsys):
+    X, F = sheet()
+    path, link = obj(tmp_path / "a.obj", X, {"roof": F}), tmp_path / "b.obj"
+    link.hardlink_to(path)
+    assert cli.main(["repair", str(path), "-o", str(link)]) == 2
+    assert path.samefile(link)
+
+
 def test_what_cannot_be_repaired_is_refused_by_name(tmp_path):
     X, F = sheet()
     with refused(FileError, what=str(tmp_path / "none.obj")):
@@ -244,7 +252,8 @@ def test_what_cannot_be_repaired_is_refused_by_name(tmp_path):
     with refused(FileError) as caught:
         pcmc.repair(path, weld=100.0)
     assert "weld" in str(caught.value)
-    for options in ({"weld": -1.0}, {"holes": 2.5}, {"edge_length": 0.0}):
+    lengths = [{"edge_length": length} for length in (0.0, 1e-320, 1e-5)]
+    for options in ({"weld": -1.0}, {"holes": 2.5}, *lengths):
         with pytest.raises(OptionError):
             pcmc.repair(path, **options)
 

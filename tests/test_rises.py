@@ -81,6 +81,7 @@ def test_a_rise_is_over_the_outline_and_an_apex_over_the_plane(given):
     [
         (f"{HALL}rise = 1\npressure = 0.0\n", "rise"),
         (f"{HALL}rise = -1\n", "rise"),
+        (f"{HALL}rise = 1e200\n", "rise"),
         (f"{HALL}rise = 1\napex = 2\n", "rise"),
         (f"{HALL}tension = 3.0\napex = 2\n", "plan.apex"),
         (f"{HALL}[plan.patches]\nroof = {{tension = 3, rise = 1}}\n", "rise"),

@@ -11,6 +11,7 @@ import numpy as np
 from ..base import validate
 from ..base.errors import MissingExtra, OptionError
 from ..plan import Plan, patch_names
+from ..surface import checks
 
 if TYPE_CHECKING:
     from ..design import Parameter, Target
@@ -38,7 +39,7 @@ class Rise:
     value: float
 
     def __post_init__(self) -> None:
-        validate.positive(self.kind, self.value)
+        validate.number(self.kind, self.value, above=0.0, most=checks.LARGEST)
 
 
 def take_rises(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Rise]]:

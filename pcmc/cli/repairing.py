@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from .. import project as projects
-from ..base.errors import FileError
 from ..base.interrupts import defer_interrupts
 from ..io import metres_note, write
 from ..io.repairing import HOLES, repair
@@ -42,9 +41,7 @@ def repair_(
       pcmc repair blender.obj -o hall.obj --units mm --up y
     """
     projects.check_names([output])
-    projects.check_outputs([output])
-    if output.resolve() == file.resolve():
-        raise FileError(f"{output}: this is the mesh to repair; name another file", what=str(output))
+    projects.check_outputs([output], inputs=[file])
     with working() as say:
         say("repairing")
         repaired = repair(file, weld=weld, holes=holes, edge_length=edge_length, units=units, up=up)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -13,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
-from ..base.errors import FileError, PcmcError
+from ..base.arrays import Floats, Ints
+from ..base.errors import FileError, OptionError, PcmcError
 from ..base.units import NO_UNITS, Units
 from ..surface import Plane, Surface
 from . import meshlab
@@ -25,6 +27,7 @@ from .scaling import converted, stated
 
 WELD = 1e-5  # of the size
 HOLES = 8  # edges of a hole
+MOST = 20_000_000  # triangles; more mean a mistake in the edge length
 MESHLAB_READS = (".obj", ".ply", ".stl")
 TURNS = {"x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]], "y": [[1, 0, 0], [0, 0, -1], [0, 1, 0]], "z": np.eye(3)}
 """The rotations that turn an axis to be z."""
@@ -126,6 +129,8 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
         "holes": holes,
         "edge_length": 0.0 if edge_length is None or several else edge_length,
     }
+    if edge_length is not None:
+        _refuse_too_many(X, F, edge_length)
     with tempfile.TemporaryDirectory() as folder:
         request = Path(folder) / "mesh.npz"
         np.savez(request, **values)
@@ -147,6 +152,17 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
             surface = remesh(surface, edge_length)
         notes = (*notes, f"{len(F)} triangles became {surface.m}")
     return Repaired(surface, changes, notes, data.units)
+
+
+def _refuse_too_many(X: Floats, F: Ints, edge_length: float) -> None:
+    """Refuse an edge length that would make more than ``MOST`` triangles, with the least possible one."""
+    a, b, c = (X[corner] for corner in F.T)
+    area = 0.5 * float(np.nansum(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
+    least = math.sqrt(area / (math.sqrt(0.1875) * MOST))
+    if edge_length < least:
+        message = f"edge_length = {edge_length:g} would make more than {MOST} triangles"
+        text = f"{message}; use {1.01 * least:.2g} or more"
+        raise OptionError(text, what="edge_length", found=edge_length, expected=least)
 
 
 def _read(path: Path) -> MeshData:

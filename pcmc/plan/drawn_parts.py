@@ -21,6 +21,7 @@ from .paths import JoinedPath, join_strokes
 from .strokes import Stroke, Strokes
 
 GAP = 1e-3  # of the diagonal of the outline: gaps up to this are closed
+LEAST_GAP = 1e-9  # of the diagonal: a thousandth of it, the grid that lines are cut on, is above rounding
 ALONG = 2e-3  # of that diagonal: lines on an edge are compared with it at points so far apart
 FLAT = 1e-9  # of that diagonal: heights nearer to each other than this are one
 
@@ -44,7 +45,7 @@ class DrawnParts:
         points = np.concatenate([curve.at(curve.dense) for curve in outline])
         self.size = float(np.linalg.norm(np.ptp(points, axis=0)))
         if gap is not None:
-            validate.positive("gap", gap)
+            validate.number("gap", gap, least=LEAST_GAP * self.size, hint="or leave it out")
         self.gap = GAP * self.size if gap is None else gap
         self.level = float(points[0, 2]) if np.ptp(points[:, 2]) <= FLAT * self.size else 0.0
 

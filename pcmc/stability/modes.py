@@ -233,9 +233,9 @@ def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
     Σ M |v|² = 1. Rigid motions are left out; rooms keep their prescribed volumes.
     """
     size = len(system.mass)
-    k = min(max(count, system.negative + 2), size - 1)
+    k = min(max(count, system.negative + 2), max(size - 1, 1))
     root = np.sqrt(system.mass)
-    if size - system.excluded.shape[1] <= k < size:  # no more motions count than are wanted
+    if size - system.excluded.shape[1] <= k:  # no more motions count than are wanted
         values, columns = (part[..., :count] for part in all_modes(system))
         fields = [system.space.to_vectors(column) for column in columns.T]
         return values, np.array(fields).reshape(len(values), len(system.space.dimension), 3)
