@@ -36,7 +36,7 @@ from .cables import cable_end_table, cable_table
 from .curve_tables import junction_table, room_table
 from .leaning import lean_table, lean_texts
 from .proof import Proof
-from .reactions import reactions
+from .reactions import SupportForces, support_forces
 from .supports import boundary_view, support_table
 from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
 
@@ -82,7 +82,7 @@ class Certificate:
     cable_ends : one row per end of these: vertex, place, whether held, the force of a support there.
     load, support : forces along Π's normal, of pressure and weight and of all supports; their sum is
         what the mesh leaves along the sheets.
-    reactions : (n,3) force of each support on the surface.
+    acting : the forces of the supports by how they act; ``reactions`` are these (n,3) for each vertex.
     pinched : (k,) vertices where a junction rests on Π and its wall has no height.
     load_ratio : pressure and weight along Π's normal over the most that the supports could carry; see
         the function ``load_ratio``.
@@ -104,11 +104,9 @@ class Certificate:
     walls_quality: float
     patches: pd.DataFrame
     junctions: pd.DataFrame
-    supports: pd.DataFrame
-    balance: pd.DataFrame
     load: float
     support: float
-    reactions: Floats
+    acting: SupportForces
     pinched: Ints
     load_ratio: float
     proofs: tuple[Proof, ...] = ()
@@ -117,6 +115,21 @@ class Certificate:
     rooms: pd.DataFrame = field(default_factory=pd.DataFrame)
     symmetric_in: tuple[str, ...] = ()
     leaning: pd.DataFrame = field(default_factory=pd.DataFrame)
+
+    @cached_property
+    def supports(self) -> pd.DataFrame:
+        """The table of supports, made when first asked for."""
+        return support_table(self.acting)
+
+    @cached_property
+    def balance(self) -> pd.DataFrame:
+        """The balance of loads and supports, made when first asked for."""
+        return balance_table(self.acting.standing, self.supports)
+
+    @property
+    def reactions(self) -> Floats:
+        """(n,3) force of each support on the surface."""
+        return self.acting.forces
 
     @property
     def certified(self) -> bool:
@@ -253,8 +266,7 @@ def certify(
     index, eigenvalues, fields = _stability(standing, classes, space, rigid, modes) if at_rest else UNKNOWN
 
     patches = _patch_table(surface, standing, areas, qualities)
-    ratio, support_forces = load_ratio(standing), reactions(standing)
-    supports = support_table(surface, support_forces)
+    ratio, acting = load_ratio(standing), support_forces(surface, standing=standing)
     notes = _pulled_off(unheld), pressures_left_over(standing)
     findings = Findings(
         surface=surface,
@@ -288,11 +300,9 @@ def certify(
         walls_quality=float(qualities[in_wall].min(initial=1.0)),
         patches=patches,
         junctions=junction_table(standing, left),
-        supports=supports,
-        balance=balance_table(standing, supports),
         load=load(standing),
-        support=float((support_forces @ np.array(surface.plane.normal)).sum()),
-        reactions=support_forces,
+        support=float((acting.forces @ np.array(surface.plane.normal)).sum()),
+        acting=acting,
         pinched=np.flatnonzero(part.resting),
         load_ratio=ratio,
         proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),

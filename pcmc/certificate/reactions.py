@@ -51,6 +51,7 @@ class SupportForces(NamedTuple):
     Attributes
     ----------
     surface, standing : the surface, and the part of it that stands, which the supports hold.
+    forces : (n,3) all of them.
     along : (n,3) on lines and sheets.
     points : (n,3) at single points, and of the cables that end on a line.
     mirrors : (n,3) the pull of images across mirror planes.
@@ -66,6 +67,7 @@ class SupportForces(NamedTuple):
 
     surface: Surface
     standing: Surface
+    forces: Floats
     along: Floats
     points: Floats
     mirrors: Floats
@@ -100,8 +102,12 @@ class SupportForces(NamedTuple):
         return float(np.linalg.norm(self.per_length[chosen], axis=1).max()) if chosen.any() else None
 
 
-def support_forces(surface: Surface, forces: Floats | None = None) -> SupportForces:
-    """The reactions of a surface by how they act; ``forces`` (n,3) are by default those of its standing part.
+def support_forces(
+    surface: Surface, forces: Floats | None = None, standing: Surface | None = None
+) -> SupportForces:
+    """The reactions of a surface by how they act.
+
+    ``standing`` is its standing part, ``forces`` (n,3) are its reactions; both are found where not given.
 
     A vertex on several planes divides its force among them: Σ c_i n_i of their normals. Where a fixed vertex
     lies in mirror planes, these take the part across them.
@@ -112,7 +118,7 @@ def support_forces(surface: Surface, forces: Floats | None = None) -> SupportFor
     >>> (3 * support_forces(square).per_length).round(9)[1].tolist()  # tension -1, 1; a third of p A = 2
     [-1.5, 1.5, -1.0]
     """
-    standing = standing_part(surface).surface
+    standing = standing_part(surface).surface if standing is None else standing
     forces = reactions(standing) if forces is None else forces
     planes, topo = standing.on_planes, surface.topology
     ends = np.zeros_like(forces)
@@ -141,6 +147,7 @@ def support_forces(surface: Surface, forces: Floats | None = None) -> SupportFor
     return SupportForces(
         surface,
         standing,
+        forces,
         along,
         points,
         mirrors,

@@ -14,7 +14,7 @@ from ..surface.geometry import segment_lengths
 from ..surface.topology import POINT, Curve, vertex_kind
 from .cables import cable_ends
 from .curve_tables import middle
-from .reactions import SupportForces, at_both_ends, support_forces
+from .reactions import SupportForces, at_both_ends
 
 COLUMNS = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
 COLUMNS += ["moment_x", "moment_y", "moment_z", "per_length_max"]
@@ -34,11 +34,10 @@ class _Part(NamedTuple):
     per_length: float = np.nan
 
 
-def support_table(surface: Surface, forces: Floats | None = None) -> pd.DataFrame:
+def support_table(acting: SupportForces) -> pd.DataFrame:
     """A row per support of the part of a surface that stands; together they carry all its reactions.
 
-    ``forces`` (n,3) are by default the ``reactions``. Where curves meet in a corner, they share its force
-    equally; per length it counts in full in each.
+    Where curves meet in a corner, they share its force equally; per length it counts in full in each.
 
     Columns: ``support``, the number in plans and reports: B1, B2, … for what is as long as a curve, S1, S2, …
     for points, C1, C2, … for ends of cables. ``name``, that of the patches there, or of the cables.
@@ -49,8 +48,9 @@ def support_table(surface: Surface, forces: Floats | None = None) -> pd.DataFram
     ``length``, 0 for points; ``x``, ``y``, ``z``, the middle; ``force_x``, …, of the support on the surface;
     ``moment_x``, …, that of these forces about the middle; ``per_length_max``, the largest force per length.
     """
-    rows, size = [], surface.size
-    for label, part in _labelled(surface, forces):
+    rows, surface = [], acting.surface
+    size = surface.size
+    for label, part in _labelled(acting):
         at = np.where(np.abs(part.place) <= 1e-12 * size, 0.0, part.place)
         moment = np.cross(surface.vertices[part.vertices] - at, part.forces).sum(axis=0)
         numbers = [part.length, *at, *part.forces.sum(axis=0), *moment, part.per_length]
@@ -58,20 +58,21 @@ def support_table(surface: Surface, forces: Floats | None = None) -> pd.DataFram
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def support_vertices(surface: Surface, forces: Floats | None = None) -> dict[str, Ints]:
-    """The vertices (k,) of each support, by its number in the table of the same surface and forces.
+def support_vertices(acting: SupportForces) -> dict[str, Ints]:
+    """The vertices (k,) of each support, by its number in the table.
 
-    >>> from pcmc import Patch
+    >>> from pcmc import Patch, Surface
+    >>> from pcmc.certificate.reactions import support_forces
     >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], fixed=range(3))
-    >>> {label: sorted(vertices.tolist()) for label, vertices in support_vertices(flat).items()}
+    >>> {name: sorted(on.tolist()) for name, on in support_vertices(support_forces(flat)).items()}
     {'B1': [0, 1, 2]}
     """
-    return {label: part.vertices for label, part in _labelled(surface, forces)}
+    return {label: part.vertices for label, part in _labelled(acting)}
 
 
-def _labelled(surface: Surface, forces: Floats | None) -> Iterator[tuple[str, _Part]]:
+def _labelled(acting: SupportForces) -> Iterator[tuple[str, _Part]]:
     """Each support with its number."""
-    acting, count = support_forces(surface, forces), {"B": 0, "S": 0, "C": 0}
+    count = {"B": 0, "S": 0, "C": 0}
     parts = [*_held_lines(acting), *_mirrors(acting), *_inner_lines(acting), *_planes(acting)]
     for part in (*parts, *_points(acting), *_ends_of_cables(acting)):
         letter = {"point": "S", "cable end": "C"}.get(part.kind, "B")

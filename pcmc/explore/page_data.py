@@ -134,7 +134,7 @@ def fields(state: State, origin: Floats) -> Arrays:
     """Vertices relative to the origin, and the values that colours may show."""
     surface, certificate, whole = state.surface, state.certificate, whole_of(state.surface)
     drawn = surface if whole is None else whole.surface
-    acting = support_forces(drawn, certificate.reactions if whole is None else None)
+    acting = certificate.acting if whole is None else support_forces(drawn)
     arrays: Arrays = {
         "vertices": drawn.vertices - origin,
         "curvature": mean_curvature(drawn, "variational"),
@@ -213,9 +213,11 @@ def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[
     }
 
 
-def findings(certificate: Certificate) -> dict[str, Any]:
-    """Numbers and tables of a certificate, for the page."""
-    tables = {"rooms": certificate.rooms, "supports": certificate.supports, "balance": certificate.balance}
+def findings(certificate: Certificate, moving: bool = False) -> dict[str, Any]:
+    """Numbers and tables of a certificate, for the page; while a slider moves, without those of supports."""
+    tables = {"rooms": certificate.rooms}
+    if not moving:
+        tables |= {"supports": certificate.supports, "balance": certificate.balance}
     rows = {name: _rows(table) for name, table in tables.items()}
     return {**certificate.numbers(), "mirrored": list(certificate.symmetric_in), **rows}
 

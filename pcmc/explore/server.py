@@ -292,7 +292,8 @@ class _Handler(BaseHTTPRequestHandler):
         else:
             arguments = requests.ACTS[act](asked)
             more = (self._gone,) if act == "meet" else ()
-            self._send_state(session, getattr(session, act)(*arguments, *more))
+            state = getattr(session, act)(*arguments, *more)
+            self._send_state(session, state, moving=act == "follow")
 
     def _gone(self) -> bool:
         """Whether the page has closed the connection, and waits for no answer."""
@@ -347,8 +348,10 @@ class _Handler(BaseHTTPRequestHandler):
     def _send_header(self, header: dict[str, Any]) -> None:
         self._send(pack(header, {}), "application/octet-stream")
 
-    def _send_state(self, session: Session, state: State, first: dict[str, Any] | None = None) -> None:
-        """A state; with ``first``, what the page learns once, and the mesh."""
+    def _send_state(
+        self, session: Session, state: State, first: dict[str, Any] | None = None, *, moving: bool = False
+    ) -> None:
+        """A state; with ``first``, what the page learns once, and the mesh; ``moving`` with a slider."""
         header: dict[str, Any] = {"superseded": state.superseded and first is None}
         drawn: dict[str, Any] = {}
         origin = self.server.explorer.origin
@@ -363,7 +366,7 @@ class _Handler(BaseHTTPRequestHandler):
                 "values": {"asked": values_of(state.wanted), "shown": values_of(state.surface)},
                 "verdict": verdict_data(state.failure or state.certificate),
                 "at_rest": state.failure is None,
-                "findings": findings(state.certificate),
+                "findings": findings(state.certificate, moving),
                 "figures": figures_data(state.surface, state.certificate),
                 "undo": state.undo,
                 "redo": state.redo,

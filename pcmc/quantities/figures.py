@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..certificate import Certificate
-from ..certificate.reactions import support_forces
 from ..energy.volume_below import volumes_below
 from ..surface import Surface
 from .table import dimension_of
@@ -49,7 +48,7 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
         rows.append(Figure(quantity, of, owner, value))
 
     height, area = surface.plane.height(surface.vertices), certificate.patches["area"].to_numpy()
-    volume, acting = volumes_below(surface), support_forces(surface, certificate.reactions)
+    volume, acting = volumes_below(surface), certificate.acting
     roof = surface.roof
     for k, patch in enumerate(surface.patches):
         owner, name = "patch" if roof[k] else "wall", patch.name

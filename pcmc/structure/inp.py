@@ -124,7 +124,7 @@ def _supports(model: StructuralModel) -> Iterator[str]:
     yield _set("FIXED", np.flatnonzero(held & (model.freedom == 0)))
     yield _set("SLIDING", np.flatnonzero(held & (model.freedom > 0)))
     assert model.certificate is not None  # a model has that of its surface
-    for label, vertices in support_vertices(model.surface, model.certificate.reactions).items():
+    for label, vertices in support_vertices(model.certificate.acting).items():
         yield _set(f"SUPPORT_{label}", vertices[held[vertices]])
     if (held & (model.freedom == 0)).any():
         yield "*BOUNDARY\nFIXED,1,3\n"

@@ -194,7 +194,7 @@ class Page {
     showVerdict(find("#verdict"), header);
     showFindings(find("#findings tbody"), header.findings, header.figures, this.units);
     showParts(find("#parts"), header.figures, this.units);
-    showSupports(find("#supports"), header.findings, this.units);
+    if (header.findings.supports) showSupports(find("#supports"), header.findings, this.units);
     this.variants.show(header, this.units);
     find("#check-result").hidden = true; // it was about the last surface
     find("#check").disabled = !header.at_rest;
