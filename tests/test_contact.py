@@ -242,6 +242,13 @@ def test_a_lifted_wall_is_back():
     assert resting_vertices(partly, walls).sum() == 2
 
 
+def test_a_vertex_on_no_top_edge_is_not_lifted():
+    full, walls, resting, _ = pressed(count=3)
+    elsewhere = np.setdiff1d(np.arange(full.n), walls.top_edges)[0]
+    up = lift(full, walls, resting | (np.arange(full.n) == elsewhere), 0.1)
+    np.testing.assert_array_equal(up.vertices, lift(full, walls, resting, 0.1).vertices)
+
+
 @pytest.mark.parametrize(("alpha_aux", "lifts"), [(0.5, 3), (50.0, 0)])
 def test_a_junction_put_down_comes_up_where_the_wall_cannot_hold_it(alpha_aux, lifts):
     state = State(two_squares(6, alpha_aux=alpha_aux), min_quality=0.45)

@@ -199,6 +199,9 @@ def test_native_keeps_the_certificate(tmp_path):
     again = load(tmp_path / "a.pcmc").certificate
     assert again["verdict"] == certificate.verdict.name.lower()
     np.testing.assert_array_equal(again["reactions"], certificate.reactions)
+    assert again["supports"] == certificate.supports.to_dict(orient="records")
+    assert again["balance"] == certificate.balance.to_dict(orient="records")
+    assert "acting" not in again
     assert [row["patch"] for row in again["patches"]] == ["west side", "east", "wall"]
     with refused(FileError, what="certificate", found="int"):
         pcmc.write(tmp_path / "b.pcmc", tent(), certificate=3)

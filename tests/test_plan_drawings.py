@@ -238,3 +238,29 @@ def test_the_reading_process_gives_plain_values(tmp_path):
     assert content["unit"] == 6  # metres in DXF
     assert [entity["layer"] for entity in content["entities"]] == ["outline"]
     assert len(content["entities"][0]["pieces"]) == 4
+
+
+@pytest.mark.parametrize("miss", [3e-3, -3e-3, 7e-3, -7e-3])
+def test_masts_and_supports_that_just_miss_the_outline_are_moved_to_it(tmp_path, miss):
+    def held(x, name):
+        lines = (
+            ("line", "support", (0, 6, 5), (0, 0, 5)),
+            ("point", "mast", (10, 0, 2)),
+            ("line", "mast", (10 + x, 6 + x, 0), (10 + x, 6 + x, 3)),
+            ("point", "support", (10 + x, 3, 4)),
+        )
+        lines = (("line", "support", (x, 6 - x, 5), (x, 0, 5)), *lines[1:])
+        folder = tmp_path / name
+        folder.mkdir()
+        return read_drawing(drawing(folder, *lines))
+
+    exact, near = held(0.0, "exact"), held(miss, "near")
+    for one, other in zip(near.supports, exact.supports, strict=True):
+        ends = [s.at([0.0, 1.0]) if hasattr(s, "at") else s for s in (one, other)]
+        np.testing.assert_allclose(*ends, atol=1e-12)
+    assert not exact.notes
+    text = "4 points of supports moved by up to"
+    assert any(text in note for note in near.notes)
+    assert (
+        plan_from(proposed(near)).surface().vertices == plan_from(proposed(exact)).surface().vertices
+    ).all()

@@ -386,3 +386,12 @@ def test_a_written_picture_has_all_its_colours(tmp_path):
     image = plot.draw(surface, tmp_path / "p.png", scalars=pcmc.mean_curvature(surface), width=400)
     with Image.open(tmp_path / "p.png") as picture:
         assert np.array_equal(np.asarray(picture), image)
+
+
+def test_powers_of_ten_at_an_axis_stay_short():
+    """Unread mathematics, $\\mathdefault{10^{3}}$, would take a third of the width."""
+    values = {"residual": (np.arange(9.0), 10.0 ** -np.arange(9.0))}
+    picture = np.asarray(plot.lines(values, x="step", y="residual", yscale="log", width=900))
+    ink = (picture < 128).any(axis=2)
+    frame = int(ink[: len(ink) // 2].sum(axis=0).argmax())  # the vertical axis
+    assert frame < 0.15 * picture.shape[1]

@@ -106,7 +106,7 @@ class Certificate:
     junctions: pd.DataFrame
     load: float
     support: float
-    acting: SupportForces
+    acting: SupportForces = field(repr=False)  # no file has it: it holds the surface
     pinched: Ints
     load_ratio: float
     proofs: tuple[Proof, ...] = ()

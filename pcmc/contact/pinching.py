@@ -298,7 +298,8 @@ def lift(
     """
     if directions is None:
         directions = walls.side[:, None] * np.array(surface.plane.normal)
-    rise = fraction * np.where(vertices, top_spacing(surface, walls), 0.0)
+    spacing = top_spacing(surface, walls)
+    rise = fraction * np.where(vertices & np.isfinite(spacing), spacing, 0.0)
     X = surface.vertices + rise[:, None] * directions
     rows = walls.rows
     below = rows.vertices[vertices[rows.top_ends].any(axis=1)]

@@ -25,6 +25,8 @@ from .formats import FORMATS, Format, format_of
 from .metadata import metadata_text
 from .scaling import scaled_surface
 
+MADE = ("supports", "balance", "reactions")  # of a certificate, when they are asked for; files have them, too
+
 
 class Solved(Protocol):
     """The result of a solver."""
@@ -131,6 +133,7 @@ def _values(certificate: Any) -> Mapping[str, Any]:
             f"certificate: expected a Certificate, found {found}", what="certificate", found=found
         )
     shown = [f.name for f in fields(certificate) if f.repr and not f.name.startswith("_")]
+    shown += [name for name in MADE if hasattr(certificate, name)]
     return {name: getattr(certificate, name) for name in shown}
 
 

@@ -108,6 +108,8 @@ def _drawing(parts: DrawnParts, factor: float) -> Drawing:
     supports = parts.supports()
     masts = parts.masts(holes)
     edges = [outline, *holes.values()]
+    places = parts.settled([*supports, *masts], edges)
+    supports, masts = places[: len(supports)], places[len(supports) :]
     lines, loose_edges = parts.cables(edges)
     dividers = parts.dividers(edges, lines)
     cables = parts.moved(loose_edges, edges, "cables")

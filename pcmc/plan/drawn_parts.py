@@ -172,6 +172,14 @@ class DrawnParts:
         self.notes += [note] if note else []
         return longer
 
+    def settled(self, supports: Sequence[Any], edges: Sequence[Curve]) -> list[Any]:
+        """The supports moved over small gaps to the edges that they just miss."""
+        from .extending import settled  # needs shapely
+
+        places, note = settled(supports, edges, self.gap)
+        self.notes += [note] if note else []
+        return places
+
     def dividers(self, edges: Sequence[Curve], ridges: Mapping[str, Curve]) -> dict[str, Curve]:
         """The dividers by name, upright ones and cables across the roof among them."""
         dividers = dict(ridges)

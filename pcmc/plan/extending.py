@@ -58,6 +58,54 @@ def extended(
     return result, f"{note} that they meet" if moved else ""
 
 
+def settled(
+    supports: Sequence[Floats | Curve], edges: Sequence[Curve], tolerance: float
+) -> tuple[list[Floats | Curve], str]:
+    """Points (3,), and curves by their ends and joints, moved in plan onto edges that they just miss; a note.
+
+    A point within ``tolerance`` of a corner of an edge goes there, otherwise onto the nearest edge as near.
+    """
+    rims = [Line("an edge", Kind.OUTLINE, edge) for edge in edges if _extent(edge)]
+    corners = np.concatenate([rim.corners for rim in rims])
+    lengths = [0.0]
+
+    def steps(points: Floats) -> Floats:
+        """(k,3) how far each point moves."""
+        xy = points[:, :2]
+        nearest = xy.copy()
+        away = np.full(len(xy), tolerance)
+        for rim in rims:
+            t, distance = rim.nearest(xy)
+            nearer = distance <= away
+            nearest[nearer], away[nearer] = rim.curve.at(t)[nearer, :2], distance[nearer]
+        if len(corners):
+            apart, corner = (np.asarray(found) for found in cKDTree(corners).query(xy))
+            nearest[apart <= tolerance] = corners[corner[apart <= tolerance]]
+        moves = nearest - xy
+        moves[np.linalg.norm(moves, axis=1) <= EXACT * tolerance] = 0.0
+        lengths.extend(np.linalg.norm(moves, axis=1).tolist())
+        return np.pad(moves, ((0, 0), (0, 1)))
+
+    result: list[Floats | Curve] = []
+    for support in supports:
+        if not isinstance(support, Curve):
+            result.append(support + steps(support[None])[0])
+            continue
+        count = len(support.pieces)
+        joints = steps(support.at(np.arange(count + (not support.closed), dtype=float)))
+        ends = np.roll(joints, -1, axis=0) if support.closed else joints[1:]
+        parts = zip(support.pieces, joints, ends, strict=False)
+        pieces = tuple(
+            bent(piece, start, end) if start.any() or end.any() else piece for piece, start, end in parts
+        )
+        result.append(replace(support, pieces=pieces))
+    moved = np.count_nonzero(lengths)
+    note = (
+        f"{moved} point{'s' if moved > 1 else ''} of supports moved by up to {max(lengths):.3g} to the edges"
+    )
+    return result, f"{note} that they just miss" if moved else ""
+
+
 def _extent(curve: Curve) -> bool:
     return bool(np.ptp(curve.at(curve.dense)[:, :2], axis=0).any())
 

@@ -72,11 +72,15 @@ def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
 
 
 def _as_written(figure: Any) -> None:
-    """Draw the names in a figure as they are, and no mathematics between two signs $; powers at axes stay."""
+    """Draw the names in a figure as they are, and no mathematics between two signs $.
+
+    Numbers at axes have no text yet, and are mathematics once they are drawn: powers of ten.
+    """
     from matplotlib.text import Text
 
     for text in figure.findobj(Text):
-        text.set_parse_math("mathdefault" in text.get_text())
+        if "$" in text.get_text() and "mathdefault" not in text.get_text():
+            text.set_parse_math(False)
 
 
 def style(axes: Any) -> Any:
