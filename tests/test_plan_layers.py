@@ -202,3 +202,13 @@ def test_heights_in_texts_have_the_unit_of_the_drawing_or_their_own(tmp_path):
 def test_a_whole_outline_may_be_a_cable(tmp_path):
     file = drawing(tmp_path, *MASTS, ("lwpolyline", "cable rim", [*BOX, BOX[0]]))
     assert [cable.name for cable in project.build(file).cables] == [f"rim-{k}" for k in (1, 2, 3, 4)]
+
+
+def test_a_weight_and_a_pressure_of_all_patches_beside_a_drawing(tmp_path):
+    drawn.nave(tmp_path / "hall.dxf")
+    given = {"weight": 0.02, "pressure": 0.9, "patches": {"apse": {"weight": 0.05}}}
+    plan = project.planning.plan_from(proposed(read_drawing(tmp_path / "hall.dxf"), given))
+    patches = {
+        p.name: (p.pressure, p.weight) for p in plan.surface().patches if p.name in ("west", "east", "apse")
+    }
+    assert patches == {"west": (0.9, 0.02), "east": (0.9, 0.02), "apse": (0.9, 0.05)}

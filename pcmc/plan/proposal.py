@@ -137,6 +137,11 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
     sail = drawing.loose or bool(drawing.cables) or values.get("edge") in ("free", "cable")
     parts = parts_of(drawing)
     areas = _areas(parts, drawing, values.pop("patches", {}), values.pop("tension", None))
+    for key in ("pressure", "weight"):  # of all patches, which have their own tensions here
+        if key in values:
+            common = values.pop(key)
+            for area in areas:
+                area.setdefault(key, common)
     tensions = [area["tension"] for area in areas]
     edge_length = values.setdefault("edge_length", edge_length_for(parts, drawing))
     outline, tree = (
