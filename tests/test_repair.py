@@ -258,6 +258,16 @@ def test_what_cannot_be_repaired_is_refused_by_name(tmp_path):
             pcmc.repair(path, **options)
 
 
+def test_the_command_says_what_tensions_of_one_mean_in_a_unit(tmp_path, capsys):
+    X, F = sheet()
+    path = obj(tmp_path / "a.obj", 1000.0 * X, {"roof": F})
+    said = []
+    for more in (["--units", "mm"], []):
+        assert cli.main(["repair", str(path), "-o", str(tmp_path / "b.obj"), *more]) == 0
+        said.append("tensions are 1 per mm, pressures 1 per mm²" in capsys.readouterr().out)
+    assert said == [True, False]
+
+
 @pytest.mark.slow
 def test_flipped_bits_never_crash_the_repair(tmp_path):
     X, F = sheet()

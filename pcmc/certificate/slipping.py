@@ -10,6 +10,7 @@ from ..base.arrays import Floats
 from ..surface import Surface
 from .collapse import KEY
 
+ALIKE = 6  # decimals of a share: symmetric places differ by rounding
 SLIPS = 0.25  # of the mode's largest motion: that much beside a fixed end is a slip of this end
 
 
@@ -45,7 +46,7 @@ def slipping_ends(surface: Surface, mode: Floats) -> list[SlippingEnd]:
             share = float(motion[beside] / largest)
             walls = tuple(surface.patches[i].name for i in curve.sheets if surface.walls[i])
             ends.append(SlippingEnd(_name(surface, curve.sheets), walls, surface.vertices[end], share))
-    return sorted(ends, key=lambda end: -end.share)
+    return sorted(ends, key=lambda end: -round(end.share, ALIKE))  # of equal ones the first of the mesh
 
 
 def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
@@ -53,7 +54,8 @@ def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
     ways = f"index {index}: {'1 way' if index == 1 else f'{index} ways'} down"
     if not len(mode):
         return ways
-    most = int(np.linalg.norm(mode, axis=1).argmax())
+    motion = np.linalg.norm(mode, axis=1)
+    most = int(np.round(motion / (motion.max() or 1.0), ALIKE).argmax())
     curves = [curve for curve in surface.topology.junctions if most in curve.vertices]
     if curves:
         part = f"the junction {_name(surface, curves[0].sheets)}"

@@ -7,7 +7,6 @@ number of negative λ is the Morse index; it is counted by inertia, without comp
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -210,17 +209,18 @@ def all_modes(system: Stiffness) -> tuple[Floats, Floats]:
     return values, across @ vectors
 
 
-def _settled(values: Floats, vectors: Floats, inverse: Callable[[Floats], Floats]) -> Floats:
-    """The eigenvectors (n,k), those of equal eigenvalues as the projections of fixed vectors.
+def _settled(values: Floats, vectors: Floats, space: MotionSpace, root: Floats) -> Floats:
+    """The eigenvectors (s,k), those of equal eigenvalues as the projections of fixed displacements.
 
     Any basis of their space is as good, and rounding alone would choose one: a symmetric saddle would lean
-    to another side on each processor.
+    to another side on each processor. ``root`` (s,) are the roots of the masses.
     """
     vectors, ends = vectors.copy(), np.flatnonzero(np.diff(values) > ALIKE * np.abs(values).max()) + 1
     for group in np.split(np.arange(len(values)), ends):
         if len(group) > 1:
-            waves = np.cos(np.outer(np.arange(len(vectors)), 1.618 + group - group[0]))
-            shares = vectors[:, group].T @ np.column_stack([inverse(wave) for wave in waves.T])
+            wave = np.arange(3 * len(space.dimension)).reshape(-1, 3)
+            fixed = [space.to_coordinates(np.cos((1.618 + k) * wave)) for k in range(len(group))]
+            shares = vectors[:, group].T @ (root * np.array(fixed)).T
             basis, upper = np.linalg.qr(shares)
             vectors[:, group] = vectors[:, group] @ (basis * np.where(np.diag(upper) < 0.0, -1.0, 1.0))
     return vectors
@@ -256,6 +256,6 @@ def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
             break
         k *= 2  # a strongly negative one may be farther from zero than positive ones
     order = np.argsort(values)
-    values, vectors = values[order], _settled(values[order], vectors[:, order], inverse)
+    values, vectors = values[order], _settled(values[order], vectors[:, order], system.space, root)
     fields = [system.space.to_vectors(vector / root) for vector in vectors.T[:count]]
     return values[:count], np.array(fields).reshape(len(fields), len(system.space.dimension), 3)
