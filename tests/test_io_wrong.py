@@ -91,3 +91,11 @@ def test_a_gltf_that_is_cut_off_or_without_its_parts_says_so(tmp_path):
     path.write_text(re.sub(r'"uri": ?"data:[^"]*"', '"uri":"part.bin"', whole), encoding="utf-8")
     with refused(FileError, what=str(path), where="part.bin"):
         pcmc.read(path)
+
+
+@pytest.mark.parametrize("name", ["a\0.obj", "\ud800.obj"])
+def test_a_name_that_no_file_can_have_is_refused(name):
+    with refused(FileError, what=name):
+        pcmc.read(name)
+    with refused(FileError, what=name):
+        pcmc.write(name, expected())

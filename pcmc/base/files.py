@@ -62,6 +62,11 @@ def check_name(path: Path) -> None:
     if "\0" in str(path):
         text = f"{str(path)!r}: a file name cannot have the character NUL"
         raise FileError(text, what=str(path), found="\0")
+    try:
+        os.fsencode(path)
+    except UnicodeEncodeError:
+        text = f"{str(path)!a}: a file name cannot have half a surrogate pair"
+        raise FileError(text, what=str(path)) from None
 
 
 def suffix_of(path: str | os.PathLike[str], known: Iterable[str], thing: str) -> str:
