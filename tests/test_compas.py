@@ -444,6 +444,9 @@ def test_files_stay_in_the_folder(proxy, service, tmp_path):
     with pytest.raises(compas_rpc.RPCServerError, match="exists; pass overwrite=True to replace it"):
         proxy.write("inner/a.pcmc", meshes)
     proxy.write(str(folder / "inner" / "a.pcmc"), meshes, overwrite=True)
+    os.mkfifo(folder / "pipe.obj")
+    with pytest.raises(compas_rpc.RPCServerError, match="a pipe or a device"):
+        proxy.write("pipe.obj", meshes, overwrite=True)
     outside = tmp_path / "b.pcmc"
     pcmc.write(outside, two_squares(2))
     before = outside.read_bytes()

@@ -12,7 +12,7 @@ import pcmc
 from pcmc import cli
 from pcmc.base.errors import FileError
 from pcmc.io import FORMATS
-from pcmc.project import load
+from pcmc.project import check_outputs, load
 from tests.test_hostile_files import TRIANGLE, V, ply
 from tests.test_io_foreign import expected
 
@@ -30,6 +30,15 @@ def test_pipes_and_devices_are_not_opened(tmp_path, suffix, capsys):
         for file in (path, project) if suffix in READ else (path,):
             assert cli.main(["certify", str(file)]) == 2
             assert capsys.readouterr().err.count("is no regular file but a pipe or a device") == 1
+
+
+def test_pipes_and_devices_are_not_written_over(tmp_path):
+    os.mkfifo(tmp_path / "pipe.obj")
+    (tmp_path / "device.obj").symlink_to("/dev/zero")
+    for name in ("pipe.obj", "device.obj"):
+        with refused(FileError, what=str(tmp_path / name)) as caught:
+            check_outputs([tmp_path / name])
+        assert str(caught.value).endswith("is a pipe or a device; name a file")
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

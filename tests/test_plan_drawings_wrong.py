@@ -126,6 +126,20 @@ def test_a_line_far_longer_than_the_plan_is_refused(tmp_path):
         project.surface_of(loaded)
 
 
+def test_too_many_lines_and_patches_are_counted_with_the_name_of_the_file(tmp_path):
+    loose = [("line", "divider", (0.001 * k, 2), (0.001 * k, 4)) for k in range(1, 1002)]
+    path = drawing(tmp_path, *loose)
+    with refused(PlanError, what="dividers", found=1001) as caught:
+        read_drawing(path)
+    assert str(caught.value).startswith(f"{path}: dividers: 1001 are too many")
+    across = [("line", "divider", (0.2 * k, 0), (0.2 * k, 6)) for k in range(1, 50)]
+    along = [("line", "divider", (0, 0.12 * k), (10, 0.12 * k)) for k in range(1, 50)]
+    path = drawing(tmp_path, *across, *along)
+    with refused(PlanError, what="patches", found=2500) as caught:
+        proposed(read_drawing(path))
+    assert str(caught.value).startswith(f"{path}: patches: 2500 are too many")
+
+
 @pytest.mark.slow
 def test_blocks_of_blocks_of_blocks_end(tmp_path):
     file = tmp_path / "a.dxf"

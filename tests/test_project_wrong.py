@@ -190,3 +190,10 @@ def test_output_in_another_folder_is_the_users_to_choose(tmp_path):
 def test_output_names_that_no_file_can_have(tmp_path, name):
     with refused(FileError):
         run(project(tmp_path, with_output(f'files = ["{name}"]')))
+
+
+@pytest.mark.parametrize("name", ["", " "])
+def test_an_empty_name_of_an_output_is_called_empty(tmp_path, name):
+    with refused(FileError, what="output") as caught:
+        load(project(tmp_path, with_output(f'files = ["{name}"]')))
+    assert "the name of an output file is empty" in str(caught.value)

@@ -259,6 +259,7 @@ def read(path: str, **options: Any) -> list[Any]:
 def write(path: str, meshes: Any, weld: bool = False, overwrite: bool = False, **options: Any) -> None:
     """Write meshes to a file in the service's folder; an existing one only with ``overwrite``."""
     place = read_settings().place(path)
+    check_regular(place)
     if not validate.flag("overwrite", overwrite) and place.exists():
         raise FileError(f"{path}: exists; pass overwrite=True to replace it", what=path)
     service.write(place, meshes, weld, **options)

@@ -17,7 +17,7 @@ from ..surface.topology import components
 from .arrangement import Arrangement, arrange, hole_points
 from .edges import Boundary, boundary, check_lines
 from .lines import SNAP, Kind, Line, LineTree
-from .parts import PlanData
+from .parts import PlanData, check_count
 
 MAX_TRIANGLES = 500_000  # of a plan's mesh, which takes about a minute; finer ones are made by remeshing
 MAX_POINTS = 1_000_000  # of all lines, where they are measured
@@ -75,6 +75,10 @@ def part_count(plan: PlanData) -> int:
     Errors as in ``drafted``.
     """
     *_, drawn = _arranged(plan)
+    return _part_count(plan, drawn)
+
+
+def _part_count(plan: PlanData, drawn: Arrangement) -> int:
     ends = np.array([chain.vertices[[0, -1]] for chain in drawn.chains])
     used, renumbered = np.unique(ends, return_inverse=True)
     pieces = components(renumbered.reshape(-1, 2), len(used))
@@ -92,6 +96,7 @@ def _arranged(plan: PlanData) -> tuple[list[Line], list[Curve], Arrangement]:
     named = np.array([[*point, np.nan] for point in plan.points.values()]).reshape(-1, 3)
     drawn = arrange(lines, plan.edge_length, np.concatenate([spots.reshape(-1, 3), named]), stops)
     # the named points are vertices, but not held
+    check_count("patches", _part_count(plan, drawn))
     return lines, on_edge, replace(drawn, spots=drawn.spots[: len(spots)])
 
 

@@ -16,7 +16,7 @@ from ..base.errors import PlanError
 from ..curves.curves import Curve, polyline
 from ..curves.pieces import point_text, two_digits
 from .layers import Layer, layer_of, left_out, listed, understood
-from .parts import hole_label
+from .parts import check_count, hole_label
 from .paths import JoinedPath, join_strokes
 from .strokes import Stroke, Strokes
 
@@ -151,6 +151,7 @@ class DrawnParts:
             for name, path in zip(_names(layer, "hole", len(paths), loops), paths, strict=True):
                 loops[name] = path.curve
                 self.layers[hole_label(name)] = f"layer {strokes[0].layer!r}: {listed(path.labels)}"
+        check_count("holes", len(loops))
         return loops
 
     def _named(self, role: str, what: str, usual: str, curves: dict[str, Curve]) -> list[str]:
@@ -162,6 +163,7 @@ class DrawnParts:
                 curves[name] = path.curve
                 new.append(name)
                 self.layers[f"{what} {name!r}"] = f"layer {strokes[0].layer!r}: {listed(path.labels)}"
+        check_count(f"{what}s", len(curves))
         return new
 
     def moved(self, curves: Mapping[str, Curve], edges: Sequence[Curve], what: str) -> dict[str, Curve]:

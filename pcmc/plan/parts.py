@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
-from ..base.errors import OptionError, unknown
+from ..base.errors import OptionError, PcmcError, PlanError, unknown
 from ..base.names import checked_name
 from ..curves.curves import Curve, curve
 from ..meshing.walls import EDGES
@@ -17,6 +17,16 @@ from ..surface import Plane
 
 BOTTOMS = ("sliding", "held", "sloped")
 BALANCED = "balanced"  # in place of a wall's tension: chosen from those of its neighbours
+MOST = {"dividers": 1000, "holes": 2000, "cables": 2000, "mirrors": 100, "supports": 10_000, "patches": 2000}
+"""How many of its parts a plan may have; its dividers cut it into no more parts than patches."""
+
+
+def check_count(key: str, count: int, kind: type[PcmcError] = PlanError) -> None:
+    """Refuse more of a plan's parts than ``MOST`` allows, before they take long."""
+    if count > MOST[key]:
+        fewer = "draw fewer dividers" if key == "patches" else "draw fewer"
+        text = f"{key}: {count} are too many for a plan; at most {MOST[key]} are allowed: {fewer}"
+        raise kind(text, what=key, found=count, expected=MOST[key])
 
 
 @dataclass(frozen=True, eq=False)

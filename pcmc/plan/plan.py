@@ -18,9 +18,11 @@ from ..curves.pieces import to_local, to_space
 from ..meshing.walls import EDGES
 from ..surface import Plane, Surface
 from .parts import (
+    MOST,
     PlanData,
     areas_of,
     cable_of,
+    check_count,
     check_keys,
     curve_of,
     divider_of,
@@ -32,16 +34,6 @@ from .parts import (
     support_of,
 )
 from .summary import summary
-
-MOST = {
-    "dividers": 2000,
-    "holes": 2000,
-    "cables": 2000,
-    "mirrors": 100,
-    "supports": 10_000,
-    "patches": 10_000,
-}
-"""How many of its parts a plan may have."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -115,10 +107,8 @@ class Plan(PlanData):
     """
 
     def __post_init__(self) -> None:
-        for key, most in MOST.items():
-            if len(getattr(self, key)) > most:
-                problem = f"{key}: {len(getattr(self, key))} are too many for a plan; at most {most} are read"
-                raise OptionError(problem, what=key, found=len(getattr(self, key)), expected=most)
+        for key in MOST:
+            check_count(key, len(getattr(self, key)), OptionError)
         parsed = {
             "outline": curve_of(self.outline, "outline", closed=True),
             "dividers": tuple(divider_of(d, k) for k, d in enumerate(self.dividers, 1)),

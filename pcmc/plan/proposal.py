@@ -17,7 +17,7 @@ from .corners import most_in_corners
 from .drawing import Drawing
 from .edges import cable_for
 from .lines import Kind, Line
-from .parts import Area, CableLine, Divider, Hole, PlanData, check_keys
+from .parts import Area, CableLine, Divider, Hole, PlanData, check_count, check_keys
 from .texts import Label
 
 TRIANGLES = 1500  # of a first roof, about
@@ -27,7 +27,7 @@ ROOM = 1.6  # tension, over the least at which a roof over the plan exists
 SAMPLES = 16  # points of a divider at which its neighbours are looked up
 SMALL_HOLE = 0.05  # of the plan's area; smaller holes change its least tension little
 MANY, ROUGH = 4000, 1e-5  # curves of more points are simplified, by so much of their length
-NEAR = 1e-4  # of the plan's size: a part this near to a point of a divider is beside it
+NEAR = 1e-4  # of the length of all parts' edges: a part this near to a point of a divider is beside it
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +47,13 @@ def parts_of(drawing: Drawing) -> list[Part]:
     noded = shapely.set_precision(shapely.union_all(lines, grid_size=1e-3 * drawing.gap), 0.0)
     roof = roof_area(drawing)
     polygons = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
-    inside = [p for p in polygons if shapely.contains_xy(roof, *largest_circle(p)[0])]
-    parts = [Part(p, *largest_circle(p)) for p in inside]
-    return sorted(parts, key=lambda part: (round(part.area.centroid.x, 6), round(part.area.centroid.y, 6)))
+    try:
+        check_count("patches", len(polygons) - len(holes))
+    except PlanError as error:
+        raise error.in_file(drawing.path) from None
+    parts = [Part(p, *largest_circle(p)) for p in polygons]
+    inside = [part for part in parts if shapely.contains_xy(roof, *part.middle)]
+    return sorted(inside, key=lambda part: (round(part.area.centroid.x, 6), round(part.area.centroid.y, 6)))
 
 
 def plan_area(plan: PlanData) -> Any:
@@ -148,6 +152,7 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
         Line("the outline", Kind.OUTLINE, drawing.outline),
         shapely.STRtree([p.area for p in parts]),
     )
+    near = NEAR * sum(part.area.length for part in parts)
     cable = cable_for(drawing.outline, max(tensions))
     if drawing.loose and values.setdefault("edge", "cable") == "cable":
         values.setdefault("cable", cable)
@@ -165,7 +170,7 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
             else:
                 entry.setdefault("bottom", "held" if drawing.flat else "sloped")
                 most = most_in_corners(curve, outline, edge_length)
-                entry.setdefault("wall", wall_tension(curve, tree, tensions, most, upright))
+                entry.setdefault("wall", wall_tension(curve, tree, tensions, near, most, upright))
             if name in drawing.ridges:
                 entry.setdefault("cable", cable)
     patches: dict[str, dict[str, Any]] = {}
@@ -285,12 +290,12 @@ def _changed(drawn: Mapping[str, Curve], given: Sequence[Any], what: str, kind: 
 
 
 def wall_tension(
-    curve: Curve, parts: shapely.STRtree, tensions: Sequence[float], most: float, upright: bool = False
+    curve: Curve, parts: shapely.STRtree, tensions: Sequence[float], near: float, most: float, upright: bool
 ) -> float:
-    """The tension of a wall along a curve; see ``balanced_wall``. An upright one needs no difference."""
-    size = sum(part.length for part in parts.geometries)
+    """The tension of a wall between the parts as near as ``near`` to a curve; see ``balanced_wall``. An upright
+    one needs no difference."""
     points = shapely.points(curve.at(len(curve.pieces) * (np.arange(SAMPLES) + 0.5) / SAMPLES)[:, :2])
     neighbours: list[list[float]] = [[] for _ in points]
-    for point, part in zip(*parts.query(points, predicate="dwithin", distance=NEAR * size), strict=True):
+    for point, part in zip(*parts.query(points, predicate="dwithin", distance=near), strict=True):
         neighbours[point].append(tensions[part])
-    return balanced_wall([[min(near)] if upright and near else near for near in neighbours], most)
+    return balanced_wall([[min(found)] if upright and found else found for found in neighbours], most)

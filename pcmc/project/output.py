@@ -126,8 +126,12 @@ def _check_view(view: Any) -> None:
 
 
 def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> None:
-    """Refuse file names whose suffix is no format of surfaces, or no format of pictures."""
+    """Refuse file names that are empty, or whose suffix is no format of surfaces, or no format of pictures."""
     for file in files:
+        if not str(file).strip():
+            raise FileError(
+                "the name of an output file is empty; give one, such as 'roof.obj'", what="output"
+            )
         suffix = Path(file).suffix.lower()
         if suffix not in io.FORMATS:
             hint = "; a picture has its own option" if suffix in SUFFIXES else ""
@@ -159,6 +163,8 @@ def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: It
             problem = "is a folder; give the name of a file"
         elif path.exists() and any(path.samefile(one) for one in read):
             problem = "is read here, and is not written over; name another file"
+        elif path.exists() and not path.is_file():
+            problem = "is a pipe or a device; name a file"
         elif place in seen:
             problem = "is named twice; name two files for the output"
         elif folder != made and not folder.is_dir():
