@@ -148,10 +148,8 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
                 area.setdefault(key, common)
     tensions = [area["tension"] for area in areas]
     edge_length = values.setdefault("edge_length", edge_length_for(parts, drawing))
-    outline, tree = (
-        Line("the outline", Kind.OUTLINE, drawing.outline),
-        shapely.STRtree([p.area for p in parts]),
-    )
+    outline = Line("the outline", Kind.OUTLINE, drawing.outline)
+    tree = shapely.STRtree([part.area for part in parts])
     near = NEAR * sum(part.area.length for part in parts)
     cable = cable_for(drawing.outline, max(tensions))
     if drawing.loose and values.setdefault("edge", "cable") == "cable":
@@ -292,8 +290,8 @@ def _changed(drawn: Mapping[str, Curve], given: Sequence[Any], what: str, kind: 
 def wall_tension(
     curve: Curve, parts: shapely.STRtree, tensions: Sequence[float], near: float, most: float, upright: bool
 ) -> float:
-    """The tension of a wall between the parts as near as ``near`` to a curve; see ``balanced_wall``. An upright
-    one needs no difference."""
+    """The tension of a wall between the parts near a curve; see ``balanced_wall``. An upright
+    one needs no difference of theirs."""
     points = shapely.points(curve.at(len(curve.pieces) * (np.arange(SAMPLES) + 0.5) / SAMPLES)[:, :2])
     neighbours: list[list[float]] = [[] for _ in points]
     for point, part in zip(*parts.query(points, predicate="dwithin", distance=near), strict=True):

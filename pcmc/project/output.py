@@ -126,7 +126,7 @@ def _check_view(view: Any) -> None:
 
 
 def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> None:
-    """Refuse file names that are empty, or whose suffix is no format of surfaces, or no format of pictures."""
+    """Refuse empty file names, and those whose suffix is no format of surfaces, or of pictures."""
     for file in files:
         if not str(file).strip():
             raise FileError(
