@@ -14,7 +14,7 @@ from pcmc.certificate.neck import narrowest_neck
 from pcmc.certificate.proof import Fold, Overload, UnbalancedJunction, Unheld
 from pcmc.existence.starts import low_start
 from pcmc.io import native
-from pcmc.plan import Divider, Plan
+from pcmc.plan import Divider, Hole, Plan
 from pcmc.solvers import solve as one_start
 from pcmc.solvers.result import Status
 from pcmc.sweep import solve_case
@@ -339,3 +339,19 @@ def test_from_equal_tensions_to_those_asked_for():
     found = solve(two_caps(1.2, alpha_large=6.0, alpha_small=5.0, alpha_aux=16.0), target="stationary")
     assert found.certificate.verdict is Verdict.STABLE
     assert "along the branch from equal tensions" in found.message
+
+
+def test_an_upright_wall_that_ends_on_a_leaning_one_ends_in_a_verdict():
+    """Pinched at their common foot, each wall keeps its own plane."""
+    eye = Hole({"circle": {"centre": [8.5, 12, 2.2], "radius": 1.2}}, name="skylight")
+    walls = [Divider([[4, 0], [4, 16]]), Divider([[4, 7], [12, 7]], upright=True)]
+    patches = {"foyer": (8.0, [2, 8]), "pool": (14.0, [8, 3]), "dive": (13.0, [5, 12])}
+    half = Plan(
+        [[0, 0], [12, 0], [12, 16], [0, 16]],
+        walls,
+        holes=[eye],
+        edge_length=1.1,
+        mirrors=[[[12, 0], [12, 16]]],
+        patches={name: {"tension": tension, "at": at} for name, (tension, at) in patches.items()},
+    )
+    assert solve(half.surface()).certificate.verdict is Verdict.WALL_DOWN

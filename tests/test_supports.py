@@ -135,6 +135,16 @@ def test_what_remains_falls_with_the_mesh():
     assert shares[1]["moment_share"] < 1e-12  # a cap is symmetric
 
 
+def test_an_upright_wall_under_different_snow_has_no_error_of_curvature():
+    """Its plane takes the difference: the wall is flat, and no number says that it should curve."""
+    areas = {"west": {"tension": 4.0, "snow": 0.3}, "east": {"tension": 4.0}}
+    wall = [Divider([[3, 0], [3, 5]], 1.0, upright=True)]
+    plan = Plan([[0, 0], [6, 0], [6, 5], [0, 5]], wall, edge_length=0.3, patches=areas)
+    found = pcmc.solve(plan.surface()).certificate
+    assert found.certified
+    assert found.curvature_error < 1e-9
+
+
 def test_upright_walls_hold_what_neighbours_of_unequal_tension_leave():
     """A long hall of tensions 5 and 4: far from its ends the plane takes their difference."""
     patches = {"west": {"tension": 5.0}, "east": {"tension": 4.0}}

@@ -15,6 +15,7 @@ from ..surface.topology import Curve
 from ..surface.wall_tensions import balanced_wall
 from .proof import UnbalancedJunction, Unheld
 
+COARSE = 0.05  # of the loads: more than this left over is said with what to do
 HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets meet at about 20°
 FORCE, MOMENT = (tuple(f"{kind}_{axis}" for axis in "xyz") for kind in ("force", "moment"))
 
@@ -99,7 +100,9 @@ def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:
         return f"the forces of the supports cancel {share}"
     place = ", ".join(f"{left[c] + 0.0:.4g}" for c in "xyz")
     whose = " of the piece between the mirror planes" if mirrors else ""
-    return f"the supports carry the loads{whose} {share} about ({place})"
+    hint = "; the rest is what the mesh leaves along its sheets: refine it"
+    coarse = hint if left["force_share"] > COARSE else ""
+    return f"the supports carry the loads{whose} {share} about ({place}){coarse}"
 
 
 def load_is_given(surface: Surface) -> bool:

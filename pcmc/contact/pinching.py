@@ -319,7 +319,8 @@ def place_pinched_walls(surface: Surface, walls: Walls, resting: Bools, X: Float
     gone = (resting | walls.corner)[rows.top_ends].all(axis=1) & ~(stands | surface.pinned)[rows.vertices]
     X, places = X.copy(), rows.top_places(X)
     X[rows.vertices[gone]] = places[gone]
-    return X[owner]
+    X = X[owner]
+    return surface.onto_supports(X) if surface.on_planes else X  # beside another wall each keeps its plane
 
 
 def standing_faces(part: StandingPart, whole: Surface) -> Ints:

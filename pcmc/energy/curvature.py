@@ -106,9 +106,12 @@ def curvature_error(surface: Surface, method: Method = "cotangent") -> Floats:
 def _within_one_sheet(surface: Surface) -> Bools:
     """(n,) vertices off boundaries and junctions, and where sheets do not just touch.
 
-    The boundary in a mirror plane is none.
+    The boundary in a mirror plane is none. In another plane that holds a sheet, such as that of an upright
+    wall, the plane takes what acts across it, and the sheet is flat whatever its pressure.
     """
     topo = surface.topology
     inside = np.ones(surface.n, dtype=bool)
     inside[topo.edges[topo.curve_edge & ~surface.mirror_edge]] = False
+    for plane, mask in surface.on_planes:
+        inside &= plane.mirror | ~mask
     return inside & (topo.fans == 1)

@@ -55,7 +55,7 @@ def run(
         Before solving, if the tensions at a junction cannot balance.
     """
     project = load(path)
-    project = project.in_folder(project.path.parent if out_dir is None else out_dir)
+    project = project if out_dir is None else project.in_folder(out_dir)
     return run_project(project, progress, anyway=anyway)
 
 
@@ -76,6 +76,7 @@ def run_project(
     the cache, unless it was changed or ``use_cache`` is false; it is solved in any case.
     """
     report = progress or ignore
+    project = project if project.folder is not None else project.in_folder(project.path.parent)
     outputs = project.outputs
     check_names(project.files, project.picture)
     check_outputs(outputs, project.folder, inputs=project.inputs)
