@@ -168,6 +168,7 @@ def test_a_surface_that_is_not_at_rest_has_no_mesh_check():
     ("path", "body", "status", "line"),
     [
         ("/api/NAME/follow", '{"tensions": {"lefft": 3}}', 400, "did you mean 'left'"),
+        ("/api/NAME/settle", '{"tensoins": {"left": 3}}', 400, "did you mean 'tensions'"),
         ("/api/NAME/follow", '{"tensions": {"left": -3}}', 400, "expected a finite number"),
         ("/api/NAME/follow", '{"tensions": {"left": "a"}}', 400, "'left': expected a number, found 'a'"),
         ("/api/NAME/follow", '{"tensions": {"left": true}}', 400, "expected a number, found True"),

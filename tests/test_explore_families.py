@@ -6,8 +6,9 @@ import numpy as np
 
 import pcmc
 from generators import two_squares
-from pcmc.explore.page_data import ALIKE, families_drawn, family_of_face, fields
+from pcmc.explore.page_data import families_drawn, fields
 from pcmc.explore.session import State
+from pcmc.panels.families import ALIKE, family_of_face
 from pcmc.surface.geometry import edge_vectors
 
 

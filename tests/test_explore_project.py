@@ -17,7 +17,8 @@ from pcmc.design import Parameter, Target
 from pcmc.design.targets import measure
 from pcmc.explore.roof import Roof, read_roof
 from pcmc.explore.session import Session
-from pcmc.explore.variants import difference, figures_data
+from pcmc.explore.variants import figures_data
+from pcmc.panels.distance import difference
 
 CAP = spherical_cap(edge_length=0.25)
 
@@ -149,6 +150,9 @@ def test_an_unknown_patch_in_a_target_or_parameter_is_named(client):
         ("keep", {}, "name: expected a name"),
         ("keep", {"name": " "}, "1 to 60 characters"),
         ("keep", {"name": "x" * 61}, "1 to 60 characters"),
+        ("keep", {"name": "\ud800"}, "expected printable characters"),
+        ("keep", {"name": "a\u202eb"}, "expected printable characters"),
+        ("keep", {"name": "a\0b"}, "expected printable characters"),
         ("recall", {"number": 0}, "there is no variant 1"),
         ("recall", {"number": "0"}, "expected a whole number"),
         ("forget", {"number": -1}, "there is no variant"),
@@ -163,6 +167,8 @@ def test_an_unknown_patch_in_a_target_or_parameter_is_named(client):
         ("save", {"name": "a\\b.toml"}, "a name without folder"),
         ("save", {"name": "a\0b"}, "a name without folder"),
         ("save", {"name": ".bashrc"}, "a name without folder"),
+        ("save", {"name": "x" * 96}, "at most 100"),
+        ("save", {"name": "屋" * 90}, "at most"),
         ("save", {"name": "hall.toml"}, "is there already"),
     ],
 )

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -18,9 +20,10 @@ from pcmc import explore
 from pcmc.base.errors import FileError, OptionError
 from pcmc.design import Parameter, Target
 from pcmc.explore import saving
+from pcmc.explore.requests import RequestError
 from pcmc.explore.roof import Roof, read_roof
 from pcmc.explore.session import Session, solved_start
-from pcmc.explore.variants import difference
+from pcmc.panels.distance import difference
 
 CAP = spherical_cap(edge_length=0.25)
 
@@ -115,7 +118,7 @@ def test_values_that_a_project_cannot_hold_are_refused(hall_roof, hall_folder):
 def test_no_link_leads_a_save_out_of_the_folder(hall_roof, hall_folder, tmp_path):
     os.symlink(tmp_path / "elsewhere.toml", hall_folder / "link.toml")
     try:
-        with pytest.raises(FileError, match="without folder"):
+        with pytest.raises(FileError, match="is a link to another folder"):
             saving.save(hall_roof, hall_roof.surface, "link.toml", True)
         assert not list(tmp_path.iterdir())
     finally:
@@ -134,6 +137,41 @@ def test_walls_are_found_by_name_number_and_as_bare_curves(tmp_path):
     dividers = tomllib.loads(saving.project_with(roof, surface)[0])["plan"]["dividers"]
     assert [d["wall"] for d in dividers] == [0.5, 0.25]
     assert dividers[0]["curve"] == [[4, 0], [4, 4]]
+
+
+def test_a_save_that_waits_saves_what_was_shown_when_it_was_asked_for(hall_roof, hall_folder):
+    running, taken = explore.start_roof(hall_roof), threading.Event()
+    session = running.open()[1]
+    real = session.state
+
+    def state():
+        found = real()
+        taken.set()
+        return found
+
+    session.state = state
+    try:
+        with ThreadPoolExecutor() as pool:
+            with running._saving:  # another save is under way
+                saved = pool.submit(running.save, session, "before", False)
+                taken.wait(2)
+                session.meet((Target("apex", "west", at_least=1.1),), (Parameter("west"),))
+                session.settle({"tensions": {"west": 4.0}})
+            assert saved.result(60)["note"] == ""
+            plan = tomllib.loads((hall_folder / "before.toml").read_text())
+            assert plan == tomllib.loads(HALL_TOML)
+            taken.clear()
+            with running._saving:
+                saved = pool.submit(running.save, session, "hall", True)
+                taken.wait(2)
+                running.show(hall_roof)  # the file was changed
+            with pytest.raises(RequestError, match="was changed while this save waited"):
+                saved.result(60)
+        assert (hall_folder / "hall.toml").read_text() == HALL_TOML
+    finally:
+        running.close()
+        (hall_folder / "before.toml").unlink(missing_ok=True)
+        (hall_folder / "hall.toml").write_text(HALL_TOML)
 
 
 def test_surfaces_without_a_project_are_not_saved(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from refusals import refused
 
 import pcmc
-from pcmc import cli
+from pcmc import cli, io
 from pcmc.base.errors import FileError, FileWarning, OptionError, SurfaceError
 from pcmc.surface.geometry import area_vectors
 
@@ -258,14 +258,32 @@ def test_what_cannot_be_repaired_is_refused_by_name(tmp_path):
             pcmc.repair(path, **options)
 
 
-def test_the_command_says_what_tensions_of_one_mean_in_a_unit(tmp_path, capsys):
+@pytest.mark.parametrize("units", ["mm", ""])
+@pytest.mark.parametrize("suffix", [s for s, form in io.FORMATS.items() if form.reads])
+def test_a_repaired_mesh_has_no_more_tensions_than_before(tmp_path, suffix, units):
+    """Tensions and pressures of 1 stood for none, and became 1000 and 1000000 in metres."""
     X, F = sheet()
-    path = obj(tmp_path / "a.obj", 1000.0 * X, {"roof": F})
-    said = []
-    for more in (["--units", "mm"], []):
-        assert cli.main(["repair", str(path), "-o", str(tmp_path / "b.obj"), *more]) == 0
-        said.append("tensions are 1 per mm, pressures 1 per mm²" in capsys.readouterr().out)
-    assert said == [True, False]
+    raw = obj(tmp_path / "a.obj", 1000.0 * X, {"roof": F})
+    once, clean = tmp_path / "b.obj", tmp_path / f"c{suffix}"
+    assert cli.main(["repair", str(raw), "-o", str(once)]) == 0
+    for source in (raw, once):
+        more = ["--units", units] if units else []
+        assert cli.main(["repair", str(source), "-o", str(clean), *more]) == 0
+        with pytest.warns(FileWarning, match="tensions and pressures are 1 unless given"):
+            surface, data = io.read_bare(clean, "m", "mm")
+        assert (surface.tensions.tolist(), surface.pressures.tolist()) == ([1.0], [1.0])
+        assert data.bare == ("roof",)
+        assert np.ptp(surface.vertices[:, 0]) == pytest.approx(1.0, rel=1e-6) or not units
+
+
+def test_a_patch_that_another_program_added_has_no_tension_to_convert(tmp_path):
+    X, F = sheet()
+    surface = pcmc.repair(obj(tmp_path / "b.obj", X, {"roof": F})).surface
+    pcmc.write(path := tmp_path / "a.obj", surface, units="mm")
+    assert not io.load(path).bare
+    path.write_text(path.read_text().replace("g roof", "g roof_1"))
+    with pytest.warns(FileWarning, match="tensions and pressures are 1 unless given"):
+        assert io.read_bare(path, "m")[0].tensions.tolist() == [1.0]
 
 
 @pytest.mark.slow

@@ -258,3 +258,21 @@ def test_snow_beside_free_edges_of_a_mesh_is_refused_in_one_line(tmp_path, monke
     for given in (["sail.toml"], ["sail.pcmc", "--snow", "0.1"]):
         assert cli.main(["solve", *given]) == 2
         assert "edges are free" in capsys.readouterr().err
+
+
+def test_snow_on_one_of_two_patches_without_a_wall_names_both(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    roof = hypar_roof(4)
+    halves = (roof.vertices[roof.faces].mean(axis=1)[:, 0] > roof.vertices[:, 0].mean()).astype(int)
+    patches, edge = [Patch("left", 4.0), Patch("right", 4.0)], roof.topology.on_boundary
+    pcmc.write("two.pcmc", roof.rebuilt(patches=patches, patch_of_face=halves, fixed=edge))
+    table = '[mesh]\nfile = "two.pcmc"\npatches = {%s}\n'
+    (tmp_path / "two.toml").write_text(table % "left = {snow = 0.1}, right = {snow = 0.5}")
+    for given in (["two.toml"], ["two.pcmc", "--snow", "right=0.5"]):
+        assert cli.main(["solve", *given]) == 2
+        said = capsys.readouterr().err
+        assert "snow differs between 'right' and 'left', and no wall stands there" in said
+        assert "'left' = {snow = 0.5} under patches" in said
+        assert "free" not in said
+    (tmp_path / "two.toml").write_text(table % "'left' = {snow = 0.5}, right = {snow = 0.5}")
+    assert cli.main(["solve", "two.toml", "--no-mesh-check"]) == 0

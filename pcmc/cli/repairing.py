@@ -10,7 +10,7 @@ import typer
 from .. import project as projects
 from ..base.interrupts import defer_interrupts
 from ..io import metres_note, write
-from ..io.repairing import HOLES, Repaired, repair
+from ..io.repairing import HOLES, repair
 from . import OK, arguments
 from .arguments import number, option
 from .progress import working
@@ -46,16 +46,6 @@ def repair_(
         say("repairing")
         repaired = repair(file, weld=weld, holes=holes, edge_length=edge_length, units=units, up=up)
     with defer_interrupts():
-        write(output, repaired.surface, units=repaired.units)
-    notes = [*_values_note(repaired), *metres_note([output], repaired.units.length)]
-    print(repaired, *notes, f"written: {output}", sep="\n")
+        write(output, repaired, units=repaired.units)
+    print(repaired, *metres_note([output], repaired.units.length), f"written: {output}", sep="\n")
     return OK
-
-
-def _values_note(repaired: Repaired) -> list[str]:
-    """What the tensions and pressures of 1 mean that stand for those that a mesh in a unit does not have."""
-    unit = repaired.units.length
-    if not unit or any((p.tension, p.pressure) != (1.0, 1.0) for p in repaired.surface.patches):
-        return []
-    text = f"note: tensions are 1 per {unit}, pressures 1 per {unit}², as the mesh has no others;"
-    return [f"{text} another unit converts them, so give both there"]

@@ -18,19 +18,17 @@ from ..design import Parameter, Target
 from ..design.quantities import MEASURES
 from ..design.targets import NAMED
 from ..energy.curvature import curvature_error, mean_curvature
-from ..panels.families import families
+from ..panels.distance import difference
+from ..panels.families import family_of_face
 from ..project.values import values_of
 from ..quantities import dimension_of
 from ..surface import Patch, Surface
 from ..surface.colours import patch_colors
-from ..surface.geometry import edge_vectors
 from ..surface.mirroring import Whole, unfolded
 from .session import State
-from .variants import Variant, difference
+from .variants import Variant
 
 Arrays = dict[str, npt.NDArray[Any]]
-
-ALIKE = 0.01  # of the mean edge: panels of a family differ by at most this
 
 
 def outline(surface: Surface, origin: Floats) -> tuple[dict[str, Any], Arrays]:
@@ -154,16 +152,6 @@ def families_drawn(state: State) -> Floats:
     """``family_of_face`` of the surface that is drawn. It takes longer than an answer to a slider."""
     whole = whole_of(state.surface)
     return family_of_face(state.surface if whole is None else whole.surface)
-
-
-def family_of_face(surface: Surface) -> Floats:
-    """(m,) the family of congruent panels that each triangle belongs to, from 1; NaN for those of walls."""
-    roof = surface.roof[surface.patch_of_face]
-    family = np.full(surface.m, np.nan)
-    if roof.any():
-        lengths = np.linalg.norm(edge_vectors(surface.vertices[surface.faces[roof]]), axis=2)
-        family[roof] = 1 + families(lengths, ALIKE * float(lengths.mean())).family
-    return family
 
 
 def patch_data(patches: tuple[Patch, ...]) -> list[dict[str, Any]]:

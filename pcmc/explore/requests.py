@@ -6,6 +6,8 @@ from collections.abc import Callable
 from http import HTTPStatus
 from typing import Any
 
+from ..base.errors import unknown
+from ..base.names import checked_name
 from ..design import Parameter, Target
 from ..surface.renewed import KINDS
 
@@ -34,7 +36,10 @@ def session_name(asked: dict[str, Any]) -> str | None:
 def values(asked: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Numbers, and points, by kind and name."""
     given: dict[str, dict[str, Any]] = {}
-    for kind in (*KINDS, "points"):
+    kinds = (*KINDS, "points")
+    if odd := [key for key in asked if key not in kinds]:
+        raise RequestError(unknown("kind of values", odd[0][:60], kinds))
+    for kind in kinds:
         listed = asked.get(kind, {})
         if not isinstance(listed, dict):
             raise RequestError(f"{kind}: expected numbers by name")
@@ -97,7 +102,7 @@ def variant_name(asked: dict[str, Any]) -> str:
     name = " ".join(_name("name", asked.get("name")).split())
     if not 0 < len(name) <= 60:
         raise RequestError(f"name: expected 1 to 60 characters, found {len(name)}")
-    return name
+    return checked_name("name", name)
 
 
 def file_to_save(asked: dict[str, Any]) -> tuple[str, bool]:

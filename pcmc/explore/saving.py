@@ -101,12 +101,17 @@ def _place(roof: Roof, name: str) -> tuple[Project, Path]:
         raise FileError("only a project or a drawing can be saved as a project; use Export", what="name")
     name = name if name.lower().endswith(".toml") else f"{name}.toml"
     folder = roof.project.path.parent.resolve()
-    plain = re.fullmatch(r"[^/\\:*?\"<>|.][^/\\:*?\"<>|]{0,100}", name) and name.isprintable()
-    if not plain or (folder / name).resolve().parent != folder:
-        text = f"{name!r:.60}: a name without folder is needed, such as variant.toml"
-        raise FileError(text, what="name", found=name[:60])
-    if (folder / name).exists() and not (folder / name).is_file():
-        raise FileError(f"{name} is no file; give another name", what="name", found=name)
+    problem = ""
+    if not re.fullmatch(r"[^/\\:*?\"<>|.][^/\\:*?\"<>|]*", name) or not name.isprintable():
+        problem = "a name without folder is needed, such as variant.toml"
+    elif len(name) > 100 or len(name.encode()) > 240:  # file systems have 255 bytes
+        problem = "a shorter name is needed: at most 100 letters and 240 bytes, with .toml"
+    elif (folder / name).resolve().parent != folder:
+        problem = "this is a link to another folder; give another name"
+    elif (folder / name).exists() and not (folder / name).is_file():
+        problem = "this is no file; give another name"
+    if problem:
+        raise FileError(f"{name!r:.60}: {problem}", what="name", found=name[:60])
     return roof.project, roof.project.path.parent / name
 
 

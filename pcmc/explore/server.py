@@ -119,9 +119,11 @@ class Explorer:
         if not self.local:
             text = "only a page of this machine saves files; this server listens for others, too"
             raise RequestError(text, HTTPStatus.FORBIDDEN)
+        start, state = self.start, session.state()  # after all that was asked for before
         with self._saving:
-            surface = session.state().surface  # after all that was asked for before
-            path, note = saving.save(self.roof, surface, name, replace, session.aims)
+            if self.start is not start:
+                raise RequestError("the file was changed while this save waited; save again")
+            path, note = saving.save(self.roof, state.surface, name, replace, state.aims)
             if path == self.roof.path:
                 outcome = dataclasses.replace(self.roof.outcome, project=load(path))
                 self.roof = dataclasses.replace(self.roof, outcome=outcome)

@@ -56,6 +56,7 @@ class State:
     number : of the state; a later one is greater.
     note : how the values were reached where following did not lead there; else empty.
     variants : those kept; ``compared`` is the number of the one compared with, or None.
+    aims : the targets met last, with what they vary, or None.
     """
 
     surface: Surface
@@ -71,6 +72,7 @@ class State:
     note: str = ""
     variants: tuple[Variant, ...] = ()
     compared: int | None = None
+    aims: Aims | None = None
 
     @property
     def asked(self) -> tuple[Patch, ...]:
@@ -429,4 +431,5 @@ class Session:
             self._note,
             tuple(self.variants),
             self._compared,
+            self.aims,
         )

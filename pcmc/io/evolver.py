@@ -15,7 +15,7 @@ A room of prescribed volume is a body with that ``volume``; its Lagrange multipl
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +49,7 @@ DEFINE FACET ATTRIBUTE patch INTEGER
 """
 
 
-def write(path: Path, surface: Surface, **_: Any) -> None:
+def write(path: Path, surface: Surface, bare: Collection[str] = (), **_: Any) -> None:
     """The datafile of a surface."""
     edges = surface.topology.edges + 1
     patches = list(enumerate(surface.patches, 1))
@@ -62,6 +62,7 @@ def write(path: Path, surface: Surface, **_: Any) -> None:
         origin=" ".join(map(repr, origin.tolist())),
         names="\n".join(
             [f"// patch {k} {escaped(p.name, SPECIAL)}" for k, p in patches]
+            + [f"// bare {k} {escaped(p.name, SPECIAL)}" for k, p in patches if p.name in bare]
             + [f"// wall {k}" for k, p in patches if p.wall]
             + [f"// room {k} {escaped(room.name, SPECIAL)}" for k, room in enumerate(surface.rooms, 1)]
             + evolver_forces.names(surface)

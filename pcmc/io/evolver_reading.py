@@ -45,6 +45,7 @@ def read(path: Path) -> MeshData:
     origin = np.array([_numbers((c,), known, place, 0)[0] for c in given.groups()] if given else np.zeros(3))
     plane, planes = _planes(header, file["top"], constraints, support, origin, known)
     rooms = _rooms(header, prescribed, patch_of_face, patches)
+    unset = evolver_forces.names_in(header, "bare").values()
     X, notes = X + origin, (*notes, *more)
     return MeshData(
         X,
@@ -57,6 +58,7 @@ def read(path: Path) -> MeshData:
         planes=planes,
         rooms=rooms,
         cables=_cables(header, file["edges"], ids, known),
+        bare=tuple(p.name for p in patches if p.name in unset and p.tension == p.pressure == 1.0),
     )
 
 

@@ -33,7 +33,8 @@ class MeshData:
     Attributes
     ----------
     vertices, faces, patch_of_face : as in Surface.
-    patches : one per patch; tension and pressure are 1 where the format has none.
+    patches : one per patch; tension and pressure are 1 where the file has none.
+    bare : the names of these patches. Their 1 stands for no value and is the same in any unit.
     support : (n,) int, FREE, SLIDING or FIXED; None where the format has no supports.
     plane : Π; None where the format has none.
     scalars : (n,) or (m,) arrays by name.
@@ -65,6 +66,7 @@ class MeshData:
     cables: tuple[Cable, ...] = ()
     rooms: tuple[Room, ...] = ()
     parts: Mapping[str, Any] = field(default_factory=dict)
+    bare: tuple[str, ...] = ()
 
 
 def checked(data: MeshData) -> MeshData:

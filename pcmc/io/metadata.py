@@ -7,7 +7,7 @@ has a mesh per patch.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from typing import Any
 
@@ -33,6 +33,7 @@ def metadata_text(
     joined: bool = True,
     without: Sequence[str] = (),
     counts: tuple[int, int] | None = None,
+    bare: Collection[str] = (),
 ) -> str:
     """Everything of a surface but its mesh and supports on Π, as JSON: a format's comment or metadata.
 
@@ -41,6 +42,7 @@ def metadata_text(
     joined : whether vertices keep their numbers in the file.
     without : the parts that the format holds itself.
     counts : numbers of vertices and faces in the file, if not those of the surface.
+    bare : the patches whose tension and pressure of 1 stand for none.
     """
 
     def where(vertices: Ints) -> Any:
@@ -57,6 +59,7 @@ def metadata_text(
     }
     parts = {
         "units": astuple(units) if units else (),
+        "bare": [patch.name for patch in surface.patches if patch.name in bare],
         "cables": [[cable.name, cable.tension, where(cable.edges)] for cable in surface.cables],
         "rooms": [astuple(room) for room in surface.rooms],
         "lines": [[astuple(guide), where(own)] for guide, own in guides if len(own)],
@@ -77,9 +80,9 @@ PARTS = ("cables", "rooms", "lines", "planes", "slides")
 
 @dataclass(frozen=True)
 class Metadata:
-    """The same read back: patches by name, the plane, numbers of vertices and faces, units, other parts."""
+    """The same read back: patches by name (bare ones are None), plane, counts, units, other parts."""
 
-    patches: Mapping[str, Patch] = field(default_factory=dict)
+    patches: Mapping[str, Patch | None] = field(default_factory=dict)
     plane: Plane | None = None
     counts: tuple[int, int] | None = None
     units: Units = NO_UNITS
@@ -88,10 +91,11 @@ class Metadata:
     def mesh_data(
         self, X: Floats, F: Ints, patch: Ints, names: Sequence[str], notes: Sequence[str] = (), **more: Any
     ) -> MeshData:
-        """A mesh with all of this; tension and pressure of a patch are 1 where the metadata lack its name."""
+        """A mesh with all of this; tension and pressure of a patch are 1 where the metadata have none."""
         found, changed = names_from_file(names)
         patches = tuple(self.patches.get(name) or Patch(found[name], 1.0) for name in names)
-        about = {"plane": self.plane, "units": self.units, "parts": self.parts} | more
+        bare = tuple(found[name] for name in names if self.patches.get(name) is None)
+        about = {"bare": bare, "plane": self.plane, "units": self.units, "parts": self.parts} | more
         return MeshData(X, F, patch, patches, notes=(*notes, *filter(None, (changed,))), **about)
 
     def of_meshes(self, meshes: Iterable[tuple[str, Any, Any]], default: str = "", **more: Any) -> MeshData:
@@ -131,10 +135,11 @@ def parse_metadata(text: str | None) -> Metadata:
         plane = Plane(point, normal)
         counts = (int(values["counts"][0]), int(values["counts"][1]))
         units = Units(*values.get("units", ()))
+        known = {p.name: None if p.name in values.get("bare", ()) else p for p in patches}
     except DAMAGED:
         raise _damaged(text) from None
     parts = {key: values[key] for key in PARTS if key in values}
-    return Metadata({p.name: p for p in patches}, plane, counts, units, parts)
+    return Metadata(known, plane, counts, units, parts)
 
 
 def _damaged(text: str) -> FileError:

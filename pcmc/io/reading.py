@@ -25,9 +25,7 @@ from .mesh_data import MeshData, checked, merged, to_surface, without_unused
 from .metadata import with_parts
 from .scaling import converted, stated
 
-NO_SUPPORTS = (
-    "no supports in the file: its boundary is taken as fixed; tensions and pressures are 1 unless given"
-)
+NO_SUPPORTS = "no supports in the file: its boundary is taken as fixed"
 NO_UNIT = "no unit of length in the file; name it with --units mm, say"
 
 
@@ -75,7 +73,7 @@ def read(
 
 
 def read_bare(path: str | os.PathLike[str], units: str = "", assumed: str = "") -> tuple[Surface, MeshData]:
-    """The Surface in a file and all its data; a note if the file has no supports, or no unit of length.
+    """The Surface in a file and all its data; a note if it lacks supports, tensions or a unit.
 
     Parameters
     ----------
@@ -97,8 +95,11 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
             raised.args = (f"{raised}; or try: pcmc repair {os.fspath(path)} -o clean.obj",)
         raise raised from None
     notes = (*data.notes, *import_warnings(data, path))
-    if not given and data.support is None:
-        notes = (*notes, NO_SUPPORTS, *([] if data.units else [NO_UNIT]))
+    if not given:
+        some = f" of {', '.join(map(repr, data.bare))}" if len(data.bare) < len(data.patches) else ""
+        values = f"tensions and pressures{some} are 1 unless given"
+        said = {NO_SUPPORTS: data.support is None, values: data.bare, NO_UNIT: data.bare and not data.units}
+        notes = (*notes, *(text for text, true in said.items() if true))
     if notes:
         warnings.warn(f"{os.fspath(path)}: {'; '.join(notes)}", FileWarning, stacklevel=3)
     return surface

@@ -43,12 +43,14 @@ class Repaired:
     changes : what was done and how often, as in {"vertices welded": 12}; empty if the mesh was clean.
     notes : other changes, a sentence each, as that the mesh was cut into new triangles.
     units : of its numbers; no unit where the file has none and none was given.
+    bare : the patches whose tension and pressure of 1 stand for none; ``write`` keeps this of a Repaired.
     """
 
     surface: Surface
     changes: Mapping[str, int]
     notes: Sequence[str] = ()
     units: Units = NO_UNITS
+    bare: Sequence[str] = ()
 
     def __str__(self) -> str:
         """The changes and notes in one line."""
@@ -151,7 +153,7 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
 
             surface = remesh(surface, edge_length)
         notes = (*notes, f"{len(F)} triangles became {surface.m}")
-    return Repaired(surface, changes, notes, data.units)
+    return Repaired(surface, changes, notes, data.units, data.bare)
 
 
 def _refuse_too_many(X: Floats, F: Ints, edge_length: float) -> None:

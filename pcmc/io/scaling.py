@@ -60,8 +60,7 @@ def converted(data: MeshData, length: str) -> MeshData:
     if factor == 1.0:
         return data
     parts = {f.name: scaled(getattr(data, f.name), factor) for f in fields(data)}
-    if data.plane is None:  # tensions and pressures are 1, in any unit
-        parts["patches"] = data.patches
+    parts["patches"] = tuple(p if p.name in data.bare else scaled(p, factor) for p in data.patches)
     parts["vertices"] = factor * np.asarray(data.vertices, dtype=np.float64)
     parts["units"] = Units(length, data.units.force)
     parts["notes"] = (*data.notes, conversion_note(data.units.length, length))

@@ -29,15 +29,11 @@ MADE = ("supports", "balance", "reactions")  # of a certificate, when they are a
 
 
 class Solved(Protocol):
-    """The result of a solver."""
+    """The result of a solver, whose certificate is written, too, or of ``repair``."""
 
     @property
     def surface(self) -> Surface:
         """The surface reached."""
-
-    @property
-    def certificate(self) -> object:
-        """Its certificate."""
 
 
 def write(
@@ -59,6 +55,7 @@ def write(
     ----------
     path : the file; ``pcmc.io.FORMATS`` lists the suffixes.
     surface : a Surface, or the result of a solver; formats that hold a certificate then get the result's.
+        Or the result of ``repair``; the file then says which patches have no tension of their own.
     scalars : (n,) or (m,) arrays by name (curvature, error, ...), for formats that hold them.
     certificate : a Certificate, or values by name, for the formats that hold it (.pcmc, .ifc).
     colour : the name in ``scalars`` of an (n,) array that colours the vertices, for formats that hold
@@ -75,6 +72,7 @@ def write(
     path = Path(path)
     check_name(path)
     form = format_of(path, FORMATS)
+    bare = getattr(surface, "bare", ())
     surface, certificate = _unpacked(surface, certificate, form)
     if not isinstance(scalars, Mapping | None):
         refuse("scalars", scalars, "arrays by name, such as {'height': [...]}")
@@ -99,8 +97,8 @@ def write(
         elif shown.m < surface.m:
             walls = encode_walls(surface, shown)
     content: dict[str, Any] = {"scalars": scalars, "colour": colour, "certificate": _values(certificate)}
-    text = metadata_text(surface, units, not form.separate, form.own, (shown.n, shown.m))
-    content |= {"walls": walls, "units": units, "metadata": text}
+    text = metadata_text(surface, units, not form.separate, form.own, (shown.n, shown.m), bare)
+    content |= {"walls": walls, "units": units, "metadata": text, "bare": bare}
     with writing(path), atomic_write(path) as temporary:
         try:
             note = form.functions.write(temporary, shown, **content)

@@ -1,4 +1,4 @@
-"""Distances of points from triangles: how far one shape is from another."""
+"""Distances of points from triangles, and how far one surface is from another."""
 
 from __future__ import annotations
 
@@ -7,7 +7,19 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
-from ..surface.geometry import Vector, add, cross, dot, norm, point, scaled, sub
+from ..surface import Surface
+from ..surface.geometry import (
+    Vector,
+    add,
+    area_vectors,
+    cross,
+    dot,
+    norm,
+    point,
+    scaled,
+    sub,
+    vertex_sums,
+)
 
 
 def distances(points: Floats, X: Floats, F: Ints) -> Floats:
@@ -25,6 +37,40 @@ def distances(points: Floats, X: Floats, F: Ints) -> Floats:
     lists = tree.query_ball_point(points, nearest + reach)  # no other triangle can be nearer
     start = np.append(0, np.cumsum([len(one) for one in lists]))
     return np.asarray(_nearest(points, X, F, start, np.concatenate(lists).astype(np.int64)))
+
+
+def difference(surface: Surface, other: Surface) -> Floats:
+    """(n,) distance of each vertex from another surface, length; positive outside it, along its normals.
+
+    The meshes may differ. Walls are no part of it, except for the vertices of walls.
+
+    >>> from pcmc import Patch
+    >>> corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0.0]])
+    >>> flat = Surface(corners, [[0, 1, 2]], [0], [Patch("roof", 1.0)], fixed=[0, 1, 2])
+    >>> lower = Surface(corners - [0, 0, 0.5], [[0, 1, 2]], [0], [Patch("roof", 1.0)], fixed=[0, 1, 2])
+    >>> difference(flat, lower).tolist(), difference(lower, flat).tolist()
+    ([0.5, 0.5, 0.5], [-0.5, -0.5, -0.5])
+    """
+    roof, other_roof = (s.faces[s.roof[s.patch_of_face]] for s in (surface, other))
+    if not (len(roof) and len(other_roof)):
+        return _away(surface.vertices, other.vertices, other.faces)
+    on_roof = np.zeros(surface.n, dtype=bool)
+    on_roof[roof] = True
+    away = np.empty(surface.n)
+    away[on_roof] = _away(surface.vertices[on_roof], other.vertices, other_roof)  # a wall may be nearer
+    away[~on_roof] = _away(surface.vertices[~on_roof], other.vertices, other.faces)
+    return away
+
+
+def _away(points: Floats, Y: Floats, F: Ints) -> Floats:
+    """(k,) signed distance of points (k,3) from the triangles F of vertices Y."""
+    if not len(points):
+        return np.empty(0)
+    away = distances(points, Y, F)
+    normal, used = vertex_sums(area_vectors(Y[F]), F, len(Y)), np.unique(F)
+    nearest = used[cKDTree(Y[used]).query(points)[1]]
+    outside = np.einsum("ij,ij->i", points - Y[nearest], normal[nearest]) >= 0.0
+    return np.where(outside, away, -away)
 
 
 @compiled

@@ -13,7 +13,10 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled
+from ..surface import Surface
+from ..surface.geometry import edge_vectors
 
+ALIKE = 0.01  # of the mean edge: panels of a family differ by at most this, where no tolerance is given
 MOST_WINDOWS = 256  # places of a cube that are tried for each family
 ROUNDS = 60  # of the search for fewer families
 WORK = 200_000_000  # triangles × families × rounds: large meshes get fewer rounds
@@ -60,6 +63,24 @@ def families(lengths: Floats, tolerance: float, apart: bool = False) -> Families
     order = orders[np.arange(len(rank)), way]
     aligned = np.take_along_axis(lengths, order, axis=1)
     return Families(_numbered(family, aligned), order, at_least)
+
+
+def family_of_face(surface: Surface) -> Floats:
+    """(m,) the family of congruent panels that each triangle belongs to, from 1; NaN for those of walls.
+
+    Edges of a family differ in length by at most ``ALIKE`` times the mean edge.
+
+    >>> from pcmc import Patch
+    >>> corners, faces = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0.0]], [[0, 1, 2], [0, 2, 3]]
+    >>> family_of_face(Surface(corners, faces, [0, 0], [Patch("roof", 1.0)], fixed=[0, 1, 2, 3])).tolist()
+    [1.0, 1.0]
+    """
+    roof = surface.roof[surface.patch_of_face]
+    family = np.full(surface.m, np.nan)
+    if roof.any():
+        lengths = np.linalg.norm(edge_vectors(surface.vertices[surface.faces[roof]]), axis=2)
+        family[roof] = 1 + families(lengths, ALIKE * float(lengths.mean())).family
+    return family
 
 
 def _canonical_orders(lengths: Floats, apart: bool) -> Ints:

@@ -336,9 +336,17 @@ def refuse_rows(
     raise SurfaceError(message, what=what, where=first, found=rows[first].tolist(), expected=expected)
 
 
-def refuse_snow(snow: float, patch: str, free: int, edge: Ints) -> NoReturn:
-    """Refuse snow as a change of pressure where edges are free; ``edge`` is the first of them."""
+def refuse_snow(snow: float, patch: str, free: int, edge: Ints, other: str = "") -> NoReturn:
+    """Refuse snow as a change of pressure where edges are free; ``edge`` is the first of them.
+
+    ``other`` is the patch beyond them if they are a seam and not free.
+    """
     i, j = edge.tolist()
+    if other:
+        text = f"snow differs between {patch!r} and {other!r}, and no wall stands there; give both the same:"
+        text += f" {other!r} = {{snow = {snow:g}}} under patches in a project, or --snow {other!r}={snow:g},"
+        text += f" or retensioned(snows={{{other!r}: {snow:g}}})"
+        raise SurfaceError(text, what="snow", where=(i, j))
     text = (
         f"snow: {free} edges are free or the end of it, the first from vertex {i} to {j}, and there a change"
     )

@@ -387,8 +387,13 @@ class Surface:
         """The surface itself; SurfaceError where its snow ends at a free edge, as in ``with_snow``."""
         edges = np.flatnonzero(self._uncancelled(self.snows))
         if len(edges):
-            patch = self.patches[int(np.argmax(np.abs(self.snows)))]
-            checks.refuse_snow(patch.snow, patch.name, len(edges), self.topology.edges[edges[0]])
+            topo, first = self.topology, edges[0]
+            beside = np.unique(self.patch_of_face[(topo.edge_of_face == first).any(axis=1)])
+            seam = (topo.seam_edge & ~topo.one_way_edge)[edges].all() and not self.walls[beside].any()
+            some = [self.patches[k] for k in beside] if seam else self.patches
+            most, *others = sorted(some, key=lambda patch: -abs(patch.snow))
+            step = others[0].name if seam else ""
+            checks.refuse_snow(most.snow, most.name, len(edges), topo.edges[first], step)
         return self
 
     def __copy__(self) -> Surface:
