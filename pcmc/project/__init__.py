@@ -35,6 +35,7 @@ rooms below it. A file becomes a ``Project`` (``load``, which meshes nothing), i
     report = "roof.pdf"
 """
 
+from ..structure.wanted import Structure
 from .cache import cached_files
 from .cache import clear as clear_cache
 from .cache import folder as cache_folder
@@ -50,7 +51,6 @@ from .remeshing import Remeshing
 from .running import run, run_project, surface_files
 from .solving import solve_project
 from .start import Start, build, start_of, surface_of
-from .structure import Structure
 from .varied import check_varied, digest, varied
 
 __all__ = [

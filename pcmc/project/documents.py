@@ -16,8 +16,8 @@ from ..drawings.drawing_set import check_suffix as check_drawing
 from ..drawings.sheet import FORMATS
 from ..panels import Panels
 from ..report.document import check_suffix as check_report
+from ..structure.wanted import Structure
 from .output import Works
-from .structure import Structure
 
 CSV, INP = ".csv", ".inp"
 SINGLE = ("panels", "structure", "report")  # keys of one file each

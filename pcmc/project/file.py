@@ -22,6 +22,7 @@ from ..base.files import check_name, check_regular, system_error
 from ..base.units import NO_UNITS, Units, size_note
 from ..plan import Plan, plan_from
 from ..solvers import find_method
+from ..structure.wanted import Structure
 from .accuracy import AccuracyWanted, take_accuracy
 from .checking import check_keys, line_with
 from .documents import Documents, documents_of
@@ -29,7 +30,6 @@ from .drawn import Chosen, is_drawing, with_drawing
 from .mesh import MeshFile, mesh_file, mesh_of
 from .output import check_names, check_picture
 from .remeshing import Remeshing, remeshing
-from .structure import Structure
 
 if TYPE_CHECKING:
     from ..design import Parameter, Target

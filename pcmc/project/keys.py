@@ -18,13 +18,13 @@ from ..meshing.walls import EDGES
 from ..plan import Area, CableLine, Divider, Hole, Plan
 from ..plan.parts import BALANCED, BOTTOMS, RoomData
 from ..solvers import METHODS, find_method
+from ..structure.wanted import Structure
 from ..surface import Plane
 from .accuracy import AccuracyWanted
 from .documents import Documents
 from .mesh import PATCH_KEYS, MeshFile
 from .output import COLOURS
 from .remeshing import WHEN, Remeshing
-from .structure import Structure
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
 WHOLE = "whether to write and draw the whole roof that a plan with mirrors is a part of, and to certify it"

@@ -1,4 +1,4 @@
-"""The structural model that a project describes."""
+"""What a structural model is made of: material, thickness and loads, as a project or a command gives them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..solvers.result import Result
-from ..structure import Material, SelfWeight, Snow, StructuralModel, Wind
-from ..structure.cables import checked_areas
-from ..structure.loads import Load, check_loads
-from ..structure.model import checked_thickness
 from ..surface import Surface
+from .cables import checked_areas
+from .loads import Load, SelfWeight, Snow, Wind, check_loads
+from .model import Material, StructuralModel, checked_thickness
 
 
 @dataclass(frozen=True)
