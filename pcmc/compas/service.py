@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import os
 import warnings
 from collections.abc import Mapping
-from enum import Enum
 from typing import Any
 
-import numpy as np
-import pandas as pd
-
 from .. import certificate, existence, io
+from ..base.plain import plain
 from ..certificate import Certificate
 from ..surface import Surface
 from .meshes import from_meshes, to_meshes
@@ -100,17 +96,4 @@ def _plain_certificate(found: Certificate) -> dict[str, Any]:
     """Its findings as JSON has them."""
     tables = {name: getattr(found, name) for name in ("patches", "junctions", "boundaries", "supports")}
     values = {"certified": found.certified, **found.numbers(), "detail": found.detail, **tables}
-    return {name: _plain(value) for name, value in values.items()}
-
-
-def _plain(value: Any) -> Any:
-    """The value in the types of JSON, which has no NaN and no infinity."""
-    if isinstance(value, pd.DataFrame):
-        return [{k: _plain(v) for k, v in row.items()} for row in value.to_dict(orient="records")]
-    if isinstance(value, np.ndarray | list | tuple):
-        return [_plain(one) for one in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, Enum):
-        return value.name.lower()
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return {name: plain(value) for name, value in values.items()}

@@ -8,12 +8,13 @@ arrays      one after another, little-endian, 4 bytes a number: "f" float32, "u"
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from ..base.plain import plain
 
 KINDS = {"f": "<f4", "u": "<u4"}
 
@@ -44,16 +45,3 @@ def unpack(message: bytes) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]
         arrays[name] = np.frombuffer(message, KINDS[kind], count, start)
         start += 4 * count
     return header, arrays
-
-
-def plain(value: Any) -> Any:
-    """The value in terms of JSON; numbers that are not finite become None."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

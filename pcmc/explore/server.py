@@ -25,6 +25,7 @@ from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
 from ..base.errors import FileWarning, MissingExtra, PcmcError, SurfaceError, unknown
+from ..base.plain import plain
 from ..io import FORMATS, write
 from ..project import load
 from ..project.output import fields as written_fields
@@ -32,7 +33,7 @@ from ..project.values import values_of
 from ..surface import Surface
 from . import requests, saving
 from .listening import LOOPBACK, Listener, listen
-from .messages import pack, plain
+from .messages import pack
 from .own_way import OwnWay
 from .page_data import (
     aims_data,
