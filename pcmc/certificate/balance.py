@@ -15,7 +15,7 @@ from ..surface.topology import Curve
 from ..surface.wall_tensions import balanced_wall
 from .proof import UnbalancedJunction, Unheld
 
-COARSE = 0.05  # of the loads: more than this left over is said with what to do
+COARSE = 0.05  # of the loads: above this the sentence about the balance adds a hint to refine
 HARDLY = 0.99  # of the sum of the others: at such a largest tension two sheets meet at about 20°
 FORCE, MOMENT = (tuple(f"{kind}_{axis}" for axis in "xyz") for kind in ("force", "moment"))
 

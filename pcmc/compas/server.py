@@ -189,7 +189,7 @@ class Handler(SimpleXMLRPCRequestHandler):
         """Print nothing: ``Proxy`` never reads what its server prints, and a full pipe would stop it."""
 
 
-class LoopbackServer(ThreadingMixIn, Server):  # type: ignore[misc]
+class LoopbackServer(ThreadingMixIn, Server):
     """The server on the loopback; a silent connection does not keep others from being answered."""
 
     daemon_threads = True
@@ -238,7 +238,7 @@ class Dispatcher:
         return function(*bound.args, **bound.kwargs)
 
 
-class MeshDecoder(DataDecoder):  # type: ignore[misc]
+class MeshDecoder(DataDecoder):
     """Decodes meshes. Any other object stays a dict: COMPAS would import the module that it names."""
 
     def object_hook(self, o: dict[str, Any]) -> Any:

@@ -249,7 +249,7 @@ class Outcome:
         return self.project.mesh_check if wanted is None and self.project is not None else wanted
 
     def wants_mesh_check(self, wanted: bool | None = None) -> bool:
-        """The same, where nothing is said up to 20 000 triangles; never of a surface that is not at rest."""
+        """The same, with a default: surfaces of up to 20 000 triangles. Only surfaces at rest are checked."""
         asked = self.mesh_check_wanted(wanted)
         small = self.shown.surface.m <= MOST_CHECKED
         return self.certificate.index is not None and (small if asked is None else asked)

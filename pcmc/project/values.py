@@ -316,17 +316,20 @@ def _rounded(points: Floats) -> list[list[float]]:
 
 def _entry(plan: dict[str, Any], project: Project, source: Source) -> dict[str, Any]:
     """The table of a line in the data of a plan; one for a line of the drawing is added if it is missing."""
-    entries, number = plan.setdefault(source.where, []), source.number
+    entries: list[Any] = plan.setdefault(source.where, [])
+    number = source.number
     drawn = {} if project.drawing is None else getattr(project.drawing, source.where, {})
     if number < len(drawn):
         name = list(drawn)[number]
         for entry in entries:
-            if isinstance(entry, Mapping) and entry.get("name") == name and "curve" not in entry:
-                return entry  # type: ignore[return-value]
-        entries.append({"name": name})
-        return entries[-1]  # type: ignore[no-any-return]
+            if isinstance(entry, dict) and entry.get("name") == name and "curve" not in entry:
+                return entry
+        added = {"name": name}
+        entries.append(added)
+        return added
     own = [k for k, e in enumerate(entries) if not drawn or not isinstance(e, Mapping) or "curve" in e]
     place = own[number - len(drawn)]
-    if not isinstance(entries[place], Mapping) or "curve" not in entries[place]:
-        entries[place] = {"curve": entries[place]}
-    return entries[place]  # type: ignore[no-any-return]
+    table = entries[place]
+    if not isinstance(table, dict) or "curve" not in table:
+        entries[place] = table = {"curve": table}
+    return table

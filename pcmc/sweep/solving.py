@@ -106,7 +106,7 @@ def row(result: Result, names: Container[str], outcome: Outcome | None = None) -
     """The answer of a case: see ``solve_case``. ``names`` are the names of its parameters.
 
     With the ``outcome`` of a project it is that of the roof shown, which may be the whole of one between
-    mirror planes; ``extent`` says so. Where nothing is at rest such a row has no number of the shape.
+    mirror planes: see the column ``extent``. Without an equilibrium the row has no numbers of the shape.
     """
     from ..quantities import figures  # takes long to import
 
