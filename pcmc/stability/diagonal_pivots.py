@@ -1,14 +1,14 @@
 """The inertia of a matrix from pivots on its diagonal, guarded: a tiny pivot may make signs wrong in silence.
 
 SuperLU keeps pivots on the diagonal and gives P A Pᵀ ≈ L U. The signs of D = diag(U) are the inertia of
-L D Lᵀ (Sylvester), which rounding may set far apart from A where a pivot is small beside its column. Both have
+L D Lᵀ (Sylvester), which rounding sets far apart from A where a pivot is small beside its column. Both have
 the same inertia if no matrix between them is singular: with M = I - A (L D Lᵀ)⁻¹ the matrices
 (I - t M) L D Lᵀ, t from 0 to 1, are regular while ‖M‖ < 1. That is, if refinement by L D Lᵀ converges.
 
-``M b`` for b with standard normal entries costs one pass over L, one over Lᵀ and a product with A. If ‖M‖ ≥ 1,
-the part of b along the strongest input of M is a standard normal number g, and ‖M b‖ ≥ |g|: the chance that
-‖M b‖ < 1e-6 all the same is 8e-7. Where one vector does not pass, eight with ‖M b‖ < 0.05 must: chance 6e-12.
-These vectors are always the same. This is a guard; a theorem is what ``pcmc.verify`` gives.
+``M b`` for b with standard normal entries costs one pass over L, one over Lᵀ and a product with A. If
+‖M‖ ≥ 1, then ‖M b‖ ≥ |g|, g the part of b along the strongest input of M, a standard normal number: the
+chance that ‖M b‖ < 1e-6 all the same is 8e-7. Where one b does not pass, eight with ‖M b‖ < 0.05 must:
+chance 6e-12. The vectors are always the same. This is a guard; a theorem is what ``pcmc.verify`` gives.
 """
 
 from __future__ import annotations
@@ -37,8 +37,9 @@ def count_negative(matrix: csc_array, lu: Any, factorise: Callable[[csc_array], 
     """Number of negative eigenvalues of a symmetric matrix A with the factors ``lu``, made by ``factorise``.
 
     Where its pivots are refused, those too small are strengthened: B = A + C Σ Cᵀ with C = (√|δ_i| e_i)
-    and Σ = diag(sign δ_i), |δ_i| twice the sum of row i, so that its pivot dominates. Haynsworth's rule on [[B, C], [Cᵀ, Σ]], whose
-    Schur complements are A and Σ - CᵀB⁻¹C, gives  neg A = neg B + neg(Σ - CᵀB⁻¹C) - neg Σ.
+    and Σ = diag(sign δ_i), |δ_i| twice the sum of row i, so that its pivot dominates. Haynsworth's rule on
+    [[B, C], [Cᵀ, Σ]], whose Schur complements are A and Σ - CᵀB⁻¹C, takes that back:
+    neg A = neg B + neg(Σ - CᵀB⁻¹C) - neg Σ.
 
     Raises
     ------

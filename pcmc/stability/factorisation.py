@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
@@ -33,6 +33,7 @@ from ..energy.pattern import Pattern
 from .diagonal_pivots import ZERO, SingularMatrix, count_negative
 
 __all__ = ("BACKENDS", "Factor", "Factoriser", "SingularMatrix", "available", "factoriser")
+Ordering = Literal["MMD_AT_PLUS_A", "NATURAL"]
 BACKENDS = ("pardiso", "superlu")
 OUTDATED = (
     "this factorisation is out of date: its factoriser has made another one since; factorise its matrix"
@@ -154,7 +155,7 @@ class _SuperLU:
         off = rows != pattern.indices
         lower = csr_array((entry[off], (pattern.indices[off], rows[off])), shape=upper.shape)
         self._full = csr_array(upper + lower)
-        self._ordering = "MMD_AT_PLUS_A"
+        self._ordering: Ordering = "MMD_AT_PLUS_A"
         empty = np.empty(0, dtype=np.int32)
         self._arrange(reverse_cuthill_mckee(self._full, symmetric_mode=True) if pattern.size else empty)
 
@@ -180,7 +181,7 @@ class _SuperLU:
         return factor
 
 
-def _superlu(matrix: csc_array, ordering: str = "MMD_AT_PLUS_A") -> Any:
+def _superlu(matrix: csc_array, ordering: Ordering = "MMD_AT_PLUS_A") -> Any:
     """L and U with pivots on the diagonal, unless one is zero."""
     return splu(matrix, ordering, 0.0, panel_size=4, options={"SymmetricMode": True})
 
