@@ -7,9 +7,9 @@ triangle of tension α, weight w and pressure p acts like one of tension τ = α
     ⟨b_i, ∂²E/∂i∂j b_j⟩ = τ (e_i·e_j)/(4A) ⟨b_i,ν⟩⟨b_j,ν⟩ + ⟨p x_k/6 - ½ τ ν, b_j × b_i⟩
                           + w (⟨b_i,g_i⟩⟨n,b_j⟩ + ⟨b_i,n⟩⟨g_j,b_j⟩)/3,      g_i = ½ ν × e_i
 
-(without the skew part for j = i). A flat piece that closes a volume on a plane, -p ⟨c, a × b⟩/6 with its apex
-c, is a triangle b, a, c of pressure p alone whose third corner does not move. A cable edge of direction t adds
-±τ t and ±τ (1 - t tᵀ)/ℓ.
+(without the skew part for j = i). A flat piece that closes a volume on a plane, -p ⟨c, a × b⟩/6 with its
+apex c, is a triangle b, a, c of pressure p alone whose third corner does not move. A cable edge of direction t
+adds ±τ t and ±τ (1 - t tᵀ)/ℓ.
 """
 
 from __future__ import annotations
@@ -66,7 +66,8 @@ class Elements(NamedTuple):
 
 def elements(surface: Surface, classes: VertexClasses, pattern: Pattern) -> Elements:
     """The elements of a standing part at its own vertices."""
-    F, offset, patch, X = classes.faces, pattern.offset, classes.patch_of_face, surface.vertices
+    F: Ints = classes.faces
+    offset, patch, X = pattern.offset, classes.patch_of_face, surface.vertices
     tension, weight = surface.tensions[patch], surface.weights[patch]
     corner, push = np.empty(0, dtype=np.int64), np.empty((0, 3))
     if pieces := flat_pieces(surface):

@@ -1,18 +1,20 @@
-"""The equations of an equilibrium in frozen frames, enclosed: their value, their matrix, and how fast it changes.
+"""The equations of an equilibrium in frozen frames, enclosed: their value, matrix, and how fast it changes.
 
 Unknowns are s (N,), the motion X₀ + B₀ s, and, where rooms prescribe volumes, their pressures δ = κ η:
 
-    F(s, η) = (B₀ᵀ ∇(E - Σ δ_r V_r),  -κ_r (V_r - V̄_r))        K = DF = [[A, -κ C], [-κ Cᵀ, 0]],  C = B₀ᵀ ∇V
+    F(s, η) = (B₀ᵀ ∇(E - Σ δ_r V_r),  -κ_r (V_r - V̄_r))
+    K = DF  = [[A, -κ C], [-κ Cᵀ, 0]],    C = B₀ᵀ ∇V
 
-F is the gradient of E - Σ δ_r (V_r - V̄_r), so K is symmetric. κ is a power of two, and makes the new columns about
-as large as the diagonal of A. With K regular, C has full rank, and A has on the motions that keep the volumes
-(Cᵀ s = 0) as many negative eigenvalues as K less r (Haynsworth). If such a motion v has Av = μv + Cy, then K
-takes (v, y/κ) to (μ v, 0): so no μ is nearer to zero than the eigenvalues of K.
+F is the gradient of E - Σ δ_r (V_r - V̄_r), so K is symmetric. κ is a power of two, and makes the new columns
+about as large as the diagonal of A. With K regular, C has full rank, and A has on the motions that keep the
+volumes (Cᵀ s = 0) as many negative eigenvalues as K less r (Haynsworth). If such a motion v has Av = μv + Cy,
+then K takes (v, y/κ) to (μ v, 0): so no μ is nearer to zero than the eigenvalues of K.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.sparse import block_array, csr_array, eye_array
@@ -107,7 +109,8 @@ def _bordered(pattern: Pattern, values: Floats, columns: Floats) -> tuple[Patter
     """The upper triangle of [[A, C], [Cᵀ, 0]] with the zeros of its last diagonal."""
     corner = eye_array(columns.shape[1], format="csr")
     corner.data[:] = 0.0
-    upper = csr_array(block_array([[pattern.matrix(values), csr_array(columns)], [None, corner]]))
+    blocks: Any = [[pattern.matrix(values), csr_array(columns)], [None, corner]]
+    upper = csr_array(block_array(blocks))
     upper.sort_indices()
     return Pattern(upper.indptr, upper.indices, pattern.offset), upper.data
 

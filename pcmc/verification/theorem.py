@@ -5,17 +5,17 @@ function E(X₀ + B₀ s). Its exact gradient f(s) = B₀ᵀ∇E and Hessian A(s
 rounding (``enclosures``; where rooms prescribe volumes, with their pressures among the unknowns: ``system``).
 
 - **Gap and index.** A float matrix Â is within a of A(0). Let Â ∓ σ = L D Lᵀ + R with ‖R‖ ≤ ρ
-  (``stability.backward_error``). By Sylvester and Weyl, A(0) has at least as many negative eigenvalues below
-  -(σ - ρ - a) as D has negative entries for Â + σ, and at most as many below σ - ρ - a as D has for Â - σ. Are
-  both k, then k is the index, no eigenvalue is within g = σ - ρ - a of zero, and ‖A(0)⁻¹‖ ≤ β = 1/g.
-- **Existence.** With ‖A(s) - A(s')‖ ≤ L |s - s'| on the ball |s| ≤ r₀ (``lipschitz``) and h = β² L ‖f(0)‖ ≤ ½,
-  Newton and Kantorovich give a zero of f within (1 - √(1 - 2h))/(β L) = 2β‖f(0)‖/(1 + √(1 - 2h)) of 0, if that
-  is at most r₀, and no other one within min(r₀, (1 + √(1 - 2h))/(β L)).
+  (``stability.backward_error``) and g = σ - ρ - a > 0. By Sylvester and Weyl, A(0) has at least as many
+  eigenvalues below -g as D has negative entries for Â + σ, and at most as many below g as D has for Â - σ. If
+  both are k, that is the index, no eigenvalue is within g of zero, and ‖A(0)⁻¹‖ ≤ β = 1/g.
+- **Existence.** With ‖A(s) - A(s')‖ ≤ L |s - s'| on the ball |s| ≤ r₀ (``lipschitz``) and
+  h = β² L ‖f(0)‖ ≤ ½, Newton and Kantorovich give a zero of f within 2β‖f(0)‖/(1 + √(1 - 2h)) of 0, if that is
+  at most r₀, and no other one within min(r₀, (1 + √(1 - 2h))/(β L)).
 - **Index there.** A(s*) differs by L |s*| at most, so no eigenvalue is within g - L |s*| of zero, and the
-  index is the same. Since h ≤ ½, L |s*| ≤ g.
-- **Walls that rest.** Of the standing part this is the whole of it. A vertex that rests on Π or a held bottom
-  does so for the surface if the pull on it is less than its wall can take. Both are enclosed, and the pull
-  changes by the norm of its row of ∇²E times |s*| at most.
+  index is the same if that is positive.
+- **Walls that rest.** All this is about the standing part. A vertex that rests on Π or on a held bottom does
+  so at the exact equilibrium, too, if the pull on it is less than its wall can take. Both are enclosed there: the
+  pull changes by the norm of its row of ∇²E times |s*| at most.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ class Theorem:
         root of the sum of the squares of all.
     unique_within : there is no other one within this distance, in the same norm and frames.
     index : the Morse index of the exact equilibrium.
-    gap : no eigenvalue of B₀ᵀ∇²E B₀ there is within this of zero, force/length; where rooms prescribe volumes,
-        among motions that keep these.
+    gap : no eigenvalue of B₀ᵀ∇²E B₀ there is within this of zero, force/length; where rooms prescribe
+        volumes, among motions that keep these.
     beta, lipschitz, forces : β, length/force, L, force/length², and the bound of ‖f(0)‖, force.
     """
 
@@ -128,8 +128,8 @@ def _proved(surface: Surface) -> Theorem:
     h = beta * beta * rate * found.residual * SAFE
     if not h <= 0.5:
         raise _Unproved(
-            f"β² L |f| = {h:.2g} is above ½ (β {beta:.2g}, L {rate:.2g}, |f| {found.residual:.1e}): solve to a"
-            " smaller tolerance, or improve the thinnest triangles"
+            f"β² L |f| = {h:.2g} is above ½ (β {beta:.2g}, L {rate:.2g}, |f| {found.residual:.1e}): solve to"
+            " a smaller tolerance, or improve the thinnest triangles"
         )
     root = np.sqrt(1.0 - 2.0 * h) / SAFE
     radius = first / (1.0 + root) * _stretch(space) * SAFE
@@ -168,15 +168,16 @@ def _refuse_moving(part: StandingPart, found: System) -> None:
 def _inertia(found: System) -> tuple[int, float]:
     """The Morse index, and g: no eigenvalue of K is within g of zero."""
     pattern, data, rooms = found.pattern, found.matrix, len(found.scales)
-    rough = factoriser(pattern).factor(data)
+    solver = factoriser(pattern, "superlu")
+    rough = solver.factor(data)
     x = np.cos(1.618 * np.arange(pattern.size))
     for _ in range(STEPS):
         x = rough.solve(x / np.linalg.norm(x))
     sigma, reason = SHARE / float(np.linalg.norm(x)), ""
     diagonal = pattern.indptr[:-1]
-    solver = factoriser(pattern, "superlu")
     for _ in range(TRIES):
-        counts, errors = [], [0.0]
+        counts: list[int] = []
+        errors = [0.0]
         for shift in (-sigma, sigma):
             if shift < 0.0 or counts[0] > 0:
                 moved = data.copy()
@@ -234,7 +235,7 @@ def _words(
     kept = " that keep the volumes" if surface.rooms else ""
     rest = "" if spare is None else f" Its walls rest where these do, with {100.0 * spare:.2g} % to spare."
     return (
-        f"Proved: within {radius:.1e} of these vertices there is an exact equilibrium of the mesh, and no other"
-        f" within {unique:.1e}. Its Morse index is exactly {index}{motions}: no eigenvalue of B₀ᵀ∇²E B₀"
+        f"Proved: within {radius:.1e} of these vertices there is an exact equilibrium of the mesh, and no"
+        f" other within {unique:.1e}. Its Morse index is exactly {index}{motions}: no eigenvalue of B₀ᵀ∇²E B₀"
         f"{', among motions' + kept if kept else ''} is within {gap:.2g} of zero.{rest}"
     )
