@@ -1,7 +1,7 @@
 """Ball arithmetic for compiled loops: a number is (value, radius), and the exact one is within the radius.
 
-With u = 2⁻⁵³ each operation of floating point is off by at most u times its result; products and quotients may
-lose 2⁻¹⁰²² more by underflow. For exact a ∈ A ± α, b ∈ B ± β:
+With u = 2⁻⁵³ each operation of floating point is off by at most u times its result; products and quotients
+may lose 2⁻¹⁰²² more by underflow. For exact a ∈ A ± α, b ∈ B ± β:
 
     |ab - AB| ≤ |A| β + α (|B| + β)          |1/a - 1/A| ≤ α / (|A| (|A| - α)),  here for α ≤ |A|/2
     |√a - √A| ≤ α / √A,  A > 0

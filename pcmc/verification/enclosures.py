@@ -8,8 +8,8 @@ triangle of tension α, weight w and pressure p acts like one of tension τ = α
                           + w (⟨b_i,g_i⟩⟨n,b_j⟩ + ⟨b_i,n⟩⟨g_j,b_j⟩)/3,      g_i = ½ ν × e_i
 
 (without the skew part for j = i). A flat piece that closes a volume on a plane, -p ⟨c, a × b⟩/6 with its
-apex c, is a triangle b, a, c of pressure p alone whose third corner does not move. A cable edge of direction t
-adds ±τ t and ±τ (1 - t tᵀ)/ℓ.
+apex c, is a triangle b, a, c of pressure p alone whose third corner does not move. A cable edge of direction
+t adds ±τ t and ±τ (1 - t tᵀ)/ℓ.
 """
 
 from __future__ import annotations
@@ -82,10 +82,11 @@ def elements(surface: Surface, classes: VertexClasses, pattern: Pattern) -> Elem
         tension, weight = np.append(tension, 0.0 * f), np.append(weight, 0.0 * f)
         corner, push = pieces.end, pieces.normal
     plane, (ends, pull) = surface.plane, surface.cable_edges
-    F, offset, patch, ends = (np.array(part, dtype=np.int64) for part in (F, offset, patch, ends))
+    whole = [np.array(part, dtype=np.int64) for part in (F, offset, patch)]
     pressure, pull = surface.net_pressures[patch], np.array(pull)
+    ends = np.array(ends, dtype=np.int64)
     at = np.array(surface.origin), np.array(plane.point), np.array(plane.normal)
-    return Elements(np.array(X), F, offset, patch, tension, weight, pressure, *at, ends, pull, corner, push)
+    return Elements(np.array(X), *whole, tension, weight, pressure, *at, ends, pull, corner, push)
 
 
 def forces(items: Elements, pressures: Floats) -> tuple[Floats, Floats]:

@@ -9,13 +9,13 @@ rounding (``enclosures``; where rooms prescribe volumes, with their pressures am
   eigenvalues below -g as D has negative entries for Â + σ, and at most as many below g as D has for Â - σ. If
   both are k, that is the index, no eigenvalue is within g of zero, and ‖A(0)⁻¹‖ ≤ β = 1/g.
 - **Existence.** With ‖A(s) - A(s')‖ ≤ L |s - s'| on the ball |s| ≤ r₀ (``lipschitz``) and
-  h = β² L ‖f(0)‖ ≤ ½, Newton and Kantorovich give a zero of f within 2β‖f(0)‖/(1 + √(1 - 2h)) of 0, if that is
-  at most r₀, and no other one within min(r₀, (1 + √(1 - 2h))/(β L)).
+  h = β² L ‖f(0)‖ ≤ ½, Newton and Kantorovich give a zero of f within 2β‖f(0)‖/(1 + √(1 - 2h)) of 0, if
+  that is at most r₀, and no other one within min(r₀, (1 + √(1 - 2h))/(β L)).
 - **Index there.** A(s*) differs by L |s*| at most, so no eigenvalue is within g - L |s*| of zero, and the
   index is the same if that is positive.
 - **Walls that rest.** All this is about the standing part. A vertex that rests on Π or on a held bottom does
-  so at the exact equilibrium, too, if the pull on it is less than its wall can take. Both are enclosed there: the
-  pull changes by the norm of its row of ∇²E times |s*| at most.
+  so at the exact equilibrium, too, if the pull on it is less than its wall can take. Both are enclosed there:
+  the pull changes by the norm of its row of ∇²E times |s*| at most.
 """
 
 from __future__ import annotations
