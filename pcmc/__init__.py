@@ -37,8 +37,9 @@ if TYPE_CHECKING:
     from .continuation import BoundaryMotion, Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
     from .energy.curvature import curvature_error, mean_curvature, target_curvature
-    from .energy.functional import energy, gradient, hessian
+    from .energy.functional import energy, gradient
     from .energy.rooms import room_volume_gradients, room_volumes
+    from .energy.second_variation import hessian
     from .existence import solve
     from .io import read, write
     from .io.repairing import Repaired, repair
@@ -110,7 +111,8 @@ _NAMES = {
     "continuation": ("BoundaryMotion", "Direction", "follow"),
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
     "energy.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
-    "energy.functional": ("energy", "gradient", "hessian"),
+    "energy.functional": ("energy", "gradient"),
+    "energy.second_variation": ("hessian",),
     "energy.rooms": ("room_volume_gradients", "room_volumes"),
     "existence": ("solve",),
     "io": ("read", "write"),
