@@ -9,6 +9,7 @@ energy                     E with its derivatives, and its curvature
 contact meshing            walls that pinch; triangulation, walls of a mesh, better and finer triangles
 io plan                    surfaces from and to files; surfaces from the lines of a plan
 stability certificate      lowest modes and Morse index; the verdict on a finished surface
+verification               a theorem for a surface at rest, proved in floating point
 quantities                 what is measured on a roof: names, units, key figures
 solvers                    the paper's flow, L-BFGS, and the geometric Newton solver
 design                     tensions that meet targets
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     from .panels import FewerFamilies, Panels, fewer_families, panels
     from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
     from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
+    from .verification import Theorem, verify
 
 __all__ = [
     "BoundaryMotion",
@@ -72,6 +74,7 @@ __all__ = [
     "StructuralModel",
     "Surface",
     "Target",
+    "Theorem",
     "Verdict",
     "Wind",
     "certify",
@@ -99,6 +102,7 @@ __all__ = [
     "solve",
     "solve_to_accuracy",
     "target_curvature",
+    "verify",
     "write",
     "write_structure",
 ]
@@ -129,6 +133,7 @@ _NAMES = {
     "margins": ("Margin", "margin"),
     "panels": ("FewerFamilies", "Panels", "fewer_families", "panels"),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
+    "verification": ("Theorem", "verify"),
 }
 
 
