@@ -89,9 +89,11 @@ class Team:
             self.all.append(process)
         try:
             process.call(SCRIPT, "load", case)
-        except ChildError as error:
+        except BaseException as error:
             with self.lock:
                 self._drop(process)
+            if not isinstance(error, ChildError):
+                raise
             problem = f"a worker on {platform.node()} cannot load the case {case!r};"
             problem += f" install its package where the workers run:\n{error.output.strip()}"
             raise SweepError(problem, what=case, where=platform.node()) from None
