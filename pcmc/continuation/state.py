@@ -19,13 +19,13 @@ from ..energy.functional import (
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..energy.pattern import Pattern, hessian_pattern
-from ..energy.projected_hessian import assemble
 from ..energy.rooms import (
     prescribed_volumes,
     volume_gradients_at,
     volumes_at,
     with_room_pressures,
 )
+from ..energy.second_variation import assemble
 from ..energy.volume_below import volume_below_gradient, volumes_below
 from ..meshing.quality import worst_quality
 from ..solvers.smoother import HarmonicExtension
