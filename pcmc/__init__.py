@@ -9,6 +9,7 @@ energy                     E with its derivatives, and its curvature
 contact meshing            walls that pinch; triangulation, walls of a mesh, better and finer triangles
 io plan                    surfaces from and to files; surfaces from the lines of a plan
 stability certificate      lowest modes and Morse index; the verdict on a finished surface
+verification               a theorem for a surface at rest, proved in floating point
 quantities                 what is measured on a roof: names, units, key figures
 solvers                    the paper's flow, L-BFGS, and the geometric Newton solver
 design                     tensions that meet targets
@@ -36,14 +37,16 @@ if TYPE_CHECKING:
     from .continuation import BoundaryMotion, Direction, follow
     from .design import Design, Parameter, Target, meet, sensitivities
     from .energy.curvature import curvature_error, mean_curvature, target_curvature
-    from .energy.functional import energy, gradient, hessian
+    from .energy.functional import energy, gradient
     from .energy.rooms import room_volume_gradients, room_volumes
+    from .energy.second_variation import hessian
     from .existence import solve
     from .io import read, write
     from .io.repairing import Repaired, repair
     from .panels import FewerFamilies, Panels, fewer_families, panels
     from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
     from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
+    from .verification import Theorem, verify
 
 __all__ = [
     "BoundaryMotion",
@@ -68,6 +71,7 @@ __all__ = [
     "StructuralModel",
     "Surface",
     "Target",
+    "Theorem",
     "Verdict",
     "Wind",
     "certify",
@@ -94,6 +98,7 @@ __all__ = [
     "solve",
     "solve_to_accuracy",
     "target_curvature",
+    "verify",
     "write",
     "write_structure",
 ]
@@ -106,7 +111,8 @@ _NAMES = {
     "continuation": ("BoundaryMotion", "Direction", "follow"),
     "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
     "energy.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
-    "energy.functional": ("energy", "gradient", "hessian"),
+    "energy.functional": ("energy", "gradient"),
+    "energy.second_variation": ("hessian",),
     "energy.rooms": ("room_volume_gradients", "room_volumes"),
     "existence": ("solve",),
     "io": ("read", "write"),
@@ -122,6 +128,7 @@ _NAMES = {
     ),
     "panels": ("FewerFamilies", "Panels", "fewer_families", "panels"),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
+    "verification": ("Theorem", "verify"),
 }
 
 

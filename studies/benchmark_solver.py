@@ -19,7 +19,7 @@ from pcmc.base.arrays import Floats
 from pcmc.energy.functional import energy_and_gradient
 from pcmc.energy.motion_space import VertexClasses, motion_space, vertex_classes
 from pcmc.energy.pattern import Pattern, hessian_pattern
-from pcmc.energy.projected_hessian import assemble
+from pcmc.energy.second_variation import assemble
 from pcmc.stability.factorisation import Factoriser, available, factoriser
 
 from . import evolver

@@ -7,7 +7,7 @@ from motion_cases import SURFACES, seam
 from pcmc import hessian
 from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.energy.pattern import hessian_pattern
-from pcmc.energy.projected_hessian import assemble
+from pcmc.energy.second_variation import assemble
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 

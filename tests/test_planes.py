@@ -18,14 +18,13 @@ from pcmc.energy.functional import (
     apply_supports,
     energy_and_gradient,
     energy_at,
-    hessian,
     patch_volumes,
     weighted,
 )
 from pcmc.energy.jacobian import linearise
 from pcmc.energy.motion_space import motion_space, vertex_classes
 from pcmc.energy.pattern import hessian_pattern
-from pcmc.energy.projected_hessian import assemble
+from pcmc.energy.second_variation import assemble, hessian
 from pcmc.meshing.local_refinement import refine_faces
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh

@@ -7,13 +7,17 @@ import pytest
 from design_cases import changed
 
 import pcmc
-from generators import catenoid, four_fans, spherical_cap, two_caps, two_squares
+from generators import catenoid, double_bubble, four_fans, spherical_cap, two_caps, two_squares
 from pcmc import Parameter, Patch, Plane, Target
+from pcmc.accuracy.quantities import given_volume
 from pcmc.design.targets import measure
 from pcmc.energy.functional import patch_volumes, volume
 from pcmc.energy.volume_below import volume_below, volume_below_gradient, volumes_below
 from pcmc.plan import Divider, Plan
+from pcmc.quantities import figures
 from pcmc.surface.geometry import area_vectors
+from pcmc.sweep.solving import row
+from studies.forces_cases import tube
 
 TIGHT = {"tolerance": 1e-13, "min_quality": 0.0}
 
@@ -84,11 +88,64 @@ def test_a_roof_raised_over_the_plane_has_more_volume_by_the_area_of_its_plan():
     assert volume(high) < 0.6 * expected
 
 
+def test_a_room_between_plates_does_not_prescribe_the_volume_over_the_plane():
+    """A tube between level plates has none over Π but where it bulges; its room has all that it encloses."""
+    enclosed = pcmc.solve(tube(0.4, 2.0), target="stationary").surface
+    assert given_volume(enclosed) is None
+    assert abs(volume_below(enclosed)) < 0.01 * enclosed.rooms[0].volume
+    bubbles = pcmc.solve(double_bubble(0.6, volumes=(1.0, 0.7))).surface
+    assert given_volume(bubbles) == pytest.approx(1.7) == volume_below(bubbles)
+
+
 def test_films_without_pressure_have_the_volume_of_the_target():
     film = catenoid(half=True)
     assert film.auxiliary.all()
     assert film.roof.all()
     assert pcmc.certify(film).volume == measure(film, Target("volume")).value != 0.0
+
+
+def cap(**changes):
+    low = spherical_cap(0.4, alpha=1.0)
+    return low.rebuilt(vertices=low.vertices + np.array([0.0, 0.0, 2.0]), **{"plane": Plane(), **changes})
+
+
+def two_snows():
+    """Patches of unequal net pressures, one of them without any, between a raised boundary."""
+    patches = {"west": {"tension": 6.0, "snow": 1.0}, "east": {"tension": 6.0, "snow": 0.2}}
+    outline = [[0, 0, 3], [6, 0, 3], [6, 4, 3], [0, 4, 3]]
+    return Plan(outline, [Divider([[3, 0], [3, 4]], 3.0)], patches=patches, edge_length=1.0).surface()
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        cap,
+        lambda: cap(plane=Plane((0, 0, -3), (1, 2, 8))),
+        lambda: cap(patches=[Patch("sail", 1.0, 0.0, weight=0.2)]),
+        two_snows,
+        lambda: catenoid(half=True),
+        leaning_hall,
+        lambda: double_bubble(0.6, volumes=(1.0, 0.7)),
+    ],
+    ids=["above", "slanted", "sail", "two snows", "film", "hall", "rooms"],
+)
+def test_volume_has_one_meaning(make):
+    """In the certificate, as a target, among the figures, along branches, and in rows of sweeps."""
+    result = pcmc.solve(make(), **TIGHT)
+    surface, found = result.surface, result.certificate
+    assert found.index is not None
+    volume = found.volume
+    assert volume == pytest.approx(volume_below(surface), rel=1e-12)
+    assert measure(surface, Target("volume")).value == pytest.approx(volume, rel=1e-12)
+    shown = [f.value for f in figures(surface, found) if (f.quantity, f.owner) == ("volume", "roof")]
+    assert shown == [pytest.approx(volume, rel=1e-12)]
+    assert row(result, ())["volume"] == pytest.approx(volume, rel=1e-12)
+    name, goal = surface.patches[0].name, 1.01 * volume
+    if surface.held.any():
+        branch = pcmc.follow(surface, name, until={"volume": goal}, steps=3, min_quality=0.0)
+        ends = [pcmc.certify(branch.surfaces[k]).volume for k in (0, max(branch.surfaces))]
+        assert branch.points.volume.iloc[[0, -1]].tolist() == pytest.approx(ends, rel=1e-9)
+        assert ends[0] == pytest.approx(volume, rel=1e-9)
 
 
 @pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (1.0, -2.0, 2.0)])

@@ -11,9 +11,11 @@ from ..base.arrays import Floats
 from ..certificate import Certificate
 from ..certificate.supports import held_curves
 from ..energy.rooms import closing_volumes, prescribed_volumes, room_pressures
+from ..energy.volume_below import volume_below
 from ..surface import Surface
 
 ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open
+SAME = 1e-6  # of the size, cubed: volumes this near are one, up to what solving to rest leaves open
 RESIDUALS = 10.0  # that a quantity may change with the forces left, relative
 EIGENVALUES = 1e-12  # of the largest eigenvalue: rounding of the lowest one
 
@@ -87,6 +89,8 @@ def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[
 def given_volume(surface: Surface) -> float | None:
     """The volume under the roof, where the prescribed volumes of rooms fix it; else None.
 
+    A room between plates that are not upright encloses another volume than the roof has over Π.
+
     >>> from pcmc import Patch, Room
     >>> X, F, sides = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[1, 2, 3]], [Patch("side", 2.0)]
     >>> given_volume(Surface(X[1:], [[0, 1, 2]], [0], sides, fixed=range(3))) is None
@@ -98,10 +102,11 @@ def given_volume(surface: Surface) -> float | None:
     """
     if not surface.rooms or np.any(closing_volumes(surface)):
         return None
-    signs, roof = surface.room_signs, (~surface.auxiliary).astype(float)
+    signs, roof = surface.room_signs, surface.roof.astype(float)
     share = np.round(np.linalg.lstsq(signs.T, roof)[0], 9)  # most are whole: no rounding in the sum
-    known = np.abs(share @ signs - roof).max() <= ROUNDING
-    return float(share @ prescribed_volumes(surface)) if known else None
+    given = float(share @ prescribed_volumes(surface))
+    same = abs(given - volume_below(surface)) <= SAME * surface.size**3
+    return given if same and np.abs(share @ signs - roof).max() <= ROUNDING else None
 
 
 def _boundaries(

@@ -12,15 +12,18 @@ from .pinching import Walls
 SLACK = 1e-9  # of the capacity: an excess below is rounding
 
 
-def pull_and_capacity(surface: Surface, walls: Walls, resting: Bools) -> tuple[Floats, Floats]:
+def pull_and_capacity(
+    surface: Surface, walls: Walls, resting: Bools, force: Floats | None = None
+) -> tuple[Floats, Floats]:
     """Pull (n,) on each resting vertex of a standing part and what the wall can take, force.
 
     The pull is the force of the sheets away from Π, to the vertex's own side; negative to the other.
     Lifting the vertex by dz to either side makes a wall of area ½ ℓ dz under each top edge there, ℓ
     its length along Π, so the capacity is ½ Σ α_w ℓ; the vertex rests while |pull| ≤ capacity.
     On a held bottom the pull is the force across its curve, to any side, and ℓ is taken on the bottom.
+    ``force`` (n,3) is -∇E without supports, if that is known.
     """
-    force = -energy_and_gradient(surface, supports=False)[1]
+    force = -energy_and_gradient(surface, supports=False)[1] if force is None else force
     pull = np.where(resting, walls.side * (force @ np.array(surface.plane.normal)), 0.0)
     held = resting & walls.held
     pull[held] = np.linalg.norm(walls.across_bottom(force, surface.vertices)[held], axis=1)

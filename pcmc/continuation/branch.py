@@ -30,9 +30,9 @@ class Branch:
     Attributes
     ----------
     points : one row per point: arclength s (a number), parameter λ, the tensions and pressures that
-        vary (``tension NAME``, ``pressure NAME``), energy (force·length), volume (length³), height
-        over Π (length), index, lowest_eigenvalue (force/length³), residual (relative), quality of the
-        worst triangle, slope dλ/ds, iterations of Newton's method.
+        vary (``tension NAME``, ``pressure NAME``), energy (force·length), volume (length³, that
+        of certificates), height over Π (length), index, lowest_eigenvalue (force/length³), residual
+        (relative), quality of the worst triangle, slope dλ/ds, iterations of Newton's method.
     events : one row per event: kind ("fold", "index" or "contact"), parameter, energy, volume, height,
         arclength, the index before and after it, and, of a change of index, along_branch: the cosine
         between the mode that turns and the branch. It is 1 at a fold; 0 where the branch goes on as it was

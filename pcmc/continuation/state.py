@@ -15,19 +15,18 @@ from ..energy.functional import (
     energy_and_gradient,
     energy_at,
     onto_circles,
-    patch_volumes,
-    weighted,
 )
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..energy.pattern import Pattern, hessian_pattern
-from ..energy.projected_hessian import assemble
 from ..energy.rooms import (
     prescribed_volumes,
     volume_gradients_at,
     volumes_at,
     with_room_pressures,
 )
+from ..energy.second_variation import assemble
+from ..energy.volume_below import volume_below_gradient, volumes_below
 from ..meshing.quality import worst_quality
 from ..solvers.smoother import HarmonicExtension
 from ..stability.factorisation import Factor, Factoriser, factoriser
@@ -58,7 +57,7 @@ class BranchMesh:
     part : the standing part of the surface, without the walls that vanish where a junction rests on Π.
     surface, classes, quality_faces : those of ``part``.
     walls, resting : the walls that can pinch, and (n,) which junction vertices rest on Π.
-    loaded : (patches,) 1 for the patches under pressure, 0 for walls.
+    roof : (patches,) 1 for the patches whose volumes over Π are that of the roof, 0 for walls.
     """
 
     def __init__(self, surface: Surface, line: Line, backend: str | None = None) -> None:
@@ -66,7 +65,7 @@ class BranchMesh:
         self.part = part = standing_part(surface)
         self.surface, self.walls, self.resting = part.surface, part.walls, part.resting
         self.classes, self.quality_faces = part.classes, part.quality_faces
-        self.loaded: Floats = (~surface.auxiliary).astype(float)
+        self.roof: Floats = surface.roof.astype(float)
         self._curves_move = bool(((self.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None
         self._inside: HarmonicExtension | None = None
@@ -221,14 +220,14 @@ class State:
 
     @cached_property
     def volume(self) -> float:
-        """Σ V_i of the energy over the patches that had a pressure at the start, length³."""
-        return float(patch_volumes(self.mesh.surface.moved(self.X)) @ self.mesh.loaded)
+        """The volume under the roof, length³, as in ``volume_below``; its patches are those of the start."""
+        return float(volumes_below(self.mesh.surface.moved(self.X)) @ self.mesh.roof)
 
     @cached_property
     def volume_gradient(self) -> Floats:
         """(n,3) gradient of the volume, supports applied unless the boundary moves, length²."""
         surface = self.mesh.surface
-        gradient = weighted(surface, 0.0, -self.mesh.loaded, self.X)[2]
+        gradient = volume_below_gradient(surface.moved(self.X), self.mesh.roof)
         return gradient if self.carried is not None else apply_supports(surface, gradient, self.X)
 
     @cached_property

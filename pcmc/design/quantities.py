@@ -18,10 +18,9 @@ from ..base.errors import OptionError
 from ..certificate.cables import cable_ends
 from ..certificate.reactions import support_forces
 from ..energy import kernels
-from ..energy.cables import add_cable_products
 from ..energy.functional import gradient_by, weighted
+from ..energy.second_variation import add_products
 from ..energy.volume_below import volume_below_gradient, volumes_below
-from ..energy.weight import add_weight_products
 from ..surface import Surface
 from ..surface.geometry import area_vectors, cross_2d, vertex_sums
 from . import cable_quantities
@@ -156,15 +155,10 @@ def _force_gradient(surface: Surface, v: int, pull: Floats) -> Floats:
     """(n,3) derivative of ⟨pull, f_v⟩, f_v = Σ α ∂A - ⅓ Σ p A_T ν_T at v with cables and weights."""
     around = np.flatnonzero((surface.faces == v).any(axis=1))
     F, patch = surface.faces[around], surface.patch_of_face[around]
-    blocks = np.empty((len(F), 3, 3, 3, 3))
-    mesh = kernels.energy_mesh(surface, pressure=0.0 * surface.pressures)
-    kernels.hessian_blocks(mesh._replace(faces=F, patch=patch), surface.vertices, blocks)
     slope, unit = np.zeros_like(surface.vertices), np.zeros_like(surface.vertices)
     unit[v] = pull  # the second derivatives are symmetric
-    add_cable_products(surface, surface.vertices, unit, slope)
-    add_weight_products(surface, F, patch, surface.vertices, unit, slope)
-    row, corner = np.nonzero(np.equal(F, v))
-    np.add.at(slope, F[row], np.einsum("fjab,a->fjb", blocks[row, corner], pull))
+    mesh = kernels.energy_mesh(surface, pressure=0.0 * surface.pressures)
+    add_products(surface, mesh._replace(faces=F, patch=patch), surface.vertices, unit, slope)
     # ⅓ A ν = (q - p) × (r - p) / 6, whose part along u changes by (q - r) × u / 6 as p moves
     X, sixth = surface.vertices, surface.net_pressures[surface.patch_of_face[around]] / 6.0
     for c in range(3):

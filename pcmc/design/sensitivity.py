@@ -33,8 +33,8 @@ from ..energy.functional import energy_and_gradient, gradient_by
 from ..energy.jacobian import Linearisation, linearise
 from ..energy.motion_space import MotionSpace, force_scale, motion_space
 from ..energy.pattern import hessian_pattern
-from ..energy.projected_hessian import assemble
 from ..energy.rooms import prescribed_volumes, volume_defects, volume_gradients_at
+from ..energy.second_variation import assemble
 from ..stability.bordered import BorderedFactor
 from ..stability.factorisation import Factor, SingularMatrix, factoriser
 from ..surface import Surface

@@ -3,6 +3,7 @@
 Gives these to contact, stability, the certificate and the solvers. Imports ``surface`` and ``base``.
 """
 
-from .functional import energy, energy_and_gradient, energy_at, gradient, hessian
+from .functional import energy, energy_and_gradient, energy_at, gradient
+from .second_variation import hessian
 
 __all__ = ["energy", "energy_and_gradient", "energy_at", "gradient", "hessian"]

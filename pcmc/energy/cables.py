@@ -1,8 +1,8 @@
-"""Cables: the part Σ τ ℓ of E, over edges with a line tension τ, and its derivatives.
+"""Cables: the part Σ τ ℓ of E, over edges with a line tension τ, and its gradient.
 
 An edge from a to b has the length ℓ = |b - a| and the direction t = (b - a) / ℓ. Then
 
-    ∂ℓ/∂b = t = -∂ℓ/∂a,    ∂²ℓ/∂b∂b = ∂²ℓ/∂a∂a = -∂²ℓ/∂a∂b = (1 - t tᵀ) / ℓ
+    ∂ℓ/∂b = t = -∂ℓ/∂a
 
 An edge without length has no direction and contributes neither. Nothing is computed where no cable pulls.
 """
@@ -50,24 +50,6 @@ def directions(X: Floats, ends: Ints) -> tuple[Floats, Floats]:
     side = X[ends[:, 1]] - X[ends[:, 0]]
     length = np.sqrt(np.einsum("ij,ij->i", side, side))
     return side / np.where(length > 0.0, length, 1.0)[:, None], length
-
-
-def cable_blocks(surface: Surface, X: Floats) -> Floats:
-    """(c,3,3) the matrix τ/ℓ (1 - t tᵀ) of each edge that pulls, force/length."""
-    ends, tension = surface.cable_edges
-    t, length = directions(X, ends)
-    stiffness = np.divide(tension, length, out=np.zeros_like(length), where=length > 0.0)
-    return np.asarray(stiffness[:, None, None] * (np.eye(3) - t[:, :, None] * t[:, None, :]))
-
-
-def add_cable_products(surface: Surface, X: Floats, d: Floats, change: Floats) -> None:
-    """Add the change of the cables' gradient along the motion d (n,3) to ``change`` (n,3)."""
-    ends = surface.cable_edges.ends
-    if not len(ends):
-        return
-    turned = np.einsum("cij,cj->ci", cable_blocks(surface, X), d[ends[:, 1]] - d[ends[:, 0]])
-    np.add.at(change, ends[:, 1], turned)
-    np.add.at(change, ends[:, 0], -turned)
 
 
 def squared_cable_forces(surface: Surface) -> Floats:

@@ -1,4 +1,4 @@
-"""The energy of a Surface, its gradient with the supports applied, and its Hessian.
+"""The energy of a Surface, and its gradient with the supports applied.
 
     E = Σ α_i A_i - Σ p_i V_i + Σ τ L + Σ w ∫ z dA   (11), (20); the paper's pressures are 1 and 0
     A_i = Σ_T ½ |(q_j - p) × (q_{j+1} - p)|        (9a), (10a)
@@ -19,20 +19,14 @@ Units: E force·length, ∇E force, with tension in force/length and pressure in
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
 from . import kernels
-from .cables import add_cables, add_pull, cable_blocks
-from .flat_pieces import flat_pieces
-from .plane_pieces import add_plane_forces, add_plane_volumes, plane_hessian
-from .weight import add_weights, moments, weight_blocks
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+from .cables import add_cables, add_pull
+from .plane_pieces import add_plane_forces, add_plane_volumes
+from .weight import add_weights, moments
 
 
 def energy(surface: Surface) -> float:
@@ -128,38 +122,6 @@ def onto_circles(surface: Surface, X: Floats) -> Floats:
     for circle, along in circles:
         X[along] = circle.nearest(X[along])
     return X
-
-
-def hessian(surface: Surface) -> csr_array:
-    """∂²E/∂X², sparse symmetric (3n,3n), supports not applied; unknown 3v + d is coordinate d of v.
-
-    >>> from pcmc import Patch, Surface
-    >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("t", 1.0)], fixed=[0])
-    >>> H = hessian(flat.retensioned(pressures={"t": 0.0}))  # A is homogeneous of degree 2: H X = ∇A
-    >>> (H @ flat.vertices.ravel()).reshape(3, 3).round(12).tolist()
-    [[-0.5, -0.5, 0.0], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]
-    """
-    from scipy.sparse import coo_array, csr_array
-
-    expect_surface(surface)
-    blocks = np.empty((surface.m, 3, 3, 3, 3))
-    kernels.hessian_blocks(kernels.energy_mesh(surface), surface.vertices, blocks)
-    if surface.weights.any():
-        blocks += weight_blocks(surface, surface.vertices)
-    unknowns = 3 * surface.faces[:, :, None] + np.arange(3)
-    rows = np.broadcast_to(unknowns[:, :, None, :, None], blocks.shape)
-    columns = np.broadcast_to(unknowns[:, None, :, None, :], blocks.shape)
-    shape = (3 * surface.n, 3 * surface.n)
-    H = csr_array(coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=shape))
-    ends = surface.cable_edges.ends
-    if len(ends):
-        k = cable_blocks(surface, surface.vertices)
-        both = np.stack([np.stack([k, -k], axis=1), np.stack([-k, k], axis=1)], axis=1)  # (c,2,2,3,3)
-        unknowns = 3 * ends[:, :, None] + np.arange(3)
-        rows = np.broadcast_to(unknowns[:, :, None, :, None], both.shape)
-        columns = np.broadcast_to(unknowns[:, None, :, None, :], both.shape)
-        H = csr_array(H + coo_array((both.ravel(), (rows.ravel(), columns.ravel())), shape=shape))
-    return H + plane_hessian(surface) if flat_pieces(surface) else H
 
 
 def weighted(

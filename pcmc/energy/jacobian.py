@@ -23,8 +23,6 @@ from ..base.compiled import compiled
 from ..surface import Surface
 from ..surface.geometry import (
     accumulate,
-    add,
-    cross,
     cross_sum,
     divided,
     dot,
@@ -36,12 +34,9 @@ from ..surface.geometry import (
     vertex_area_vectors,
 )
 from ..surface.topology import SHEET
-from .cables import add_cable_products
-from .kernels import Mesh
 from .motion_space import MotionSpace, VertexClasses, curve_chords
-from .plane_pieces import add_plane_turns
+from .second_variation import add_products
 from .turning import circle_turning
-from .weight import add_weight_products
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +66,9 @@ class Linearisation:
     def times(self, d: Floats) -> Floats:
         """Bᵀ Df[d] (size,), for a motion d (n,3) of the vertices."""
         surface, classes, space = self.surface, self.classes, self.space
-        change = np.zeros_like(self.X)
+        change = add_products(surface, classes.mesh(surface), self.X, d, np.zeros_like(self.X))
         turn = np.zeros(len(self.X))
-        _add_times(classes.mesh(surface), self.X, d, self.sheet_factor, change, turn)
-        add_cable_products(surface, self.X, d, change)
-        add_weight_products(surface, classes.faces, classes.patch_of_face, self.X, d, change)
-        add_plane_turns(surface, d, change)
+        _add_turns(classes.faces, self.X, d, self.sheet_factor, turn)
         turned = curve_chords(surface, classes, d)[self.curve_rows]
         change[classes.curve[self.curve_rows]] += self.curve_factor[:, None] * turned
         out = space.to_coordinates(change)
@@ -142,38 +134,12 @@ def _across_normals(area_vector: Floats, chosen: Bools, basis: Floats, gradient:
 
 
 @compiled
-def _add_times(mesh: Mesh, X: Floats, D: Floats, sheet_factor: Floats, change: Floats, turn: Floats) -> None:
-    """Add (∂²E) D to change (n,3), and ⟨sheet_factor, Da⟩ to turn (n,), a the vertices' area vectors.
-
-    The force of a tension is ½ α ν × e, with ν = n / |n| and n = u × w of two edges; so it changes by
-    ½ α (Dν × e + ν × De), with Dν = (Dn - ν ⟨ν, Dn⟩) / |n| and Dn = Du × w + u × Dw.
-    """
-    F, origin = mesh.faces, vector(mesh.origin)
+def _add_turns(F: Ints, X: Floats, D: Floats, sheet_factor: Floats, turn: Floats) -> None:
+    """Add ⟨sheet_factor, Da⟩ to turn (n,), a = Σ ½ u × w the vertices' area vectors."""
     for f in range(len(F)):
-        alpha, sixth_p = mesh.tension[mesh.patch[f]], mesh.pressure[mesh.patch[f]] / 6.0
         i, j, k = F[f, 0], F[f, 1], F[f, 2]
-        Da, Db, Dc = point(D, i), point(D, j), point(D, k)
         u, w = sub(point(X, j), point(X, i)), sub(point(X, k), point(X, i))
-        Du, Dw = sub(Db, Da), sub(Dc, Da)
-        n = cross(u, w)
-        Dn = cross_sum(Du, w, u, Dw)
+        Du, Dw = sub(point(D, j), point(D, i)), sub(point(D, k), point(D, i))
+        Da = scaled(0.5, cross_sum(Du, w, u, Dw))
         for corner in range(3):
-            v = F[f, corner]
-            turn[v] += 0.5 * dot(point(sheet_factor, v), Dn)
-        length = norm(n)
-        scale = 1.0 / length if length > 0.0 else 0.0
-        nu = scaled(scale, n)
-        half_nu = scaled(0.5 * alpha, nu)
-        half_Dnu = scaled(scale * (0.5 * alpha), sub(Dn, scaled(dot(nu, Dn), nu)))
-        # tension: ½ α ν × u acts at c, -½ α ν × w at b, and the negative of their sum at a
-        along_u = cross_sum(half_Dnu, u, half_nu, Du)
-        along_w = cross_sum(half_Dnu, w, half_nu, Dw)
-        # pressure: the corners seen from the point of Π
-        a = sub(point(X, i), origin)
-        b, c = add(a, u), add(a, w)
-        at_a = scaled(sixth_p, cross_sum(Db, c, b, Dc))
-        at_b = scaled(sixth_p, cross_sum(Dc, a, c, Da))
-        at_c = scaled(sixth_p, cross_sum(Da, b, a, Db))
-        accumulate(change, i, sub(sub(along_w, along_u), at_a))
-        accumulate(change, j, scaled(-1.0, add(along_w, at_b)))
-        accumulate(change, k, sub(along_u, at_c))
+            turn[F[f, corner]] += dot(point(sheet_factor, F[f, corner]), Da)

@@ -1,12 +1,10 @@
-"""The compiled loops over triangles: areas, volumes, energy gradient, Hessian. Arrays only.
+"""The compiled loops over triangles for areas, volumes and the energy's gradient. Arrays only.
 
 A triangle has corners a, b, c (counter-clockwise seen from its positive side), the edges opposite them
 e_a = c - b, e_b = a - c, e_c = b - a, the area A and the unit normal ν = (b - a) × (c - a) / 2A. Then
 
-    ∂A/∂a  = ½ ν × e_a                                    (15a)
-    ∂²A/∂i∂j = (e_i·e_j)/(4A) ν νᵀ  ± ½ [ν]×              (+ for j two corners after i, - for one)
-    ∂V/∂a  = (b × c) / 6                                  (15b, with the sign that makes (10b) positive)
-    ∂²V/∂a∂b = -[c]× / 6
+    ∂A/∂a = ½ ν × e_a      (15a)
+    ∂V/∂a = (b × c) / 6    (15b, with the sign that makes (10b) positive)
 
 Every loop releases the interpreter, so blocks of triangles run on several threads (``blocks``).
 A triangle whose area is zero has no normal and contributes no area gradient.
@@ -21,7 +19,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints, read_only
 from ..base.compiled import blocks, compiled, run_blocks, threads
 from ..surface import Surface
-from ..surface.geometry import Vector, accumulate, cross, dot, norm, point, scaled, sub, vector
+from ..surface.geometry import accumulate, cross, dot, norm, point, scaled, sub, vector
 
 
 class Mesh(NamedTuple):
@@ -30,8 +28,9 @@ class Mesh(NamedTuple):
     Attributes
     ----------
     faces, patch : (m,3) and (m,) int: corners, and the patch of each triangle.
-    origin : (3,) the point that volumes are seen from.
-    tension, pressure : (k,) α and p of each patch.
+    origin : (3,) the reference point that volumes are seen from.
+    tension, pressure, weight : (k,) α, p and w of each patch.
+    ground, normal : (3,) a point of Π and its normal: weights act along it.
     """
 
     faces: Ints
@@ -39,13 +38,19 @@ class Mesh(NamedTuple):
     origin: Floats
     tension: Floats
     pressure: Floats
+    weight: Floats
+    ground: Floats
+    normal: Floats
 
 
 def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Floats | None = None) -> Mesh:
     """All triangles of a surface, with its own tensions and pressures (k,) or with others."""
     tension = surface.tensions if tension is None else read_only(tension)
     pressure = surface.net_pressures if pressure is None else read_only(pressure)
-    return Mesh(surface.faces, surface.patch_of_face, surface.origin, tension, pressure)
+    plane = np.array(surface.plane.point), np.array(surface.plane.normal)
+    return Mesh(
+        surface.faces, surface.patch_of_face, surface.origin, tension, pressure, surface.weights, *plane
+    )
 
 
 @compiled
@@ -90,44 +95,6 @@ def _measure_areas(mesh: Mesh, X: Floats, first: int, last: int, area: Floats, v
         a, b, c = sub(point(X, i), origin), sub(point(X, j), origin), sub(point(X, k), origin)
         area[patch[f]] += 0.5 * norm(cross(sub(b, a), sub(c, a)))
         volume[patch[f]] += dot(a, cross(b, c)) / 6.0
-
-
-@compiled
-def hessian_blocks(mesh: Mesh, X: Floats, out: Floats) -> None:
-    """Fill out (m,3,3,3,3): entry (f,i,j) is the 3×3 block ∂²(αA - pV)/∂x_i∂x_j of triangle f."""
-    F, origin = mesh.faces, vector(mesh.origin)
-    for f in range(len(F)):
-        alpha, p = mesh.tension[mesh.patch[f]], mesh.pressure[mesh.patch[f]]
-        a = sub(point(X, F[f, 0]), origin)
-        b = sub(point(X, F[f, 1]), origin)
-        c = sub(point(X, F[f, 2]), origin)
-        corner, edge = (a, b, c), (sub(c, b), sub(a, c), sub(b, a))
-        normal = cross(edge[1], edge[2])
-        twice_area = norm(normal)
-        half_alpha = 0.5 * alpha / twice_area if twice_area > 0.0 else 0.0
-        for i in range(3):
-            for j in range(3):
-                e_dot_e = dot(edge[i], edge[j])
-                for r in range(3):
-                    for s in range(3):
-                        stiff = 0.5 * alpha * e_dot_e * normal[r] * normal[s]
-                        out[f, i, j, r, s] = stiff / twice_area**3 if twice_area > 0.0 else 0.0
-            after, before = (i + 1) % 3, (i + 2) % 3
-            _add_cross(out[f, i, after], normal, -half_alpha)
-            _add_cross(out[f, i, before], normal, half_alpha)
-            _add_cross(out[f, i, after], corner[before], p / 6.0)
-            _add_cross(out[f, i, before], corner[after], -p / 6.0)
-
-
-@compiled
-def _add_cross(block: Floats, v: Vector, scale: float) -> None:
-    """block += scale [v]×, the matrix of v × ·."""
-    block[0, 1] -= scale * v[2]
-    block[0, 2] += scale * v[1]
-    block[1, 0] += scale * v[2]
-    block[1, 2] -= scale * v[0]
-    block[2, 0] -= scale * v[1]
-    block[2, 1] += scale * v[0]
 
 
 def measure(mesh: Mesh, X: Floats, workers: int | None = None) -> tuple[Floats, Floats, Floats]:

@@ -9,6 +9,7 @@ from scipy.sparse import csr_array
 
 from ..base.arrays import Floats, Ints
 from ..base.compiled import compiled, inlined
+from ..surface import Surface
 from .motion_space import MotionSpace, VertexClasses
 
 
@@ -20,11 +21,13 @@ class Pattern(NamedTuple):
     indptr, indices : CSR structure of the upper triangle, diagonal first in each row.
     offset : (m,3) int: for corner pairs (0,1), (1,2), (2,0) of each active face, where the columns
         of the later vertex begin in the rows of the earlier one, counted after its diagonal block.
+    edge_offset : (e,) int: the same for each edge.
     """
 
     indptr: Ints
     indices: Ints
     offset: Ints
+    edge_offset: Ints = np.empty(0, dtype=np.int32)
 
     @property
     def size(self) -> int:
@@ -36,18 +39,18 @@ class Pattern(NamedTuple):
         return csr_array((data, self.indices, self.indptr), shape=(self.size, self.size))
 
 
-def hessian_pattern(classes: VertexClasses, space: MotionSpace) -> Pattern:
+def hessian_pattern(of: VertexClasses | Surface, space: MotionSpace) -> Pattern:
     """Sparsity of Bᵀ (∂²E) B: it depends on the faces and on the dimensions of the motion space."""
-    low, high = classes.topology.edges.T.astype(np.int64)
+    low, high = of.topology.edges.T.astype(np.int64)
     first = np.searchsorted(low, np.arange(len(space.dimension) + 1))
     width = space.dimension[high]
     before = np.concatenate([[0], np.cumsum(width)])
-    edge_offset = before[:-1] - before[first[low]]
+    edge_offset = (before[:-1] - before[first[low]]).astype(np.int32)
     beyond = before[first[1:]] - before[first[:-1]]
     indptr, indices = _fill_pattern(space, first, high, beyond)
     # edge (i,j) opposite corner k: pairs (0,1), (1,2), (2,0) are opposite corners 2, 0, 1
-    offset = edge_offset[classes.topology.edge_of_face[:, [2, 0, 1]]]
-    return Pattern(indptr, indices, np.ascontiguousarray(offset.astype(np.int32)))
+    offset = np.ascontiguousarray(edge_offset[of.topology.edge_of_face[:, [2, 0, 1]]])
+    return Pattern(indptr, indices, offset, edge_offset)
 
 
 @inlined

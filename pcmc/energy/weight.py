@@ -1,9 +1,9 @@
-"""Self-weight: the part Σ w ∫ z dA of E, with z the height over Π, and its derivatives.
+"""Self-weight: the part Σ w ∫ z dA of E, with z the height over Π, and its gradient.
 
 Over a flat triangle of area A and corners at heights z_a, z_b, z_c the integral is A z̄, z̄ = (z_a+z_b+z_c)/3.
 With n the normal of Π and g_i = ∂A/∂i,
 
-    ∂(A z̄)/∂i = z̄ g_i + A n/3,    ∂²(A z̄)/∂i∂j = z̄ ∂²A/∂i∂j + (g_i nᵀ + n g_jᵀ)/3
+    ∂(A z̄)/∂i = z̄ g_i + A n/3
 
 So a sheet of weight w acts like one of tension α + w z, pushed by w n per area: at rest
 
@@ -20,21 +20,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..surface import Surface
-from ..surface.geometry import (
-    accumulate,
-    add,
-    area_vectors,
-    cross,
-    cross_sum,
-    dot,
-    edge_vectors,
-    norm,
-    point,
-    scaled,
-    sub,
-    vector,
-)
-from . import kernels
+from ..surface.geometry import accumulate, add, cross, dot, norm, point, scaled, sub, vector
 
 
 def add_weights(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
@@ -58,30 +44,6 @@ def moments(surface: Surface, X: Floats, weights: Floats, gradient: Floats | Non
     out = np.empty((0, 3)) if gradient is None else gradient
     _measure(surface.faces, surface.patch_of_face, X, weights, *_plane(surface), moment, out)
     return moment
-
-
-def weight_blocks(surface: Surface, X: Floats) -> Floats:
-    """(m,3,3,3,3): entry (f,i,j) is the 3×3 block w ∂²(A z̄)/∂x_i∂x_j of triangle f."""
-    blocks = np.empty((surface.m, 3, 3, 3, 3))
-    one = np.ones(len(surface.patches))
-    kernels.hessian_blocks(kernels.energy_mesh(surface, one, 0.0 * one), X, blocks)
-    corners, n = X[surface.faces], np.array(surface.plane.normal)
-    vector = area_vectors(corners)
-    nu = vector / np.linalg.norm(vector, axis=1)[:, None]
-    g = 0.5 * np.cross(nu[:, None], edge_vectors(corners))
-    mean = surface.plane.height(corners).mean(axis=1)
-    blocks *= mean[:, None, None, None, None]
-    blocks += g[:, :, None, :, None] * n / 3.0
-    blocks += (n[:, None] * g[:, None, :, None, :]) / 3.0
-    return np.asarray(surface.weights[surface.patch_of_face][:, None, None, None, None] * blocks)
-
-
-def add_weight_products(
-    surface: Surface, faces: Ints, patch: Ints, X: Floats, d: Floats, change: Floats
-) -> None:
-    """Add the change of the weights' gradient along the motion d (n,3) to ``change`` (n,3)."""
-    if surface.weights.any():
-        _add_products(faces, patch, X, d, surface.weights, *_plane(surface), change)
 
 
 def effective_tensions(surface: Surface, X: Floats, faces: Ints, patch: Ints) -> Floats:
@@ -121,32 +83,3 @@ def _measure(
         accumulate(out, F[f, 0], add(cross(half_nu, sub(c, b)), down))
         accumulate(out, F[f, 1], add(cross(half_nu, sub(a, c)), down))
         accumulate(out, F[f, 2], add(cross(half_nu, sub(b, a)), down))
-
-
-@compiled
-def _add_products(
-    F: Ints, patch: Ints, X: Floats, D: Floats, weight: Floats, at: Floats, normal: Floats, change: Floats
-) -> None:
-    """With ν = m/|m| of m = u × v, two edges: ν changes by (Dm - ν ⟨ν, Dm⟩) / |m|, and |m| by ⟨ν, Dm⟩."""
-    origin, n = vector(at), vector(normal)
-    for f in range(len(F)):
-        w = weight[patch[f]]
-        if w == 0.0:
-            continue
-        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
-        Da, Db, Dc = point(D, F[f, 0]), point(D, F[f, 1]), point(D, F[f, 2])
-        u, v, Du, Dv = sub(b, a), sub(c, a), sub(Db, Da), sub(Dc, Da)
-        m, Dm = cross(u, v), cross_sum(Du, v, u, Dv)
-        length = norm(m)
-        if length == 0.0:
-            continue
-        mean = dot(sub(scaled(1.0 / 3.0, add(add(a, b), c)), origin), n)
-        Dmean = dot(add(add(Da, Db), Dc), n) / 3.0
-        nu = scaled(1.0 / length, m)
-        Dnu = scaled(1.0 / length, sub(Dm, scaled(dot(nu, Dm), nu)))
-        half, Dhalf = scaled(0.5 * w * mean, nu), scaled(0.5 * w * mean, Dnu)
-        Dhalf = add(Dhalf, scaled(0.5 * w * Dmean, nu))
-        down = scaled(w * dot(nu, Dm) / 6.0, n)
-        accumulate(change, F[f, 0], add(cross_sum(Dhalf, sub(c, b), half, sub(Dc, Db)), down))
-        accumulate(change, F[f, 1], add(cross_sum(Dhalf, sub(a, c), half, sub(Da, Dc)), down))
-        accumulate(change, F[f, 2], add(cross_sum(Dhalf, sub(b, a), half, sub(Db, Da)), down))

@@ -17,7 +17,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..energy.functional import apply_supports
 from ..energy.motion_space import MotionSpace, VertexClasses, perpendicular
 from ..energy.pattern import hessian_pattern
-from ..energy.projected_hessian import assemble
+from ..energy.second_variation import assemble
 from ..stability.factorisation import factoriser
 from ..surface import Surface
 from ..surface.topology import SHEET

@@ -12,8 +12,8 @@ from ..base.arrays import Floats
 from ..energy.jacobian import linearise
 from ..energy.motion_space import MotionSpace
 from ..energy.pattern import Pattern, hessian_pattern
-from ..energy.projected_hessian import assemble
 from ..energy.rigid_motions import rigid_modes, rigid_motions
+from ..energy.second_variation import assemble
 from ..meshing.quality import edge_lengths
 from ..stability.bordered import BorderedFactor
 from ..stability.factorisation import Factor, Factoriser, SingularMatrix, factoriser

@@ -16,7 +16,7 @@ import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -28,11 +28,17 @@ from scipy.sparse.linalg import splu
 
 from ..base import validate
 from ..base.arrays import Floats, Ints
-from ..base.errors import MissingExtra
+from ..base.errors import MissingExtra, PcmcError
 from ..energy.pattern import Pattern
+from .diagonal_pivots import ZERO, SingularMatrix, count_negative
 
+__all__ = ("BACKENDS", "Factor", "Factoriser", "SingularMatrix", "available", "factoriser")
+Ordering = Literal["MMD_AT_PLUS_A", "NATURAL"]
 BACKENDS = ("pardiso", "superlu")
-ZERO = 1e-13  # of the largest entry: a pivot below is zero to rounding
+OUTDATED = (
+    "this factorisation is out of date: its factoriser has made another one since; factorise its matrix"
+    " again, or use a factoriser for each"
+)
 TINY = float(np.finfo(float).tiny)
 ONE_THREAD = 10_000  # rows; up to here MKL is fastest with one thread
 
@@ -46,10 +52,6 @@ IPARM = {  # MKL's parameters by their numbers from 1
     21: 1,  # pivots of one and two rows: Bunch and Kaufman
     24: 1,  # two-level parallel factorisation
 }
-
-
-class SingularMatrix(ArithmeticError):
-    """A pivot is zero: the matrix has no factorisation, or none that shows its inertia."""
 
 
 class Factor(Protocol):
@@ -67,7 +69,10 @@ class Factoriser(Protocol):
     """Factorises matrices of one pattern."""
 
     def factor(self, data: Floats) -> Factor:
-        """Factorise the matrix with these upper-triangle values; a new factor replaces the last."""
+        """Factorise the matrix with these upper-triangle values.
+
+        A new factor replaces the last: with PARDISO, that one then solves no more (``PcmcError``).
+        """
 
 
 @cache
@@ -150,7 +155,7 @@ class _SuperLU:
         off = rows != pattern.indices
         lower = csr_array((entry[off], (pattern.indices[off], rows[off])), shape=upper.shape)
         self._full = csr_array(upper + lower)
-        self._ordering: Literal["MMD_AT_PLUS_A", "NATURAL"] = "MMD_AT_PLUS_A"
+        self._ordering: Ordering = "MMD_AT_PLUS_A"
         empty = np.empty(0, dtype=np.int32)
         self._arrange(reverse_cuthill_mckee(self._full, symmetric_mode=True) if pattern.size else empty)
 
@@ -166,7 +171,7 @@ class _SuperLU:
         _finite(data)
         matrix = csc_array((data[self._source], self._indices, self._indptr), self._full.shape)
         try:
-            lu = splu(matrix, self._ordering, 0.0, panel_size=4, options={"SymmetricMode": True})
+            lu = _superlu(matrix, self._ordering)
         except RuntimeError as error:
             raise SingularMatrix(str(error)) from None
         factor = _SuperLUFactor(matrix, lu, self._order)
@@ -176,21 +181,20 @@ class _SuperLU:
         return factor
 
 
+def _superlu(matrix: csc_array, ordering: Ordering = "MMD_AT_PLUS_A") -> Any:
+    """L and U with pivots on the diagonal, unless one is zero."""
+    return splu(matrix, ordering, 0.0, panel_size=4, options={"SymmetricMode": True})
+
+
 @dataclass(frozen=True, eq=False)
 class _SuperLUFactor:
     matrix: csc_array
     lu: Any
     order: Ints
 
-    @property
+    @cached_property
     def negative(self) -> int:
-        if not np.array_equal(self.lu.perm_r, self.lu.perm_c):
-            raise SingularMatrix("a zero pivot forced a row exchange, so the inertia is unknown")
-        pivots = self.lu.U.diagonal()
-        largest = np.abs(self.matrix.data).max(initial=0.0)
-        if zero := int(np.count_nonzero(np.abs(pivots) < ZERO * largest)):
-            raise SingularMatrix(f"{zero} pivots are zero to rounding")
-        return int(np.count_nonzero(pivots < 0.0))
+        return count_negative(self.matrix, self.lu, _superlu)
 
     def solve(self, right: Floats) -> Floats:
         right = right[self.order]
@@ -217,6 +221,7 @@ class _Pardiso:
         for number, value in IPARM.items():
             self._solver.set_iparm(number, value)
         self._analysed = False
+        self._made = 0  # factorisations so far: MKL keeps the last one only
 
     def factor(self, data: Floats) -> Factor:
         _finite(data)
@@ -224,6 +229,8 @@ class _Pardiso:
         unit = 0.5 ** math.frexp(np.abs(data).max(initial=TINY))[1]
         matrix = self._pattern.matrix(unit * data)
         nothing = np.zeros((self._pattern.size, 1), order="F")
+        self._made += 1
+        made = self._made
         try:
             if not self._analysed:
                 self.run(11, matrix, nothing)
@@ -236,10 +243,13 @@ class _Pardiso:
         iparm = self._solver.iparm
         if iparm[13]:  # the number of pivots that MKL has replaced
             raise SingularMatrix(f"{iparm[13]} pivots are zero to rounding")
-        return _PardisoFactor(self, matrix, unit, int(iparm[22]))
+        return _PardisoFactor(self, matrix, unit, int(iparm[22]), made)
 
-    def run(self, phase: int, matrix: csr_array, right: Floats) -> Floats:
+    def run(self, phase: int, matrix: csr_array, right: Floats, made: int | None = None) -> Floats:
+        """A phase of MKL's; where it uses a factor, the ``made``-th one."""
         with self._lock, self._threads():
+            if made not in (None, self._made):
+                raise PcmcError(OUTDATED)
             self._solver.set_phase(phase)
             return self._solver._call_pardiso(matrix, right)
 
@@ -277,6 +287,7 @@ class _PardisoFactor:
     matrix: csr_array
     unit: float
     negative: int
+    made: int
 
     def solve(self, right: Floats) -> Floats:
-        return self.owner.run(33, self.matrix, np.asfortranarray(self.unit * right))
+        return self.owner.run(33, self.matrix, np.asfortranarray(self.unit * right), self.made)

@@ -20,9 +20,9 @@ from ..base.arrays import Floats
 from ..contact.pinching import standing_part
 from ..energy.motion_space import MotionSpace, VertexClasses, motion_space
 from ..energy.pattern import Pattern, hessian_pattern
-from ..energy.projected_hessian import assemble
 from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..energy.rooms import volume_columns
+from ..energy.second_variation import assemble
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from .factorisation import Factor, SingularMatrix, factoriser

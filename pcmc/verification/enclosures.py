@@ -1,0 +1,266 @@
+"""∇E and its derivative in frozen frames, each number enclosed in a ball.
+
+E is a sum over triangles and cable edges. With the formulas of ``energy.kernels`` and ``energy.weight`` a
+triangle of tension α, weight w and pressure p acts like one of tension τ = α + w z̄, and
+
+    ∂E/∂i     = ½ τ ν × e_i + w A n/3 - p (x_j × x_k)/6
+    ⟨b_i, ∂²E/∂i∂j b_j⟩ = τ (e_i·e_j)/(4A) ⟨b_i,ν⟩⟨b_j,ν⟩ + ⟨p x_k/6 - ½ τ ν, b_j × b_i⟩
+                          + w (⟨b_i,g_i⟩⟨n,b_j⟩ + ⟨b_i,n⟩⟨g_j,b_j⟩)/3,      g_i = ½ ν × e_i
+
+(without the skew part for j = i). A flat piece that closes a volume on a plane, -p ⟨c, a × b⟩/6 with its
+apex c, is a triangle b, a, c of pressure p alone whose third corner does not move. A cable edge of direction
+t adds ±τ t and ±τ (1 - t tᵀ)/ℓ.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Floats, Ints
+from ..base.compiled import compiled, inlined
+from ..energy.flat_pieces import flat_pieces
+from ..energy.motion_space import MotionSpace, VertexClasses
+from ..energy.pattern import Pattern, pair_place, row_place
+from ..surface import Surface
+from ..surface.geometry import vector
+from . import balls
+from .balls import Ball, Balls, U, exact, gather, minus, plus, times
+
+
+class Elements(NamedTuple):
+    """Triangles and cable edges with what acts on them, for compiled loops.
+
+    Attributes
+    ----------
+    X : (n+k,3) positions, those of the k flat pieces' apices last.
+    faces, offset : (m,3) corners, and as in ``Pattern``; a flat piece has its apex last.
+    patch : (m,) the patch of each.
+    tension, weight, pressure : (m,) of each.
+    origin, point, normal : (3,) where volumes are seen from; Π.
+    ends, pull : (c,2) and (c,) cable edges and their tension.
+    corner, push : (e,) and (e,3) vertices where flat pieces end, and the normals there (``FlatPieces``).
+    """
+
+    X: Floats
+    faces: Ints
+    offset: Ints
+    patch: Ints
+    tension: Floats
+    weight: Floats
+    pressure: Floats
+    origin: Floats
+    point: Floats
+    normal: Floats
+    ends: Ints
+    pull: Floats
+    corner: Ints
+    push: Floats
+
+    def of_volume(self, signs: Floats) -> Elements:
+        """The elements whose energy is Σ s_i V_i, with s (k,) of the patches; the push is as before."""
+        zero = 0.0 * self.tension
+        return self._replace(tension=zero, weight=zero, pressure=-signs[self.patch], pull=0.0 * self.pull)
+
+
+def elements(surface: Surface, classes: VertexClasses, pattern: Pattern) -> Elements:
+    """The elements of a standing part at its own vertices."""
+    F: Ints = classes.faces
+    offset, patch, X = pattern.offset, classes.patch_of_face, surface.vertices
+    tension, weight = surface.tensions[patch], surface.weights[patch]
+    corner, push = np.empty(0, dtype=np.int64), np.empty((0, 3))
+    if pieces := flat_pieces(surface):
+        here = classes.active[pieces.face]
+        f, i = (np.cumsum(classes.active) - 1)[pieces.face[here]], pieces.corner[here]
+        apex = len(X) + np.arange(len(f))
+        F = np.concatenate([F, np.stack([F[f, (i + 1) % 3], F[f, i], apex], axis=1)])
+        zero = 0 * offset[f, i]
+        offset = np.concatenate([offset, np.stack([offset[f, i], zero, zero], axis=1)])
+        X = np.concatenate([X, pieces.apex[here] + surface.origin])
+        patch = np.append(patch, patch[f])
+        tension, weight = np.append(tension, 0.0 * f), np.append(weight, 0.0 * f)
+        corner, push = pieces.end, pieces.normal
+    plane, (ends, pull) = surface.plane, surface.cable_edges
+    whole = [np.array(part, dtype=np.int64) for part in (F, offset, patch)]
+    pressure, pull = surface.net_pressures[patch], np.array(pull)
+    ends = np.array(ends, dtype=np.int64)
+    at = np.array(surface.origin), np.array(plane.point), np.array(plane.normal)
+    return Elements(np.array(X), *whole, tension, weight, pressure, *at, ends, pull, corner, push)
+
+
+def forces(items: Elements, pressures: Floats) -> tuple[Floats, Floats]:
+    """∇E (n,3) and the radii of its balls; ``pressures`` (e,) act on the ends of flat pieces."""
+    value, radius = np.zeros_like(items.X), np.zeros_like(items.X)
+    _add_forces(items, value, radius)
+    each = -pressures[:, None] * items.push
+    np.add.at(value, items.corner, each)
+    np.add.at(radius, items.corner, 2.0 * U * (np.abs(each) + np.abs(value[items.corner])))
+    return value, radius
+
+
+@inlined
+def _triangle(items: Elements, f: int) -> tuple[Balls, Balls, Balls]:
+    """The corners of triangle f."""
+    F, X = items.faces, items.X
+    return balls.row(X, F[f, 0]), balls.row(X, F[f, 1]), balls.row(X, F[f, 2])
+
+
+@inlined
+def _bent(items: Elements, f: int, a: Balls, b: Balls, c: Balls) -> tuple[Ball, Ball, Ball, Balls]:
+    """2A, 1/(2A), τ and ν of triangle f with the corners a, b, c."""
+    area_vector = balls.cross(balls.sub(b, a), balls.sub(c, a))
+    twice = balls.root(balls.dot(area_vector, area_vector))
+    one = balls.inverse(twice)
+    tension = exact(items.tension[f])
+    if items.weight[f] != 0.0:
+        P, n = balls.of(vector(items.point)), balls.of(vector(items.normal))
+        third = balls.times(exact(items.weight[f]), balls.inverse(exact(3.0)))
+        away = balls.add(balls.add(balls.sub(a, P), balls.sub(b, P)), balls.sub(c, P))
+        tension = plus(tension, times(third, balls.dot(away, n)))
+    return twice, one, tension, balls.scaled(one, area_vector)
+
+
+@compiled
+def _add_forces(items: Elements, value: Floats, radius: Floats) -> None:
+    F, n, half = items.faces, balls.of(vector(items.normal)), exact(0.5)
+    origin = balls.of(vector(items.origin))
+    sixth = balls.inverse(exact(6.0))
+    for f in range(len(F)):
+        x = _triangle(items, f)
+        y = (balls.sub(x[0], origin), balls.sub(x[1], origin), balls.sub(x[2], origin))
+        press = times(exact(items.pressure[f]), sixth)
+        pulls = items.tension[f] != 0.0 or items.weight[f] != 0.0
+        if pulls:
+            twice, _, tension, nu = _bent(items, f, x[0], x[1], x[2])
+            half_nu = balls.scaled(times(half, tension), nu)
+            down = balls.scaled(times(times(exact(items.weight[f]), sixth), twice), n)
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            force = balls.scaled(press, balls.cross(y[k], y[j]))
+            if pulls:
+                force = balls.add(force, balls.add(balls.cross(half_nu, balls.sub(x[k], x[j])), down))
+            for d in range(3):
+                gather(value[F[f, i]], radius[F[f, i]], d, force[d])
+    for e in range(len(items.ends)):
+        i, j = items.ends[e, 0], items.ends[e, 1]
+        side = balls.sub(balls.row(items.X, j), balls.row(items.X, i))
+        one = balls.inverse(balls.root(balls.dot(side, side)))
+        force = balls.scaled(times(exact(items.pull[e]), one), side)
+        for d in range(3):
+            gather(value[j], radius[j], d, force[d])
+            gather(value[i], radius[i], d, (-force[d][0], force[d][1]))
+
+
+@compiled
+def coordinates(space: MotionSpace, value: Floats, radius: Floats) -> tuple[Floats, Floats]:
+    """Bᵀ of vectors (n,3) in balls: (N,) values and radii."""
+    out, error = np.zeros(space.start[-1]), np.zeros(space.start[-1])
+    for v in range(len(space.dimension)):
+        force = (
+            (value[v, 0], radius[v, 0]),
+            (value[v, 1], radius[v, 1]),
+            (value[v, 2], radius[v, 2]),
+        )
+        for c in range(space.dimension[v]):
+            out[space.start[v] + c], error[space.start[v] + c] = balls.dot(
+                balls.row(space.basis[v], c), force
+            )
+    return out, error
+
+
+@compiled
+def second_variation(items: Elements, space: MotionSpace, pattern: Pattern) -> tuple[Floats, Floats]:
+    """B₀ᵀ ∇²E B₀ in the pattern: (k,) values and radii."""
+    value, radius = np.zeros(len(pattern.indices)), np.zeros(len(pattern.indices))
+    F, dimension, half = items.faces, np.append(space.dimension, np.zeros(len(items.X), np.int64)), exact(0.5)
+    origin, n = balls.of(vector(items.origin)), balls.of(vector(items.normal))
+    sixth, third = balls.inverse(exact(6.0)), balls.inverse(exact(3.0))
+    for f in range(len(F)):
+        x = _triangle(items, f)
+        edge = (balls.sub(x[2], x[1]), balls.sub(x[0], x[2]), balls.sub(x[1], x[0]))
+        press, heavy = times(exact(items.pressure[f]), sixth), times(exact(items.weight[f]), third)
+        pulls = items.tension[f] != 0.0 or items.weight[f] != 0.0
+        bend, nu, half_nu = exact(0.0), edge[0], edge[0]
+        if pulls:
+            _, one, tension, nu = _bent(items, f, x[0], x[1], x[2])
+            half_nu = balls.scaled(times(half, tension), nu)
+            bend = times(half, times(tension, one))
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            v, w = F[f, i], F[f, j]
+            q = balls.scaled(press, balls.sub(x[k], origin))
+            if pulls:
+                q = balls.sub(q, half_nu)
+            along, across = times(bend, balls.dot(edge[i], edge[i])), times(bend, balls.dot(edge[i], edge[j]))
+            for r in range(dimension[v]):
+                b = balls.row(space.basis[v], r)
+                lean = balls.dot(b, nu) if pulls else exact(0.0)
+                for s in range(r, dimension[v]):
+                    c = balls.row(space.basis[v], s)
+                    entry = times(times(along, lean), balls.dot(c, nu)) if pulls else exact(0.0)
+                    if heavy[0] != 0.0:
+                        entry = plus(entry, times(heavy, _slope(b, c, nu, edge[i], edge[i], n)))
+                    gather(value, radius, row_place(space, pattern, v, r) + s, entry)
+                for s in range(dimension[w]):
+                    c = balls.row(space.basis[w], s)
+                    entry = balls.dot(q, balls.cross(c, b))
+                    if pulls:
+                        entry = plus(entry, times(times(across, lean), balls.dot(c, nu)))
+                    if heavy[0] != 0.0:
+                        entry = plus(entry, times(heavy, _slope(b, c, nu, edge[i], edge[j], n)))
+                    at = pair_place(space, pattern, v, r, w, s, items.offset[f, i])
+                    gather(value, radius, at, entry)
+    _add_cables(items, space, pattern, value, radius)
+    return value, radius
+
+
+@inlined
+def _slope(b: Balls, c: Balls, nu: Balls, e_i: Balls, e_j: Balls, n: Balls) -> Ball:
+    """⟨b, g_i⟩⟨n, c⟩ + ⟨b, n⟩⟨g_j, c⟩, g = ½ ν × e."""
+    first = times(balls.dot(b, balls.cross(nu, e_i)), balls.dot(n, c))
+    return times(exact(0.5), plus(first, times(balls.dot(c, balls.cross(nu, e_j)), balls.dot(b, n))))
+
+
+@compiled
+def _add_cables(items: Elements, space: MotionSpace, pattern: Pattern, value: Floats, radius: Floats) -> None:
+    dimension, start, indptr = space.dimension, space.start, pattern.indptr
+    for e in range(len(items.ends)):
+        i, j = min(items.ends[e, 0], items.ends[e, 1]), max(items.ends[e, 0], items.ends[e, 1])
+        side = balls.sub(balls.row(items.X, j), balls.row(items.X, i))
+        one = balls.inverse(balls.root(balls.dot(side, side)))
+        t, stiff = balls.scaled(one, side), times(exact(items.pull[e]), one)
+        for v, w, sign in ((i, i, 1.0), (j, j, 1.0), (i, j, -1.0)):
+            for r in range(dimension[v]):
+                at = row_place(space, pattern, v, r)
+                if v != w and dimension[w] > 0:
+                    low, high = indptr[start[v] + r], indptr[start[v] + r + 1]
+                    at = low + np.searchsorted(pattern.indices[low:high], start[w])
+                b = balls.row(space.basis[v], r)
+                for s in range(r if v == w else 0, dimension[w]):
+                    c = balls.row(space.basis[w], s)
+                    turn = minus(balls.dot(b, c), times(balls.dot(b, t), balls.dot(c, t)))
+                    entry = times(stiff, turn)
+                    gather(value, radius, at + s, (sign * entry[0], entry[1]))
+
+
+def volume(items: Elements, signs: Floats, patch_of_end: Ints) -> tuple[Floats, Floats]:
+    """(r,) Σ s_i V_i for each row of signs (r,k), flat pieces included, and its radius."""
+    value, radius = np.zeros(len(signs)), np.zeros(len(signs))
+    for r, row in enumerate(signs):
+        _add_volume(items, row[items.patch], row[patch_of_end], value[r : r + 1], radius[r : r + 1])
+    return value, radius
+
+
+@compiled
+def _add_volume(items: Elements, sign: Floats, end_sign: Floats, value: Floats, radius: Floats) -> None:
+    origin, sixth = balls.of(vector(items.origin)), balls.inverse(exact(6.0))
+    for f in range(len(items.faces)):
+        if sign[f] != 0.0:
+            x = _triangle(items, f)
+            y = (balls.sub(x[0], origin), balls.sub(x[1], origin), balls.sub(x[2], origin))
+            cone = times(sixth, balls.dot(y[0], balls.cross(y[1], y[2])))
+            gather(value, radius, 0, times(exact(sign[f]), cone))
+    for e in range(len(items.corner)):
+        v = balls.sub(balls.row(items.X, items.corner[e]), origin)
+        gather(value, radius, 0, times(exact(end_sign[e]), balls.dot(v, balls.row(items.push, e))))

@@ -1,0 +1,124 @@
+"""The equations of an equilibrium in frozen frames, enclosed: their value, matrix, and how fast it changes.
+
+Unknowns are s (N,), the motion X₀ + B₀ s, and, where rooms prescribe volumes, their pressures δ = κ η:
+
+    F(s, η) = (B₀ᵀ ∇(E - Σ δ_r V_r),  -κ_r (V_r - V̄_r))
+    K = DF  = [[A, -κ C], [-κ Cᵀ, 0]],    C = B₀ᵀ ∇V
+
+F is the gradient of E - Σ δ_r (V_r - V̄_r), so K is symmetric. κ is a power of two, and makes the new columns
+about as large as the diagonal of A. With K regular, C has full rank, and A has on the motions that keep the
+volumes (Cᵀ s = 0) as many negative eigenvalues as K less r (Haynsworth). If such a motion v has Av = μv + Cy,
+then K takes (v, y/κ) to (μ v, 0): so no μ is nearer to zero than the eigenvalues of K.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import block_array, csr_array, eye_array
+
+from ..base.arrays import Floats
+from ..contact.pinching import StandingPart
+from ..energy.flat_pieces import flat_pieces
+from ..energy.motion_space import MotionSpace
+from ..energy.pattern import Pattern, hessian_pattern
+from ..energy.rooms import closing_volumes, prescribed_volumes
+from .balls import SAFE, U
+from .enclosures import Elements, coordinates, elements, forces, second_variation, volume
+from .lipschitz import lipschitz
+
+CUBIC = 1.0 / np.sqrt(27.0)  # |det(d_0, d_1, d_2)| ≤ this times |d|³
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """F and K at the given vertices, s = 0 and η = 0.
+
+    Attributes
+    ----------
+    items, space, pattern : the elements, the frozen frames, and the upper triangle of K.
+    forces, forces_radius : (n,3) ∇E and the radii of its balls.
+    matrix, matrix_error : (k,) values of K in the pattern, and a bound of ‖K - its values‖₂.
+    residual : a bound of ‖F‖₂, force.
+    rooms : r.
+    coupling : a bound of ‖Σ κ_r ζ_r B₀ᵀ∇²V_r B₀‖₂ for |ζ| = 1, per |ζ|; ``scales`` (r,) are κ.
+    """
+
+    items: Elements
+    space: MotionSpace
+    pattern: Pattern
+    forces: Floats
+    forces_radius: Floats
+    matrix: Floats
+    matrix_error: float
+    residual: float
+    scales: Floats
+    coupling: float
+
+    def lipschitz(self, radius: float) -> float:
+        """L with ‖K(x) - K(y)‖₂ ≤ L |x - y| for x, y in the ball of this radius.
+
+        K has the third derivatives of E with pressures up to κ ``radius`` more, and those with one derivative
+        by η: 3 ζ ⟨c, κ∇²V c⟩ in the cubic form, at most 3 · coupling · 2/√27 where |c|² + |ζ|² = 1.
+        """
+        own = lipschitz(self.items, self.space, radius, float(self.scales.sum()) * radius)[0]
+        if not len(self.scales):
+            return own
+        shared = np.bincount(self.items.faces.ravel()).max() * CUBIC * float(np.linalg.norm(self.scales))
+        return float((own + 6.0 * CUBIC * (self.coupling + shared * radius)) * SAFE)
+
+
+def system(part: StandingPart, space: MotionSpace) -> System:
+    """The system of a standing part in these frames."""
+    surface = part.surface
+    pattern = hessian_pattern(part.classes, space)
+    items = elements(surface, part.classes, pattern)
+    patch_of_end = flat_pieces(surface).end_patch
+    force, force_radius = forces(items, surface.net_pressures[patch_of_end])
+    left, error = coordinates(space, force, force_radius)
+    values, radii = second_variation(items, space, pattern)
+    scales, coupling = np.empty(0), 0.0
+    if surface.rooms:
+        diagonal = np.abs(values[pattern.indptr[:-1]]).mean()
+        columns, column_errors, forms = [], [], []
+        for signs in surface.room_signs:
+            room = items.of_volume(signs)
+            column, off = coordinates(space, *forces(room, -signs[patch_of_end]))
+            scale = 2.0 ** np.round(np.log2(diagonal / np.linalg.norm(column)))
+            scales = np.append(scales, scale)
+            columns.append(-scale * column)
+            column_errors.append(scale * off)
+            form, form_error = second_variation(room, space, pattern)
+            forms.append(scale * _norm(pattern, np.abs(form) + form_error))
+        coupling = float(np.linalg.norm(forms) * SAFE)
+        found, off = volume(items, np.array(surface.room_signs), patch_of_end)
+        off += U * (np.abs(found) + 2.0 * np.abs(found + closing_volumes(surface)))
+        found = found + closing_volumes(surface)
+        lacking = scales * (prescribed_volumes(surface) - found)
+        left, error = np.append(left, lacking), np.append(error, scales * off + U * np.abs(lacking))
+        radii = _bordered(pattern, radii, np.stack(column_errors, axis=1))[1]
+        pattern, values = _bordered(pattern, values, np.stack(columns, axis=1))
+    residual = float(np.linalg.norm(np.abs(left) + error) * SAFE)
+    error_norm = _norm(pattern, radii)
+    return System(items, space, pattern, force, force_radius, values, error_norm, residual, scales, coupling)
+
+
+def _bordered(pattern: Pattern, values: Floats, columns: Floats) -> tuple[Pattern, Floats]:
+    """The upper triangle of [[A, C], [Cᵀ, 0]] with the zeros of its last diagonal."""
+    corner = eye_array(columns.shape[1], format="csr")
+    corner.data[:] = 0.0
+    blocks: Any = [[pattern.matrix(values), csr_array(columns)], [None, corner]]
+    upper = csr_array(block_array(blocks))
+    upper.sort_indices()
+    return Pattern(upper.indptr, upper.indices, pattern.offset), upper.data
+
+
+def _norm(pattern: Pattern, positive: Floats) -> float:
+    """A bound of the 2-norm of the symmetric matrix with these entries ≥ 0: its largest row sum."""
+    rows = np.repeat(np.arange(pattern.size), np.diff(pattern.indptr))
+    off = rows != pattern.indices
+    sums = np.bincount(rows, positive, pattern.size)
+    sums += np.bincount(pattern.indices[off], positive[off], pattern.size)
+    return float(sums.max(initial=0.0) * SAFE)

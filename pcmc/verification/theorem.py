@@ -1,0 +1,241 @@
+"""A theorem for a surface at rest: an exact equilibrium is near, alone, and of this Morse index.
+
+Freeze the vertices X₀ and the frames B₀ of the motion space, as the floats they are, and look at the smooth
+function E(X₀ + B₀ s). Its exact gradient f(s) = B₀ᵀ∇E and Hessian A(s) at s = 0 are enclosed with outward
+rounding (``enclosures``; where rooms prescribe volumes, with their pressures among the unknowns: ``system``).
+
+- **Gap and index.** A float matrix Â is within a of A(0). Let Â ∓ σ = L D Lᵀ + R with ‖R‖ ≤ ρ
+  (``stability.backward_error``) and g = σ - ρ - a > 0. By Sylvester and Weyl, A(0) has at least as many
+  eigenvalues below -g as D has negative entries for Â + σ, and at most as many below g as D has for Â - σ. If
+  both are k, that is the index, no eigenvalue is within g of zero, and ‖A(0)⁻¹‖ ≤ β = 1/g.
+- **Existence.** With ‖A(s) - A(s')‖ ≤ L |s - s'| on the ball |s| ≤ r₀ (``lipschitz``) and
+  h = β² L ‖f(0)‖ ≤ ½, Newton and Kantorovich give a zero of f within 2β‖f(0)‖/(1 + √(1 - 2h)) of 0, if
+  that is at most r₀, and no other one within min(r₀, (1 + √(1 - 2h))/(β L)).
+- **Index there.** A(s*) differs by L |s*| at most, so no eigenvalue is within g - L |s*| of zero, and the
+  index is the same if that is positive.
+- **Walls that rest.** All this is about the standing part. A vertex that rests on Π or on a held bottom does
+  so at the exact equilibrium, too, if the pull on it is less than its wall can take. Both are enclosed there:
+  the pull changes by the norm of its row of ∇²E times |s*| at most.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..certificate.certificate import TOLERANCE
+from ..contact.pinching import StandingPart, standing_part
+from ..contact.pull import pull_and_capacity
+from ..energy.loose_parts import relative_forces
+from ..energy.motion_space import MotionSpace, motion_space
+from ..energy.rigid_motions import rigid_modes, rigid_motions
+from ..energy.rooms import volume_defects
+from ..stability.backward_error import backward_error
+from ..stability.factorisation import SingularMatrix, factoriser
+from ..surface import Surface, expect_surface
+from .balls import SAFE, U
+from .lipschitz import lipschitz
+from .system import System, system
+
+STEPS = 8  # of inverse iteration for the least eigenvalue: within some tens of percent
+SHARE = 0.5  # of that estimate is σ first; a quarter of it after each failure
+TRIES = 4
+REACH = 1e-3  # of the least height of a triangle: r₀, where the zero does not need more
+MOST = 0.05  # of it: farther away nothing is tried, as triangles may turn over
+
+
+@dataclass(frozen=True)
+class Theorem:
+    """What ``verify`` has proved of a surface, or why it has not. ``print`` shows it in words.
+
+    Attributes
+    ----------
+    proved, reason : whether all below is proved; if not, why.
+    text : the theorem in words; empty if it is not proved.
+    radius : the exact equilibrium is at most this far from the given vertices, length: each vertex, and the
+        root of the sum of the squares of all.
+    unique_within : there is no other one within this distance, in the same norm and frames.
+    index : the Morse index of the exact equilibrium.
+    gap : no eigenvalue of B₀ᵀ∇²E B₀ there is within this of zero, force/length; where rooms prescribe
+        volumes, among motions that keep these.
+    beta, lipschitz, forces : β, length/force, L, force/length², and the bound of ‖f(0)‖, force.
+    """
+
+    proved: bool
+    reason: str = ""
+    text: str = ""
+    radius: float = np.inf
+    unique_within: float = 0.0
+    index: int | None = None
+    gap: float = 0.0
+    beta: float = np.inf
+    lipschitz: float = np.inf
+    forces: float = np.inf
+
+    def __str__(self) -> str:
+        return self.text or f"not proved: {self.reason}"
+
+
+class _Unproved(Exception):
+    """Why there is no theorem."""
+
+
+def verify(surface: Surface) -> Theorem:
+    """Prove that an exact equilibrium of the discrete energy is near a surface at rest, and its Morse index.
+
+    The proof is one about real numbers, made in floating point with every rounding bounded. It is about the
+    mesh, its energy, and motions in the frozen frames B₀; not about the limit of finer meshes.
+
+    Examples
+    --------
+    >>> from pcmc import Patch
+    >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 0.125**0.5]]
+    >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
+    ...                [Patch("roof", 1.0)], fixed=range(4))
+    >>> theorem = verify(roof)
+    >>> theorem.proved, theorem.index, theorem.radius < 1e-15, round(theorem.gap, 2)
+    (True, 0, True, 1.68)
+    >>> verify(roof.moved(roof.vertices + [[0, 0, 0]] * 4 + [[0, 0, 1e-6]])).proved
+    False
+    """
+    expect_surface(surface)
+    try:
+        return _proved(surface)
+    except (_Unproved, SingularMatrix) as why:
+        return Theorem(False, str(why))
+
+
+def _proved(surface: Surface) -> Theorem:
+    part = standing_part(surface)
+    space = motion_space(part.surface, part.classes, part.surface.vertices)
+    _refuse(part, space)
+    found = system(part, space)
+    _refuse_moving(part, found)
+    index, gap = _inertia(found)
+    beta = SAFE / gap
+    _, stiffness, height = lipschitz(found.items, space, 0.0, 0.0)
+    first = 2.0 * beta * found.residual * SAFE
+    if not first <= MOST * height:
+        raise _Unproved(
+            f"the forces left, {found.residual:.1e}, may move it by {first:.1e}: too far beside its thinnest"
+            f" triangle, of height {height:.1e}; solve to a smaller tolerance, or improve the mesh"
+        )
+    reach = max(REACH * height, first)
+    rate = found.lipschitz(reach)
+    h = beta * beta * rate * found.residual * SAFE
+    if not h <= 0.5:
+        raise _Unproved(
+            f"β² L |f| = {h:.2g} is above ½ (β {beta:.2g}, L {rate:.2g}, |f| {found.residual:.1e}): solve to"
+            " a smaller tolerance, or improve the thinnest triangles"
+        )
+    root = np.sqrt(1.0 - 2.0 * h) / SAFE
+    radius = first / (1.0 + root) * _stretch(space) * SAFE
+    unique = min(reach, (1.0 + root) / (beta * rate)) / SAFE
+    spare = _rests(surface, part, found, stiffness, radius)
+    left = (gap - rate * radius) / SAFE
+    if not left > 0.0:
+        raise _Unproved("no gap is left between the eigenvalues and zero at the exact equilibrium")
+    words = _words(surface, radius, unique, index, left, spare)
+    return Theorem(True, "", words, radius, unique, index, left, beta, rate, found.residual)
+
+
+def _refuse(part: StandingPart, space: MotionSpace) -> None:
+    """Refuse what the theorem does not cover."""
+    surface = part.surface
+    if not space.size:
+        raise _Unproved("no vertex can move")
+    if any(space.dimension[along].any() for _, along in surface.on_circle):
+        raise _Unproved("vertices slide along a circle, and the frozen frames are straight")
+    free = rigid_modes(space, rigid_motions(surface), surface.vertices).shape[1]
+    if free:
+        raise _Unproved(f"no support resists {free} of its rigid motions, so equilibria are not isolated")
+
+
+def _refuse_moving(part: StandingPart, found: System) -> None:
+    """Refuse a surface that is not at rest by the certificate's measure."""
+    surface, X = part.surface, part.surface.vertices
+    left = found.space.project(found.forces[: surface.n])
+    residual = relative_forces(surface, part.classes, X, left)
+    if surface.rooms:
+        residual = float(np.hypot(residual, np.linalg.norm(volume_defects(surface))))
+    if not residual <= TOLERANCE:
+        raise _Unproved(f"it is not at rest: the residual is {residual:.1e}; solve it first")
+
+
+def _inertia(found: System) -> tuple[int, float]:
+    """The Morse index, and g: no eigenvalue of K is within g of zero."""
+    pattern, data, rooms = found.pattern, found.matrix, len(found.scales)
+    solver = factoriser(pattern, "superlu")
+    rough = solver.factor(data)
+    x = np.cos(1.618 * np.arange(pattern.size))
+    for _ in range(STEPS):
+        x = rough.solve(x / np.linalg.norm(x))
+    sigma, reason = SHARE / float(np.linalg.norm(x)), ""
+    diagonal = pattern.indptr[:-1]
+    for _ in range(TRIES):
+        counts: list[int] = []
+        errors = [0.0]
+        for shift in (-sigma, sigma):
+            if shift < 0.0 or counts[0] > 0:
+                moved = data.copy()
+                moved[diagonal] += shift
+                lu = cast(Any, solver.factor(moved)).lu
+                if not np.array_equal(lu.perm_r, lu.perm_c):
+                    raise _Unproved("a zero pivot hides the signs of the eigenvalues")
+                errors.append(backward_error(lu.L, lu.U) + U * float(np.abs(moved[diagonal]).max()))
+                counts.append(int(np.count_nonzero(lu.U.diagonal() < 0.0)))
+        gap = (sigma - (max(errors) + found.matrix_error) * SAFE) / SAFE
+        if len(set(counts)) == 1 and gap > 0.0:
+            return counts[0] - rooms, gap
+        reason = f"{min(counts)} to {max(counts)} eigenvalues below ∓{sigma:.1e}"
+        if gap <= 0.0:
+            reason = f"rounding, {sigma - gap:.1e}, hides eigenvalues as near to zero as {sigma:.1e}"
+            break
+        sigma *= 0.25
+    raise _Unproved(f"its Morse index is not certain: {reason}")
+
+
+def _stretch(space: MotionSpace) -> float:
+    """A bound of ‖B₀‖₂, which rounding keeps from 1: the root of the largest row sum of |B₀ᵀB₀|."""
+    b = space.basis
+    return float(np.sqrt(np.abs(b @ b.transpose(0, 2, 1)).sum(axis=2).max()) * SAFE)
+
+
+def _rests(
+    surface: Surface, part: StandingPart, found: System, stiffness: Floats, radius: float
+) -> float | None:
+    """How much of their walls' capacity the resting vertices have to spare, at least; None without any."""
+    if not part.resting.any():
+        return None
+    n, walls, resting = surface.n, part.walls, part.resting
+    pull, capacity = pull_and_capacity(part.surface, walls, resting, -found.forces[:n])
+    size = np.linalg.norm(found.forces[:n], axis=1)
+    off = np.linalg.norm(found.forces_radius[:n], axis=1) + 2.0 * stiffness[:n] * radius + 1e-14 * size
+    lost = np.zeros(n)
+    for end in walls.top_edges.T:  # both ends of a top edge may move by the radius
+        np.add.at(lost, end, surface.tensions[walls.wall_below] * radius)
+    spare = (capacity * (1.0 - 1e-12) - lost - np.abs(pull) - off * SAFE)[resting]
+    worst = int(spare.argmin())
+    if not spare[worst] > 0.0:
+        vertex = int(np.flatnonzero(resting)[worst])
+        raise _Unproved(
+            f"resting vertex {vertex} is on the verge of lifting off, so which rest is not certain"
+        )
+    return float((spare / capacity[resting]).min())
+
+
+def _words(
+    surface: Surface, radius: float, unique: float, index: int, gap: float, spare: float | None
+) -> str:
+    mirrors = [str(plane) for plane, _ in surface.on_planes if plane.mirror]
+    motions = f" among motions symmetric in {', '.join(mirrors)}" if mirrors else ""
+    kept = " that keep the volumes" if surface.rooms else ""
+    rest = "" if spare is None else f" Its walls rest where these do, with {100.0 * spare:.2g} % to spare."
+    return (
+        f"Proved: within {radius:.1e} of these vertices there is an exact equilibrium of the mesh, and no"
+        f" other within {unique:.1e}. Its Morse index is exactly {index}{motions}: no eigenvalue of B₀ᵀ∇²E B₀"
+        f"{', among motions' + kept if kept else ''} is within {gap:.2g} of zero.{rest}"
+    )
