@@ -8,10 +8,9 @@ from starts import sphere, spherical_cap, two_caps, two_squares
 
 from generators import spherical_cap_exact
 from pcmc import Circle, Patch, Verdict, certify, solve, write
-from pcmc.certificate.balance import unbalanced, unheld
+from pcmc.certificate.balance import unheld
 from pcmc.certificate.neck import narrowest_neck
 from pcmc.certificate.proof import Overload, UnbalancedJunction, Unheld
-from pcmc.contact.pinching import standing_part
 from pcmc.existence.starts import low_start
 from pcmc.io import native
 from pcmc.plan import Divider, Hole, Plan
@@ -65,7 +64,7 @@ def test_every_cap_below_the_fold_ends_with_balance_as_proof(alpha):
         assert fold.value == pytest.approx(2.0 * alpha, rel=0.03)
         found = result.certificate
         assert found.verdict is Verdict.NO_EQUILIBRIUM
-        assert found.proofs == result.proofs
+        assert [p.ratio for p in found.proofs] == pytest.approx([p.ratio for p in result.proofs])
         assert found.tried == result.tried
         for text in (result.message, found.detail, str(found)):
             assert f"folds at {fold.value:.3f} of the pressure" in text
@@ -253,8 +252,7 @@ def test_a_part_that_nothing_holds_falls_under_its_weight():
     heavy = sphere(0.8).retensioned(weights={"bubble": 0.1})
     result = solve(heavy)
     assert result.proofs == certify(heavy).proofs == (Unheld(0, falls=True),)
-    on_the_ground = heavy.rebuilt(on_plane=[int(heavy.vertices[:, 2].argmin())])
-    assert unheld(on_the_ground) is None
+    assert unheld(heavy.rebuilt(fixed=[0])) is None
 
 
 @pytest.mark.slow
@@ -325,7 +323,6 @@ def test_a_coarse_mesh_at_rest_is_not_disproved():
     result = solve(random_surface(30082), target="stationary", iterations=12)
     assert result.status is Status.ITERATION_LIMIT
     assert result.proofs == ()
-    assert unbalanced(result.surface, standing_part(result.surface).walls.pinchable) is not None
     assert result.certificate.verdict is Verdict.STABLE
 
 

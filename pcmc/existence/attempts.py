@@ -42,7 +42,7 @@ class Attempts:
     evaluations: int = 0
 
     def solve(self, surface: Surface, **changes: Any) -> Result:
-        """Solve from one start; StopIteration if stopped, LimitReached at the limit of iterations."""
+        """Solve from one start; StopIteration if stopped, LimitReached at the limit asked for."""
         before = self.steps
 
         def count(progress: Progress) -> None:
@@ -55,7 +55,7 @@ class Attempts:
             raise StopIteration
         rows = [{**row, "iteration": before + row["iteration"]} for row in result.rows]
         result = replace(result, rows=rows)
-        if result.status is Status.ITERATION_LIMIT:
+        if result.status is Status.ITERATION_LIMIT and "iterations" in self.options:
             raise LimitReached(result)
         return result
 

@@ -31,16 +31,17 @@ from .loads import raise_loads
 from .starts import low_start
 from .tensions import relax_tensions
 
-RAN = (Status.DIVERGED, Status.DEGENERATE, Status.STALLED, Status.VANISHED)
+RAN = (Status.DIVERGED, Status.DEGENERATE, Status.STALLED, Status.ITERATION_LIMIT, Status.VANISHED)
 
 
 def search(surface: Surface, first: Result, callback: Callback | None, options: Mapping[str, Any]) -> Result:
     """An equilibrium from a further start, or the first result with what was tried, and proved.
 
     ``first`` : what the solver made of ``surface`` with the same ``options``. Where it or a further solve
-    reaches the limit of iterations, the search ends.
+    reaches the limit of iterations in ``options``, the search ends.
     """
-    if first.status not in RAN or not first.rows:
+    limited = first.status is Status.ITERATION_LIMIT and "iterations" in options
+    if first.status not in RAN or limited or not first.rows:
         return first
     level = first.rows[-1]["level"]
     start = first.surface if level else surface
