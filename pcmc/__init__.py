@@ -15,6 +15,7 @@ solvers                    the paper's flow, L-BFGS, and the geometric Newton so
 design                     tensions that meet targets
 continuation existence     branches of equilibria; whether there is one at all
 accuracy                   error bars from finer meshes, and meshes for an accuracy
+margins                    how far a roof is from the edge of its stability
 compas panels structure    COMPAS; families of panels; structural models
 drawings plot report       sheets, pictures, and pages for those who build
 advice                     first tensions for a rise, and what to type where a roof fails
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from .existence import solve
     from .io import read, write
     from .io.repairing import Repaired, repair
+    from .margins import Margin, margin
     from .panels import FewerFamilies, Panels, fewer_families, panels
     from .structure import Material, SelfWeight, Snow, StructuralModel, Wind, read_results, write_structure
     from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, mirrored
@@ -57,6 +59,7 @@ __all__ = [
     "Direction",
     "FewerFamilies",
     "Line",
+    "Margin",
     "Material",
     "MeshCheck",
     "MeshVerdict",
@@ -85,6 +88,7 @@ __all__ = [
     "follow",
     "gradient",
     "hessian",
+    "margin",
     "mean_curvature",
     "meet",
     "panels",
@@ -126,6 +130,7 @@ _NAMES = {
         "read_results",
         "write_structure",
     ),
+    "margins": ("Margin", "margin"),
     "panels": ("FewerFamilies", "Panels", "fewer_families", "panels"),
     "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface", "cut", "mirrored"),
     "verification": ("Theorem", "verify"),

@@ -96,7 +96,7 @@ def verify(surface: Surface) -> Theorem:
     >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
     ...                [Patch("roof", 1.0)], fixed=range(4))
     >>> theorem = verify(roof)
-    >>> theorem.proved, theorem.index, theorem.radius < 1e-15, round(theorem.gap, 2)
+    >>> theorem.proved, theorem.index, theorem.radius < 1e-14, round(theorem.gap, 2)
     (True, 0, True, 1.68)
     >>> verify(roof.moved(roof.vertices + [[0, 0, 0]] * 4 + [[0, 0, 1e-6]])).proved
     False
@@ -139,7 +139,8 @@ def _proved(surface: Surface) -> Theorem:
     if not left > 0.0:
         raise _Unproved("no gap is left between the eigenvalues and zero at the exact equilibrium")
     words = _words(surface, radius, unique, index, left, spare)
-    return Theorem(True, "", words, radius, unique, index, left, beta, rate, found.residual)
+    numbers = (float(x) for x in (left, beta, rate, found.residual))
+    return Theorem(True, "", words, float(radius), float(unique), index, *numbers)
 
 
 def _refuse(part: StandingPart, space: MotionSpace) -> None:

@@ -1,0 +1,241 @@
+"""``margin``: how far an equilibrium is from the edge, with a bar from a finer mesh."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from ..accuracy import check_mesh
+from ..accuracy.extrapolation import extrapolate
+from ..accuracy.mesh_check import with_bar
+from ..base import validate
+from ..base.arrays import Floats
+from ..base.errors import PcmcError, SurfaceError
+from ..base.units import NO_UNITS, Units
+from ..certificate import Certificate, certify
+from ..continuation.segment import EVENT_ACCURACY
+from ..quantities import dimension_of
+from ..solvers.result import Callback, Result
+from ..surface import Surface
+from ..surface.geometry import vertex_area_vectors
+from .ending import End, MarginEnd, find_end
+from .varied import Varied
+
+MOST = 10.0  # times, up or down: a margin this wide is no worry of a designer's
+INFLATES = 0.5  # |∫ φ·ν dA| over ∫ |φ| dA from which a mode φ moves a patch to one side
+OPEN = (MarginEnd.NONE, MarginEnd.MESH)  # ends that leave the margin open above
+
+
+@dataclass(frozen=True, eq=False)
+class Margin:
+    """How far a surface at rest is from the edge. ``print`` shows a sentence.
+
+    Attributes
+    ----------
+    what, more : what is varied, such as "pressure" or "tension of west", and whether it grows.
+    factor : times the present value up to which the equilibrium stays stable; NaN where that is 0.
+    values : at that end, by label, such as {"pressure of roof": 1.43}, in units of each.
+    bar : how far the limit of ``factor`` (where it is NaN: of the value) on finer and finer meshes may be
+        from it. From two meshes it is an estimate; infinite from one, and where the meshes end differently.
+    limit, limit_bar : the extrapolated number and its bar; NaN and infinite without a limit in sight.
+    ends_by : what ends it. With ``NONE`` and ``MESH`` the margin is at least this.
+    detail : what else is to be known: ridges that come to rest on the way, the finer mesh, symmetry.
+    surface : at the end.
+    mode : (n,3) the motion in which it leaves the equilibrium; (0,3) where there is none.
+    where : what moves most in it, such as "'north' inflates"; empty without a mode.
+    index : of the surface given. A saddle is followed until it has more ways down.
+    """
+
+    what: str
+    more: bool
+    factor: float
+    values: Mapping[str, float]
+    bar: float
+    limit: float
+    limit_bar: float
+    ends_by: MarginEnd
+    detail: str
+    surface: Surface = field(repr=False)
+    mode: Floats = field(repr=False)
+    where: str
+    index: int
+    dimension: str = ""
+
+    @property
+    def value(self) -> float:
+        """The value at the end; NaN where several differ."""
+        values = set(self.values.values())
+        return values.pop() if len(values) == 1 else math.nan
+
+    def __str__(self) -> str:
+        return self.text()
+
+    __repr__ = __str__
+
+    def text(self, units: Units = NO_UNITS) -> str:
+        """The margin in a sentence."""
+        holds = f"stays a saddle of index {self.index}" if self.index else "holds"
+        none_now = math.isnan(self.factor)
+        number = self.value if none_now else self.factor
+        at_least = self.ends_by in OPEN
+        shown = f"{number:.4g}" if at_least else with_bar(number, self.bar)
+        shown += f"{units.behind(self.dimension)} of {self.what}" if none_now else f" times the {self.what}"
+        then = f": then {self.where}" if self.where else ""
+        holds += f"{' at least' * at_least} {'up' if self.more else 'down'} to"
+        text = f"{holds} {shown}{then} ({self.ends_by.value})"
+        return "; ".join(filter(None, (text, self.detail)))
+
+
+def margin(
+    surface: Surface | Result,
+    what: str,
+    *,
+    towards: str | None = None,
+    most: float = MOST,
+    meshes: int = 2,
+    corners: npt.ArrayLike = (),
+    callback: Callback | None = None,
+    certificate: Certificate | None = None,
+) -> Margin:
+    """The factor on a load or a tension up to which an equilibrium stays stable, and what ends it.
+
+    The branch of equilibria is followed from the surface (``pcmc.follow``) until its index rises or the
+    parameter turns back, whichever comes first. On a mesh whose symmetry is broken a branch that would
+    end at a bifurcation bends away instead, and ends at a fold a little before, or not at all.
+
+    Parameters
+    ----------
+    surface : at rest.
+    what : ``"pressure"``, ``"snow"``, ``"weight"``, ``"tension"`` (with cables), ``"cable"`` or ``"volume"``:
+        all of a kind in proportion; or one of them, such as ``"pressure of hall"``; the name of a patch or
+        cable alone means its tension. What is 0 now is added, alike on all patches.
+    towards : ``"more"`` or ``"less"``; by default loads and walls pull more, sheets and cables less.
+    most : followed up to this factor, or down to 1 over it; of what is 0 now, up to so many times the
+        largest pressure, or tension over size.
+    meshes : on so many meshes in all, each once refined from the one before, for the bar.
+    corners : as of ``pcmc.check_mesh``.
+    callback : called with a ``Progress`` at each step. Where it raises StopIteration, the search ends with
+        KeyboardInterrupt.
+    certificate : of the surface, if it is known.
+
+    Raises
+    ------
+    OptionError : an unknown name, with the nearest known one; nothing depends on it; it cannot become less.
+    SurfaceError : the surface is not at rest.
+
+    Examples
+    --------
+    A cap over the unit disc folds as a hemisphere, at p = 2 α; here on a coarse mesh:
+
+    >>> from pcmc import Patch, solve
+    >>> angle = 2 * np.pi * np.arange(12) / 12
+    >>> rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> disc = Surface([[0, 0, 0.3], *rim], [[0, k + 1, (k + 1) % 12 + 1] for k in range(12)], [0] * 12,
+    ...                [Patch("cap", 0.8)], fixed=range(1, 13))
+    >>> from pcmc.meshing.refinement import refine
+    >>> found = margin(solve(refine(disc)), "pressure")
+    >>> found.ends_by.name, found.where, bool(abs(found.factor - 1.6) <= found.bar)
+    ('FOLD', 'the roof inflates', True)
+    """
+    if isinstance(surface, Result):
+        certificate, surface = surface.certificate, surface.surface
+    if not isinstance(surface, Surface):
+        validate.refuse("surface", type(surface).__name__, "a Surface or a Result", error=SurfaceError)
+    validate.number("most", most, above=1.0)
+    validate.integer("meshes", meshes, least=1)
+    varied = Varied.of(surface, what, towards)
+    certificate = certify(surface) if certificate is None else certificate
+    index = certificate.index
+    if index is None:
+        message = f"margin: the surface is not at rest, so it has none ({certificate.verdict.value})"
+        raise SurfaceError(message, what="surface", found=certificate.residual)
+    ends, notes = [find_end(surface, varied, index, most, callback)], list[str]()
+    if meshes > 1 and ends[0].ends_by not in OPEN:
+        finer, note = _on_finer_meshes(surface, varied, index, most, meshes, corners, callback)
+        ends, notes = [*ends, *finer], [note]
+    end, unit = ends[0], varied.unit or 1.0
+    numbers = np.array([[unit * one.factor] for one in ends])
+    alike = {one.ends_by in OPEN for one in ends} == {False}
+    bars = extrapolate(numbers if alike else numbers[:1], np.array([EVENT_ACCURACY * abs(numbers[0, 0])]))
+    mode = _mode(end, index)
+    if end.contacts:
+        at = ", ".join(f"{unit * factor:.4g}" for factor in end.contacts)
+        notes.append(f"ridges come to rest, or lift off, on the way: at {at}")
+    if certificate.symmetric_in:
+        notes.append(f"among shapes symmetric in {', '.join(certificate.symmetric_in)}")
+    kinds = {dimension_of(kind) for kind, _ in varied.parts}
+    return Margin(
+        what=varied.what,
+        more=varied.more,
+        factor=math.nan if varied.unit else end.factor,
+        values=varied.at(end.factor),
+        bar=float(bars.error[0]),
+        limit=float(bars.limit[0]),
+        limit_bar=float(bars.limit_error[0]),
+        ends_by=end.ends_by,
+        detail="; ".join(filter(None, (end.detail, *notes))),
+        surface=end.surface,
+        mode=mode,
+        where=_where(end, mode),
+        index=index,
+        dimension=kinds.pop() if len(kinds) == 1 else "",
+    )
+
+
+def _on_finer_meshes(
+    surface: Surface,
+    varied: Varied,
+    index: int,
+    most: float,
+    meshes: int,
+    corners: npt.ArrayLike,
+    callback: Callback | None,
+) -> tuple[list[End], str]:
+    """The ends on finer meshes, and what is to be known about these; without ends where one is lost."""
+    try:
+        check = check_mesh(surface, meshes, corners=corners, callback=callback)
+        if not check.persists:
+            return [], f"no bar: the mesh check finds that the roof {check.verdict.value}"
+        ends = [find_end(finer, varied, index, most, callback) for finer in check.surfaces[1:]]
+    except PcmcError as error:
+        return [], f"no bar: {error}"
+    unit = varied.unit or 1.0
+    return ends, ", ".join(
+        f"on {end.surface.m} triangles {unit * end.factor:.4g} by {end.ends_by.name.lower()}" for end in ends
+    )
+
+
+def _mode(end: End, index: int) -> Floats:
+    """(n,3) the motion that loses its stiffness at the end, with the sign in which a branch goes on."""
+    if end.ends_by in OPEN:
+        return np.empty((0, 3))
+    modes = certify(end.surface, modes=index + 1).modes
+    mode = modes[index] if len(modes) > index else end.motion
+    return -mode if (mode * end.motion).sum() < 0.0 else mode
+
+
+def _where(end: End, mode: Floats) -> str:
+    """What moves most in a mode, and how."""
+    surface = end.surface
+    motion = np.linalg.norm(mode, axis=1)
+    if not motion.any():
+        return ""
+    roof, most = np.flatnonzero(surface.roof), int(motion.argmax())
+    through, size = np.zeros((2, len(surface.patches)))
+    for k in roof:
+        vectors, areas = vertex_area_vectors(surface.vertices, surface.faces[surface.patch_of_face == k])
+        through[k], size[k] = (mode * vectors).sum(), motion @ areas
+    near = np.unique(surface.patch_of_face[(surface.faces == most).any(axis=1)])
+    largest = int(roof[size[roof].argmax()]) if len(roof) else int(near[0])
+    turns = end.ends_by is MarginEnd.BIFURCATION  # to either side
+    if abs(through[largest]) >= INFLATES * size[largest] > 0.0 and not (turns and len(near) > 1):
+        part = "the roof" if len(roof) == 1 else repr(surface.patches[largest].name)
+        return f"{part} {'inflates' if through[largest] > 0.0 else 'sinks'}{' or the opposite' * turns}"
+    names = " | ".join(surface.patches[k].name for k in near[:3]) + " …" * (len(near) > 3)
+    part = f"the junction {names}" if len(near) > 1 else repr(surface.patches[near[0]].name)
+    place = ", ".join(f"{x:.3g}" for x in surface.vertices[most].round(9) + 0.0)
+    return f"{part} sways to one side, most near ({place})"

@@ -1,0 +1,98 @@
+"""What a margin varies: all pressures, snow, weights, tensions or volumes in proportion, or one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base import validate
+from ..base.arrays import Floats
+from ..base.errors import OptionError
+from ..continuation import Direction
+from ..design import Parameter
+from ..surface import Surface
+
+TOWARDS = ("more", "less")
+
+Part = tuple[str, str]  # the kind of a parameter, such as "tension", and the name of what it belongs to
+
+
+@dataclass(frozen=True, eq=False)
+class Varied:
+    """Numbers that change together: in proportion to λ, which is 1 on the surface; where all are 0, to λ.
+
+    Attributes
+    ----------
+    what : in words, such as "pressure" or "tension of west".
+    parts : the kind and the name of each.
+    values : (k,) the present values.
+    more : whether they grow on the way to the edge.
+    unit : what λ = 1 means for each where all are 0 now; 0 where they are not.
+    """
+
+    what: str
+    parts: tuple[Part, ...]
+    values: Floats
+    more: bool
+    unit: float = 0.0
+
+    @classmethod
+    def of(cls, surface: Surface, what: str, towards: str | None = None) -> Varied:
+        """What a text names on a surface. Errors as ``margin``."""
+        known = named(surface)
+        parts = known[validate.choice("what", what, [*known])]
+        if towards is not None:
+            validate.choice("towards", towards, TOWARDS)
+        walls = {patch.name for patch, wall in zip(surface.patches, surface.walls, strict=True) if wall}
+        pulls = any(kind == "cable" or (kind == "tension" and name not in walls) for kind, name in parts)
+        more = not pulls if towards is None else towards == "more"
+        values = np.array([Parameter(name, kind).value(surface) for kind, name in parts])
+        if what == parts[0][1]:
+            what = Parameter(what, parts[0][0]).label
+        if values.any():
+            varied = tuple(part for part, value in zip(parts, values, strict=True) if value)
+            return cls(what, varied, values[values != 0.0], more)
+        if not more:
+            raise OptionError(f"margin: the {what} is 0, and cannot become less", what="towards", found=0.0)
+        usual = float(np.abs(surface.pressures).max()) or float(surface.tensions.max()) / surface.size
+        return cls(what, parts, values, more, usual)
+
+    @property
+    def direction(self) -> Direction:
+        """The same as a direction of branches."""
+        rates: dict[str, Any] = {}
+        for (kind, name), value in zip(self.parts, self.values.tolist(), strict=True):
+            rates.setdefault(f"{kind}s", {})[name] = value or self.unit
+        return Direction(**rates)
+
+    def at(self, factor: float) -> dict[str, float]:
+        """The values at λ, by their labels."""
+        values = np.where(self.unit > 0.0, self.unit * factor, self.values * factor).tolist()
+        return {Parameter(name, kind).label: x for (kind, name), x in zip(self.parts, values, strict=True)}
+
+
+def named(surface: Surface) -> Mapping[str, tuple[Part, ...]]:
+    """All that a margin of a surface may vary, by name.
+
+    Kinds alone mean all of a kind in proportion, the name of a patch or cable alone its tension.
+
+    >>> from pcmc import Patch
+    >>> tent = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 1]], [[0, 1, 2]], [0], [Patch("sail", 2.0)], fixed=[0])
+    >>> [*named(tent)][:5], named(tent)["sail"]
+    (['pressure', 'snow', 'weight', 'tension', 'pressure of sail'], (('tension', 'sail'),))
+    """
+    every = [patch.name for patch in surface.patches]
+    sheets = [name for name, wall in zip(every, surface.walls, strict=True) if not wall]
+    cables = dict.fromkeys(cable.name for cable in surface.cables)
+    owners = {"pressure": sheets, "snow": sheets, "weight": every, "tension": every, "cable": [*cables]}
+    owners["volume"] = [room.name for room in surface.rooms]
+    listed = {kind: tuple((kind, name) for name in names) for kind, names in owners.items() if names}
+    tensions = listed["tension"] + listed.get("cable", ())
+    pulling = tuple(part for part in tensions if Parameter(part[1], part[0]).value(surface) > 0.0)
+    together = {**listed, "tension": pulling} if pulling else listed
+    single = {Parameter(name, kind).label: ((kind, name),) for kind, name in sum(listed.values(), ())}
+    plain = {name: ((kind, name),) for kind, name in tensions[::-1]}
+    return {**together, **single, **plain}

@@ -1,0 +1,159 @@
+"""How far from the edge: closed forms, and Surface Evolver just below and just above a fold."""
+
+import re
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq, minimize_scalar
+
+from generators import barrel, catenoid, joined_caps, spherical_cap, two_caps, two_squares
+from generators.catenary import FOLD
+from pcmc import certify, margin, solve
+from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.margins import MarginEnd
+from studies import evolver
+
+
+def cap(alpha=0.75, edge_length=0.2):
+    return solve(spherical_cap(edge_length, alpha=alpha)).surface
+
+
+@pytest.mark.parametrize(("what", "exact"), [("pressure", 1.5), ("tension", 1 / 1.5), ("cap", 1 / 1.5)])
+def test_a_cap_folds_as_a_hemisphere(what, exact):
+    """At rest up to p R = 2 α."""
+    found = margin(cap(), what)
+    assert found.ends_by is MarginEnd.FOLD
+    assert found.where == "the roof inflates"
+    assert found.bar <= 0.06 * exact
+    assert abs(found.factor - exact) <= found.bar
+    assert abs(found.limit - exact) <= found.limit_bar
+    assert np.ptp(found.surface.vertices[:, 2]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_snow_that_is_not_there_is_added():
+    """Net p - s from 1 down to -2 α."""
+    found = margin(cap(), "snow")
+    assert np.isnan(found.factor)
+    assert abs(found.value - 2.5) <= found.bar <= 0.1
+    assert found.where == "the roof sinks"
+    assert "of snow" in found.text()
+
+
+def test_the_heaviest_long_strip():
+    """z + α/w = c cosh(x/c) spans 2a only where α/w ≥ a cosh(t)/t, t tanh t = 1."""
+    strip = solve(barrel(8, alpha=2.0, pressure=0.0, weight=1.0, rise=-0.2)).surface
+    found = margin(strip, "weight")
+    exact = 2.0 * FOLD / np.cosh(FOLD)
+    assert found.ends_by is MarginEnd.FOLD
+    assert abs(found.factor - exact) <= found.bar <= 0.05 * exact
+    assert "symmetric in" in found.detail
+
+
+def film_pressure(bulge, half=0.5):
+    """Pressure at which a film of tension 1 between unit rings at z = ± half has this largest radius.
+
+    With q = p/2 the force along the axis gives r cos θ - q r² = const, θ from the axis; dz = cot θ dr.
+    """
+
+    def reach(q):
+        def slope(u):  # r = bulge - u², which takes the root out of the integral
+            r = bulge - u * u
+            cosine = (bulge - q * bulge**2 + q * r * r) / r
+            return 2.0 * u * cosine / np.sqrt(max(1.0 - cosine**2, 1e-12))
+
+        return quad(slope, 1e-7, np.sqrt(bulge - 1.0), limit=200)[0]
+
+    most = 1.0 / (bulge - 1.0)  # there the film would turn back at the rings
+    return 2.0 * brentq(lambda q: reach(q) - half, 0.5001 / bulge, min(0.999 * most, 3.0))
+
+
+def test_pressure_in_a_film_between_rings():
+    """No pressure now: from the catenoid over the cylinder to the fold of the bulging film, by quadrature."""
+    exact = -minimize_scalar(lambda r: -film_pressure(r), bounds=(1.2, 1.7), method="bounded").fun
+    film = solve(catenoid(0.2)).surface
+    found = margin(film, "pressure")
+    assert found.ends_by is MarginEnd.FOLD
+    assert abs(found.value - exact) <= found.bar <= 0.1 * exact
+    assert found.where == "the roof inflates"
+
+
+def test_two_caps_with_a_wall_fold_where_the_wall_pulls_too_much():
+    """(4, 3, 3) at depth 4.5. Where the junction ends at a corner the fold depends a little on where the
+    vertices lie along the surface; beside it, the solver and its eigenvalues agree."""
+    start = solve(joined_caps(1.0)).surface
+    found = margin(start, "wall", meshes=1)
+    assert found.what == "tension of wall"
+    assert found.ends_by is MarginEnd.FOLD
+    assert found.value == pytest.approx(3.0 * found.factor)
+    below, above = (found.surface.retensioned({"wall": share * found.value}) for share in (0.99, 1.01))
+    assert solve(below, min_quality=0.0).certificate.index == 0
+    assert not solve(above, min_quality=0.0, target="stationary").converged
+
+
+def test_a_wall_that_pulls_too_much_slips_before_it_comes_down():
+    """Contact and loss of stability on one step of the branch are told apart: first it slips."""
+    start = solve(two_squares(8)).surface
+    found = margin(start, "wall", meshes=1)
+    assert found.ends_by is MarginEnd.BIFURCATION
+    assert found.where.startswith("the junction left | right | wall sways")
+    for share, index in ((0.998, 0), (1.002, 1)):
+        beside = found.surface.retensioned({"wall": 2.0 * found.factor * share})
+        result = solve(beside, target="stationary", min_quality=0.0)
+        assert result.certificate.index == index
+        assert len(result.certificate.pinched) == 0
+    assert abs(certify(found.surface).eigenvalues[0]) < 1e-4
+
+
+def test_ridges_that_come_to_rest_do_not_end_it():
+    caps = solve(two_caps(1.2), target="stationary").surface
+    found = margin(caps, "wall", meshes=1, most=2.0)
+    assert found.ends_by is MarginEnd.NONE
+    assert found.factor == 2.0
+    assert "ridges come to rest" in found.detail
+    assert found.text().startswith("holds at least up to 2 times the tension of wall (no end found")
+
+
+def test_names():
+    caps = solve(two_caps(1.2), target="stationary").surface
+    with pytest.raises(OptionError, match="did you mean 'pressure of large'"):
+        margin(caps, "pressure of larg")
+    with pytest.raises(OptionError, match="cannot become less"):
+        margin(caps, "snow", towards="less")
+    with pytest.raises(OptionError, match="did you mean 'less'"):
+        margin(caps, "pressure", towards="les")
+    less = margin(cap(), "pressure", towards="less")
+    assert (less.more, less.factor, less.ends_by) == (False, 0.1, MarginEnd.NONE)
+
+
+def test_what_is_not_at_rest_has_none():
+    with pytest.raises(SurfaceError, match="not at rest, so it has none"):
+        margin(spherical_cap(0.4), "pressure")
+
+
+def test_a_saddle_is_followed_until_it_has_more_ways_down():
+    upper = solve(spherical_cap(0.2, alpha=0.6, upper=True, exact=True), target="stationary").surface
+    assert certify(upper).index == 1
+    found = margin(upper, "pressure", meshes=1)
+    assert found.index == 1
+    assert found.text().startswith("stays a saddle of index 1")
+
+
+@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@pytest.mark.parametrize("build", [cap, lambda: solve(two_caps(1.2), target="stationary").surface])
+def test_surface_evolver_comes_to_rest_just_below_the_fold_and_runs_away_just_above(build):
+    """On the same mesh, from the surface at the fold, by the program's own search along its Newton step."""
+    start = build()
+    found = margin(start, "pressure", meshes=1)
+    assert found.ends_by is MarginEnd.FOLD
+    search = "hessian_normal on\n" + "hessian_seek\n" * 30
+    pressures = {patch.name: patch.pressure for patch in start.patches if patch.pressure}
+    beside = [
+        found.surface.retensioned(None, {name: share * found.factor * p for name, p in pressures.items()})
+        for share in (0.995, 1.005)
+    ]
+    energies = [evolver.energy(surface, search) for surface in beside]
+    assert energies[0] == pytest.approx(solve(beside[0], min_quality=0.0).energy, rel=1e-4)
+    assert abs(energies[1]) > 1e20
+    ended = evolver.run(beside[0], f"{search}eigenprobe 0")
+    assert re.search(r"Eigencounts:\s*0 <,\s*0 ==,\s*[1-9]\d* >", ended)
