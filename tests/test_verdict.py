@@ -14,6 +14,7 @@ from pcmc.certificate.balance import coarseness, load_ratio
 from pcmc.certificate.proof import Attempt
 from pcmc.certificate.verdict import Findings, judge
 from pcmc.solvers.result import Status
+from pcmc.stability.softness import Spectrum
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
@@ -197,9 +198,8 @@ def findings(**changes):
         "residual": 0.0,
         "tolerance": 1e-8,
         "quality": 0.9,
-        "index": 0,
+        "spectrum": Spectrum(0, 0),
         "own_residuals": np.zeros(1),
-        "softest": 5.0,
     }
     return Findings(**(given | changes))
 
@@ -208,11 +208,15 @@ def findings(**changes):
     ("changes", "verdict"),
     [
         ({}, Verdict.STABLE),
-        ({"softest": 1e-3}, Verdict.NEUTRAL),
-        ({"softest": -1e-3, "index": 1}, Verdict.SADDLE),
+        ({"spectrum": Spectrum(0, 0, soft=1)}, Verdict.NEUTRAL),
+        ({"spectrum": Spectrum(1, 0, soft=1)}, Verdict.NEUTRAL),
+        ({"spectrum": Spectrum(None, 0, soft=1)}, Verdict.NEUTRAL),
+        ({"spectrum": Spectrum(1, 1)}, Verdict.SADDLE),
+        ({"spectrum": Spectrum(2, 1, soft=1)}, Verdict.SADDLE),
+        ({"spectrum": Spectrum(0, 0, hidden="ARPACK stops")}, Verdict.UNDECIDED),
         ({"own_residuals": np.array([1e-4])}, Verdict.NOT_CONVERGED),
         ({"own_residuals": np.array([1e-6])}, Verdict.STABLE),
-        ({"index": None}, Verdict.UNDECIDED),
+        ({"spectrum": Spectrum()}, Verdict.UNDECIDED),
         ({"residual": 1e-7, "rounding": 1e-8}, Verdict.UNDECIDED),
         ({"residual": 1e-6, "rounding": 1e-8}, Verdict.NOT_CONVERGED),
         ({"residual": 1e-7}, Verdict.NOT_CONVERGED),

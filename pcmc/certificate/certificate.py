@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -27,9 +26,9 @@ from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..energy.volume_below import volume_below
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import lowest, stiffness
+from ..stability.modes import SecondVariation, lowest
+from ..stability.softness import Spectrum, count_soft
 from ..surface import Plane, Surface, expect_surface, mirrored
-from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
 from .balance import FORCE, MOMENT, balance_sentence, balance_table, load, load_ratio, pressures_left_over
 from .cables import cable_end_table, cable_table
@@ -38,10 +37,10 @@ from .leaning import lean_table, lean_texts
 from .proof import Attempt, Proof
 from .reactions import SupportForces, support_forces
 from .supports import boundary_view, support_table
-from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
+from .verdict import COLLAPSED, NEUTRAL, Evidence, Findings, Verdict, judge
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
-UNKNOWN: tuple[int | None, Floats, Floats] = None, np.empty(0), np.empty((0, 0, 3))  # as of ``_stability``
+UNKNOWN = np.empty(0), np.empty((0, 0, 3))  # no eigenvalues, no modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +264,9 @@ def certify(
     in_wall = part.walls.pinchable[standing.patch_of_face]
     quality = float(qualities[~in_wall].min(initial=1.0))
     at_rest = residual <= tolerance and quality > COLLAPSED
-    index, eigenvalues, fields = _stability(standing, classes, space, rigid, modes) if at_rest else UNKNOWN
+    spectrum, eigenvalues, fields = Spectrum(), *UNKNOWN
+    if at_rest:
+        spectrum, eigenvalues, fields = _stability(standing, classes, space, rigid, modes)
 
     patches = _patch_table(surface, standing, areas, qualities)
     ratio, acting = load_ratio(standing), support_forces(surface, standing=standing)
@@ -276,9 +277,8 @@ def certify(
         residual=residual,
         tolerance=tolerance,
         quality=quality,
-        index=index,
+        spectrum=spectrum,
         own_residuals=_own_residuals(standing, classes, left),
-        softest=_softest(standing, classes, eigenvalues, fields),
         rounding=rounding_left(standing, classes, X),
         evidence=evidence,
         tried=tried,
@@ -293,7 +293,7 @@ def certify(
         scale=scale,
         energy=value,
         volume=below,
-        index=index,
+        index=spectrum.index,
         eigenvalues=eigenvalues,
         modes=fields,
         curvature_error=_largest(patches["variational_max"]),
@@ -318,15 +318,16 @@ def certify(
 
 def _stability(
     surface: Surface, classes: VertexClasses, space: MotionSpace, rigid: Floats, modes: int
-) -> tuple[int | None, Floats, Floats]:
-    """The Morse index, the lowest eigenvalues and their modes; unknown where the matrix is singular."""
-    index, eigenvalues, fields = UNKNOWN
-    with suppress(SingularMatrix):
-        system = stiffness(surface, classes, space, rigid)
-        index = system.negative
-        if modes > 0 and space.size > 2:
-            eigenvalues, fields = lowest(system, modes)
-    return index, eigenvalues, fields
+) -> tuple[Spectrum, Floats, Floats]:
+    """What the eigenvalues are like by their counts, and the lowest of them with their modes (k,n,3)."""
+    variation = SecondVariation.of(surface, classes, space, rigid)
+    spectrum, system = count_soft(variation, NEUTRAL / surface.size**2)
+    if system is not None and modes > 0:
+        try:
+            return spectrum, *lowest(system, modes)
+        except SingularMatrix as error:
+            spectrum = replace(spectrum, hidden=f"{error}; modes=0 judges by counts alone")
+    return spectrum, *UNKNOWN
 
 
 def _own_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> Floats:
@@ -343,16 +344,6 @@ def _own_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> Fl
     squares = ratios(inside, island_of_vertex, own, island)
     np.maximum.at(out, classes.patch_of_face, squares[island])
     return np.sqrt(out)
-
-
-def _softest(surface: Surface, classes: VertexClasses, values: Floats, fields: Floats) -> float:
-    """The lowest λ in units of α/size², α the mean tension where its mode moves; infinite without one."""
-    if not len(values):
-        return np.inf
-    F = classes.faces
-    moved = face_areas(surface.vertices[F]) * np.einsum("fij,fij->f", fields[0][F], fields[0][F])
-    tension = float(surface.tensions[classes.patch_of_face] @ moved / moved.sum())
-    return float(values[0]) * surface.size**2 / tension
 
 
 def _pulled_off(excess: Floats) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats
 from ..energy.weight import compressed, effective_tensions
+from ..stability.softness import Spectrum
 from ..surface import Surface
 from .balance import coarseness, describe_growing, growing_part, hardly_balanced, overload, unbalanced, unheld
 from .cables import too_long, weak_cable
@@ -21,7 +22,7 @@ from .slipping import describe_saddle
 
 NOISE = 10.0  # times what rounding of the coordinates leaves: forces up to here may be rounding alone
 FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
-NEUTRAL = 1e-2  # |λ| size²/α below which a mode counts as neutral
+NEUTRAL = 1e-2  # |λ| size²/α up to which a motion counts as neutral, α the tension of what it moves
 SMALL = 1e3  # tolerances of its own forces that a patch may lack where stronger ones hide it
 COLLAPSED = 1e-3  # triangle quality up to which a mesh counts as degenerate
 
@@ -61,9 +62,8 @@ class Findings:
     pinchable : (patches,) bool, its walls that can pinch.
     residual, tolerance : forces left, relative; the most at which a surface counts as at rest.
     quality : smallest triangle quality outside walls that can pinch.
-    index : Morse index; None where it is not known.
+    spectrum : how many eigenvalues are negative, and how many nearly zero; see ``Spectrum``.
     own_residuals : (patches,) each patch's forces left, relative to its own.
-    softest : lowest eigenvalue in units of α/size²; infinite where none is known.
     rounding : what rounding of the coordinates alone leaves of the residual, about.
     evidence : what happened on the way, if a solver was there to see it.
     tried : what a search has tried; empty if there was none.
@@ -76,9 +76,8 @@ class Findings:
     residual: float
     tolerance: float
     quality: float
-    index: int | None
+    spectrum: Spectrum
     own_residuals: Floats
-    softest: float
     rounding: float = 0.0
     evidence: Evidence | None = None
     tried: tuple[Attempt, ...] = ()
@@ -208,10 +207,10 @@ def _hidden_forces(f: Findings) -> str:
 
 
 def _hidden_stability(f: Findings) -> str:
-    reason = (
-        f"the forces balance (relative residual {f.residual:.1e}), but the second variation is singular to"
-        " rounding, so its negative eigenvalues cannot be counted"
+    hidden = f.spectrum.hidden or (
+        "the second variation is singular to rounding, so its negative eigenvalues cannot be counted"
     )
+    reason = f"the forces balance (relative residual {f.residual:.1e}), but {hidden}"
     tensions = f.surface.tensions[f.surface.tensions > 0.0]
     if len(tensions) and tensions.max() > FACTOR * tensions.min():
         reason += f"; the tensions differ by a factor of {tensions.max() / tensions.min():.0e}"
@@ -235,7 +234,16 @@ def _compressed(f: Findings) -> str:
 
 
 def _ways_down(f: Findings) -> str:
-    return describe_saddle(f.surface, f.index or 0, f.mode)
+    return describe_saddle(f.surface, f.spectrum.index or f.spectrum.below or 0, f.mode)
+
+
+def _soft(f: Findings) -> str:
+    count, index = f.spectrum.soft, f.spectrum.index
+    signs = "of signs that rounding hides" if index is None else f"{index} of them negative"
+    return (
+        f"at a fold or a branching, or beside one: {count} softest mode{'s'[: count > 1]} within"
+        f" ±{NEUTRAL:g} α/size², {signs}"
+    )
 
 
 RULES = (
@@ -261,8 +269,8 @@ RULES = (
     Rule(Verdict.NOT_CONVERGED, lambda f: f.moving, _forces_left),
     Rule(Verdict.NOT_CONVERGED, lambda f: bool(f.own_residuals.max() > SMALL * f.tolerance), _weak_patch),
     Rule(Verdict.SADDLE, lambda f: bool(compressed(f.surface).any()), _compressed),
-    Rule(Verdict.UNDECIDED, lambda f: f.index is None, _hidden_stability),
-    Rule(Verdict.SADDLE, lambda f: f.index != 0, _ways_down),
+    Rule(Verdict.UNDECIDED, lambda f: f.spectrum.unknown, _hidden_stability),
+    Rule(Verdict.SADDLE, lambda f: bool(f.spectrum.below), _ways_down),
     Rule(
         Verdict.NEUTRAL,
         lambda f: f.rigid > 0,
@@ -270,8 +278,8 @@ RULES = (
     ),
     Rule(
         Verdict.NEUTRAL,
-        lambda f: abs(f.softest) < NEUTRAL,
-        lambda f: f"softest mode {f.softest:.1e} in units of α/size²",
+        lambda f: bool(f.spectrum.soft),
+        _soft,
     ),
     Rule(Verdict.STABLE, lambda f: True, lambda f: ""),
 )

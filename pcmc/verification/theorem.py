@@ -98,7 +98,7 @@ def verify(surface: Surface) -> Theorem:
     >>> theorem = verify(roof)
     >>> theorem.proved, theorem.index, theorem.radius < 1e-14, round(theorem.gap, 2)
     (True, 0, True, 1.68)
-    >>> verify(roof.moved(roof.vertices + [[0, 0, 0]] * 4 + [[0, 0, 1e-6]])).proved
+    >>> verify(roof.moved(roof.vertices * [1, 1, 1 + 1e-6])).proved
     False
     """
     expect_surface(surface)
