@@ -90,6 +90,10 @@ class BalanceWarning(UserWarning):
     """The tensions at a junction cannot balance, whatever its shape."""
 
 
+class CurveWarning(UserWarning):
+    """Held vertices were moved off the curves that they were drawn on."""
+
+
 class SweepError(PcmcError):
     """The executor, scheduler or workers of a sweep failed; the cases stored before are safe."""
 
