@@ -36,7 +36,7 @@ from .curve_tables import junction_table, room_table
 from .leaning import lean_table, lean_texts
 from .proof import Attempt, Proof
 from .reactions import SupportForces, support_forces
-from .supports import boundary_view, support_table
+from .supports import boundary_view, pull_table, support_table
 from .verdict import COLLAPSED, NEUTRAL, Evidence, Findings, Verdict, judge
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
@@ -71,6 +71,7 @@ class Certificate:
     supports : one row per support: a line, point, plane, mirror or end of a cable, with its length, middle,
         force, moment and largest force per length; see ``pcmc.certificate.supports.support_table``.
         Its forces and moments add up to those of the loads, but for the ``balance``'s remainder.
+    pulls : one row per edge of these, with the force per length there and its direction.
     boundaries : the rows of ``supports`` that are as long as a curve: length, middle, reaction, largest
         reaction per length.
     balance : force and moment of the loads, of the supports, and what remains of both: a row each.
@@ -121,6 +122,11 @@ class Certificate:
     def supports(self) -> pd.DataFrame:
         """The table of supports, made when first asked for."""
         return support_table(self.acting)
+
+    @cached_property
+    def pulls(self) -> pd.DataFrame:
+        """The force per length along each edge of the supports, made when first asked for."""
+        return pull_table(self.acting)
 
     @cached_property
     def balance(self) -> pd.DataFrame:

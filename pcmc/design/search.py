@@ -29,7 +29,7 @@ from ..surface import Surface
 from ..surface.wall_pressures import with_pressures
 from .outcome import Design, DesignStatus, NoStart
 from .quantities import vertices_up
-from .sensitivity import sensitivities
+from .sensitivity import slopes
 from .steps import Iterate, StepPlan, Trial
 from .targets import KINDS, Parameter, Target, as_parameters, as_targets, measure
 
@@ -277,10 +277,10 @@ class Search:
     def with_jacobian(self, at: Trial) -> Iterate | None:
         """The trial with its derivatives; None at a fold."""
         try:
-            slopes = sensitivities(at.result.surface, at.aims, self.parameters).to_numpy()
+            found = np.array([own for own, *_ in slopes(at.result.surface, at.aims, self.parameters)])
         except SurfaceError:
             return None
-        jacobian = slopes * np.where(self.reciprocal, -(self.converted(at.x) ** 2), 1.0)
+        jacobian = found * np.where(self.reciprocal, -(self.converted(at.x) ** 2), 1.0)
         jacobian = jacobian * (at.r != 0.0)[:, None] / self.scale[:, None]
         return Iterate(at.x, at.result, at.quantities, at.r, at.phi, at.aims, jacobian)
 
