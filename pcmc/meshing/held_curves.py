@@ -10,9 +10,8 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface
-from .refinement import held_midpoints
+from .refinement import CORNER, held_midpoints
 
-CORNER = 40.0  # degrees: where held edges turn by more, the curve has a corner
 STRAIGHT = 1e-9  # of the length of an edge: smaller rises of an arc over it count as none
 
 
@@ -99,8 +98,9 @@ def held_corners(surface: Surface, corner: float = CORNER) -> Ints:
 
 
 def held_edges(surface: Surface) -> Ints:
-    """(e,2) the edges whose new vertices are held."""
-    return np.asarray(surface.topology.edges[held_midpoints(surface)[0]])
+    """(e,2) the edges whose new vertices are held, but on no curve that was drawn."""
+    guessed = held_midpoints(surface)[0] & ~surface.edges_on_curves.drawn
+    return np.asarray(surface.topology.edges[guessed])
 
 
 def arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> tuple[Floats, Bools]:

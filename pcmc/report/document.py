@@ -137,7 +137,7 @@ class RoofReport:
     def _mesh_story(self, check: MeshCheck) -> list[Any]:
         sentences = filter(None, (check.verdict.value, check.detail, check.advice))
         text = "; ".join(sentences)
-        about = "An error bar is how far the limit on finer and finer meshes may be from the number."
+        about = "An error bar estimates how far the limit on finer and finer meshes may be from the number."
         return [
             pages.heading("Mesh check"),
             pages.paragraph(f"{text[:1].upper()}{text[1:]}. {about}"),

@@ -20,7 +20,8 @@ VERDICTS = {
     Verdict.SADDLE: "The roof is in equilibrium, but leaves this shape at the smallest disturbance. Do not"
     " build it like this.",
     Verdict.NOT_CONVERGED: "The roof is not in equilibrium yet: the forces do not balance. Solve it further.",
-    Verdict.NO_EQUILIBRIUM: "There is no equilibrium: no shape balances these tensions and pressures.",
+    Verdict.NO_EQUILIBRIUM: "There is no equilibrium: no smooth shape balances these tensions and loads.",
+    Verdict.NONE_FOUND: "No equilibrium was found; that there is none is not proved.",
     Verdict.RAN_AWAY: "No equilibrium is known: the shape moved away without coming to rest.",
     Verdict.UNDECIDED: "Rounding of numbers hides whether the roof is in equilibrium, or stable.",
     Verdict.WALL_DOWN: "A ridge comes down on the bottom of its wall, where it cannot rest.",
