@@ -34,7 +34,7 @@ from .balance import FORCE, MOMENT, balance_sentence, balance_table, load, load_
 from .cables import cable_end_table, cable_table
 from .curve_tables import junction_table, room_table
 from .leaning import lean_table, lean_texts
-from .proof import Proof
+from .proof import Attempt, Proof
 from .reactions import SupportForces, support_forces
 from .supports import boundary_view, pull_table, support_table
 from .verdict import COLLAPSED, NEUTRAL, Evidence, Findings, Verdict, judge
@@ -87,7 +87,8 @@ class Certificate:
     load_ratio : pressure and weight along Π's normal over the most that the supports could carry; see
         the function ``load_ratio``.
     proofs : why there is no equilibrium, if that is the verdict: ``Overload``, ``UnbalancedJunction``,
-        ``Fold`` or ``Unheld``.
+        ``Unheld`` or ``WeakCable``.
+    tried : what a search for an equilibrium has tried, if that led to none.
     """
 
     verdict: Verdict
@@ -110,6 +111,7 @@ class Certificate:
     pinched: Ints
     load_ratio: float
     proofs: tuple[Proof, ...] = ()
+    tried: tuple[Attempt, ...] = ()
     cables: pd.DataFrame = field(default_factory=pd.DataFrame)
     cable_ends: pd.DataFrame = field(default_factory=pd.DataFrame)
     rooms: pd.DataFrame = field(default_factory=pd.DataFrame)
@@ -216,7 +218,7 @@ def certify(
     modes: int = 1,
     tolerance: float = TOLERANCE,
     evidence: Evidence | None = None,
-    proofs: tuple[Proof, ...] = (),
+    tried: tuple[Attempt, ...] = (),
     whole: bool | Sequence[str | Plane] = False,
 ) -> Certificate:
     """Examine a surface.
@@ -226,7 +228,7 @@ def certify(
     surface : the surface; it is not changed.
     modes : how many of the lowest modes to compute; the index is counted in any case.
     tolerance : relative residual, > 0, up to which it counts as at rest.
-    evidence, proofs : what happened to it while it was solved, and what that proves.
+    evidence, tried : what happened to it while it was solved, and what a search has tried without success.
         ``Result.certify`` passes them on.
     whole : of a surface between mirror planes, examine ``mirrored`` of it: all its motions count for the
         index then, and not only those symmetric in these planes. True, or the planes to unfold at.
@@ -283,10 +285,9 @@ def certify(
         quality=quality,
         spectrum=spectrum,
         own_residuals=_own_residuals(standing, classes, left),
-        load_ratio=ratio,
         rounding=rounding_left(standing, classes, X),
         evidence=evidence,
-        given=proofs,
+        tried=tried,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
         rigid=rigid.shape[1] if surface.rooms else 0,
     )
@@ -312,6 +313,7 @@ def certify(
         pinched=np.flatnonzero(part.resting),
         load_ratio=ratio,
         proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),
+        tried=tried,
         cables=cable_table(standing, left),
         cable_ends=cable_end_table(standing),
         rooms=rooms,

@@ -20,7 +20,8 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..certificate.balance import coarseness, load_is_given, load_name, load_ratio
+from ..base.interrupts import stop_requested
+from ..certificate.balance import coarseness, overload
 from ..certificate.proof import Overload
 from ..solvers import solve
 from ..solvers.result import Progress, Result, Status
@@ -166,7 +167,8 @@ class Search:
         """Search to the end; if asked to stop, end with the best so far."""
         try:
             return self.search()
-        except (StopIteration, KeyboardInterrupt):
+        except (StopIteration, KeyboardInterrupt) as error:
+            stop_requested(error)
             if self.best is None:
                 given = self.trial(self.initial_unknowns(), _unsolved(self.surface))
                 return self.design(DesignStatus.STOPPED, given)
@@ -218,8 +220,9 @@ class Search:
         None where no equilibrium is found, or where it is at a fold and has no derivatives.
         """
         surface = self.with_unknowns(start, x)
-        if load_is_given(surface) and load_ratio(surface) > 1.0 + coarseness(surface):
-            self.failed = Overload(load_ratio(surface), load_name(surface))
+        load = overload(surface)
+        if load is not None and load.ratio > 1.0 + coarseness(surface):
+            self.failed = load
             self.record(x, OVERLOADED)
             return None
         result = solve(surface, "newton", **{**quality, **self.options})
