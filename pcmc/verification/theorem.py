@@ -41,9 +41,9 @@ from .balls import SAFE, U
 from .lipschitz import lipschitz
 from .system import System, system
 
-STEPS = 8  # of inverse iteration for the least eigenvalue: within some tens of percent
-SHARE = 0.5  # of that estimate is σ first; a quarter of it after each failure
-TRIES = 4
+STEPS = 5  # of inverse iteration for the least eigenvalue: then mostly within a few percent
+SHARE = 0.8  # of that estimate is σ first; half of it after each failure
+TRIES = 5
 REACH = 1e-3  # of the least height of a triangle: r₀, where the zero does not need more
 LEVEL = 1e-9  # of a unit motion along Π: a part across it that is rounding
 MOST = 0.05  # of it: farther away nothing is tried, as triangles may turn over
@@ -223,8 +223,8 @@ def _inertia(found: System) -> tuple[int, float]:
     rough = solver.factor(data)
     x = np.cos(1.618 * np.arange(pattern.size))
     for _ in range(STEPS):
-        x = rough.solve(x / np.linalg.norm(x))
-    sigma, reason = SHARE / float(np.linalg.norm(x)), ""
+        x = rough.solve(x / np.sqrt((x * x).sum()))  # a sum: threads of BLAS wait for each other
+    sigma, reason = SHARE / float(np.sqrt((x * x).sum())), ""
     diagonal = pattern.indptr[:-1]
     for _ in range(TRIES):
         counts: list[int] = []
@@ -245,7 +245,7 @@ def _inertia(found: System) -> tuple[int, float]:
         if gap <= 0.0:
             reason = f"rounding, {sigma - gap:.1e}, hides eigenvalues as near to zero as {sigma:.1e}"
             break
-        sigma *= 0.25
+        sigma *= 0.5
     raise _Unproved(f"its Morse index is not certain: {reason}")
 
 
