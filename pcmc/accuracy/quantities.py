@@ -140,8 +140,8 @@ def _height(surface: Surface, patch: int) -> tuple[float, float]:
     """Greatest height of a patch's vertices over Π, and that of the smooth surface through them there.
 
     The highest vertex is up to half an edge beside the top, at random from mesh to mesh. The paraboloid
-    through it and its neighbours, or on a junction the parabola, has its top at the surface's own. In a mirror
-    plane the images of its neighbours belong to them.
+    through it and its neighbours, or on a junction the parabola, has its top at the surface's own. In a
+    mirror plane the images of its neighbours belong to them.
     """
     local = surface.plane.to_local(surface.vertices)
     vertices = np.unique(surface.faces[surface.patch_of_face == patch])
