@@ -28,7 +28,7 @@ from .coverage_weights import barrels, domes, strips
 
 def cases() -> Iterator[Case]:
     """All closed forms on all meshes."""
-    families = (helicoids, scherk, _tubes, domes, barrels, strips, _bubbles, _wedges, _random_caps)
+    families = (helicoids, scherk, _tubes, domes, barrels, strips, _bubbles, _wedges, random_caps)
     for family in families:
         yield from family()
 
@@ -248,7 +248,7 @@ def _wedge(angle: float, rings: int, alpha: float) -> Surface:
     return one_patch(np.column_stack([plan, z]), faces, Patch("cap", alpha), rim, on_planes=planes)
 
 
-def _random_caps() -> Iterator[Case]:
+def random_caps() -> Iterator[Case]:
     """Caps over random triangulations of the disc, rims of uneven edges."""
     for alpha in (0.53, 0.65, 1.0, 4.0):
         values = {

@@ -61,7 +61,7 @@ def extrapolate(
                                                                               order, would give; at least
                                                                               0.05 |d_2|, and |d_1| / 12
                                                                               for d_1 / d_2 > 5.7
-    d_1 / d_2 > 16, or a small d_2 of     q_2 + d_2 / 3                       the larger of |d_2| and
+    d_1 / d_2 > 16, or a small d_2 of     q_2 + d_2 / 3                       the larger of 2 |d_2| and
     the other sign: they swing                                                |d_1| / 12, what order 2
                                                                               leaves of d_1
     else: no limit in sight               NaN                                 infinite
@@ -136,5 +136,8 @@ def _three(
     distance = np.maximum(SAFETY * apart, LEAST * np.abs(last))
     fast = np.abs(before) / 12.0  # what order 2 leaves of d_1: d_1 / 4 + d_1 / 16 + … = d_1 / 3 less d_1 / 4
     distance = np.where(order > FAST, np.maximum(distance, fast), distance)
-    bar = np.where(settled, distance, np.where(swings, np.maximum(np.abs(last), fast), np.inf)) + rounding
+    bar = (
+        np.where(settled, distance, np.where(swings, np.maximum(SAFETY * np.abs(last), fast), np.inf))
+        + rounding
+    )
     return np.where(same_sign, order, np.nan), limit, bar

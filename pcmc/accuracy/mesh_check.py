@@ -36,6 +36,8 @@ CURVES = 8.0 / 3.0  # times what doubtful curves change on the next mesh: 4/3 on
 class MeshCheck:
     """How far a surface at rest depends on its mesh. ``print`` shows the table.
 
+    Error bars are estimates from these meshes, no bounds: the study ``coverage`` counts how often they hold.
+
     Attributes
     ----------
     verdict, detail : the verdict, and its reason.
