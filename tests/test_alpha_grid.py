@@ -165,11 +165,14 @@ def test_the_results_explain_every_cross():
     assert len(cases) == len(alpha_grid.TENSIONS) ** 3
     crosses = cases[cases.crossed]
     assert len(crosses) == records.flow_status.isin(alpha_grid.FAILED).sum() > 200
-    reasons = {"none: a patch below its fold", "none: tensions cannot balance",
-               "none: a fold on the way"}  # fmt: skip
+    reasons = {"none: tensions cannot balance", "none found: a patch below its fold",
+               "none found: a fold on the way"}  # fmt: skip
     assert set(crosses.category[~crosses.equilibrium]) <= reasons
     assert (crosses.reason.str.len() > 0).all()
     assert (cases.quality[cases.ending == "fold"].notna()).all()
+    unbalanced = (cases.alpha_large - cases.alpha_small).abs() > cases.alpha_wall
+    assert (cases.proved == (unbalanced & ~cases.equilibrium)).all()  # each by the theorem, and no other
+    assert (cases.category == "none: tensions cannot balance").sum() == cases.proved.sum() > 400
     folds = folder.read_table("patch_folds").iloc[0]
     least = folder.read_table("weakening").groupby("patch").least.min()
     assert least.large > folds.large
