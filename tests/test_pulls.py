@@ -166,3 +166,11 @@ def test_a_maximum_that_several_places_share_has_two_derivatives():
             there = measure(changed, target).value - measure(surface, target).value
             found = table.loc[f"{quantity} {column}"].iloc[0]
             assert side * there / 1e-3 == pytest.approx(found, rel=1e-2, abs=1e-6)
+
+
+def test_a_drawn_line_inside_a_sheet_is_held_up_to_its_end_on_the_boundary():
+    plan = Plan(SQUARE, [], tension=6.0, edge_length=1.0, supports=[[[3, 0, 0], [3, 3, 1]]])
+    for roof in refined(plan.surface(), 2):
+        table = pcmc.certify(roof).supports
+        assert sorted(table["length"]) == pytest.approx([10.0**0.5, 24.0])
+        assert table["per_length_max"].max() <= 12.0 * (1.0 + 1e-12)

@@ -99,13 +99,13 @@ def given_volume(surface: Surface) -> float | None:
     A room between plates that are not upright encloses another volume than the roof has over Π.
 
     >>> from pcmc import Patch, Room
-    >>> X, F, sides = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[1, 2, 3]], [Patch("side", 2.0)]
-    >>> given_volume(Surface(X[1:], [[0, 1, 2]], [0], sides, fixed=range(3))) is None
+    >>> X, F = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 3]], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    >>> tent = Surface(X, F, [0] * 3, [Patch("tent", 2.0)], fixed=range(3))
+    >>> given_volume(tent) is None
     True
-    >>> room = Room("all", {"lid": 1}, 3.0)
-    >>> lid = Surface(X[:3], [[0, 1, 2]], [0], [Patch("lid", 2.0)], fixed=range(3), rooms=[room])
-    >>> round(given_volume(lid), 12)
-    3.0
+    >>> rooms = [Room("all", {"tent": 1}, 0.5)]
+    >>> round(given_volume(Surface(X, F, [0] * 3, tent.patches, fixed=range(3), rooms=rooms)), 12)
+    0.5
     """
     if not surface.rooms or np.any(closing_volumes(surface)):
         return None

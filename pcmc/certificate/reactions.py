@@ -150,7 +150,8 @@ def support_forces(
     single, sliding = (used & ~on_boundary & side for side in (clamped, held & ~clamped))
     between = topo.junction_edge | topo.seam_edge
     junction = between & at_both_ends(held, topo.edges)
-    inner = at_both_ends(single, topo.edges) | (between & at_both_ends(clamped, topo.edges))
+    drawn = (between | surface.edges_on_curves.drawn) & ~topo.boundary_edge
+    inner = at_both_ends(single, topo.edges) | (drawn & at_both_ends(clamped, topo.edges))
     lines = (junction[:, None] & sliding[topo.edges]) | (inner | boundary)[:, None]
     lengths = _half_lengths(surface, lines)
     pulls, normals = (
