@@ -119,7 +119,7 @@ def test_reason_of_each_case(tmp_path):
         (4, 4, 4, *rest, "diverged", 1e-3),
         (4, 6, 6, "converged", "saddle", "iteration_limit", 1e-3),
         (1, 4, 2, *open_case, "diverged", 1e9),
-        (1, 1, 4, *open_case, "diverged", 1e9),
+        (4, 1, 4, *open_case, "diverged", 1e9),
         (4, 4, 2, *open_case, "diverged", 1e9),
         (8, 3, 8, *open_case, "diverged", 1e9),
         (8, 8, 6, *open_case, "diverged", 1e9),
@@ -139,7 +139,7 @@ def test_reason_of_each_case(tmp_path):
     columns = [*alpha_grid.AXES, "status", "height", "finer_height"]
     folder.write_table("finer", pd.DataFrame(finer, columns=columns))
     found, names = explained(folder), list(CATEGORIES)
-    assert found.category.tolist() == [names[k] for k in (0, 1, 2, 5, 4, 6, 7, 8, 3)]
+    assert found.category.tolist() == [names[k] for k in (0, 1, 2, 4, 5, 6, 7, 8, 3)]
     assert found.crossed.sum() == 6
     assert found.equilibrium.sum() == 4
     assert found.finer.tolist() == [True] + [False] * 8
