@@ -48,6 +48,7 @@ WHOLE_INDEX = "Of a surface with mirror planes certify the whole: motions that a
 RISE = "Find the tension with which the whole roof rises so much over its outline."
 APEX = "The same, over the plane."
 SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
+MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
 
@@ -114,6 +115,7 @@ def solve_(
         print("nothing written (use --anyway to write it)")
     if check := checking.mesh_check(outcome):
         print(f"\n{check.brief(outcome.units)}")
+    checking.margins(outcome)
     return OK if outcome.good else NOT_CERTIFIED
 
 
@@ -135,6 +137,7 @@ def certify_(
     cable: Cables = None,
     volume: Volumes = None,
     meshes: Annotated[int | None, option("NUMBER", MESHES, parser=arguments.integer)] = None,
+    margin: Annotated[list[str] | None, option("WHAT", MARGIN, "--margin")] = None,
     start: Start = False,
     cache: Cache = True,
     whole: Annotated[bool, typer.Option("--whole", help=WHOLE_INDEX)] = False,
@@ -146,6 +149,7 @@ def certify_(
       pcmc certify roof.pcmc
       pcmc certify roof.toml
       pcmc certify roof.pcmc --meshes 3
+      pcmc certify roof.toml --margin pressure --margin "tension of west"
     """
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
@@ -159,6 +163,7 @@ def certify_(
     if roof.result is not None:
         report(roof, verdict=False)
     print(certificate.text(roof.units))
+    checking.margins(roof, margin or ())
     if meshes is not None and certificate.index is not None:
         sys.stdout.flush()
         with working() as say:

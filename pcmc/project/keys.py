@@ -27,6 +27,7 @@ from .output import COLOURS
 from .remeshing import WHEN, Remeshing
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
+MARGIN = "how far it is from the edge: pressure, snow or such as tension of NAME; see ``pcmc.margin``"
 WHOLE = "whether to write and draw the whole roof that a plan with mirrors is a part of, and to certify it"
 FIRST = "First lines"  # the keys before any table
 WALL = 'a number, "balanced" or false'
@@ -270,6 +271,7 @@ def solve_section(method: str) -> Section:
     known = (
         Key("method", "a text", "newton", "the solver", tuple(METHODS)),
         Key("mesh_check", "true or false", None, CHECKED),
+        Key("margin", "a list of names", [], MARGIN),
     )
     if method not in METHODS:
         return Section("solve", "The solver and its options.", known)
@@ -284,10 +286,11 @@ def solve_section(method: str) -> Section:
 @cache
 def target_sections() -> tuple[Section, ...]:
     """[targets] and its tables."""
-    from ..design import Parameter, Target  # needed by projects with targets only
+    from ..design import Parameter  # needed by projects with targets only
     from ..design.quantities import MEASURES
     from ..design.targets import KINDS as KINDS_OF_PARAMETER
     from ..design.targets import SHORT
+    from ..margins.targets import Target
 
     changing = _of_class(
         Parameter, {"patch": "a name or a list of names"}, choices={"kind": KINDS_OF_PARAMETER}

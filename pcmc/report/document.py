@@ -28,6 +28,7 @@ from .plan import PaperPlan, paper_plan
 
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
+    from ..margins import Margin
 
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
 PIXELS = 1300  # width of a picture
@@ -43,7 +44,7 @@ class RoofReport:
     name, date : in the head and the foot of the pages; empty for none.
     plan : to scale.
     schedule : the panels, if a tolerance was given; else None.
-    mesh_check, mesh_failure, targets : as given to ``roof_report``.
+    mesh_check, mesh_failure, targets, margins : as given to ``roof_report``.
     figures : the key figures.
     files : name of each file that belongs to the roof, and what it is.
     """
@@ -58,6 +59,7 @@ class RoofReport:
     mesh_check: MeshCheck | None = None
     mesh_failure: str = ""
     targets: pd.DataFrame | None = None
+    margins: Sequence[Margin] = ()
     files: Mapping[str, str] = field(default_factory=dict)
     figures: Sequence[Figure] = ()
 
@@ -102,6 +104,7 @@ class RoofReport:
         story = [
             pages.heading("Verdict"),
             *map(pages.paragraph, words.verdict_sentences(certificate, self.mesh_check)),
+            *(pages.paragraph(f"The roof {margin.text(units)}.") for margin in self.margins),
             *pages.table(tables.key_figures(surface, self.figures, units)),
             *pages.picture("View from above", pictures["The roof"]),
             pages.new_page(),
@@ -184,6 +187,7 @@ def roof_report(
     mesh_check: MeshCheck | None = None,
     mesh_failure: str = "",
     targets: pd.DataFrame | None = None,
+    margins: Sequence[Margin] = (),
     files: Mapping[str, str] | None = None,
     date: str = "",
     anyway: bool = False,
@@ -202,6 +206,7 @@ def roof_report(
     mesh_check : of the surface, for error bars; None for none.
     mesh_failure : why it was asked for and failed; empty otherwise.
     targets : ``Design.targets``; None for none.
+    margins : how far the roof is from the edge, a sentence each.
     files : name of each file that belongs to the roof, and what it is.
     date : of the report, as it is to be printed; no clock is read.
     anyway : report on a surface that is not certified; every page is marked.
@@ -240,6 +245,7 @@ def roof_report(
         mesh_check,
         mesh_failure,
         targets,
+        margins,
         dict(files or {}),
         quantities.figures(surface, certificate) if figures is None else figures,
     )
