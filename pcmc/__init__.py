@@ -4,7 +4,7 @@ The rooms of the package, from the ground up; a room imports only from those abo
 
 =========================  ==========================================================================
 base                       errors, arrays, files, units, checks of input
-surface curves             what a surface is; lines, arcs and Béziers as objects
+curves surface             lines, arcs, Béziers and planes as objects; what a surface is
 energy                     E with its derivatives, and its curvature
 contact meshing            walls that pinch; triangulation, walls of a mesh, better and finer triangles
 io plan                    surfaces from and to files; surfaces from the lines of a plan

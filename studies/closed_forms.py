@@ -59,12 +59,14 @@ class Case:
     family, name : what it is, and its parameters.
     start : builds a surface near it.
     exact : values of quantities of a mesh check.
+    corners : vertices at which the boundary has corners of less than 40°, which no mesh tells from curves.
     """
 
     family: str
     name: str
     start: Callable[[], Surface]
     exact: Mapping[Quantity, float]
+    corners: tuple[int, ...] = ()
 
 
 def cases() -> Iterator[Case]:
@@ -77,7 +79,7 @@ def _caps() -> Iterator[Case]:
     for alpha in (0.505, 0.52, 0.55, 0.6, 0.75, 1.0, 2.0, 5.0):
         for edge in (0.35, 0.25, 0.2, 0.15, 0.1):
             start = partial(spherical_cap, edge, alpha=alpha)
-            yield Case("cap", f"α {alpha:g}, edge {edge:g}", start, _cap_values(alpha, "cap"))
+            yield Case("cap", f"α {alpha:g}, edge {edge:g}", start, cap_values(alpha, "cap"))
 
 
 def _round_plans() -> Iterator[Case]:
@@ -86,10 +88,10 @@ def _round_plans() -> Iterator[Case]:
     for alpha in (0.52, 0.6, 1.0, 3.0):
         for edge in (0.4, 0.3, 0.2, 0.13):
             start = Plan(circle, tension=alpha, edge_length=edge).surface
-            yield Case("round plan", f"α {alpha:g}, edge {edge:g}", start, _cap_values(alpha, "patch 1"))
+            yield Case("round plan", f"α {alpha:g}, edge {edge:g}", start, cap_values(alpha, "patch 1"))
 
 
-def _cap_values(alpha: float, patch: str) -> dict[Quantity, float]:
+def cap_values(alpha: float, patch: str) -> dict[Quantity, float]:
     """Of a cap over the unit disc; its eigenvalue is α (ν (ν + 1) - 2) / 4α², with P_ν zero at the rim."""
     exact, rim = spherical_cap_exact(alpha=alpha), np.sqrt(1.0 - 0.25 / alpha**2)
     degrees = np.linspace(1.0001, 60.0, 3000)

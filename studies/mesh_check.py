@@ -29,7 +29,7 @@ from generators import (
 from pcmc import MeshCheck, Surface, check_mesh, project, solve
 from pcmc.solvers.result import Result
 
-from .closed_forms import cases
+from .closed_forms import Case, cases
 from .folder import Folder
 from .study import Study
 
@@ -115,39 +115,27 @@ def _closed_forms(short: bool) -> list[dict[str, Any]]:
         if short and case.family in seen:
             continue
         seen.add(case.family)
-        result = solve(case.start(), target="stationary")
-        if result.certificate.index is None:
-            rows.append({"family": case.family, "case": case.name, "verdict": "not at rest"})
-            continue
-        check = check_mesh(result)
-        verdict = check.verdict.name.lower().replace("_", " ")
-        for (quantity, of), exact in case.exact.items():
-            row = check.row(quantity, of)
-            rows.append(
-                {
-                    "family": case.family,
-                    "case": case.name,
-                    "triangles": result.surface.m,
-                    "verdict": verdict,
-                    "quantity": quantity,
-                    "exact": exact,
-                    **{str(key): float(row[key]) for key in COLUMNS},
-                }
-            )
+        rows += rows_of(case)
     return rows
+
+
+def rows_of(case: Case) -> list[dict[str, Any]]:
+    """A row for each quantity with an exact value; one alone where the case is not at rest on its mesh."""
+    result = solve(case.start(), target="stationary")
+    head: dict[str, Any] = {"family": case.family, "case": case.name, "triangles": result.surface.m}
+    if result.certificate.index is None:
+        return [{**head, "verdict": "not at rest"}]
+    check = check_mesh(result, corners=case.corners)
+    head["verdict"] = check.verdict.name.lower().replace("_", " ")
+    return [
+        {**head, "quantity": quantity, "of": of, "exact": exact, **check.row(quantity, of)[list(COLUMNS)]}
+        for (quantity, of), exact in case.exact.items()
+    ]
 
 
 def table(folder: Folder) -> dict[str, float]:
     """``coverage``: by family, and of all; the shares of bars that hold the true error, and their widths."""
-    records = folder.read_table("closed_forms")
-    known = records[records["quantity"].notna()].copy()
-    for value, bar, name in (("value", "error", "true"), ("limit", "limit_error", "limit_true")):
-        known[name] = (known[value] - known["exact"]).abs()
-        known[f"{name}_width"] = known[bar] / known[name]
-    known = known[known["true"] > EXACT * known["exact"].abs()]
-    rows = [_coverage(name, part) for name, part in known.groupby("family", sort=False)]
-    whole = _coverage("all", known)
-    folder.write_table("coverage", pd.DataFrame([*rows, whole]))
+    records, whole = coverage(folder)
     verdicts = folder.read_table("verdicts")["verdict"].value_counts()
     at_rest = records[records["quantity"].notna()]
     return {
@@ -161,10 +149,25 @@ def table(folder: Folder) -> dict[str, float]:
     }
 
 
+def coverage(folder: Folder) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """All records of closed forms, and the last row of the table that this writes: all families together."""
+    records = folder.read_table("closed_forms")
+    known = records[records["quantity"].notna()].copy()
+    for value, bar, name in (("value", "error", "true"), ("limit", "limit_error", "limit_true")):
+        known[name] = (known[value] - known["exact"]).abs()
+        known[f"{name}_width"] = known[bar] / known[name]
+    known = known[known["true"] > EXACT * known["exact"].abs()]
+    rows = [_coverage(name, part) for name, part in known.groupby("family", sort=False)]
+    whole = _coverage("all", known)
+    folder.write_table("coverage", pd.DataFrame([*rows, whole]))
+    return records, whole
+
+
 def _coverage(family: object, part: pd.DataFrame) -> dict[str, Any]:
     """Of one family: bars on this mesh's value first, then the bars of the limit."""
     bounded = np.isfinite(part["error"])
     row: dict[str, Any] = {"family": family, "quantities": len(part), "no_limit": int((~bounded).sum())}
+    row["held_by_mesh"] = int((part["verdict"] == "held by mesh").sum())
     row["inside"] = float((part["true"] <= part["error"]).mean())
     row["inside_bounded"] = float((part["true"] <= part["error"])[bounded].mean())
     part = part[bounded]

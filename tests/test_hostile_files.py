@@ -15,6 +15,7 @@ from refusals import refused
 
 import pcmc
 from pcmc import cli
+from pcmc.base import child_script
 from pcmc.base.errors import FileError, FileWarning
 from pcmc.io import reading_process
 from tests.test_io_foreign import X, expected
@@ -324,13 +325,13 @@ def test_field_data_without_a_value_are_none(tmp_path, suffix):
 def test_a_reader_that_dies_is_an_error_and_the_next_file_is_read(tmp_path, monkeypatch):
     pcmc.write(tmp_path / "a.vtp", expected())
     dying = "import sys; sys.stdin.buffer.read(100); sys.exit(3)"
-    real = reading_process.reading_script.__file__
+    real = child_script.__file__
     monkeypatch.setattr(reading_process, "_processes", {})
     (tmp_path / "dying.py").write_text(dying, encoding="utf-8")
-    monkeypatch.setattr(reading_process.reading_script, "__file__", str(tmp_path / "dying.py"))
+    monkeypatch.setattr(child_script, "__file__", str(tmp_path / "dying.py"))
     with pytest.raises(FileError, match=r"it ends its reader, code"):
         pcmc.read(tmp_path / "a.vtp")
-    monkeypatch.setattr(reading_process.reading_script, "__file__", real)
+    monkeypatch.setattr(child_script, "__file__", real)
     assert pcmc.read(tmp_path / "a.vtp").m == 4
     for process in reading_process._processes.values():
         process.close()
@@ -341,7 +342,7 @@ def test_a_reader_that_takes_too_long_is_stopped(tmp_path, monkeypatch):
     monkeypatch.setattr(reading_process, "_processes", {})
     monkeypatch.setattr(reading_process, "SECONDS", 0.2)
     (tmp_path / "slow.py").write_text("import time; time.sleep(600)", encoding="utf-8")
-    monkeypatch.setattr(reading_process.reading_script, "__file__", str(tmp_path / "slow.py"))
+    monkeypatch.setattr(child_script, "__file__", str(tmp_path / "slow.py"))
     with pytest.raises(FileError, match="stopped after"):
         pcmc.read(tmp_path / "a.3dm")
 
@@ -349,7 +350,7 @@ def test_a_reader_that_takes_too_long_is_stopped(tmp_path, monkeypatch):
 def test_a_reader_may_not_fill_the_memory(tmp_path):
     code = (
         "import numpy as np\n"
-        "from pcmc.io.reading_script import limit_memory\n"
+        "from pcmc.base.child_script import limit_memory\n"
         "limit_memory(1000)\n"
         "np.ones(2**31)\n"
     )

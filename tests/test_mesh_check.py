@@ -138,7 +138,7 @@ def test_scales_of_length_and_force_scale_the_table(length, force):
             continue
         for column in ("value", "error", "limit", "limit_error"):
             assert b[column] == pytest.approx(scale[a.quantity] * a[column], rel=1e-4), (a.quantity, column)
-        assert b.order == pytest.approx(a.order, abs=1e-4)
+        assert b.order == pytest.approx(a.order, abs=1e-4, nan_ok=True)  # of a pull that no mesh changes
 
 
 def test_other_numbers_of_meshes():
@@ -324,7 +324,8 @@ def test_shallow_corners_of_a_plan_stay_corners(hall):
     row = check.row("reaction")  # the load on the plan's area
     assert check.row("reaction").value == pytest.approx(-3.0, rel=0.02)
     assert abs(row.limit + 3.0) <= row.limit_error < 0.01
-    rounded = check_mesh(check.surfaces[0]).row("reaction")  # without the plan, curves go through them
+    bare = check.surfaces[0].rebuilt(curves=())  # without the lines of the plan, curves go through them
+    rounded = check_mesh(bare).row("reaction")
     assert 0.01 < abs(rounded.limit + 3.0) <= rounded.limit_error
 
 

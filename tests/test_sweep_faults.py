@@ -6,6 +6,7 @@ import pytest
 import sweep_cases
 from tables import same
 
+from pcmc.base import child_process
 from pcmc.base.compiled import threads
 from pcmc.base.errors import OptionError
 from pcmc.sweep import Sweep, case_process, case_script, provenance, read_store, run
@@ -85,7 +86,7 @@ def test_a_case_that_is_interrupted_does_not_leave_its_answer_to_the_next(monkey
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(case_process.CaseProcess, "_receive", interrupted)
+        patch.setattr(child_process.pickle, "load", interrupted)
         with pytest.raises(KeyboardInterrupt):
             case_process.run_case("team", "sweep_cases:echo", {"value": 1}, 60.0)
     try:

@@ -25,6 +25,7 @@ from .. import existence
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, SurfaceError
+from ..base.interrupts import stop_requested
 from ..base.units import NO_UNITS, Units
 from ..meshing.curve_projection import onto_held_curves
 from ..meshing.refinement import Projection
@@ -57,6 +58,7 @@ class AccuracyStatus(Enum):
 
     REACHED = "accuracy reached"
     NO_LIMIT = "accuracy out of reach: there is no limit as the mesh gets finer"
+    CURVES = "accuracy out of reach: the curves of the boundary are not known so well"
     TRIANGLES = "accuracy not reached within the limit of triangles"
     ROUNDS = "accuracy not reached: further rounds do not help"
     NOT_AT_REST = "accuracy not reached: the solver finds no equilibrium"
@@ -182,7 +184,8 @@ def solve_to_accuracy(
         validate.choice("boundary", boundary, BOUNDARIES)
         sharp = vertex_numbers(corners, surface.n)
         project = onto_held_curves(surface, corners=sharp) if boundary == "smooth" else None
-    return _Search(wanted, accuracy_of, project, most_triangles, callback, options).run(surface)
+    given = {"boundary": boundary, "corners": corners}
+    return _Search(wanted, accuracy_of, given, project, most_triangles, callback, options).run(surface)
 
 
 def size_field(surface: Surface, shares: Floats, triangles: float, growth: float = GROWTH) -> Floats:
@@ -225,11 +228,19 @@ class _Round:
     excess: float
 
     @classmethod
-    def of(cls, result: Result, check: MeshCheck, wanted: Mapping[str, float], accuracy_of: str) -> _Round:
+    def of(
+        cls,
+        result: Result,
+        check: MeshCheck,
+        wanted: Mapping[str, float],
+        accuracy_of: str,
+        doubts: Mapping[str, float],
+    ) -> _Round:
         goals = goals_in(check.table, wanted)
         names = list(zip(check.table["quantity"], check.table["of"], strict=True))
         rows = check.table.iloc[[names.index(goal) for goal in goals]].reset_index(drop=True)
         values = rows.assign(accuracy=list(goals.values()))
+        values[["error", "limit_error"]] += np.array([[doubts.get(quantity, 0.0)] for quantity, _ in goals])
         bar = values["error" if accuracy_of == "mesh" else "limit_error"]
         return cls(result, check, goals, values, float((bar / values["accuracy"]).max()))
 
@@ -250,6 +261,7 @@ class _Search:
 
     wanted: Mapping[str, float]
     accuracy_of: str
+    given: Mapping[str, Any]
     project: Projection | None
     most_triangles: int
     callback: Callable[[Mapping[str, Any]], None] | None
@@ -266,7 +278,8 @@ class _Search:
                     status, detail = ended
                     break
                 result = self._next(self.rounds[-1])
-        except (StopIteration, KeyboardInterrupt):
+        except (StopIteration, KeyboardInterrupt) as error:
+            stop_requested(error)
             status, detail = AccuracyStatus.STOPPED, ""
         return self._end(status, detail, first)
 
@@ -279,13 +292,26 @@ class _Search:
 
     def _round(self, result: Result) -> End | None:
         """Check the mesh of a surface at rest; the end of the search if this is the last round."""
-        check = check_mesh(result, boundary=self.project or "polygon")
-        here = _Round.of(result, check, self.wanted, self.accuracy_of)
+        first = self.rounds[0].check if self.rounds else None
+        check = check_mesh(
+            result, **(self.given if first is None else {"boundary": self.project or "polygon"})
+        )
+        doubts: dict[str, float] = {}
+        for (quantity, _), doubt in (first.curve_doubts if first else {}).items():
+            doubts[quantity] = max(doubt, doubts.get(quantity, 0.0))
+        here = _Round.of(result, check, self.wanted, self.accuracy_of, doubts)
         self.rounds.append(here)
         if self.callback is not None:
             self.callback({"round": len(self.rounds), **here.record, "excess": here.excess})
         if here.excess <= 1.0 and check.persists:
             return AccuracyStatus.REACHED, ""
+        for (quantity, of), accuracy in here.goals.items():
+            if (doubt := self.rounds[0].check.curve_doubts.get((quantity, of), 0.0)) > accuracy:
+                name = _name({"quantity": quantity, "of": of})
+                return AccuracyStatus.CURVES, (
+                    f"the first mesh has only points of them, and the {name} may be {doubt:.2g} off for that;"
+                    " draw them in a plan, start from more points, or give boundary= a function"
+                )
         if len(self.rounds) >= PATIENCE and not any(r.settled for r in self.rounds[-PATIENCE:]):
             return AccuracyStatus.NO_LIMIT, _why_no_limit(here)
         m = result.surface.m

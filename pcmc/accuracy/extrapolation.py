@@ -18,8 +18,8 @@ USUAL = 2.0  # order of smooth surfaces on triangles
 LOWEST, HIGHEST = 0.25, 4.0  # orders between which the observed one is used
 SAFETY = 2.0  # times the distance of two extrapolations
 UNSETTLED = 1.5  # order of the surface's own moves below which quantities are not believed more
-CURVES = 4.0  # times the doubt about curved boundaries
-LEAST = 0.02  # of the last correction: least uncertainty of the limit, as p = 2 may be a coincidence
+FAST = 2.5  # an order above is a coincidence: on triangles no error shrinks so fast for long
+LEAST = 0.05  # of the last correction: least uncertainty of the limit, as equal orders may be a coincidence
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ def extrapolate(
     value: Floats | None = None,
     *,
     shape_order: float = USUAL,
-    curve_doubt: float = 0.0,
+    doubt: Floats | float = 0.0,
 ) -> Extrapolation:
     """Limits and error bars of quantities from their values on nested meshes.
 
@@ -56,10 +56,12 @@ def extrapolate(
     the last two differences d_1, d_2     limit                               its bar
     ====================================  ==================================  =============================
     both at most ``rounding``             q_2                                 ``rounding``
-    1.19 ≤ d_1 / d_2 ≤ 16                 q_2 + d_2 / (d_1/d_2 - 1)           2 × its distance from
-                                                                              q_2 + d_2 / 3 (order 2), at
-                                                                              least 0.02 |d_2|
-    d_1 / d_2 > 16, or a small d_2 of     q_2 + d_2 / 3                       the larger of |d_2| and
+    1.19 ≤ d_1 / d_2 ≤ 16                 q_2 + d_2 / (d_1/d_2 - 1)           2 × its distance from what
+                                                                              order 2, and the shape's
+                                                                              order, would give; at least
+                                                                              0.05 |d_2|, and |d_1| / 12
+                                                                              for d_1 / d_2 > 5.7
+    d_1 / d_2 > 16, or a small d_2 of     q_2 + d_2 / 3                       the larger of 2 |d_2| and
     the other sign: they swing                                                |d_1| / 12, what order 2
                                                                               leaves of d_1
     else: no limit in sight               NaN                                 infinite
@@ -67,8 +69,9 @@ def extrapolate(
     only one mesh                         NaN                                 infinite
     ====================================  ==================================  =============================
 
-    The bar of the value is its distance from the limit plus the limit's bar. Two things that one quantity
-    alone may not show make the bar of a limit wider, see the last two parameters.
+    The bar of the value is its distance from the limit plus the limit's bar. Bars are estimates, not bounds:
+    three values cannot show what shrinks more slowly than all that is seen. The last two parameters bring
+    what one quantity alone does not show.
 
     Parameters
     ----------
@@ -76,12 +79,12 @@ def extrapolate(
     rounding : (q,) differences up to which two values count as equal.
     value : (q,) the values whose bars are wanted; by default those on the first mesh. They may be read
         in another way than the estimates, if both have the same limit.
-    shape_order : observed order s of the surface itself, from how far it moves from mesh to mesh. Below
-        1.5 a quantity may owe its own better order to errors that cancel. Then its bar is at least
-        |d_1| / (S (S - 1)), S = 2^s: what is left where d_1 shrinks by S with each mesh. If s ≤ 0, no
-        limit is in sight.
-    curve_doubt : share of the rise of curved boundaries that is in doubt; 4 × that share of the first
-        difference is added.
+    shape_order : observed order s of the surface itself, from how far it moves from mesh to mesh: what
+        corners, ends of junctions, contact or uneven triangles let it have. A quantity may owe a better one
+        to errors that cancel. With S = 2^s the last difference would leave d_2 / (S - 1). Below 1.5 the
+        bar is also at least |d_1| / (S (S - 1)): what is left where d_1 shrinks by S with each mesh. If
+        s ≤ 0, no limit is in sight. It counts where s < 2.
+    doubt : (q,) how far limits may be off as the curves of the boundary are not known; added to the bars.
 
     Examples
     --------
@@ -102,33 +105,39 @@ def extrapolate(
     elif len(steps) == 1:
         order, limit, bar = none, q[-1] + steps[-1] / 3.0, np.abs(steps[-1]) + rounding
     else:
-        order, limit, bar = _three(q[-1], steps[-2], steps[-1], rounding)
+        order, limit, bar = _three(q[-1], steps[-2], steps[-1], rounding, min(shape_order, USUAL))
     if shape_order <= 0.0:
         bar = np.full_like(none, np.inf)
     elif shape_order < UNSETTLED and len(steps) > 1:
         factor = 2.0**shape_order
         bar = np.maximum(bar, np.abs(steps[-2]) / (factor * (factor - 1.0)))
-    if curve_doubt > 0.0 and len(steps):
-        bar = bar + CURVES * curve_doubt * np.abs(steps[0])
+    limit, bar = np.where(equal, q[-1], limit), np.where(equal, rounding, bar) + doubt
     limit, bar = np.where(np.isinf(bar), np.nan, limit), np.where(np.isnan(limit), np.inf, bar)
-    limit, bar = np.where(equal, q[-1], limit), np.where(equal, rounding, bar)
     order = np.where(equal, np.nan, order)
     error = np.where(np.isnan(limit), np.inf, np.abs(limit - value) + bar)
     return Extrapolation(value, limit, error, bar, order)
 
 
-def _three(finest: Floats, before: Floats, last: Floats, rounding: Floats) -> tuple[Floats, Floats, Floats]:
+def _three(
+    finest: Floats, before: Floats, last: Floats, rounding: Floats, shape_order: float
+) -> tuple[Floats, Floats, Floats]:
     """Order, limit and its bar from the last two differences, where these are not rounding alone."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.abs(before) / np.abs(last)
         order = np.log2(ratio)
         observed = finest + last / (ratio - 1.0)
     usual = finest + last / (2.0**USUAL - 1.0)
+    shape = finest + last / (2.0**shape_order - 1.0) if shape_order >= LOWEST else usual
     same_sign = before * last > 0.0
     settled = same_sign & (order >= LOWEST) & (order <= HIGHEST)
     swings: Bools = (same_sign & (order > HIGHEST)) | (~same_sign & (np.abs(last) <= np.abs(before)))
     limit = np.where(settled, observed, np.where(swings, usual, np.nan))
-    distance = np.maximum(SAFETY * np.abs(observed - usual), LEAST * np.abs(last))
-    swing = np.maximum(np.abs(last), np.abs(before) / 12.0)
-    bar = np.where(settled, distance, np.where(swings, swing, np.inf)) + rounding
+    apart = np.maximum(np.abs(observed - usual), np.abs(observed - shape))
+    distance = np.maximum(SAFETY * apart, LEAST * np.abs(last))
+    fast = np.abs(before) / 12.0  # what order 2 leaves of d_1: d_1 / 4 + d_1 / 16 + … = d_1 / 3 less d_1 / 4
+    distance = np.where(order > FAST, np.maximum(distance, fast), distance)
+    bar = (
+        np.where(settled, distance, np.where(swings, np.maximum(SAFETY * np.abs(last), fast), np.inf))
+        + rounding
+    )
     return np.where(same_sign, order, np.nan), limit, bar

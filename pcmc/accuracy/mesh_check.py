@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from ..base.arrays import Ints
 from ..base.errors import OptionError, SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
-from ..meshing.held_curves import curve_doubt, held_corners, smooth_midpoints
+from ..meshing.held_curves import doubted_midpoints, held_corners, smooth_midpoints
 from ..meshing.refinement import Projection, refine
 from ..quantities import dimension_of
 from ..solvers import solve
@@ -29,11 +29,14 @@ from .quantities import Key, Reading, readings
 MOST = 4_000_000  # triangles of the finest mesh, by default
 STEPS = 60  # of the solver on each finer mesh: it starts near
 BOUNDARIES = ("smooth", "polygon")
+CURVES = 8.0 / 3.0  # times what doubtful curves change on the next mesh: 4/3 on all finer ones, times 2
 
 
 @dataclass(frozen=True, eq=False)
 class MeshCheck:
     """How far a surface at rest depends on its mesh. ``print`` shows the table.
+
+    Error bars are estimates from these meshes, no bounds: the study ``coverage`` counts how often they hold.
 
     Attributes
     ----------
@@ -51,6 +54,7 @@ class MeshCheck:
         Without a limit in sight ``limit`` is NaN and the bars are infinite. ``order`` is NaN for what is
         the same on all meshes, to rounding, and for what swings.
     surfaces : on each mesh at rest, the one given first; a solve that failed is left out.
+    curve_doubts : by quantity and ``of``, what of both bars is there as curves of the boundary are guesses.
     """
 
     verdict: MeshVerdict
@@ -59,6 +63,7 @@ class MeshCheck:
     advice: str
     table: pd.DataFrame
     surfaces: tuple[Surface, ...]
+    curve_doubts: Mapping[tuple[str, str], float]
 
     @property
     def persists(self) -> bool:
@@ -190,14 +195,18 @@ def check_mesh(
         surfaces.append(result.surface)
         certificates.append(result.certificate)
     if finding is None or len(surfaces) > 1:
-        found = compared(surfaces, certificates)
-        finding = found if finding is None or found.verdict is MeshVerdict.CHANGES else finding
+        other = compared(surfaces, certificates)
+        finding = other if finding is None or other.verdict is MeshVerdict.CHANGES else finding
+    found = [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)]
+    doubts = _curve_doubts(first, sharp, found, callback) if boundary == "smooth" else {}
     table = _table(
-        [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)],
+        found,
         shape_order=shape_order(surfaces) if order is None else order,
-        curve_doubt=curve_doubt(first, corners=sharp) if boundary == "smooth" else 0.0,
+        doubt=np.array([doubts.get((r.quantity, r.of), 0.0) for r in found[0].values()]),
     )
-    return MeshCheck(finding.verdict, finding.reason, finding.place, finding.advice, table, tuple(surfaces))
+    return MeshCheck(
+        finding.verdict, finding.reason, finding.place, finding.advice, table, tuple(surfaces), doubts
+    )
 
 
 def _refuse_unsolved(certificate: Certificate) -> None:
@@ -230,7 +239,25 @@ def _solved(start: Surface, callback: Callback | None) -> Result:
     return result
 
 
-def _table(found: Sequence[dict[Key, Reading]], **doubts: float) -> pd.DataFrame:
+def _curve_doubts(
+    first: Surface, corners: Ints, found: Sequence[dict[Key, Reading]], callback: Callback | None
+) -> dict[tuple[str, str], float]:
+    """How far limits may be off as curves are guesses: the next mesh is solved with other guesses, too."""
+    other = doubted_midpoints(first, corners=corners)
+    if other is None:
+        return {}
+    there: dict[Key, Reading] = {}
+    if len(found) > 1 and (result := _solved(refine(first, 1, lambda _: other), callback)).converged:
+        there = readings(result.surface, result.certificate, first.n)
+    return {
+        (reading.quantity, reading.of): CURVES * abs(found[1][key].estimate - there[key].estimate)
+        if key in there and key in found[1]
+        else math.inf
+        for key, reading in found[0].items()
+    }
+
+
+def _table(found: Sequence[dict[Key, Reading]], **doubts: Any) -> pd.DataFrame:
     """Values, limits, bars and orders; NaN for a quantity that a finer mesh does not have."""
     first = list(found[0].values())
     estimates = np.array([[_of(one, key, "estimate") for key in found[0]] for one in found])

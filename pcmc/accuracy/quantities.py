@@ -48,6 +48,9 @@ class Reading:
 def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[Key, Reading]:
     """The quantities of a surface. Keys are the same for all refinements of one surface.
 
+    All supports together carry the loads in the limit; on a mesh forces within the sheets, which move no
+    vertex, keep a part that comes and goes from mesh to mesh. So the loads are the estimate of the reaction.
+
     ``vertices`` is the number of vertices of the coarsest mesh, which come first in all finer ones.
     """
     share = ROUNDING + RESIDUALS * certificate.residual
@@ -55,8 +58,11 @@ def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[
     areas = certificate.patches["area"].to_numpy()
     found: dict[Key, Reading] = {}
 
-    def add(quantity: str, of: str, value: float, scale: float, curve: Curve = ((), b"")) -> None:
-        found[quantity, "" if curve[1] else of, *curve] = Reading(quantity, of, value, value, share * scale)
+    def add(
+        what: str, of: str, value: float, scale: float, curve: Curve = ((), b""), better: float | None = None
+    ) -> None:
+        reading = Reading(what, of, value, value if better is None else better, share * scale)
+        found[what, "" if curve[1] else of, *curve] = reading
 
     for k, patch in enumerate(surface.patches):
         if surface.roof[k]:
@@ -72,9 +78,10 @@ def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[
     for room, pressure in zip(surface.rooms, room_pressures(surface).tolist(), strict=True):
         add("pressure", room.name, pressure, tension / size)
     add("energy", "", certificate.energy, tension * float(areas.sum()))
-    add("reaction", "", certificate.support, tension * size)
+    add("reaction", "", certificate.support, tension * size, better=-certificate.load)
     for curve, name, pull, most in _boundaries(surface, certificate, vertices):
-        add("reaction", name, float(pull @ np.array(surface.plane.normal)), tension * size, curve)
+        alone = -certificate.load if len(certificate.supports) == 1 else None
+        add("reaction", name, float(pull @ np.array(surface.plane.normal)), tension * size, curve, alone)
         add("thrust", name, float(np.linalg.norm(surface.plane.along(pull))), tension * size, curve)
         add("reaction per length", name, most, tension, curve)
     if len(certificate.eigenvalues):
@@ -92,13 +99,13 @@ def given_volume(surface: Surface) -> float | None:
     A room between plates that are not upright encloses another volume than the roof has over Π.
 
     >>> from pcmc import Patch, Room
-    >>> X, F, sides = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[1, 2, 3]], [Patch("side", 2.0)]
-    >>> given_volume(Surface(X[1:], [[0, 1, 2]], [0], sides, fixed=range(3))) is None
+    >>> X, F = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 3]], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    >>> tent = Surface(X, F, [0] * 3, [Patch("tent", 2.0)], fixed=range(3))
+    >>> given_volume(tent) is None
     True
-    >>> room = Room("all", {"lid": 1}, 3.0)
-    >>> lid = Surface(X[:3], [[0, 1, 2]], [0], [Patch("lid", 2.0)], fixed=range(3), rooms=[room])
-    >>> round(given_volume(lid), 12)
-    3.0
+    >>> rooms = [Room("all", {"tent": 1}, 0.5)]
+    >>> round(given_volume(Surface(X, F, [0] * 3, tent.patches, fixed=range(3), rooms=rooms)), 12)
+    0.5
     """
     if not surface.rooms or np.any(closing_volumes(surface)):
         return None

@@ -12,6 +12,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.integer[Any]]
 Bools = npt.NDArray[np.bool_]
+Vector = tuple[float, float, float]
 
 Array = TypeVar("Array", bound=npt.NDArray[Any])
 

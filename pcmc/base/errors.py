@@ -62,6 +62,10 @@ class OptionError(PcmcError):
     """A parameter has a value that is not allowed."""
 
 
+class NoBranch(SurfaceError, OptionError):
+    """No branch of equilibria starts here: not at rest, not held, or nothing depends on the parameter."""
+
+
 class FileError(PcmcError):
     """A file cannot be read or written as the format its suffix names."""
 
@@ -84,6 +88,10 @@ class PlanWarning(UserWarning):
 
 class BalanceWarning(UserWarning):
     """The tensions at a junction cannot balance, whatever its shape."""
+
+
+class CurveWarning(UserWarning):
+    """Held vertices were moved off the curves that they were drawn on."""
 
 
 class SweepError(PcmcError):

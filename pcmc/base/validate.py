@@ -18,6 +18,7 @@ from .errors import OptionError, PcmcError, unknown
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+LARGEST = 1e50  # of a coordinate, tension or pressure: the squares of forces stay finite
 MOST = 2**31 - 1  # of a count: more steps, levels or vertices than that no run can have
 
 Options = TypeVar("Options", bound="DataclassInstance")

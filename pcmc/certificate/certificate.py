@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -27,21 +26,21 @@ from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..energy.volume_below import volume_below
 from ..meshing.quality import triangle_quality
 from ..stability.factorisation import SingularMatrix
-from ..stability.modes import lowest, stiffness
+from ..stability.modes import SecondVariation, lowest
+from ..stability.softness import Spectrum, count_soft
 from ..surface import Plane, Surface, expect_surface, mirrored
-from ..surface.geometry import face_areas
 from ..surface.topology import SHEET
 from .balance import FORCE, MOMENT, balance_sentence, balance_table, load, load_ratio, pressures_left_over
 from .cables import cable_end_table, cable_table
 from .curve_tables import junction_table, room_table
 from .leaning import lean_table, lean_texts
-from .proof import Proof
+from .proof import Attempt, Proof
 from .reactions import SupportForces, support_forces
-from .supports import boundary_view, support_table
-from .verdict import COLLAPSED, Evidence, Findings, Verdict, judge
+from .supports import boundary_view, pull_table, support_table
+from .verdict import COLLAPSED, NEUTRAL, Evidence, Findings, Verdict, judge
 
 TOLERANCE = 1e-8  # relative residual up to which a surface counts as at rest
-UNKNOWN: tuple[int | None, Floats, Floats] = None, np.empty(0), np.empty((0, 0, 3))  # as of ``_stability``
+UNKNOWN = np.empty(0), np.empty((0, 0, 3))  # no eigenvalues, no modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +71,7 @@ class Certificate:
     supports : one row per support: a line, point, plane, mirror or end of a cable, with its length, middle,
         force, moment and largest force per length; see ``pcmc.certificate.supports.support_table``.
         Its forces and moments add up to those of the loads, but for the ``balance``'s remainder.
+    pulls : one row per edge of these, with the force per length there and its direction.
     boundaries : the rows of ``supports`` that are as long as a curve: length, middle, reaction, largest
         reaction per length.
     balance : force and moment of the loads, of the supports, and what remains of both: a row each.
@@ -87,7 +87,8 @@ class Certificate:
     load_ratio : pressure and weight along Π's normal over the most that the supports could carry; see
         the function ``load_ratio``.
     proofs : why there is no equilibrium, if that is the verdict: ``Overload``, ``UnbalancedJunction``,
-        ``Fold`` or ``Unheld``.
+        ``Unheld`` or ``WeakCable``.
+    tried : what a search for an equilibrium has tried, if that led to none.
     """
 
     verdict: Verdict
@@ -110,6 +111,7 @@ class Certificate:
     pinched: Ints
     load_ratio: float
     proofs: tuple[Proof, ...] = ()
+    tried: tuple[Attempt, ...] = ()
     cables: pd.DataFrame = field(default_factory=pd.DataFrame)
     cable_ends: pd.DataFrame = field(default_factory=pd.DataFrame)
     rooms: pd.DataFrame = field(default_factory=pd.DataFrame)
@@ -120,6 +122,11 @@ class Certificate:
     def supports(self) -> pd.DataFrame:
         """The table of supports, made when first asked for."""
         return support_table(self.acting)
+
+    @cached_property
+    def pulls(self) -> pd.DataFrame:
+        """The force per length along each edge of the supports, made when first asked for."""
+        return pull_table(self.acting)
 
     @cached_property
     def balance(self) -> pd.DataFrame:
@@ -211,7 +218,7 @@ def certify(
     modes: int = 1,
     tolerance: float = TOLERANCE,
     evidence: Evidence | None = None,
-    proofs: tuple[Proof, ...] = (),
+    tried: tuple[Attempt, ...] = (),
     whole: bool | Sequence[str | Plane] = False,
 ) -> Certificate:
     """Examine a surface.
@@ -221,7 +228,7 @@ def certify(
     surface : the surface; it is not changed.
     modes : how many of the lowest modes to compute; the index is counted in any case.
     tolerance : relative residual, > 0, up to which it counts as at rest.
-    evidence, proofs : what happened to it while it was solved, and what that proves.
+    evidence, tried : what happened to it while it was solved, and what a search has tried without success.
         ``Result.certify`` passes them on.
     whole : of a surface between mirror planes, examine ``mirrored`` of it: all its motions count for the
         index then, and not only those symmetric in these planes. True, or the planes to unfold at.
@@ -263,7 +270,9 @@ def certify(
     in_wall = part.walls.pinchable[standing.patch_of_face]
     quality = float(qualities[~in_wall].min(initial=1.0))
     at_rest = residual <= tolerance and quality > COLLAPSED
-    index, eigenvalues, fields = _stability(standing, classes, space, rigid, modes) if at_rest else UNKNOWN
+    spectrum, eigenvalues, fields = Spectrum(), *UNKNOWN
+    if at_rest:
+        spectrum, eigenvalues, fields = _stability(standing, classes, space, rigid, modes)
 
     patches = _patch_table(surface, standing, areas, qualities)
     ratio, acting = load_ratio(standing), support_forces(surface, standing=standing)
@@ -274,13 +283,11 @@ def certify(
         residual=residual,
         tolerance=tolerance,
         quality=quality,
-        index=index,
+        spectrum=spectrum,
         own_residuals=_own_residuals(standing, classes, left),
-        softest=_softest(standing, classes, eigenvalues, fields),
-        load_ratio=ratio,
         rounding=rounding_left(standing, classes, X),
         evidence=evidence,
-        given=proofs,
+        tried=tried,
         mode=fields[0] if len(fields) else np.empty((0, 3)),
         rigid=rigid.shape[1] if surface.rooms else 0,
     )
@@ -292,7 +299,7 @@ def certify(
         scale=scale,
         energy=value,
         volume=below,
-        index=index,
+        index=spectrum.index,
         eigenvalues=eigenvalues,
         modes=fields,
         curvature_error=_largest(patches["variational_max"]),
@@ -306,6 +313,7 @@ def certify(
         pinched=np.flatnonzero(part.resting),
         load_ratio=ratio,
         proofs=findings.proofs if verdict is Verdict.NO_EQUILIBRIUM else (),
+        tried=tried,
         cables=cable_table(standing, left),
         cable_ends=cable_end_table(standing),
         rooms=rooms,
@@ -316,15 +324,16 @@ def certify(
 
 def _stability(
     surface: Surface, classes: VertexClasses, space: MotionSpace, rigid: Floats, modes: int
-) -> tuple[int | None, Floats, Floats]:
-    """The Morse index, the lowest eigenvalues and their modes; unknown where the matrix is singular."""
-    index, eigenvalues, fields = UNKNOWN
-    with suppress(SingularMatrix):
-        system = stiffness(surface, classes, space, rigid)
-        index = system.negative
-        if modes > 0 and space.size > 2:
-            eigenvalues, fields = lowest(system, modes)
-    return index, eigenvalues, fields
+) -> tuple[Spectrum, Floats, Floats]:
+    """What the eigenvalues are like by their counts, and the lowest of them with their modes (k,n,3)."""
+    variation = SecondVariation.of(surface, classes, space, rigid)
+    spectrum, system = count_soft(variation, NEUTRAL / surface.size**2)
+    if system is not None and modes > 0:
+        try:
+            return spectrum, *lowest(system, modes)
+        except SingularMatrix as error:
+            spectrum = replace(spectrum, hidden=f"{error}; modes=0 judges by counts alone")
+    return spectrum, *UNKNOWN
 
 
 def _own_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> Floats:
@@ -341,16 +350,6 @@ def _own_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> Fl
     squares = ratios(inside, island_of_vertex, own, island)
     np.maximum.at(out, classes.patch_of_face, squares[island])
     return np.sqrt(out)
-
-
-def _softest(surface: Surface, classes: VertexClasses, values: Floats, fields: Floats) -> float:
-    """The lowest λ in units of α/size², α the mean tension where its mode moves; infinite without one."""
-    if not len(values):
-        return np.inf
-    F = classes.faces
-    moved = face_areas(surface.vertices[F]) * np.einsum("fij,fij->f", fields[0][F], fields[0][F])
-    tension = float(surface.tensions[classes.patch_of_face] @ moved / moved.sum())
-    return float(values[0]) * surface.size**2 / tension
 
 
 def _pulled_off(excess: Floats) -> str:

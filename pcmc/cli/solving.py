@@ -49,6 +49,7 @@ RISE = "Find the tension with which the whole roof rises so much over its outlin
 APEX = "The same, over the plane."
 SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
 MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
+VERIFY = "Prove that an exact equilibrium of the mesh is near, and its Morse index; print the theorem."
 CHORD = "Largest distance to the smooth surface; triangles are smaller where it curves more."
 
 
@@ -75,6 +76,7 @@ def solve_(
     accuracy_of: Annotated[str | None, option("NAME", ACCURACY_OF, "--accuracy-of")] = None,
     most_triangles: Annotated[int | None, option("NUMBER", MOST_TRIANGLES, parser=arguments.integer)] = None,
     mesh_check: Annotated[bool | None, typer.Option("--mesh-check/--no-mesh-check", help=CHECKED)] = None,
+    verify: Annotated[bool, typer.Option("--verify", help=VERIFY)] = False,
     cache: Cache = True,
     whole: Whole = False,
     units: FileUnits = "",
@@ -102,7 +104,8 @@ def solve_(
     goal = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
     wanted = project.mesh_check if mesh_check is None else mesh_check
     project = replace(project, method=method or project.method, options=options, wanted=goal)
-    project = replace(project, mesh_check=wanted, whole=whole or project.whole)
+    verify = verify or project.verify
+    project = replace(project, mesh_check=wanted, verify=verify, whole=whole or project.whole)
     if projects.is_drawing(file) and project.drawing is not None:
         print(projects.proposal_text(project))
     with working() as say:
@@ -111,6 +114,8 @@ def solve_(
         how: dict[str, Any] = {"anyway": anyway, "use_cache": cache, "check_after": False}
         outcome = projects.run_project(project, say, changed=changed, **how)
     report(outcome)
+    if verify:
+        print(outcome.theorem.text(outcome.units))
     if project.outputs and not outcome.files:
         print("nothing written (use --anyway to write it)")
     if check := checking.mesh_check(outcome):
@@ -141,6 +146,7 @@ def certify_(
     start: Start = False,
     cache: Cache = True,
     whole: Annotated[bool, typer.Option("--whole", help=WHOLE_INDEX)] = False,
+    verify: Annotated[bool, typer.Option("--verify", help=VERIFY)] = False,
 ) -> int:
     """Check a surface, or a project's roof: residual forces, curvature errors, stability, reactions.
 
@@ -150,6 +156,7 @@ def certify_(
       pcmc certify roof.toml
       pcmc certify roof.pcmc --meshes 3
       pcmc certify roof.toml --margin pressure --margin "tension of west"
+      pcmc certify roof.pcmc --verify
     """
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
@@ -164,6 +171,8 @@ def certify_(
         report(roof, verdict=False)
     print(certificate.text(roof.units))
     checking.margins(roof, margin or ())
+    if verify or (roof.project is not None and roof.project.verify):
+        print(roof.theorem.text(roof.units))
     if meshes is not None and certificate.index is not None:
         sys.stdout.flush()
         with working() as say:

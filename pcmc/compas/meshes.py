@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,7 @@ from .whole import KEY, Whole, read_whole
 MARKS: dict[str, Any] = {"is_support": False, SLIDES: False, GUIDE: None, PLANES: None}
 QUANTITIES = dict.fromkeys(("mean_curvature", "rx", "ry", "rz"))
 CARRIED = {"vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane", "on_line"}
-CARRIED |= {"on_planes", "cables", "rooms", "given_supports"}
+CARRIED |= {"on_planes", "cables", "rooms", "curves", "given_supports"}
 
 
 def to_meshes(surface: Surface) -> list[Any]:
@@ -182,7 +182,17 @@ def _surface(
         mesh_arrays.read_cables(named, places, whole.cables),
         whole.rooms,
     )
-    return surface, notes
+    of_key = {key: k for of_mesh in places.values() for key, k in of_mesh.items()}
+    try:
+        curves = [
+            replace(c, vertices=np.array([of_key[k] for k in c.vertices.tolist()])) for c in whole.curves
+        ]
+        return surface.rebuilt(curves=curves), notes
+    except (KeyError, SurfaceError):
+        lost = (
+            "the curves that held vertices were drawn on do not fit these meshes any more and were left out"
+        )
+        return surface, (*notes, lost)
 
 
 def _check_carried(surface: Surface) -> None:

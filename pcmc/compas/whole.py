@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from ..surface import Circle, Guide, Line, Plane, Room, Surface
+from ..surface import Circle, Guide, HeldCurve, Line, Plane, Room, Surface
 from .mesh_arrays import refuse
 
 KEY = "pcmc"
@@ -23,6 +23,7 @@ class Whole:
     planes : the planes besides Π that vertices slide on.
     rooms : rooms of prescribed volume.
     cables : the names of the cables in their order.
+    curves : the curves that held vertices were drawn on; their vertices are keys of the meshes.
     """
 
     plane: Plane = field(default_factory=Plane)
@@ -30,13 +31,15 @@ class Whole:
     planes: tuple[Plane, ...] = ()
     rooms: tuple[Room, ...] = ()
     cables: tuple[str, ...] = ()
+    curves: tuple[HeldCurve, ...] = ()
 
     @classmethod
     def of(cls, surface: Surface) -> Whole:
         """That of a surface."""
         guides = tuple(guide for guide, _ in surface.given_supports.on_line)
         planes = tuple(plane for plane, _ in surface.on_planes)
-        return cls(surface.plane, guides, planes, surface.rooms, tuple(c.name for c in surface.cables))
+        cables = tuple(cable.name for cable in surface.cables)
+        return cls(surface.plane, guides, planes, surface.rooms, cables, surface.held_curves)
 
     def plain(self) -> dict[str, Any]:
         """The values as JSON holds them."""
@@ -46,6 +49,7 @@ class Whole:
             "planes": [_plain(plane) for plane in self.planes],
             "rooms": [{**asdict(room), "patches": dict(room.patches)} for room in self.rooms],
             "cables": list(self.cables),
+            "curves": [curve.plain() for curve in self.curves],
         }
 
 
@@ -66,6 +70,7 @@ def read_whole(named: Mapping[str, Any]) -> Whole:
             tuple(Plane(**_tuples(one)) for one in values.get("planes", ())),
             tuple(Room(**one) for one in values.get("rooms", ())),
             tuple(str(one) for one in values.get("cables", ())),
+            tuple(map(HeldCurve.from_plain, values.get("curves", ()))),
         )
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]

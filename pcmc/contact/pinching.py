@@ -202,7 +202,9 @@ def remove_pinched_walls(surface: Surface, walls: Walls, resting: Bools) -> Surf
     if surface.on_planes:
         supports |= resting_supports(surface, resting & ~held)
     cables = tuple(filter(None, (cable.carried(owner) for cable in surface.cables)))
-    return surface._with(vertices=X, faces=F, patch_of_face=patch, topology=topo, cables=cables, **supports)
+    return surface._with(
+        vertices=X, faces=F, patch_of_face=patch, topology=topo, cables=cables, curves=(), **supports
+    )
 
 
 def resting_supports(surface: Surface, resting: Bools) -> dict[str, object]:

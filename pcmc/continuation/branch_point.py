@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats
-from ..stability.modes import Stiffness, all_modes, lowest
-from .correction import BorderedMatrix
+from ..stability.factorisation import SingularMatrix
+from ..stability.modes import Stiffness, lowest
+from .correction import BorderedMatrix, NotOnBranch
 from .state import BranchMesh, State
 
 TANGENT_ACCURACY = 1e-6  # relative, to which the tangent's linear system is solved
-DENSE = 12  # unknowns below which all eigenvalues are computed at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,19 +87,26 @@ def branch_point(at: State, before: Tangent | float) -> BranchPoint:
     direction, weights = at.motion(s[:size], slope), at.area_weights
     length = Tangent(direction, slope, weights, scale).length(direction, slope)
     tangent = Tangent(direction / length, slope / length, weights, scale)
-    stiffness = at.mesh.stiffness(at.space, at.X, matrix.values, matrix.factor)
     rates = at.volume_units * s[size:] / length
-    return BranchPoint(at, tangent, _eigenvalues(stiffness), stiffness.negative, rates)
+    with _counted():
+        stiffness = at.mesh.stiffness(at.space, at.X, matrix.values, matrix.factor)
+        return BranchPoint(at, tangent, _eigenvalues(stiffness), stiffness.negative, rates)
+
+
+@contextmanager
+def _counted() -> Iterator[None]:
+    """Where rounding hides the eigenvalues, there is no point of the branch: one beside it will do."""
+    try:
+        yield
+    except SingularMatrix as error:
+        raise NotOnBranch(f"the second variation has no eigenvalues that can be told ({error})") from None
 
 
 def soft_modes(at: State, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, nearest first, and their motions (k,n,3)."""
-    values, factor = at.mesh.hessian(at.surface, at.space, at.X)
-    stiffness = at.mesh.stiffness(at.space, at.X, values, factor)
-    if len(stiffness.mass) < DENSE:
-        every, vectors = all_modes(stiffness)
-        fields = np.array([at.space.to_vectors(column) for column in vectors.T])
-    else:
+    with _counted():
+        values, factor = at.mesh.hessian(at.surface, at.space, at.X)
+        stiffness = at.mesh.stiffness(at.space, at.X, values, factor)
         every, fields = lowest(stiffness, stiffness.negative + count + 1)
     nearest = np.argsort(np.abs(every))[:count]
     return every[nearest], np.array([at.motion(at.space.to_coordinates(fields[i])) for i in nearest])
@@ -113,13 +122,5 @@ def along_branch(at: BranchPoint, count: int) -> float:
 
 def _eigenvalues(stiffness: Stiffness) -> Floats:
     """All negative eigenvalues and at least one more, ascending."""
-    size = len(stiffness.mass)
-    if size < DENSE:
-        values = all_modes(stiffness)[0]
-        return values if len(values) else np.array([np.inf])  # nothing moves at these volumes
-    count = stiffness.negative + 2
-    while True:
-        values = lowest(stiffness, min(count, size - 1))[0]
-        if np.count_nonzero(values < 0.0) >= stiffness.negative or count >= size - 1:
-            return values
-        count *= 2
+    values = lowest(stiffness, stiffness.negative + 2)[0]
+    return values if len(values) else np.array([np.inf])  # nothing moves at these volumes

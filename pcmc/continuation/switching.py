@@ -36,7 +36,10 @@ def leaving(mesh: BranchMesh, parameter: float, options: FollowOptions, row: int
         If no mode has the eigenvalue 0 there, or no other branch is found; ``where`` is ``row``.
     """
     at = State(mesh, mesh.surface.vertices, parameter)
-    values, modes = soft_modes(at, 2)
+    try:
+        values, modes = soft_modes(at, 2)
+    except NotOnBranch as reason:
+        raise OptionError(f"event {row}: {reason}", what="event", where=row) from None
     if len(values) > 1 and not abs(values[0]) <= NULL * abs(values[1]):
         message = (
             f"no mode turns at event {row}: the eigenvalues nearest 0 are {values[0]:.3g}, {values[1]:.3g}"

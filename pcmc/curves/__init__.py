@@ -1,6 +1,6 @@
-"""Curves as objects: lines, arcs, ellipses and Béziers; the ``pieces`` they are made of; their plain data.
+"""Curves as objects: lines, arcs, ellipses, Béziers; the ``pieces`` they are made of; plain data; planes.
 
-Gives Curve and what makes one to plans, drawings and projects. Imports ``surface`` and the rooms below it.
+Gives Curve and what makes one to surfaces, plans, drawings and projects. Imports only ``base``.
 """
 
 from .curves import Curve, arc, bezier, circle, curve, ellipse, join, polyline

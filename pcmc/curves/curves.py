@@ -15,8 +15,8 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, unknown
-from ..surface import Plane
 from .pieces import Alike, Piece
+from .plane import Plane
 
 CORNER = math.radians(10.0)  # a joint that turns by more is a corner
 NEAR = 0.5  # of the edge length: an extreme nearer to another stop than this becomes no vertex
@@ -163,10 +163,10 @@ class Curve:
         lengths = np.concatenate(inner)[1:]
         return self.parameter(np.where(lengths > total, lengths - total, lengths))
 
-    def middle(self, start: float, end: float) -> Floats:
-        """(1,) the parameter half of the way from one to another, as in ``between``."""
-        half = self._lengths_at(np.array([start, end])).mean()
-        return self.parameter(np.array([half % self.length]))
+    def middle(self, start: npt.ArrayLike, end: npt.ArrayLike, share: Floats | float = 0.5) -> Floats:
+        """(n,) the parameters half of the way from ones to others, or another share, as in ``between``."""
+        low, high = (self._lengths_at(np.atleast_1d(np.asarray(t, dtype=float))) for t in (start, end))
+        return self.parameter((low + share * (high - low)) % self.length)
 
     @cached_property
     def _twice(self) -> tuple[Floats, Floats]:
@@ -200,6 +200,31 @@ class Curve:
     def reversed(self) -> Curve:
         """The same curve run backwards."""
         return Curve(tuple(piece.reversed() for piece in self.pieces[::-1]), self.closed)
+
+    def mapped(self, matrix: Floats, shift: Floats) -> Curve:
+        """The curve where the affine map x → M x + b takes it."""
+        return replace(self, pieces=tuple(piece.mapped(matrix, shift) for piece in self.pieces))
+
+    @property
+    def controls(self) -> Floats:
+        """(k,d) points that an affine map takes along with the curve."""
+        return np.concatenate([piece.controls for piece in self.pieces])
+
+    def part(self, low: float, high: float, at: Floats) -> tuple[Curve, Floats]:
+        """The open curve from one parameter to another, and its parameters for those ``at`` (n,) of this one.
+
+        On a closed curve ``high`` may exceed the last parameter.
+
+        >>> quarter, at = circle([0, 0], 2.0).part(0.75, 1.25, np.array([0.75, 1.0, 1.25]))
+        >>> at.tolist(), round(quarter.length, 3)
+        ([0.0, 1.0, 2.0], 6.283)
+        """
+        joints = np.arange(math.floor(low) + 1, math.ceil(high))
+        stops = np.concatenate([[low], joints, [high]])
+        piece = np.floor(stops[:-1]).astype(int)
+        cuts = zip(piece % len(self.pieces), stops[:-1] - piece, stops[1:] - piece, strict=True)
+        part = Curve(tuple(self.pieces[k].part(start, end) for k, start, end in cuts))
+        return part, np.interp(at, stops, np.arange(float(len(stops))))
 
     def local(self, plane: Plane) -> Curve:
         """The curve in the coordinates of Π: two along it, and the height above it."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..surface import Plane
+from .plane import Plane
 
 SAME = 1e-9  # of a curve's size or parameter: differences up to this are none
 SAMPLES, BISECTIONS = 66, 60  # of a coordinate of a Bézier curve, and to find where it turns between two
@@ -41,6 +41,11 @@ class Piece:
         """(k,d+1) control points times their weights, and the weights."""
         weights = np.ones(len(self.points)) if self.weights is None else self.weights
         return np.column_stack([self.points * weights[:, None], weights])
+
+    @property
+    def controls(self) -> Floats:
+        """(k,d) the control points; of an arc its centre, and the ends of its axes."""
+        return np.concatenate([c := self.points[:1], c + self.points[1:]]) if self.sweep else self.points
 
     def extremes(self) -> Floats:
         """(e,) ascending parameters inside 0..1 at which x or y is largest or smallest.
@@ -107,6 +112,29 @@ class Piece:
         c, s = math.cos(self.sweep), math.sin(self.sweep)
         return Piece(np.stack([centre, u * c + v * s, u * s - v * c]), self.sweep)
 
+    def mapped(self, matrix: Floats, shift: Floats) -> Piece:
+        """The piece where the affine map x → M x + b takes it: an arc may become one of an ellipse."""
+        whole = np.array([[1.0], [0.0], [0.0]]) if self.sweep else 1.0  # an arc's axes are vectors
+        return replace(self, points=self.points @ matrix.T + whole * shift)
+
+    def part(self, start: float, end: float) -> Piece:
+        """The piece between two parameters: of a Bézier curve by de Casteljau's algorithm, from each end.
+
+        >>> Piece(np.array([[0.0, 0], [1, 2], [2, 0]])).part(0.5, 1.0).points.tolist()
+        [[1.0, 1.0], [1.5, 1.0], [2.0, 0.0]]
+        """
+        if start == 0.0 and end == 1.0:
+            return self
+        if self.sweep:
+            centre, u, v = self.points
+            c, s = math.cos(start * self.sweep), math.sin(start * self.sweep)
+            return Piece(np.stack([centre, u * c + v * s, v * c - u * s]), (end - start) * self.sweep)
+        control = _first_part(self.homogeneous, end)
+        control = _first_part(control[::-1], 1.0 - start / end)[::-1]
+        if self.weights is None:
+            return Piece(control[:, :-1])
+        return Piece(control[:, :-1] / control[:, -1:], weights=control[:, -1])
+
     def local(self, plane: Plane) -> Piece:
         """The piece in the coordinates of Π."""
         local = to_local(self.points, plane)
@@ -154,6 +182,15 @@ def _casteljau(control: Floats, t: Floats) -> Floats:
     while level.shape[1] > 1:
         level = (1.0 - s) * level[:, :-1] + s * level[:, 1:]
     return level[:, 0]
+
+
+def _first_part(control: Floats, t: float) -> Floats:
+    """(k,d) the Bernstein coefficients (k,d) of a polynomial on 0..t instead of 0..1."""
+    first = [control[0]]
+    while len(control) > 1:
+        control = (1.0 - t) * control[:-1] + t * control[1:]
+        first.append(control[0])
+    return np.array(first)
 
 
 def to_local(points: Floats, plane: Plane) -> Floats:

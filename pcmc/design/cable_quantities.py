@@ -8,7 +8,7 @@ from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError
 from ..energy.cables import add_pull
 from ..surface import Surface
-from .measurement import Measurement
+from .measurement import Branches, Measurement, largest
 
 
 def sag(surface: Surface, of: str) -> Measurement:
@@ -24,13 +24,15 @@ def sag(surface: Surface, of: str) -> Measurement:
     share = (X - a) @ chord / (chord @ chord)
     out = X - a - share[:, None] * chord
     distance = np.linalg.norm(out, axis=1)
-    top = int(distance.argmax())
-    slope = np.zeros_like(surface.vertices)
-    direction = out[top] / (distance[top] or 1.0)
-    slope[order[top]] = direction
-    slope[order[-2]] -= (1.0 - share[top]) * direction
-    slope[order[-1]] -= share[top] * direction
-    return Measurement(float(distance[top]), slope)
+    direction = out / np.where(distance > 0.0, distance, 1.0)[:, None]
+
+    def branches(near: Ints) -> Branches:
+        along, e = share[near][:, None], direction[near]
+        ends = np.tile(order[-2:], (len(near), 1))
+        slopes = np.stack([e, (along - 1.0) * e, -along * e], axis=1)
+        return Branches.of(np.column_stack([order[near], ends]), slopes, surface.n)
+
+    return largest(distance, float(np.linalg.norm(chord)), branches)
 
 
 def length(surface: Surface, of: str) -> Measurement:

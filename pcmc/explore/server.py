@@ -67,7 +67,7 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:",
 }
-OTHERS = ("check", "families", "margin", "news", "save")  # acts that answer with no surface
+OTHERS = ("check", "verify", "families", "margin", "news", "save")  # acts that answer with no surface
 
 
 class Explorer:
@@ -289,6 +289,9 @@ class _Handler(BaseHTTPRequestHandler):
             margin = session.margin(requests.varied(asked), self._gone)
             about, arrays = margin_findings(margin, explorer.origin, explorer.roof.units)
             self._send(pack(about, arrays), "application/octet-stream")
+        elif act == "verify":
+            theorem, units = session.verify(), explorer.roof.units
+            self._send_header({"badge": theorem.brief(units), "text": theorem.text(units)})
         elif act == "families":
             self._send(pack({}, {"family": families_drawn(session.state())}), "application/octet-stream")
         elif act == "news":

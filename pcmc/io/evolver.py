@@ -2,8 +2,10 @@
 
 A patch's tension is its faces' ``tension``; the patches of one pressure p ≠ 0 are one body with
 ``pressure p``; fixed vertices are ``fixed``, sliding ones lie on ``constraint 1``, the plane Π, and on
-``constraint 2`` and so on, the other planes; a comment names these, and marks mirrors. Cables and
-weights are in ``evolver_forces``.
+``constraint 2`` and so on, the other planes; a comment names these, and marks mirrors.
+A cable is a line ``tension`` of its edges, which also have its number as the attribute ``cable``. A weight
+w is the attribute ``weight`` of faces, and one quantity for each w, ``self_weight_k``: their integral of w z.
+Snow is the attribute ``snow`` of faces, which the reader adds to the net pressures of the bodies.
 Evolver measures volumes from the origin (``symmetric_content``: det/6 per face, Eq. 10b), so the
 coordinates are relative to the point of Π, or with other planes to ``Surface.origin``, and a comment says
 where that is. A plane that does not pass there has the ``content`` of its flat pieces, as an integral along
@@ -28,13 +30,13 @@ from ..energy.plane_pieces import add_plane_volumes
 from ..energy.rooms import room_pressures, room_volumes
 from ..meshing.refinement import edges_on_planes
 from ..surface import Surface
-from . import evolver_forces
-from .evolver_forces import SPECIAL
 from .evolver_reading import ROUNDING, read
 from .mesh_data import FREE, SLIDING, given_support
 from .text import escaped, format_rows
 
 __all__ = ["read", "write"]
+
+SPECIAL = "\\*"  # in names: the program joins lines at a backslash, and "/*" begins a comment
 
 HEADER = """\
 // Piecewise constant-mean-curvature surface, written by pcmc.
@@ -53,8 +55,13 @@ def write(path: Path, surface: Surface, bare: Collection[str] = (), **_: Any) ->
     """The datafile of a surface."""
     edges = surface.topology.edges + 1
     patches = list(enumerate(surface.patches, 1))
-    face_tag = np.array([f" tension {p.tension!r} patch {k}" for k, p in patches])
-    face_tag = evolver_forces.patch_tags(surface, face_tag)
+    weights = np.unique(surface.weights[surface.weights != 0.0]).tolist()
+    face_tags = []
+    for k, p in patches:
+        snow = f" snow {p.snow!r}" if p.snow else ""
+        weight = f" weight {p.weight!r} self_weight_{1 + weights.index(p.weight)}" if p.weight else ""
+        face_tags.append(f" tension {p.tension!r} patch {k}{snow}{weight}")
+    face_tag = np.array(face_tags)
     origin = surface.origin if surface.on_planes else np.array(surface.plane.point)
     X = surface.vertices - origin
     sides = ((surface.topology.edge_of_face + 1) * surface.topology.sense)[:, [2, 0, 1]]
@@ -65,12 +72,12 @@ def write(path: Path, surface: Surface, bare: Collection[str] = (), **_: Any) ->
             + [f"// bare {k} {escaped(p.name, SPECIAL)}" for k, p in patches if p.name in bare]
             + [f"// wall {k}" for k, p in patches if p.wall]
             + [f"// room {k} {escaped(room.name, SPECIAL)}" for k, room in enumerate(surface.rooms, 1)]
-            + evolver_forces.names(surface)
+            + [f"// cable {k} {escaped(cable.name, SPECIAL)}" for k, cable in enumerate(surface.cables, 1)]
         ),
     )
     vertex_tag, edge_tag = _tags(surface)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(header + _constraints(surface, origin) + evolver_forces.definitions(surface, origin))
+        file.write(header + _constraints(surface, origin) + _attributes(surface, origin, weights))
         file.write("\nVERTICES\n")
         file.write(format_rows("%d %r %r %r%s\n", _count(X), *X.T, vertex_tag))
         file.write("\nEDGES\n")
@@ -110,6 +117,19 @@ def _constraints(surface: Surface, origin: Floats) -> str:
     return text
 
 
+def _attributes(surface: Surface, origin: Floats, weights: Sequence[float]) -> str:
+    """The attributes of edges and faces, and a quantity for each weight, coordinates from ``origin`` (3,)."""
+    text = "DEFINE EDGE ATTRIBUTE cable INTEGER\n" if surface.cables else ""
+    text += "DEFINE FACET ATTRIBUTE snow REAL\n" if surface.snows.any() else ""
+    text += "DEFINE FACET ATTRIBUTE weight REAL\n" if weights else ""
+    height = "".join(f"({c!r})*{axis} + " for c, axis in zip(surface.plane.normal, "xyz", strict=True))
+    height += f"({float(surface.plane.height(origin))!r})"
+    for k, weight in enumerate(weights, 1):
+        text += f"QUANTITY self_weight_{k} ENERGY METHOD FACET_SCALAR_INTEGRAL\n"
+        text += f"SCALAR_INTEGRAND: ({weight!r})*({height})\n"
+    return text
+
+
 def _tags(surface: Surface) -> tuple[Any, Any]:
     """What follows the numbers of each vertex (n,) and of each edge (e,)."""
     kinds = np.array(["", " constraint 1", " fixed"])
@@ -117,8 +137,10 @@ def _tags(surface: Surface) -> tuple[Any, Any]:
     vertices = _with_constraints(kinds[given_support(surface)], masks).astype(object)
     for k, vertex in enumerate(flat_pieces(surface).end):
         vertices[vertex] += f" corner_{k}"
-    edges = _with_constraints(kinds[_edge_support(surface)], edges_on_planes(surface))
-    return vertices, evolver_forces.edge_tags(surface, edges)
+    edges = _with_constraints(kinds[_edge_support(surface)], edges_on_planes(surface)).astype(object)
+    for k, cable in enumerate(surface.cables, 1):
+        edges[surface.topology.edge_numbers(cable.edges)] += f" tension {cable.tension!r} cable {k}"
+    return vertices, edges
 
 
 def _with_constraints(tags: Any, masks: Sequence[Bools]) -> Any:
@@ -190,6 +212,3 @@ def _room_pressures(surface: Surface) -> tuple[Floats, Floats]:
         text += " datafile has one body on each side of a face; give all patches of its rooms its load"
         raise FileError(text, where=name, found=float(left[both[0]]))
     return multipliers, left
-
-
-# Reading

@@ -19,33 +19,36 @@ import pandas as pd
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError
+from ..base.names import names_from_file
 from ..surface import Cable, Patch, Plane, Room
-from . import evolver_forces
 from .expressions import constant, linear
 from .mesh_data import FIXED, FREE, SLIDING, MeshData
 from .polygons import triangulate
 from .text import numbers
 
+WRITTEN = "written by pcmc"
 ROUNDING = 1e-12  # of the largest pressure: what is left of differences
 
 
 def read(path: Path) -> MeshData:
     """The mesh, tensions, pressures and supports of a datafile; errors name the line."""
     header, file = _open(path)
-    if evolver_forces.WRITTEN in header:
+    if WRITTEN in header:
         file["read"]  # its last line: without it the file is cut off
     known = _parameters(file["top"])
     ids, X, support, constraints = _vertices(file["vertices"], known)
-    face_ids, corners, counts, rest = _faces(file["edges"], file["faces"], ids)
+    edges, faces = file["edges"], file["faces"]
+    edge_ids, ends, edge_rest = _edges(edges, ids)
+    face_ids, corners, counts, rest = _faces(faces, edge_ids, ends)
     F, source, notes = triangulate(X, corners, counts)
     pressure, prescribed, more = _pressures(file, face_ids, known)
-    patch_of_face, patches = _patches(header, file["faces"], rest, (pressure, *prescribed.values()), known)
+    patch_of_face, patches = _patches(header, faces, rest, (pressure, *prescribed.values()), known)
     given = re.search(r"^// origin (\S+) (\S+) (\S+)$", header, re.M)
     place = _Section(header, 1)
     origin = np.array([_numbers((c,), known, place, 0)[0] for c in given.groups()] if given else np.zeros(3))
     plane, planes = _planes(header, file["top"], constraints, support, origin, known)
     rooms = _rooms(header, prescribed, patch_of_face, patches)
-    unset = evolver_forces.names_in(header, "bare").values()
+    unset = _names(header, "bare").values()
     X, notes = X + origin, (*notes, *more)
     return MeshData(
         X,
@@ -57,7 +60,7 @@ def read(path: Path) -> MeshData:
         notes=notes,
         planes=planes,
         rooms=rooms,
-        cables=_cables(header, file["edges"], ids, known),
+        cables=_cables(header, edges, ends, edge_rest, known),
         bare=tuple(p.name for p in patches if p.name in unset and p.tension == p.pressure == 1.0),
     )
 
@@ -158,18 +161,21 @@ def _vertices(section: _Section, known: Mapping[str, float]) -> tuple[Ints, Floa
     return _whole(columns[0], section), X, support[code], of_vertex
 
 
-def _faces(edges: _Section, faces: _Section, vertex_ids: Ints) -> tuple[Ints, Ints, Ints, list[str]]:
+def _edges(section: _Section, vertex_ids: Ints) -> tuple[Ints, Ints, list[str]]:
+    """Ids, vertices (e,2), and what follows them on the line of each edge."""
+    pattern, what = r"(\d+)[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)([^\n]*)", "an edge number and two vertices"
+    *columns, rest = list(zip(*section.elements(pattern, what), strict=True)) or [()] * 4
+    ids, *ends = (_whole(column, section) for column in columns)
+    return ids, np.stack([_places(vertex_ids, end, section, "vertex") for end in ends], axis=1), list(rest)
+
+
+def _faces(faces: _Section, edge_ids: Ints, ends: Ints) -> tuple[Ints, Ints, Ints, list[str]]:
     """Ids, vertices of face after face, corners of each face, and what follows the edges on its line."""
-    what = "an edge number and two vertices"
-    edge_rows = edges.elements(r"(\d+)[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)[^\n]*", what)
-    columns = list(zip(*edge_rows, strict=True)) or [()] * 3
-    numbers = np.stack([_whole(column, edges) for column in columns], axis=1)
-    ends = np.stack([_places(vertex_ids, numbers[:, k], edges, "vertex") for k in (1, 2)], axis=1)
     listed = faces.elements(r"(\d+)((?:[^\S\n]+-?\d+)+)([^\n]*)", "a face number and its edges")
     counts = np.array([len(f[1].split()) for f in listed], dtype=np.int64)
     row = np.repeat(np.arange(len(listed)), counts)
     signed = _whole(" ".join(f[1] for f in listed).split(), faces, row)
-    place = _places(numbers[:, 0], np.abs(signed), faces, "edge", row)
+    place = _places(edge_ids, np.abs(signed), faces, "edge", row)
     tail = np.where(signed > 0, ends[place, 0], ends[place, 1])
     head = np.where(signed > 0, ends[place, 1], ends[place, 0])
     last = np.cumsum(counts) - 1
@@ -182,18 +188,43 @@ def _faces(edges: _Section, faces: _Section, vertex_ids: Ints) -> tuple[Ints, In
     return ids, tail, counts, [f[2] for f in listed]
 
 
-def _cables(header: str, edges: _Section, vertex_ids: Ints, known: Mapping[str, float]) -> tuple[Cable, ...]:
-    """The edges with a tension, as cables."""
-    if not re.search(r"\b(?:tension|density)\b", edges.text, re.I):
-        return ()
-    rows = edges.elements(r"\d+[^\S\n]+(\d+)[^\S\n]+(\d+)(?!\S)([^\n]*)", "an edge number and two vertices")
-    numbers = np.stack([_whole([row[k] for row in rows], edges) for k in (0, 1)], axis=1)
-    ends = np.stack([_places(vertex_ids, column, edges, "vertex") for column in numbers.T], axis=1)
+def _names(header: str, kind: str) -> dict[str, str]:
+    """The names that comments give to patches, rooms or cables, by number."""
+    rows = re.findall(rf"^// {kind} (\d+) ([^\n]+)$", header, re.M)
+    names = names_from_file(name for _, name in rows)[0]
+    return {number: unquote(names[name]) if WRITTEN in header else names[name] for number, name in rows}
 
-    def number(word: str, row: int) -> float:
-        return float(_numbers((word,), known, edges, row)[0])
 
-    return evolver_forces.cables(header, [row[2] for row in rows], ends, number)
+def _values(
+    section: _Section, rest: Sequence[str], key: str, known: Mapping[str, float], default: float = 0.0
+) -> tuple[Floats, Bools]:
+    """(k,) the number after a key in what follows each element, and where there is one."""
+    pattern = re.compile(rf"\b(?:{key})\s+\{{?([^\s{{}}]+)", re.I)
+    if not pattern.search(section.text):
+        return np.full(len(rest), default), np.zeros(len(rest), dtype=bool)
+    code, kinds = pd.factorize(np.array(rest, dtype=object))
+    first = np.unique(code, return_index=True)[1]
+    value, given = np.full(len(kinds), default), np.zeros(len(kinds), dtype=bool)
+    for k, words in enumerate(kinds):
+        if hit := pattern.search(words):
+            value[k], given[k] = _numbers((hit[1],), known, section, int(first[k]))[0], True
+    return value[code], given[code]
+
+
+def _cables(
+    header: str, section: _Section, ends: Ints, rest: Sequence[str], known: Mapping[str, float]
+) -> tuple[Cable, ...]:
+    """The edges (e,2) with a line tension as cables, those of one number and tension together."""
+    names = _names(header, "cable")
+    tension, _ = _values(section, rest, "tension|density", known)
+    number, given = _values(section, rest, "cable", known)
+    chosen = np.flatnonzero((tension != 0.0) | (given & np.isin(number, [float(name) for name in names])))
+    kinds, kind = np.unique(np.stack([number, tension], axis=1)[chosen], axis=0, return_inverse=True)
+    once = len(np.unique(kinds[:, 0])) == len(kinds)
+    return tuple(
+        Cable(names.get(str(int(a)), f"cable {k}") if once else f"cable {k}", t, ends[chosen[kind == k - 1]])
+        for k, (a, t) in enumerate(kinds.tolist(), 1)
+    )
 
 
 def _places(ids: Ints, wanted: Ints, section: _Section, what: str, row: Ints | None = None) -> Ints:
@@ -218,29 +249,23 @@ def _pressures(
     prescribed: dict[tuple[str, float], Ints] = {}
     if "bodies" not in file:
         return pressure, prescribed, ("the file has no bodies, so no patch is under pressure",)
-    section, without = file["bodies"], []
+    section = file["bodies"]
     listed = section.elements(r"(\d+)((?:[^\S\n]+-?\d+)*)([^\n]*)", "a body number and its faces")
-    inside = np.ones(len(listed))
-    for row, (number, _, rest) in enumerate(listed):
-        given = re.search(r"\b(?:pressure|lagrange_multiplier)\s+(\S+)", rest, re.I)
-        if given is None:
-            without.append(number)
-        else:
-            inside[row] = _numbers((given[1],), known, section, row)[0]
+    rest = [words for *_, words in listed]
+    inside, given = _values(section, rest, "pressure|lagrange_multiplier", known, 1.0)
+    volume, limited = _values(section, rest, "volume", known)
     of_body = np.repeat(np.arange(len(listed)), [len(members.split()) for _, members, _ in listed])
     signed = _whole(" ".join(members for _, members, _ in listed).split(), section, of_body)
     place = _places(face_ids, np.abs(signed), section, "face", of_body)
     np.add.at(pressure, place, np.sign(signed) * inside[of_body])
-    for row, (number, _, rest) in enumerate(listed):
-        given = re.search(r"\bvolume\s+(\S+)", rest, re.I)
-        if given is not None:
-            sides = np.zeros(len(face_ids), dtype=np.int64)
-            np.add.at(sides, place[of_body == row], np.sign(signed[of_body == row]))
-            volume = float(_numbers((given[1],), known, section, row)[0])
-            prescribed[str(number), volume] = sides
+    for row in np.flatnonzero(limited):
+        sides = np.zeros(len(face_ids), dtype=np.int64)
+        np.add.at(sides, place[of_body == row], np.sign(signed[of_body == row]))
+        prescribed[listed[row][0], float(volume[row])] = sides
     if prescribed:  # the difference of two rooms' pressures is 0 but for rounding
         pressure[np.abs(pressure) <= ROUNDING * np.abs(pressure).max(initial=0.0)] = 0.0
-    note = f"body {', '.join(without)} has no pressure in the file; 1 is used"
+    without = ", ".join(number for (number, *_), there in zip(listed, given, strict=True) if not there)
+    note = f"body {without} has no pressure in the file; 1 is used"
     return pressure, prescribed, (note,) if without else ()
 
 
@@ -252,19 +277,11 @@ def _patches(
     known: Mapping[str, float],
 ) -> tuple[Ints, tuple[Patch, ...]]:
     """Faces alike in patch number, tension, weight, snow and all (m,) ``of_face`` are a patch."""
-    code, kinds = pd.factorize(np.array(rest, dtype=object))
-    first = np.unique(code, return_index=True)[1]
-    number, tension, weight, snow = np.array([[0.0], [1.0], [0.0], [0.0]]) * np.ones(len(kinds))
-    for k, words in enumerate(kinds):
-        row = int(first[k])
-        keys = {"patch": number, "tension|density": tension, "weight": weight, "snow": snow}
-        for key, target in keys.items():
-            given = re.search(rf"\b(?:{key})\s+(\S+)", words, re.I)
-            if given:
-                target[k] = _numbers((given[1],), known, section, row)[0]
-    laws = np.stack([number[code], tension[code], weight[code], snow[code], *of_face], axis=1)
+    columns = {"patch": 0.0, "tension|density": 1.0, "weight": 0.0, "snow": 0.0}
+    given = [_values(section, rest, key, known, default)[0] for key, default in columns.items()]
+    laws = np.stack([*given, *of_face], axis=1)
     rows_, patch_of_face = np.unique(laws, axis=0, return_inverse=True)
-    names = evolver_forces.names_in(header, "patch")
+    names = _names(header, "patch")
     walls = {float(k) for k in re.findall(r"^// wall (\d+)$", header, re.M)}
     once = len(np.unique(rows_[:, 0])) == len(rows_)
     patches = [
@@ -278,7 +295,7 @@ def _rooms(
     header: str, prescribed: Mapping[tuple[str, float], Ints], patch_of_face: Ints, patches: tuple[Patch, ...]
 ) -> tuple[Room, ...]:
     """The bodies of prescribed volume as rooms, with the names that pcmc has given them."""
-    names = evolver_forces.names_in(header, "room")
+    names = _names(header, "room")
     rooms = []
     for (number, volume), sides in prescribed.items():
         of_patch = np.zeros(len(patches), dtype=np.int64)

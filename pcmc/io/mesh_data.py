@@ -16,7 +16,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import NO_UNITS, Units
 from ..base.validate import choice
-from ..surface import Cable, Guide, Patch, Plane, Room, Surface, checks
+from ..surface import Cable, Guide, HeldCurve, Patch, Plane, Room, Surface, checks
 from ..surface.geometry import bounding_size
 from ..surface.topology import topology
 
@@ -44,7 +44,7 @@ class MeshData:
         vertices at one place stay two: those of a wall without height below a junction on Π.
     walls : the text of ``flat_walls.encode_walls``, where patches are separate meshes and a wall has
         no height.
-    lines, planes, cables, rooms : as ``on_line``, ``on_planes``, ``cables`` and ``rooms`` in Surface.
+    lines, planes, cables, rooms, curves : as ``on_line``, ``on_planes``, ``cables``, … in Surface.
     units : of the numbers; no unit where the file has none.
     parts : cables, rooms, lines and planes as ``metadata`` writes them, until the mesh is whole.
     """
@@ -67,6 +67,7 @@ class MeshData:
     rooms: tuple[Room, ...] = ()
     parts: Mapping[str, Any] = field(default_factory=dict)
     bare: tuple[str, ...] = ()
+    curves: tuple[HeldCurve, ...] = ()
 
 
 def checked(data: MeshData) -> MeshData:
@@ -189,6 +190,7 @@ def _selected(data: MeshData, keep: Ints, place: Ints) -> MeshData:
         scalars={k: v[keep] if len(v) == n else v for k, v in data.scalars.items()},
         planes=tuple((plane, mask[keep]) for plane, mask in data.planes),
         cables=tuple(filter(None, (cable.carried(place) for cable in data.cables))),
+        curves=tuple(replace(curve, vertices=place[curve.vertices]) for curve in data.curves),
     )
 
 
@@ -220,8 +222,11 @@ def to_surface(
     if rounded.any():  # back onto the plane
         X = X - np.where(rounded, height, 0.0)[:, None] * np.array(plane.normal)
     lines, planes = (data.lines, data.planes) if fixed is None else ((), ())
-    supports = held, sliding, plane, lines, planes
-    return Surface(X, data.faces, data.patch_of_face, patches, *supports, data.cables, data.rooms)
+    drawn = held | (support == FIXED) if data.curves else held  # where the file's curves are
+    supports = drawn, sliding, plane, lines, planes
+    parts = data.cables, data.rooms, data.curves
+    surface = Surface(X, data.faces, data.patch_of_face, patches, *supports, *parts)
+    return surface if drawn is held or np.array_equal(drawn, held) else surface.rebuilt(fixed=held)
 
 
 def _changed(

@@ -2,8 +2,9 @@
 
 A zip archive of NumPy arrays (an .npz) that ``numpy.load`` opens: ``vertices``, ``faces``,
 ``patch_of_face``, ``support``; one ``scalar <name>`` per scalar, one ``certificate <name>`` per array of the
-certificate, and ``meta``, a JSON text with the format's version, the description of ``metadata`` and the rest
-of the certificate, its tables as lists of rows. Up to version 5 cables, lines and planes were arrays.
+certificate, and ``meta``, a JSON text with the format's version, the description of ``metadata``, the curves
+with their vertices and the parameters of these, and the rest of the certificate, its tables as lists of rows.
+Up to version 5 cables, lines and planes were arrays.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Mapping
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict, is_dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -20,13 +21,13 @@ import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats
-from ..base.errors import FileError
-from ..surface import Surface
+from ..base.errors import FileError, PcmcError
+from ..surface import HeldCurve, Surface
 from .libraries import translated_errors
-from .mesh_data import MeshData, numeric, support_of
-from .metadata import parse_metadata
+from .mesh_data import MeshData, numeric, support_of, within
+from .metadata import DAMAGED, parse_metadata
 
-VERSION = 6  # since 4 weights, 5 snow, 6 cables, rooms, lines and planes; the oldest that will do
+VERSION = 7  # since 4 weights, 5 snow, 6 cables, rooms, lines, planes, 7 curves; the oldest that will do
 FORMAT = "pcmc surface"
 INFLATED = 100  # most bytes for each byte of the file; a flat grid of a million triangles has 7
 ROOM = 64_000_000  # bytes that any file may become
@@ -46,6 +47,7 @@ def write(
         "format": FORMAT,
         "version": _version(surface),
         "description": metadata,
+        "curves": [one.plain() for one in surface.held_curves],
         "certificate": {k: v for k, v in certificate.items() if k not in tables},
     }
     arrays: dict[str, Any] = {f"scalar {name}": value for name, value in scalars.items()}
@@ -79,6 +81,7 @@ def read(path: Path) -> MeshData:
             text = f"written by a newer pcmc (format {newer}, this one reads up to {VERSION}); update pcmc"
             raise FileError(text, where="version", found=newer, expected=VERSION)
         metadata = parse_metadata(meta["description"])
+        curves = _curves(meta.get("curves", ()), len(arrays["vertices"]))
         parts = {**_older_parts(meta, arrays), **metadata.parts}
         return metadata.mesh_data(
             arrays.pop("vertices"),
@@ -87,6 +90,7 @@ def read(path: Path) -> MeshData:
             list(metadata.patches),
             support=arrays.pop("support"),
             parts=parts,
+            curves=curves,
             scalars=_under("scalar ", arrays),
             certificate={**meta["certificate"], **_under("certificate ", arrays)},
         )
@@ -94,9 +98,24 @@ def read(path: Path) -> MeshData:
 
 def _version(surface: Surface) -> int:
     """The oldest version of the format that can hold a surface."""
-    if surface.rooms or surface.on_planes or surface.cables or surface.given_supports.on_line:
+    if surface.held_curves:
         return VERSION
+    if surface.rooms or surface.on_planes or surface.cables or surface.given_supports.on_line:
+        return 6
     return 5 if surface.snows.any() else 4 if surface.weights.any() else 1
+
+
+def _curves(rows: Any, n: int) -> tuple[HeldCurve, ...]:
+    """The curves of a file with n vertices."""
+    curves = list[HeldCurve]()
+    try:
+        for one in map(HeldCurve.from_plain, rows):
+            V = within(numeric(one.vertices, "vertices", "iu", (None,)), "vertices", n)
+            curves.append(replace(one, vertices=V))
+    except (*DAMAGED, PcmcError) as error:
+        text = f"curve {len(curves)} is damaged: {error}"
+        raise FileError(text, what="curves", where=len(curves)) from None
+    return tuple(curves)
 
 
 def _older_parts(meta: Mapping[str, Any], arrays: dict[str, Any]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """The part of the reading process that uses MeshLab: it reads meshes, and repairs them.
 
-``reading_script`` loads this file by its path, so it imports nothing of pcmc. MeshLab's code is native, and a
-mesh that is wrong can crash it.
+``reading_process`` loads this file by its path, so it imports nothing of pcmc. MeshLab's code is native, and
+a mesh that is wrong can crash it.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..base.units import Units, conversion_note, length_factor
-from ..surface import Circle, Line, Patch, Plane, Room, Surface
+from ..surface import Circle, HeldCurve, Line, Patch, Plane, Room, Surface
 from .mesh_data import MeshData
 
 
@@ -32,6 +32,8 @@ def scaled(value: Any, factor: float) -> Any:
             return replace(value, point=_point(value.point, factor))
         case Circle():
             return replace(value, centre=_point(value.centre, factor), radius=factor * value.radius)
+        case HeldCurve():
+            return value.mapped(factor * np.eye(3), np.zeros(3))
         case Room():
             return replace(value, volume=factor**3 * value.volume)
     return value
@@ -43,7 +45,8 @@ def scaled_surface(surface: Surface, factor: float) -> Surface:
         return surface
     parts = {f.name: scaled(getattr(surface, f.name), factor) for f in fields(surface) if f.init}
     supports = {name: scaled(part, factor) for name, part in surface.given_supports._asdict().items()}
-    return Surface(**parts | supports | {"vertices": factor * surface.vertices})
+    moved = {"vertices": factor * surface.vertices, "curves": scaled(surface.held_curves, factor)}
+    return Surface(**parts | supports | moved)
 
 
 def stated(data: MeshData, length: str) -> MeshData:

@@ -9,6 +9,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface
 from ..surface.geometry import area_vectors
+from ..surface.held_curve import EdgesOnCurves
 from .quality import edge_lengths
 from .refinement import (
     Projection,
@@ -28,7 +29,7 @@ class CurveMesh:
 
     ``support`` (n,2+p): whether a vertex is fixed, slides on Π, slides on each of ``Surface.on_planes``.
     ``source`` (n,): the number of each vertex in the mesh before MMG, or -1. ``cable`` (c,): the number of
-    the cable on each of ``curves``, or -1.
+    the cable on each of ``curves``, or -1. ``on``: where these are on curves that were drawn.
     """
 
     X: Floats
@@ -38,6 +39,7 @@ class CurveMesh:
     support: Bools
     source: Ints
     cable: Ints
+    on: EdgesOnCurves
 
 
 def cut_curves(
@@ -58,11 +60,13 @@ def cut_curves(
     at_vertices = np.stack(
         [*surface.given_supports.fixed_and_sliding(), *(mask for _, mask in surface.on_planes)], axis=1
     )
-    mesh = CurveMesh(X, F, patch, topo.edges[stay], at_vertices, number, _cable_of_edge(surface)[stay])
+    on = surface.edges_on_curves[stay]
+    mesh = CurveMesh(X, F, patch, topo.edges[stay], at_vertices, number, _cable_of_edge(surface)[stay], on)
     support = np.stack([fixed_edge, sliding_edge, *edges_on_planes(surface)], axis=1)[stay]
     while (counts > 1).any():
         mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
     new = mesh.support[:, 0] & (np.arange(len(mesh.X)) >= first)
+    new[mesh.curves[mesh.on.drawn]] = False
     if (project is not None or surface.on_circle) and new.any():
         X = mesh.X.copy()
         if project is not None:
@@ -136,15 +140,18 @@ def _cut_once(
     size_start, size_end = size[ends].T
     share = place_between(first / pieces, size_start, size_end)
     start, end = mesh.X[ends[:, 0]], mesh.X[ends[:, 1]]
+    on = mesh.on[cut]
+    at, points = on.between(share)
+    points = np.where(on.drawn[:, None], points, start + share[:, None] * (end - start))
     number = len(mesh.X) + np.arange(len(ends))
     F, patch = cut_triangles(mesh.F, mesh.patch, ends, number, len(mesh.X))
     halves = np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)
-    X = np.concatenate([mesh.X, start + share[:, None] * (end - start)])
+    X = np.concatenate([mesh.X, points])
     size = np.concatenate([size, size_start + share * (size_end - size_start)])
     curves = np.concatenate([mesh.curves[~cut], *halves])
     at_vertices = np.concatenate([mesh.support, support[cut]])
     cable = np.concatenate([mesh.cable[~cut], mesh.cable[cut], mesh.cable[cut]])
-    new = CurveMesh(X, F, patch, curves, at_vertices, np.arange(len(X)), cable)
+    new = CurveMesh(X, F, patch, curves, at_vertices, np.arange(len(X)), cable, mesh.on.cut(cut, at))
     counts = np.concatenate([counts[~cut], first, pieces - first])
     return new, size, counts, np.concatenate([support[~cut], support[cut], support[cut]])
 

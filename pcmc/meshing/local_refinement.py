@@ -115,10 +115,10 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
         count = cut.sum()
         cut[first[cut[edge_of_face].any(axis=1)]] = True
         cut |= np.isin(columns, columns[cut & (columns >= 0)])
-    middle, held, slides = new_vertices(surface, cut, project)
-    ends, number = surface.topology.edges[cut], surface.n + np.arange(len(middle))
+    new = new_vertices(surface, cut, project)
+    ends, number = surface.topology.edges[cut], surface.n + np.arange(len(new.middle))
     F, patch = cut_triangles(surface.faces, surface.patch_of_face, ends, number, surface.n, longest)
-    return with_vertices_on(surface, cut, F, patch, middle, held, slides)
+    return with_vertices_on(surface, cut, F, patch, new)
 
 
 def _face_mask(surface: Surface, chosen: Bools | Ints) -> Bools:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -12,6 +13,8 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..contact.midpoints import midpoints
 from ..surface import Circle, Guide, Plane, Surface, expect_surface
+
+CORNER = 40.0  # degrees: where held edges turn by more, their line has a corner
 
 Projection = Callable[[Floats], Floats]
 
@@ -24,12 +27,15 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     per-face field is carried over by ``numpy.repeat(field, 4)`` and a per-vertex field by
     ``prolongation(surface) @ field``.
 
-    A midpoint is held where both ends of its edge are held *and* the edge is part of that support:
+    The midpoint of an edge on one of ``surface.curves`` is fixed, half way along the curve. On other edges a
+    midpoint is held where both ends are held *and* the edge is part of that support, as far as can be told:
 
     - boundary edge, both ends fixed: fixed;
     - boundary edge, one end sliding and the other sliding, or fixed and on Π: sliding;
     - junction or seam edge, both ends fixed, not leading from boundary to boundary: fixed;
-    - edge inside a sheet, both ends fixed and off the boundary (a held line in a patch): fixed;
+    - edge inside a sheet, both ends fixed, off the boundary and on none of the curves (a held line in a
+      patch): fixed; the same for the edge by which a line of two or more of them goes on to a fixed vertex
+      of the boundary;
     - boundary edge in a plane of ``on_planes``: sliding there; the same for a curve in a mirror plane, and
       for each edge of a triangle that lies in the plane;
     - every other edge, such as one across a sheet between two fixed boundary vertices: free.
@@ -40,8 +46,8 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     Parameters
     ----------
     levels : how often, ≥ 0.
-    project : (k,3) → (k,3), applied to the new fixed vertices at each level: puts them on a curved
-        boundary that the edges only approximate.
+    project : (k,3) → (k,3), applied to the new fixed vertices on no curve at each level: puts them on a
+        curved boundary that the edges only approximate.
 
     Raises
     ------
@@ -96,18 +102,50 @@ def prolongation(surface: Surface) -> csr_array:
 
 
 def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
-    """(e,) masks of the edges whose midpoint is fixed, and of those whose midpoint slides on Π."""
+    """(e,) masks of the edges whose midpoint is fixed, and of those whose midpoint slides on Π.
+
+    Of the fixed ones, those on no curve are a guess.
+    """
     topo, (fixed, sliding) = surface.topology, surface.given_supports.fixed_and_sliding()
     start, end = topo.edges.T
     boundary = topo.boundary_edge
     crossing = topo.on_boundary[start] & topo.on_boundary[end]
     inner = (topo.junction_edge | topo.seam_edge) & ~crossing
-    inside = ~(topo.on_boundary[start] | topo.on_boundary[end])
-    both_fixed = fixed[start] & fixed[end] & (boundary | inner | inside)
+    drawn, known = surface.edges_on_curves.drawn, np.zeros(surface.n, dtype=bool)
+    known[topo.edges[drawn]] = True
+    inside = ~(topo.on_boundary | known)[topo.edges].any(axis=1) & ~boundary & ~inner
+    if surface.held_curves:  # then the edges that are held and carry no cable are known
+        boundary = boundary.copy()
+        boundary[topo.edge_numbers(surface.cable_edges.ends)] = False
+    both_fixed = drawn | (fixed[start] & fixed[end] & (boundary | inner | inside))
+    both_fixed |= _last_edges(surface, both_fixed & inside, fixed)
     height = surface.plane.height(surface.vertices)
     resting = sliding | (fixed & (np.abs(height) <= 1e-9 * surface.size))
-    slides = boundary & resting[start] & resting[end] & (sliding[start] | sliding[end])
+    slides = topo.boundary_edge & resting[start] & resting[end] & (sliding[start] | sliding[end])
     return both_fixed, slides
+
+
+def _last_edges(surface: Surface, inside: Bools, fixed: Bools) -> Bools:
+    """(e,) the edges by which lines of held edges ``inside`` (e,) a patch go straight on to the boundary.
+
+    At the end of a line this is the edge to a fixed vertex of the boundary that turns least, by ``CORNER`` at
+    most. A single vertex inside is no line, and ends none.
+    """
+    topo, X, more = surface.topology, surface.vertices, np.zeros(len(inside), dtype=bool)
+    ends = np.bincount(topo.edges[inside].ravel(), minlength=surface.n) == 1
+    before = np.zeros(surface.n, dtype=np.int64)
+    line = np.concatenate([topo.edges[inside], topo.edges[inside][:, ::-1]])
+    before[line[:, 0]] = line[:, 1]
+    rim = topo.on_boundary & fixed
+    number = np.flatnonzero((ends[topo.edges] & rim[topo.edges][:, ::-1]).any(axis=1))
+    here, there = np.where(ends[topo.edges[number, :1]], topo.edges[number], topo.edges[number][:, ::-1]).T
+    along, on = X[here] - X[before[here]], X[there] - X[here]
+    lengths = np.linalg.norm(along, axis=1) * np.linalg.norm(on, axis=1)
+    cosine = np.einsum("ij,ij->i", along, on) / np.maximum(lengths, 1e-300)
+    order = np.lexsort((-cosine, here))
+    best = order[np.unique(here[order], return_index=True)[1]]
+    more[number[best[cosine[best] >= np.cos(np.radians(CORNER))]]] = True
+    return more
 
 
 def carry_planes(surface: Surface, cut: Bools) -> tuple[tuple[Plane, Bools], ...]:
@@ -141,39 +179,48 @@ def projected(project: Projection, points: Floats) -> Floats:
     return moved
 
 
-def new_vertices(
-    surface: Surface, cut: Bools, project: Projection | None = None
-) -> tuple[Floats, Bools, Bools]:
-    """Positions (k,3) and supports of new vertices on the edges ``cut`` (e,): fixed, sliding (k,)."""
+class NewVertices(NamedTuple):
+    """New vertices on edges: positions (k,3); which are fixed, and slide on Π, (k,); (k,) their parameters on
+    the curves of their edges."""
+
+    middle: Floats
+    held: Bools
+    slides: Bools
+    at: Floats
+
+
+def new_vertices(surface: Surface, cut: Bools, project: Projection | None = None) -> NewVertices:
+    """The new vertices on the edges ``cut`` (e,)."""
     middle = midpoints(surface, surface.topology.edges[cut])
     held, slides = (mask[cut] for mask in held_midpoints(surface))
+    on = surface.edges_on_curves[cut]
+    guessed = held & ~on.drawn
     if project is not None:
-        middle[held] = projected(project, middle[held])
-    middle[held] = onto_round_edges(surface, middle[held])
-    return middle, held, slides
+        middle[guessed] = projected(project, middle[guessed])
+    middle[guessed] = onto_round_edges(surface, middle[guessed])
+    at, points = on.between()
+    middle[on.drawn] = points[on.drawn]
+    return NewVertices(middle, held, slides, at)
 
 
 def _refine_once(surface: Surface, project: Projection | None) -> Surface:
     every = np.ones(len(surface.topology.edges), dtype=bool)
-    middle, held, slides = new_vertices(surface, every, project)
+    new = new_vertices(surface, every, project)
     a, b, c = surface.faces.T
     bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
     patch = np.repeat(surface.patch_of_face, 4)
     F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
-    return with_vertices_on(surface, every, F, patch, middle, held, slides)
+    return with_vertices_on(surface, every, F, patch, new)
 
 
-def with_vertices_on(
-    surface: Surface, cut: Bools, F: Ints, patch: Ints, middle: Floats, held: Bools, slides: Bools
-) -> Surface:
-    """The surface of triangles ``F`` whose last k vertices ``middle`` (k,3) lie on the edges ``cut`` (e,).
-
-    ``held`` and ``slides`` (k,) are their supports.
-    """
-    X, ends = np.concatenate([surface.vertices, middle]), surface.topology.edges[cut]
+def with_vertices_on(surface: Surface, cut: Bools, F: Ints, patch: Ints, new: NewVertices) -> Surface:
+    """The surface of triangles ``F`` whose last k vertices are the new ones on the edges ``cut`` (e,)."""
+    X, ends = np.concatenate([surface.vertices, new.middle]), surface.topology.edges[cut]
     fixed, sliding = surface.given_supports.fixed_and_sliding()
-    fixed, sliding = np.concatenate([fixed, held]), np.concatenate([sliding, slides])
-    number = surface.n + np.arange(len(middle))
+    fixed, sliding = np.concatenate([fixed, new.held]), np.concatenate([sliding, new.slides])
+    number = surface.n + np.arange(len(new.middle))
+    halves = (np.stack([ends[:, 0], number], axis=1), np.stack([number, ends[:, 1]], axis=1))
+    curves = surface.edges_on_curves.cut(cut, new.at)
     return surface.rebuilt(
         vertices=X,
         faces=F,
@@ -183,6 +230,7 @@ def with_vertices_on(
         on_line=carry_lines(surface, X, fixed, surface.n),
         on_planes=carry_planes(surface, cut),
         cables=tuple(cable.cut(ends, number) for cable in surface.cables),
+        curves=curves.joined(np.concatenate([surface.topology.edges[~cut], *halves])),
     )
 
 

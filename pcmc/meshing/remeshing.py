@@ -58,11 +58,11 @@ def remesh(
     """The same surface with triangles near a wanted edge length, the same everywhere or not.
 
     Patches, tensions, the plane and all names stay. Boundaries, junctions and seams do not move, to
-    rounding: their vertices stay, and new ones are put on the straight edges between them, with the
-    same support as the edge. So along curves the mesh gets finer, never coarser. Vertices held inside a
-    patch stay. A junction that rests on the plane is lifted off it by a quarter of its edges, so that
-    its wall has triangles; solving brings it down again. Everywhere else MMG puts new vertices on a
-    smooth approximation of the surface: solve again afterwards.
+    rounding: their vertices stay, and new ones are put on ``surface.curves``, or on the straight edges that
+    are on none, with the same support as the edge. So along curves the mesh gets finer, never coarser.
+    Vertices held inside a patch stay. A junction that rests on the plane is lifted off it by a quarter of
+    its edges, so that its wall has triangles; solving brings it down again. Everywhere else MMG puts new
+    vertices on a smooth approximation of the surface: solve again afterwards.
 
     Parameters
     ----------
@@ -74,8 +74,8 @@ def remesh(
     chord : largest distance between the triangles and the smooth surface, length; where the surface
         is strongly curved, edges get shorter to keep it. By default a tenth of ``edge_length``, of the
         largest one if there are several.
-    project : (k,3) → (k,3), applied to the new fixed vertices: puts them on a curved boundary that the
-        edges only approximate.
+    project : (k,3) → (k,3), applied to the new fixed vertices on none of ``surface.curves``: puts them on a
+        curved boundary that the edges only approximate.
 
     Raises
     ------
@@ -242,7 +242,7 @@ def _remesh_with_mmg(mesh: CurveMesh, size: Floats, growth: float, chord: float)
     _check_curves(mesh, curves, F, len(X))
     source = np.where(known, mesh.source[place], -1)
     support = known[:, None] & mesh.support[place]
-    return CurveMesh(X, F.astype(np.int64), patch - 1, curves, support, source, mesh.cable)
+    return CurveMesh(X, F.astype(np.int64), patch - 1, curves, support, source, mesh.cable, mesh.on)
 
 
 def _corners_to_keep(mesh: CurveMesh, size: Floats) -> Ints:
@@ -303,6 +303,7 @@ def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]
         on_line=lines,
         on_planes=planes,
         cables=cables,
+        curves=old.on.joined(ends),
     )
 
 

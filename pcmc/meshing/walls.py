@@ -10,8 +10,9 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError, unknown
+from ..curves import polyline
 from ..curves.pieces import to_space
-from ..surface import Patch, Plane, Surface
+from ..surface import HeldCurve, Patch, Plane, Surface
 from ..surface.geometry import bounding_size
 from ..surface.topology import Curve
 from .planar import triangulate
@@ -33,13 +34,21 @@ class UpperEdge:
 
 @dataclass(frozen=True, eq=False)
 class WallMesh:
-    """Walls to append to a mesh: new vertices, faces with a label each, supports of the new vertices."""
+    """Walls to append to a mesh: new vertices, faces with a label each, supports of the new vertices.
+
+    Attributes
+    ----------
+    feet : by the first two vertices of each upper edge, the vertices (k,) along its bottom on Π, if held.
+    uprights : the vertical lines that are held, below fixed vertices.
+    """
 
     vertices: Floats
     faces: Ints
     label: Ints
     fixed: Bools
     sliding: Bools
+    feet: Mapping[tuple[int, int], Ints]
+    uprights: tuple[HeldCurve, ...]
 
 
 def add_walls(
@@ -96,6 +105,7 @@ def add_walls(
         on_plane=np.concatenate([given.on_plane, walls.sliding]),
         on_line=tuple((line, np.concatenate([along, none])) for line, along in given.on_line),
         on_planes=tuple((plane, np.concatenate([mask, none])) for plane, mask in surface.on_planes),
+        curves=(*surface.held_curves, *walls.uprights),
     )
 
 
@@ -132,7 +142,13 @@ def build_walls(
     new = np.array(builder.points[n:]).reshape(-1, 3)
     held, sliding = (np.isin(np.arange(len(new)) + n, list(ids)) for ids in (builder.held, builder.sliding))
     faces, label = np.concatenate(builder.faces), np.concatenate(builder.labels)
-    return WallMesh(to_space(new, plane), faces, label, held, sliding & ~held)
+    everywhere = np.concatenate([vertices, to_space(new, plane)])
+    uprights = tuple(
+        HeldCurve(polyline(everywhere[line]), np.array(line), np.arange(float(len(line))))
+        for vertex, line in builder.lines.items()
+        if fixed[vertex] and len(line) > 1
+    )
+    return WallMesh(everywhere[n:], faces, label, held, sliding & ~held, builder.feet, uprights)
 
 
 class _Builder:
@@ -151,6 +167,7 @@ class _Builder:
         self.held: set[int] = set()
         self.sliding: set[int] = set()
         self.lines: dict[int, list[int]] = {}
+        self.feet: dict[tuple[int, int], Ints] = {}
 
     def add_points(self, points: Sequence[Floats] | Floats) -> list[int]:
         """The numbers of new points."""
@@ -194,6 +211,8 @@ class _Builder:
         middle = chain[1:-1]
         foot = self.add_points(np.column_stack([self.local[middle, :2], self.floor[middle]]))
         supported.update(foot)
+        if top.held and not self.floor[chain].any():
+            self.feet[int(chain[0]), int(chain[1])] = np.array([left[0], *foot, right[0]])
         # counter-clockwise from the left foot; a line without rows is the chain's end itself
         start, end = left[:-1], right[:-1]
         ids = np.array([*start[:1], *foot, *end, *chain[::-1], *start[:0:-1]], dtype=np.int64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -21,10 +21,14 @@ from .lines import SNAP, Kind, Line, LineTree, Places, check_holes, check_line, 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Vertices (k,) along a line from one meeting or corner to the next; first = last if it is closed."""
+    """Vertices (k,) along a line from one meeting or corner to the next; first = last if it is closed.
+
+    ``at`` (k,) are their parameters on the line, where those of a closed one go on beyond its end.
+    """
 
     line: int
     vertices: Ints
+    at: Floats
 
     @property
     def edges(self) -> Ints:
@@ -102,7 +106,7 @@ def arrange(lines: Sequence[Line], edge_length: float, spots: Floats, stops: Flo
     points = np.concatenate([points, spots[alone]])
     used = np.unique(np.concatenate([vertex, *(chain.vertices for chain in chains)]))
     x, y, height = points[used].T
-    chains = [Chain(chain.line, np.searchsorted(used, chain.vertices)) for chain in chains]
+    chains = [replace(chain, vertices=np.searchsorted(used, chain.vertices)) for chain in chains]
     return Arrangement(np.stack([x, y], axis=1), height, tuple(chains), np.searchsorted(used, vertex))
 
 
@@ -216,7 +220,8 @@ def _chains(lines: Sequence[Line], nodes: _Nodes, edge_length: float) -> tuple[l
             if not len(inner):
                 direct.add(ends)
             new.append(curve.at(inner) * known)
-            chains.append(Chain(number, np.array([first, *range(n, n + len(inner)), last])))
+            at = np.concatenate([[low], inner + len(curve.pieces) * (inner < low), [high]])
+            chains.append(Chain(number, np.array([first, *range(n, n + len(inner)), last]), at))
             n += len(inner)
     return chains, np.concatenate(new)
 

@@ -34,6 +34,7 @@ from .edges import (
     usual_cable,
 )
 from .heights import dome, harmonic_heights
+from .held_lines import held_lines
 from .lines import SNAP, Kind
 from .parts import BALANCED, PlanData
 
@@ -91,6 +92,7 @@ def build_surface(plan: PlanData) -> Surface:
         on_planes=(*mirror_planes(plan, vertices), *_upright_planes(draft, walls, sides)),
         cables=tuple(cables),
         rooms=tuple(_rooms(plan, wall_patches, sides)),
+        curves=(*held_lines(draft, vertices, walls.feet), *walls.uprights),
     )
     _check_rooms(surface)
     return surface

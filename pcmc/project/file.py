@@ -59,6 +59,7 @@ class Project:
     wanted : the accuracy asked for.
     mesh_check : whether the result is solved on finer meshes, too; None if the file does not say.
     margin : what margins are wanted of, as in ``pcmc.margin``.
+    verify : whether it is to be proved that an exact equilibrium is near.
     search : whether further starts are tried where the first leads to no equilibrium.
     remeshing : in order.
     targets, vary : as in ``pcmc.meet``; empty without targets.
@@ -85,6 +86,7 @@ class Project:
     wanted: AccuracyWanted = field(default_factory=AccuracyWanted)
     mesh_check: bool | None = None
     margin: Sequence[str] = ()
+    verify: bool = False
     search: bool = True
     remeshing: Sequence[Remeshing] = ()
     targets: Sequence[Target] = ()
@@ -262,6 +264,7 @@ def project_of(
     output, options, stages = data.get("output", {}), dict(data.get("solve", {})), data.get("remesh", [])
     method, mesh_check = options.pop("method", "newton"), options.pop("mesh_check", None)
     margin = options.pop("margin", [])
+    proved = options.pop("verify", False)
     files, picture = output.get("files", []), output.get("picture")
     colour = output.get("colour", "patches")
     with in_file(path, FileError):
@@ -298,6 +301,7 @@ def project_of(
             wanted=wanted,
             mesh_check=mesh_check,
             margin=margin,
+            verify=proved,
             remeshing=[remeshing(s) for s in (stages if isinstance(stages, list) else [stages])],
             targets=targets,
             vary=vary,

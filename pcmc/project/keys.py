@@ -28,6 +28,7 @@ from .remeshing import WHEN, Remeshing
 
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
 MARGIN = "how far it is from the edge: pressure, snow or such as tension of NAME; see ``pcmc.margin``"
+PROVED = "whether to prove that an exact equilibrium is near; see ``pcmc.verify``"
 WHOLE = "whether to write and draw the whole roof that a plan with mirrors is a part of, and to certify it"
 FIRST = "First lines"  # the keys before any table
 WALL = 'a number, "balanced" or false'
@@ -272,6 +273,7 @@ def solve_section(method: str) -> Section:
         Key("method", "a text", "newton", "the solver", tuple(METHODS)),
         Key("mesh_check", "true or false", None, CHECKED),
         Key("margin", "a list of names", [], MARGIN),
+        Key("verify", "true or false", False, PROVED),
     )
     if method not in METHODS:
         return Section("solve", "The solver and its options.", known)

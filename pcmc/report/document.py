@@ -29,6 +29,7 @@ from .plan import PaperPlan, paper_plan
 if TYPE_CHECKING:
     from ..accuracy import MeshCheck
     from ..margins import Margin
+    from ..verification import Theorem
 
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
 PIXELS = 1300  # width of a picture
@@ -44,7 +45,7 @@ class RoofReport:
     name, date : in the head and the foot of the pages; empty for none.
     plan : to scale.
     schedule : the panels, if a tolerance was given; else None.
-    mesh_check, mesh_failure, targets, margins : as given to ``roof_report``.
+    mesh_check, mesh_failure, targets, theorem, margins : as given to ``roof_report``.
     figures : the key figures.
     files : name of each file that belongs to the roof, and what it is.
     """
@@ -62,6 +63,7 @@ class RoofReport:
     margins: Sequence[Margin] = ()
     files: Mapping[str, str] = field(default_factory=dict)
     figures: Sequence[Figure] = ()
+    theorem: Theorem | None = None
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the report as a PDF file; the same report gives the same bytes.
@@ -103,7 +105,7 @@ class RoofReport:
         surface, certificate, units = self.surface, self.certificate, self.units
         story = [
             pages.heading("Verdict"),
-            *map(pages.paragraph, words.verdict_sentences(certificate, self.mesh_check)),
+            *map(pages.paragraph, words.verdict_sentences(certificate, self.mesh_check, self.theorem, units)),
             *(pages.paragraph(f"The roof {margin.text(units)}.") for margin in self.margins),
             *pages.table(tables.key_figures(surface, self.figures, units)),
             *pages.picture("View from above", pictures["The roof"]),
@@ -140,7 +142,7 @@ class RoofReport:
     def _mesh_story(self, check: MeshCheck) -> list[Any]:
         sentences = filter(None, (check.verdict.value, check.detail, check.advice))
         text = "; ".join(sentences)
-        about = "An error bar is how far the limit on finer and finer meshes may be from the number."
+        about = "An error bar estimates how far the limit on finer and finer meshes may be from the number."
         return [
             pages.heading("Mesh check"),
             pages.paragraph(f"{text[:1].upper()}{text[1:]}. {about}"),
@@ -186,6 +188,7 @@ def roof_report(
     tolerance: float | None = None,
     mesh_check: MeshCheck | None = None,
     mesh_failure: str = "",
+    theorem: Theorem | None = None,
     targets: pd.DataFrame | None = None,
     margins: Sequence[Margin] = (),
     files: Mapping[str, str] | None = None,
@@ -205,6 +208,7 @@ def roof_report(
     tolerance : of the panels' families, length; None for no panels.
     mesh_check : of the surface, for error bars; None for none.
     mesh_failure : why it was asked for and failed; empty otherwise.
+    theorem : of the surface; None for none.
     targets : ``Design.targets``; None for none.
     margins : how far the roof is from the edge, a sentence each.
     files : name of each file that belongs to the roof, and what it is.
@@ -248,6 +252,7 @@ def roof_report(
         margins,
         dict(files or {}),
         quantities.figures(surface, certificate) if figures is None else figures,
+        theorem,
     )
 
 

@@ -190,10 +190,10 @@ class Stepper:
         rigid = rigid_modes(state.space, self._motions, state.X)
         try:
             system = stiffness(state.surface.moved(state.X), state.classes, state.space, rigid, self.backend)
+            self.factorisations += 1
+            modes = lowest(system, 1)[1] if system.negative else np.empty(0)
         except SingularMatrix:
             return False
-        self.factorisations += 1
-        modes = lowest(system, 1)[1] if system.negative else np.empty(0)
         if not len(modes):
             return False
         normals, area = vertex_area_vectors(state.X, state.classes.faces)

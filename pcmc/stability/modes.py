@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import eigh, null_space
-from scipy.sparse import csr_array, diags_array, triu
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+from scipy.sparse import csr_array, triu
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from ..base.arrays import Floats
 from ..contact.pinching import standing_part
@@ -24,12 +24,14 @@ from ..energy.rigid_motions import rigid_modes, rigid_motions
 from ..energy.rooms import volume_columns
 from ..energy.second_variation import assemble
 from ..surface import Surface
-from ..surface.geometry import vertex_area_vectors
-from .factorisation import Factor, SingularMatrix, factoriser
+from ..surface.geometry import face_areas, vertex_area_vectors
+from .factorisation import Factor, Factoriser, SingularMatrix, factoriser
 
 STRONG = 1e-6  # of the largest tension: where all are at least this, factors need no units
 TINY = float(np.finfo(float).tiny)
 ALIKE = 1e-7  # of the largest eigenvalue that was computed: a difference of equal ones
+CLOSE = 1e-12  # cosine of Q and H⁻¹Q: below, rounding may have chosen its sign
+DENSE = 40  # unknowns up to which all eigenvalues are computed at once
 SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
 
 
@@ -42,9 +44,9 @@ class Stiffness:
     space : the motion space that B is the basis of.
     matrix : (N,N) sparse symmetric Bᵀ(∂²E)B.
     mass : (N,) lumped area, length².
-    factor : its factorisation.
+    factor : its factorisation, or that of the matrix less a shift.
     excluded : (N,k) unit columns; only motions across all of them count. See ``excluded_columns``.
-    negative : number of negative eigenvalues among these motions.
+    negative : number of negative eigenvalues among these motions; of a shifted matrix, those below the shift.
     """
 
     space: MotionSpace
@@ -109,6 +111,10 @@ def negatives_without(factor: Factor, columns: Floats) -> int:
 
     Haynsworth: the bordered matrix [[H, Q], [Qᵀ, 0]] has the inertia of H restricted to the
     complement plus (k, k), and that of H plus that of -QᵀH⁻¹Q.
+
+    Raises
+    ------
+    SingularMatrix : the inertia of H, or that of QᵀH⁻¹Q, is hidden by rounding.
     """
     k = columns.shape[1]
     if not k:
@@ -117,35 +123,97 @@ def negatives_without(factor: Factor, columns: Floats) -> int:
     # a rigid motion costs nothing, so its entries are far larger than those of a volume
     size = np.sqrt(np.linalg.norm(solved, axis=0)) + TINY
     small = (columns.T @ solved) / np.outer(size, size)
-    positive = int((np.linalg.eigvalsh(0.5 * (small + small.T)) > 0.0).sum())
+    values = np.linalg.eigvalsh(0.5 * (small + small.T))
+    if not np.abs(values).min() > CLOSE:
+        raise SingularMatrix("the second variation is singular among the motions that keep the volumes")
+    positive = int((values > 0.0).sum())
     return factor.negative + positive - k
 
 
-def stiffness(
-    surface: Surface, classes: VertexClasses, space: MotionSpace, rigid: Floats, backend: str | None = None
-) -> Stiffness:
-    """Assemble and factorise Bᵀ(∂²E)B at the positions of the surface.
+@dataclass(frozen=True, eq=False)
+class SecondVariation:
+    """A = Bᵀ(∂²E)B of a surface at its positions, to be factorised at shifts.
 
     Motions that cost no energy at all make it singular, such as sliding a vertex inside a flat part
     that rests on Π. Then a little of the stiffness BᵀLB is added: such motions do not lower the energy.
     Where rooms prescribe volumes, only motions that keep them count.
 
+    Attributes
+    ----------
+    surface, classes, space : of which it is the second variation.
+    mass : (N,) lumped area M, length².
+    excluded : (N,k) unit columns; only motions across all of them count. See ``excluded_columns``.
+    """
+
+    surface: Surface
+    classes: VertexClasses
+    space: MotionSpace
+    mass: Floats
+    excluded: Floats
+    pattern: Pattern
+    solver: Factoriser
+
+    @classmethod
+    def of(
+        cls,
+        surface: Surface,
+        classes: VertexClasses,
+        space: MotionSpace,
+        rigid: Floats,
+        backend: str | None = None,
+    ) -> SecondVariation:
+        """That of a surface, with the rigid motions (N,k) set apart."""
+        X, pattern = surface.vertices, hessian_pattern(classes, space)
+        solver = factoriser(pattern, backend, strength_units(surface, classes, space))
+        mass = lumped_mass(space, classes, X)
+        return cls(surface, classes, space, mass, excluded_columns(surface, space, rigid, X), pattern, solver)
+
+    def at(self, shift: Floats | float = 0.0) -> Stiffness:
+        """A - diag(shift), shift (N,), factorised, ``negative`` counted there; the factor before is used up.
+
+        Raises
+        ------
+        SingularMatrix : it is singular, also with a little stiffness added.
+        """
+        diagonal = self.pattern.indptr[:-1]
+        for added in (0.0, SOFT):
+            data = self._values if not added else self._assembled(added)
+            shifted = data.copy()
+            shifted[diagonal] -= shift
+            with suppress(SingularMatrix):
+                factor = self.solver.factor(shifted)
+                negative = negatives_without(factor, self.excluded)
+                matrix = full_matrix(self.pattern, data)
+                return Stiffness(self.space, matrix, self.mass, factor, self.excluded, negative)
+        raise SingularMatrix("the second variation is singular, also with a little stiffness added")
+
+    @cached_property
+    def tension_mass(self) -> Floats:
+        """(N,) a third of tension times area, summed over the active triangles around a vertex."""
+        F = self.classes.faces
+        pull = self.surface.tensions[self.classes.patch_of_face] * face_areas(self.surface.vertices[F]) / 3.0
+        around = np.bincount(F.ravel(), np.repeat(pull, 3), self.surface.n)
+        return np.repeat(around, self.space.dimension)
+
+    @cached_property
+    def _values(self) -> Floats:
+        return self._assembled(0.0)
+
+    def _assembled(self, added: float) -> Floats:
+        X = self.surface.vertices
+        return assemble(self.surface, self.classes, self.space, self.pattern, X, 1.0, added)
+
+
+def stiffness(
+    surface: Surface, classes: VertexClasses, space: MotionSpace, rigid: Floats, backend: str | None = None
+) -> Stiffness:
+    """The second variation at the positions of a surface, assembled and factorised.
+
     Raises
     ------
-    SingularMatrix : it is singular with that stiffness, too.
+    SingularMatrix : it is singular, also with a little stiffness added.
     """
-    X = surface.vertices
-    pattern = hessian_pattern(classes, space)
-    excluded = excluded_columns(surface, space, rigid, X)
-    solver = factoriser(pattern, backend, strength_units(surface, classes, space))
-    for added in (0.0, SOFT):
-        data = assemble(surface, classes, space, pattern, X, 1.0, added)
-        with suppress(SingularMatrix):
-            factor = solver.factor(data)
-            negative = negatives_without(factor, excluded)
-            mass = lumped_mass(space, classes, X)
-            return Stiffness(space, full_matrix(pattern, data), mass, factor, excluded, negative)
-    raise SingularMatrix("the second variation is singular, also with a little stiffness added")
+    return SecondVariation.of(surface, classes, space, rigid, backend).at()
 
 
 def morse_index(surface: Surface) -> int:
@@ -178,7 +246,7 @@ def ways_down(surface: Surface) -> tuple[int, Floats]:
     SingularMatrix : the second variation has no inertia that can be counted.
     """
     system = second_variation(surface)
-    if system.negative == 0 or system.space.size <= 2:
+    if system.negative == 0:
         return system.negative, np.empty((0, 3))
     return system.negative, lowest(system, 1)[1][0]
 
@@ -215,7 +283,10 @@ def _settled(values: Floats, vectors: Floats, space: MotionSpace, root: Floats) 
     Any basis of their space is as good, and rounding alone would choose one: a symmetric saddle would lean
     to another side on each processor. ``root`` (s,) are the roots of the masses.
     """
-    vectors, ends = vectors.copy(), np.flatnonzero(np.diff(values) > ALIKE * np.abs(values).max()) + 1
+    vectors, ends = (
+        vectors.copy(),
+        np.flatnonzero(np.diff(values) > ALIKE * np.abs(values).max(initial=0.0)) + 1,
+    )
     for group in np.split(np.arange(len(values)), ends):
         if len(group) > 1:
             wave = np.arange(3 * len(space.dimension)).reshape(-1, 3)
@@ -230,32 +301,45 @@ def lowest(system: Stiffness, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, ascending, and their modes (k,n,3).
 
     The search takes in all negative ones, so the first is the lowest of all. Modes have unit mass:
-    Σ M |v|² = 1. Rigid motions are left out; rooms keep their prescribed volumes.
+    Σ M |v|² = 1. Rigid motions are left out; rooms keep their prescribed volumes. The factor may be that of
+    A - σM for a small σ; the eigenvalues are those of A.
+
+    Raises
+    ------
+    SingularMatrix : the iteration does not converge.
     """
-    size = len(system.mass)
-    k = min(max(count, system.negative + 2), max(size - 1, 1))
-    root = np.sqrt(system.mass)
-    if size - system.excluded.shape[1] <= k:  # no more motions count than are wanted
-        values, columns = (part[..., :count] for part in all_modes(system))
-        fields = [system.space.to_vectors(column) for column in columns.T]
-        return values, np.array(fields).reshape(len(values), len(system.space.dimension), 3)
+    size, root = len(system.mass), np.sqrt(system.mass)
+    k = max(count + 1, system.negative + 2)
+    while True:
+        values, vectors = _dense(system, k) if max(2 * k, DENSE) >= size else _nearest(system, k)
+        # one more than are wanted, and all negative ones: these may be farther from zero than positive ones
+        whole = len(values) <= count or values[-1] - values[count - 1] > ALIKE * np.abs(values).max()
+        if len(values) < k or (whole and np.count_nonzero(values < 0.0) >= system.negative):
+            break
+        k *= 2
+    vectors = _settled(values, root[:, None] * vectors, system.space, root)
+    fields = [system.space.to_vectors(vector / root) for vector in vectors.T[:count]]
+    return values[:count], np.array(fields).reshape(len(fields), len(system.space.dimension), 3)
+
+
+def _dense(system: Stiffness, k: int) -> tuple[Floats, Floats]:
+    values, vectors = all_modes(system)
+    return values[:k], vectors[:, :k]
+
+
+def _nearest(system: Stiffness, k: int) -> tuple[Floats, Floats]:
+    """The k eigenvalues nearest the factor's shift, ascending, and their modes (N,k) of unit mass."""
+    size, root = len(system.mass), np.sqrt(system.mass)
 
     def inverse(x: Floats) -> Floats:
         return root * system.solve(root * x)
 
-    scaled = diags_array(1.0 / root) @ system.matrix @ diags_array(1.0 / root)
     operator = LinearOperator((size, size), inverse, dtype=float)
     start = inverse(np.cos(np.arange(size) * 1.618))  # always the same, so that runs repeat
-    while True:
-        try:
-            vectors = eigsh(operator, k=k, which="LM", v0=start)[1]
-        except ArpackNoConvergence as partial:
-            vectors = np.asarray(partial.eigenvectors, dtype=float)
-        values = np.einsum("ik,ik->k", vectors, scaled @ vectors)
-        if np.count_nonzero(values < 0.0) >= system.negative or 2 * k >= size:
-            break
-        k *= 2  # a strongly negative one may be farther from zero than positive ones
+    try:
+        vectors = eigsh(operator, k=k, which="LM", v0=start)[1] / root[:, None]
+    except ArpackError as error:
+        raise SingularMatrix(f"the eigenvalues did not converge ({error})") from None
+    values = np.einsum("ik,ik->k", vectors, system.matrix @ vectors)
     order = np.argsort(values)
-    values, vectors = values[order], _settled(values[order], vectors[:, order], system.space, root)
-    fields = [system.space.to_vectors(vector / root) for vector in vectors.T[:count]]
-    return values[:count], np.array(fields).reshape(len(fields), len(system.space.dimension), 3)
+    return values[order], vectors[:, order]

@@ -8,11 +8,12 @@ from typing import Any
 from ..base import validate
 from ..base.arrays import Bools, Floats, read_only
 from ..base.errors import SurfaceError
+from ..curves.plane import Plane
 from . import checks, supports
 from .cable import checked_cables
 from .geometry import bounding_size
+from .held_curve import checked_curves
 from .patch import Patch
-from .plane import Plane
 from .room import checked_rooms
 from .topology import topology
 
@@ -30,6 +31,7 @@ def checked_parts(
     on_planes: Any,
     cables: Any,
     rooms: Any,
+    curves: Any,
 ) -> dict[str, object]:
     """The fields of a Surface by name, and its topology.
 
@@ -84,6 +86,7 @@ def checked_parts(
         "on_planes": tuple((other, read_only(mask)) for other, mask in planes),
         "cables": edge_cables,
         "rooms": volumes,
+        "curves": checked_curves(curves, X, topo, given.stays, bounding_size(X)),
         "given_supports": given.frozen(),
         "topology": topo,
     }

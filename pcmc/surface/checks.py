@@ -20,7 +20,7 @@ from .topology import Topology
 GUIDES = "a mapping from Lines or Circles to vertices"
 ZERO_AREA = 1e-14  # of the squared longest edge: below this a triangle has no direction in floats
 MANY = 16  # faces at one edge
-LARGEST = 1e50  # of a coordinate, tension or pressure: the squares of forces stay finite
+LARGEST = validate.LARGEST
 SMALLEST = 1e-50  # of a size or tension: the squares of forces and areas stay above zero
 NUMBERS = "iuf"  # kinds of arrays of numbers
 RESTING = 1e-12  # height, relative to the size, at which a vertex counts as lying on Π

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base import validate
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Vector
 from ..base.errors import SurfaceError
-from .geometry import Vector
 from .line import Line
 
 

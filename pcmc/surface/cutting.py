@@ -9,8 +9,8 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Bools, Ints
 from ..base.errors import SurfaceError
+from ..curves.plane import Plane
 from .cable import Cable
-from .plane import Plane
 from .room import Room
 from .supports import NEAR, refuse_in_mirror
 from .surface import Surface, expect_surface
@@ -63,6 +63,9 @@ def cut(surface: Surface, plane: Plane) -> Surface:
     X = X - (height[vertices] * (side[vertices] == 0))[:, None] * np.array(plane.normal)
     planes = tuple((other, mask[vertices]) for other, mask in surface.on_planes if mask[vertices].any())
     lines = tuple((guide, mask[vertices]) for guide, mask in given.on_line if mask[vertices].any())
+    edges = surface.topology.edges
+    left = np.zeros(len(edges), dtype=bool)
+    left[surface.topology.edge_of_face[stays]] = True
     return surface.rebuilt(
         vertices=X,
         faces=number[surface.faces[stays]],
@@ -74,6 +77,7 @@ def cut(surface: Surface, plane: Plane) -> Surface:
         on_planes=(*planes, (plane, side[vertices] == 0)),
         cables=_cut_cables(surface, side, number),
         rooms=_cut_rooms(surface, stays),
+        curves=surface.edges_on_curves[left].joined(number[edges[left]]),
     )
 
 

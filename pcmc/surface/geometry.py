@@ -17,10 +17,8 @@ from math import sqrt
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, Vector
 from ..base.compiled import compiled, inlined
-
-Vector = tuple[float, float, float]
 
 
 @inlined

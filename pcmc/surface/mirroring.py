@@ -12,10 +12,11 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import SurfaceError
+from ..curves.plane import Plane
 from .cable import Cable
 from .circle import Circle, Guide
+from .held_curve import HeldCurve
 from .line import Line
-from .plane import Plane
 from .room import Room
 from .supports import NEAR
 from .surface import Surface, expect_surface
@@ -124,6 +125,7 @@ def unfolded(surface: Surface, planes: Sequence[Plane | str] | None = None) -> W
         on_planes=flat[1:],
         cables=_cables(surface, place),
         rooms=_rooms(surface, mirrors, next_to, patch_label, [name for _, name in patch_names]),
+        curves=_curves(surface, images, place),
     )
     return Whole(whole, first % n, np.tile(np.arange(m), k), k)
 
@@ -338,6 +340,21 @@ def _cables(surface: Surface, place: Ints) -> tuple[Cable, ...]:
             raise SurfaceError(text, what="cables", where=cable.name)
         cables.append(Cable(cable.name, int(times[0]) * cable.tension, edges))
     return tuple(cables)
+
+
+def _curves(surface: Surface, images: Sequence[Image], place: Ints) -> tuple[HeldCurve, ...]:
+    """The curves with their images, of those in a mirror plane once."""
+    chosen = surface.edges_on_curves.drawn
+    on, edges = surface.edges_on_curves[chosen], surface.topology.edges[chosen]
+    curves, taken = list[HeldCurve](), np.empty((0, 2), dtype=np.int64)
+    for image, row in zip(images, place, strict=True):
+        ends = row[edges]
+        every = np.concatenate([taken, np.sort(ends, axis=1)])
+        new = np.unique(every, axis=0, return_index=True)[1]
+        new = np.sort(new[new >= len(taken)]) - len(taken)
+        curves += [one.mapped(image.R, image.t) for one in on[new].joined(ends[new])]
+        taken = every
+    return tuple(curves)
 
 
 def _rooms(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.arrays import Bools, Floats
-from .plane import Plane
+from ..curves.plane import Plane
 from .supports import common_point
 from .topology import Topology
 

@@ -10,10 +10,10 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, read_only
 from ..base.errors import SurfaceError
+from ..curves.plane import Plane
 from . import checks
 from .circle import Circle, Guide
 from .line import Line
-from .plane import Plane
 from .topology import Topology
 
 FLAT = 1e-9  # sine of an angle up to which two directions count as parallel
@@ -37,6 +37,13 @@ class Supports(NamedTuple):
         """(n,) masks of vertices that are fixed or slide along a line, and of the others that slide on Π."""
         fixed = np.any([self.fixed, *(along for _, along in self.on_line)], axis=0)
         return fixed, self.on_plane & ~fixed
+
+    @property
+    def stays(self) -> Bools:
+        """(n,) vertices that are fixed, and on no line."""
+        return self.fixed & ~np.any(
+            [np.zeros_like(self.fixed), *(along for _, along in self.on_line)], axis=0
+        )
 
     def frozen(self) -> Supports:
         """The same with arrays that cannot be written to."""

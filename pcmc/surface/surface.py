@@ -14,14 +14,15 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
 from ..base.errors import FreeSurfaceWarning, SurfaceError
+from ..curves.plane import Plane
 from . import checks, supports
 from .cable import Cable, CableEdges, cable_edges
 from .checked import check_planes, checked_parts
 from .circle import Circle, Guide
 from .geometry import bounding_size
+from .held_curve import EdgesOnCurves, HeldCurve, followed
 from .origin import uncancelled_pressures, volume_origin
 from .patch import Patch
-from .plane import Plane
 from .renewed import renewed
 from .room import Room, room_signs
 from .summary import summary
@@ -29,7 +30,17 @@ from .topology import Topology, topology
 from .walls import wall_patches
 
 MESH = ("vertices", "faces", "patch_of_face", "patches")
-PARTS = (*MESH, "fixed", "on_plane", "plane", "on_line", "on_planes", "cables", "rooms")  # that are given
+PARTS = (
+    *MESH,
+    "fixed",
+    "on_plane",
+    "plane",
+    "on_line",
+    "on_planes",
+    "cables",
+    "rooms",
+    "curves",
+)  # that are given
 FIELDS = (*PARTS, "given_supports")
 GROUND = Plane()
 
@@ -67,6 +78,9 @@ class Surface:
         with ``mirror=True`` the surface goes on as its mirror image.
     cables : sequence of Cable, names unique: edges with a line tension.
     rooms : sequence of Room, names unique: volumes that are prescribed instead of pressures.
+    curves : sequence of HeldCurve: the curves that fixed vertices were drawn on. The new vertices of finer
+        meshes are fixed on them; of other edges between fixed vertices it is guessed whether they are held.
+        Where fixed vertices are moved, see ``held_curves``.
 
     Attributes
     ----------
@@ -97,6 +111,7 @@ class Surface:
     on_planes: tuple[tuple[Plane, Bools], ...] = ()
     cables: tuple[Cable, ...] = ()
     rooms: tuple[Room, ...] = ()
+    curves: tuple[HeldCurve, ...] = ()
     given_supports: supports.Supports = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -149,6 +164,22 @@ class Surface:
             return np.array(self.plane.point)
         planes = [self.plane, *(plane for plane, _ in self.on_planes)]
         return volume_origin(self.vertices, self.size, planes, bool(self.given_supports.on_plane.any()))
+
+    @cached_property
+    def edges_on_curves(self) -> EdgesOnCurves:
+        """The edges of the mesh, and where their ends are on ``held_curves``."""
+        return EdgesOnCurves.of(self.held_curves, self.topology)
+
+    @cached_property
+    def held_curves(self) -> tuple[HeldCurve, ...]:
+        """The curves with their vertices where these are now.
+
+        Warns
+        -----
+        CurveWarning
+            Where fixed vertices were moved otherwise than by an affine map: their curves are left out.
+        """
+        return followed(self.curves, self.vertices, self.size)
 
     @cached_array
     def mirror_edge(self) -> Bools:
@@ -268,7 +299,7 @@ class Surface:
         """The same surface with its vertices elsewhere, (n,3); faces, supports, patches are shared.
 
         Sliding vertices must stay on Π or on their lines and circles. Triangles may collapse; ``solve``
-        can repair many of them.
+        can repair many of them. Curves go along, see ``held_curves``.
         """
         X = checks.positions(vertices)
         if X.shape != self.vertices.shape:
@@ -276,6 +307,17 @@ class Surface:
         check_planes(X, self.plane, self.on_plane, self.on_planes, self.size)
         checks.on_lines(self.on_line, X)
         return self._with(vertices=read_only(X))
+
+    def _curves_of(self, given: Mapping[str, Any]) -> tuple[HeldCurve, ...]:
+        """The curves with other vertices and supports, along the edges that stay fixed."""
+        X = checks.positions(given["vertices"])
+        if len(X) != self.n:
+            text = "curves: the vertices are others; give their curves, too, or curves=() to drop them"
+            raise SurfaceError(text, what="curves", found=len(X), expected=self.n)
+        held, edges = followed(self.curves, X, bounding_size(X)), self.topology.edges
+        fixed, lines = checks.mask(given["fixed"], self.n, "fixed"), checks.on_line(given["on_line"], X)
+        stay = np.all(supports.Supports(fixed, fixed, tuple(lines)).stays[edges], axis=1)
+        return EdgesOnCurves.of(held, self.topology)[stay].joined(edges[stay])
 
     def onto_supports(self, X: Floats) -> Floats:
         """X (n,3) with fixed vertices where they are, and sliding ones put on their plane, line or circle.
@@ -293,8 +335,9 @@ class Surface:
     def rebuilt(self, **changes: Any) -> Surface:
         """The surface with other parts, checked anew; all others as they were given to this one.
 
-        Parts with an entry per vertex (``fixed``, ``on_plane``, ``on_line``, ``on_planes``, ``cables``)
-        must be among the changes where the vertices are others. Of a surface that nothing holds the user was
+        Parts with an entry per vertex (``fixed``, ``on_plane``, ``on_line``, ``on_planes``, ``cables``,
+        ``curves``) must be among the changes where the vertices are others. Curves stay along the edges that
+        stay fixed. Of a surface that nothing holds the user was
         warned when it was made, and not again.
 
         Raises
@@ -310,6 +353,8 @@ class Surface:
         ([[0, 2, 1]], np.True_)
         """
         given = {name: getattr(self, name) for name in PARTS} | self.given_supports._asdict() | changes
+        if self.curves and "curves" not in changes:
+            given["curves"] = self._curves_of(given)
         made = object.__new__(Surface)
         vars(made).update(given | checked_parts(**given))
         if self.held.any() or self.rooms:

@@ -1,6 +1,6 @@
-"""The script of a case process: it reads cases from standard input and writes outcomes to standard output.
+"""The part of a case process that runs cases.
 
-``case_process`` starts this file as a script. It imports the standard library alone, so that a process starts
+``case_process`` loads this file by its path. It imports the standard library alone, so that a process starts
 in some hundredths of a second.
 """
 
@@ -11,25 +11,21 @@ import gc
 import importlib
 import importlib.metadata
 import importlib.util
-import io
 import operator
 import os
-import pickle
 import platform
-import signal
 import sys
-import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from typing import Any, BinaryIO
+from functools import cache
+from typing import Any
 
 WORDS = ("status", "verdict", "message")  # keys of a case's answer that are not numbers
 OUTPUT = 4000  # characters of a failed case's output that are stored
 LONGEST = 1024  # bits of an integer, the range of floats; far longer ones have no decimal text
 DISTRIBUTIONS = {"pcmc": "pcmc-surfaces"}  # where a package is installed under another name
-ORPHANED = 1.0  # seconds between two checks that the parent is alive
 
 
 def resolve(case: str) -> Callable[..., Any]:
@@ -99,10 +95,17 @@ def answer(values: object, parameters: Mapping[str, Any]) -> dict[str, Any]:
     return fields
 
 
-def run(
-    function: Callable[..., Any], parameters: Mapping[str, Any], time_limit: float | None
-) -> dict[str, Any]:
-    """Run one case; the outcome without its provenance. The process exits at the time limit."""
+def load(case: str) -> None:
+    """Import a case, which then runs without garbage collection once: it takes a fifth of large imports."""
+    gc.disable()
+    resolve(case)
+    postpone("numpy.f2py")  # scipy imports all of numpy; this part takes long and no case needs it
+    provenance()
+
+
+def run(case: str, parameters: Mapping[str, Any], time_limit: float | None) -> dict[str, Any]:
+    """Run one case that is loaded; its outcome. The process exits at the time limit."""
+    function = resolve(case)
     started, begin, extra = datetime.now(UTC), time.perf_counter(), {}
     process = os.getpid()
     if time_limit is not None:
@@ -119,8 +122,11 @@ def run(
             os._exit(0)  # this is a fork that the case has made; only the case itself answers
         faulthandler.cancel_dump_traceback_later()
     fields["wall_time"] = time.perf_counter() - begin
-    fields["provenance"] = {"started": started.isoformat(timespec="milliseconds"), **extra}
-    return fields
+    about = {"started": started.isoformat(timespec="milliseconds"), **extra, **provenance()}
+    if not gc.isenabled():  # the first case has imported the rest
+        gc.freeze()
+        gc.enable()
+    return {**fields, "provenance": about}
 
 
 def postpone(name: str) -> None:
@@ -138,6 +144,7 @@ def postpone(name: str) -> None:
     setattr(sys.modules[package], last, module)
 
 
+@cache
 def provenance() -> dict[str, Any]:
     """Host, process and versions."""
     packages = {name: version(name) for name in ("pcmc", "numpy", "scipy", "numba")}
@@ -150,69 +157,3 @@ def version(package: str) -> str:
         return importlib.metadata.version(DISTRIBUTIONS.get(package, package))
     except importlib.metadata.PackageNotFoundError:
         return "not installed"
-
-
-def _forget_output() -> None:
-    """Empty the file that holds the output of a case."""
-    sys.stdout.flush()
-    os.lseek(2, 0, os.SEEK_SET)
-    os.ftruncate(2, 0)
-
-
-def _cut_forks_off(*pipes: BinaryIO) -> None:
-    """Close the pipes in every process that a case forks: it must neither answer nor hold them open."""
-    nothing = os.open(os.devnull, os.O_RDWR)
-    if hasattr(os, "register_at_fork"):
-        os.register_at_fork(after_in_child=lambda: [os.dup2(nothing, pipe.fileno(), False) for pipe in pipes])
-
-
-def _outlive(parent: int) -> None:
-    """End this process and all that it started soon after its parent, also in the middle of a case."""
-    while os.getppid() == parent:  # always true on Windows, where the case runs to its end
-        time.sleep(ORPHANED)
-    os.killpg(0, signal.SIGKILL)
-
-
-def _reply(stream: BinaryIO, message: object) -> None:
-    stream.write(pickle.dumps(message))
-    stream.flush()
-
-
-def main() -> None:
-    """Answer cases until the other side closes."""
-    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-    os.dup2(2, 1)  # what a case prints must not get between the answers
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(line_buffering=True)
-    faulthandler.enable()
-    _cut_forks_off(requests, answers)
-    threading.Thread(target=_outlive, args=(os.getppid(),), daemon=True).start()
-    try:
-        path, case = pickle.load(requests)
-        sys.path[:] = path
-        try:
-            gc.disable()  # garbage collection takes a fifth of the time of large imports
-            function = resolve(case)
-            # scipy imports all of numpy; this part takes long and no case needs it
-            postpone("numpy.f2py")
-        except Exception:
-            _reply(answers, ("failed", traceback.format_exc(limit=-3)))
-            return
-        about = provenance()
-        _reply(answers, ("ready", None))
-        while True:
-            parameters, time_limit = pickle.load(requests)
-            _forget_output()
-            outcome = run(function, parameters, time_limit)
-            outcome["provenance"] |= about
-            _reply(answers, outcome)
-            if not gc.isenabled():  # the first case has imported the rest
-                gc.freeze()
-                gc.enable()
-    except (EOFError, BrokenPipeError):
-        os._exit(0)  # the sweep has ended
-
-
-if __name__ == "__main__":
-    main()

@@ -67,26 +67,30 @@ class Elements(NamedTuple):
 def elements(surface: Surface, classes: VertexClasses, pattern: Pattern) -> Elements:
     """The elements of a standing part at its own vertices."""
     F: Ints = classes.faces
-    offset, patch, X = pattern.offset, classes.patch_of_face, surface.vertices
+    offset: Ints = pattern.offset
+    patch: Ints = classes.patch_of_face
+    X, ends, pull = surface.vertices, *surface.cable_edges
     tension, weight = surface.tensions[patch], surface.weights[patch]
-    corner, push = np.empty(0, dtype=np.int64), np.empty((0, 3))
+    corner: Ints = np.empty(0, dtype=np.int64)
+    push = np.empty((0, 3))
     if pieces := flat_pieces(surface):
         here = classes.active[pieces.face]
-        f, i = (np.cumsum(classes.active) - 1)[pieces.face[here]], pieces.corner[here]
+        f: Ints = (np.cumsum(classes.active) - 1)[pieces.face[here]]
+        i = pieces.corner[here]
         apex = len(X) + np.arange(len(f))
         F = np.concatenate([F, np.stack([F[f, (i + 1) % 3], F[f, i], apex], axis=1)])
         zero = 0 * offset[f, i]
         offset = np.concatenate([offset, np.stack([offset[f, i], zero, zero], axis=1)])
         X = np.concatenate([X, pieces.apex[here] + surface.origin])
-        patch = np.append(patch, patch[f])
+        patch = np.concatenate([patch, patch[f]])
         tension, weight = np.append(tension, 0.0 * f), np.append(weight, 0.0 * f)
         corner, push = pieces.end, pieces.normal
-    plane, (ends, pull) = surface.plane, surface.cable_edges
-    whole = [np.array(part, dtype=np.int64) for part in (F, offset, patch)]
+    plane = surface.plane
     pressure, pull = surface.net_pressures[patch], np.array(pull)
-    ends = np.array(ends, dtype=np.int64)
     at = np.array(surface.origin), np.array(plane.point), np.array(plane.normal)
-    return Elements(np.array(X), *whole, tension, weight, pressure, *at, ends, pull, corner, push)
+    faces, places, patches, cables = (np.array(part, dtype=np.int64) for part in (F, offset, patch, ends))
+    laws = tension, weight, pressure
+    return Elements(np.array(X), faces, places, patches, *laws, *at, cables, pull, corner, push)
 
 
 def forces(items: Elements, pressures: Floats) -> tuple[Floats, Floats]:

@@ -14,9 +14,9 @@ from D ν = P Dm/|m|. With |Dm| ≤ Q |c|, |⟨ν, Dm⟩| ≤ M |c|, |D²m| ≤ 
 Here Q² = Σ |b_ir × e_i|², M² = Σ ⟨ν, b_ir × e_i⟩² (Cauchy-Schwarz), and W² = 2 Σ |b × b'|² over pairs of
 vectors at different corners (a quadratic form is at most the Frobenius norm of its matrix). For unit normals
 b ≈ ν both M and W are small: a sheet bends, it hardly stretches. For any b, |D²m| ≤ √3 |d|², as
-2|Σ d_i × d_j| is four times the area of a triangle with the corners d_i, and that is largest for an equilateral
-one. While the corners move by at most R, an edge changes by 2R at most, m by ε = 2R (|e_1| + |e_2|) + 4R², and
-ν by 2ε/|m|; μ = |m| - ε.
+2|Σ d_i × d_j| is four times the area of a triangle with the corners d_i, largest for an equilateral one.
+While the corners move by at most R, an edge changes by 2R at most, m by ε = 2R (|e_1| + |e_2|) + 4R², and ν
+by 2ε/|m|; μ = |m| - ε.
 
 Further parts of E, by the product rule where z̄ is the mean height, |Dz̄[d]| ≤ |d|/√3:
 

@@ -26,6 +26,7 @@ from typing import Any, cast
 import numpy as np
 
 from ..base.arrays import Floats
+from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import TOLERANCE
 from ..contact.pinching import StandingPart, standing_part
 from ..contact.pull import pull_and_capacity
@@ -49,12 +50,11 @@ MOST = 0.05  # of it: farther away nothing is tried, as triangles may turn over
 
 @dataclass(frozen=True)
 class Theorem:
-    """What ``verify`` has proved of a surface, or why it has not. ``print`` shows it in words.
+    """What ``verify`` has proved of a surface, or why it has not. ``print`` and ``text`` have it in words.
 
     Attributes
     ----------
     proved, reason : whether all below is proved; if not, why.
-    text : the theorem in words; empty if it is not proved.
     radius : the exact equilibrium is at most this far from the given vertices, length: each vertex, and the
         root of the sum of the squares of all.
     unique_within : there is no other one within this distance, in the same norm and frames.
@@ -62,11 +62,13 @@ class Theorem:
     gap : no eigenvalue of B₀ᵀ∇²E B₀ there is within this of zero, force/length; where rooms prescribe
         volumes, among motions that keep these.
     beta, lipschitz, forces : β, length/force, L, force/length², and the bound of ‖f(0)‖, force.
+    symmetric_in, volumes_kept : the mirror planes that motions are symmetric in, the rooms whose volumes they
+        keep: index and gap are about such motions.
+    spare : how much of their walls' capacity resting vertices have left, at least; None without any.
     """
 
     proved: bool
     reason: str = ""
-    text: str = ""
     radius: float = np.inf
     unique_within: float = 0.0
     index: int | None = None
@@ -74,9 +76,35 @@ class Theorem:
     beta: float = np.inf
     lipschitz: float = np.inf
     forces: float = np.inf
+    symmetric_in: tuple[str, ...] = ()
+    volumes_kept: tuple[str, ...] = ()
+    spare: float | None = None
 
     def __str__(self) -> str:
-        return self.text or f"not proved: {self.reason}"
+        return self.text()
+
+    def brief(self, units: Units = NO_UNITS) -> str:
+        """The theorem in a line: "proved: index 0, within 1.3e-09 m"."""
+        if not self.proved:
+            return f"not proved: {self.reason}"
+        return f"proved: index {self.index}, within {self.radius:.1e}{units.behind('length')}"
+
+    def text(self, units: Units = NO_UNITS) -> str:
+        """The theorem in words, or why there is none."""
+        if not self.proved:
+            return self.brief()
+        length, tension = units.behind("length"), units.behind("tension")
+        planes = f"are symmetric in {', '.join(self.symmetric_in)}" if self.symmetric_in else ""
+        volumes = f"keep the volume of {', '.join(self.volumes_kept)}" if self.volumes_kept else ""
+        motions = " and ".join(filter(None, (planes, volumes)))
+        among = f", among motions that {motions}" if motions else ""
+        rests = "" if self.spare is None else f"; walls rest where these do, with {self.spare:.1%} to spare"
+        return (
+            f"proved: an exact equilibrium of this mesh is within {self.radius:.1e}{length} of its vertices,"
+            f" and no other within {self.unique_within:.1e}{length}; its Morse index is exactly {self.index}"
+            f"{among}, and no eigenvalue of its second variation is within {self.gap:.2g}{tension} of zero"
+            f"{rests}"
+        )
 
 
 class _Unproved(Exception):
@@ -96,9 +124,9 @@ def verify(surface: Surface) -> Theorem:
     >>> roof = Surface(corners, [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4,
     ...                [Patch("roof", 1.0)], fixed=range(4))
     >>> theorem = verify(roof)
-    >>> theorem.proved, theorem.index, theorem.radius < 1e-15, round(theorem.gap, 2)
+    >>> theorem.proved, theorem.index, theorem.radius < 1e-14, round(theorem.gap, 2)
     (True, 0, True, 1.68)
-    >>> verify(roof.moved(roof.vertices + [[0, 0, 0]] * 4 + [[0, 0, 1e-6]])).proved
+    >>> verify(roof.moved(roof.vertices * [1, 1, 1 + 1e-6])).proved
     False
     """
     expect_surface(surface)
@@ -138,8 +166,21 @@ def _proved(surface: Surface) -> Theorem:
     left = (gap - rate * radius) / SAFE
     if not left > 0.0:
         raise _Unproved("no gap is left between the eigenvalues and zero at the exact equilibrium")
-    words = _words(surface, radius, unique, index, left, spare)
-    return Theorem(True, "", words, radius, unique, index, left, beta, rate, found.residual)
+    mirrors = tuple(str(plane) for plane, _ in surface.on_planes if plane.mirror)
+    rooms = tuple(room.name for room in surface.rooms)
+    return Theorem(
+        proved=True,
+        radius=float(radius),
+        unique_within=float(unique),
+        index=index,
+        gap=float(left),
+        beta=float(beta),
+        lipschitz=rate,
+        forces=found.residual,
+        symmetric_in=mirrors,
+        volumes_kept=rooms,
+        spare=spare,
+    )
 
 
 def _refuse(part: StandingPart, space: MotionSpace) -> None:
@@ -225,17 +266,3 @@ def _rests(
             f"resting vertex {vertex} is on the verge of lifting off, so which rest is not certain"
         )
     return float((spare / capacity[resting]).min())
-
-
-def _words(
-    surface: Surface, radius: float, unique: float, index: int, gap: float, spare: float | None
-) -> str:
-    mirrors = [str(plane) for plane, _ in surface.on_planes if plane.mirror]
-    motions = f" among motions symmetric in {', '.join(mirrors)}" if mirrors else ""
-    kept = " that keep the volumes" if surface.rooms else ""
-    rest = "" if spare is None else f" Its walls rest where these do, with {100.0 * spare:.2g} % to spare."
-    return (
-        f"Proved: within {radius:.1e} of these vertices there is an exact equilibrium of the mesh, and no"
-        f" other within {unique:.1e}. Its Morse index is exactly {index}{motions}: no eigenvalue of B₀ᵀ∇²E B₀"
-        f"{', among motions' + kept if kept else ''} is within {gap:.2g} of zero.{rest}"
-    )

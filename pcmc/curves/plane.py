@@ -9,11 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base import validate
-from ..base.arrays import Floats, cached_array
+from ..base.arrays import Floats, Vector, cached_array
 from ..base.errors import SurfaceError
 from ..base.names import checked_name
-from . import checks
-from .geometry import Vector
 
 
 @dataclass(frozen=True)
@@ -42,8 +40,8 @@ class Plane:
         for key in ("point", "normal"):
             vector = validate.vector(f"Plane.{key}", getattr(self, key), error=SurfaceError)
             object.__setattr__(self, key, vector)
-        if max(map(abs, self.point)) > checks.LARGEST:
-            limit = f"coordinates up to {checks.LARGEST:g}"
+        if max(map(abs, self.point)) > validate.LARGEST:
+            limit = f"coordinates up to {validate.LARGEST:g}"
             validate.refuse("Plane.point", self.point, limit, error=SurfaceError)
         _, exponent = math.frexp(max(map(abs, self.normal)))
         scaled = [math.ldexp(c, -exponent) for c in self.normal]  # so that no square is too large or small

@@ -1,23 +1,14 @@
-"""The script of the process in which libraries read files that could crash them: a path in, arrays out.
+"""The part of the reading process that reads surfaces, with VTK, rhino3dm and IfcOpenShell: arrays.
 
-``reading_process`` starts this file as a script. It imports the library that the file needs, and only those
-parts of VTK that read.
+``reading_process`` loads this file by its path, so it imports nothing of pcmc; only the library that the file
+needs, and only those parts of VTK that read.
 """
 
 from __future__ import annotations
 
-import os
-import pickle
 import re
-import sys
-from collections.abc import Callable
-from contextlib import suppress
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
-
-GIGABYTE = 1 << 30  # bytes that a reader may use, besides
-MEMORY = 100  # bytes for each byte of the file, which may be compressed
 
 
 def vtk_arrays(path: str) -> dict[str, Any]:
@@ -129,68 +120,3 @@ def ifc_arrays(path: str) -> dict[str, Any]:
             )
         break
     return found
-
-
-def limit_memory(size: int) -> None:
-    """On Linux, refuse memory beyond what a sound file of this size needs."""
-    if sys.platform == "linux":
-        import resource
-
-        pages = int(Path("/proc/self/statm").read_text().split()[0])
-        most = pages * resource.getpagesize() + GIGABYTE + MEMORY * size
-        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-        resource.setrlimit(resource.RLIMIT_AS, (most if hard < 0 else min(most, hard), hard))
-
-
-def from_file(name: str, function: str) -> Callable[[str], dict[str, Any]]:
-    """A reader in another file beside this one, which is loaded when it is first used."""
-
-    def read(path: str) -> dict[str, Any]:
-        module = sys.modules.get(name)
-        if module is None:
-            place = Path(__file__).with_name(f"{name}.py")
-            spec = spec_from_file_location(name, place)
-            assert spec is not None
-            assert spec.loader is not None
-            module = sys.modules[name] = module_from_spec(spec)
-            spec.loader.exec_module(module)
-        arrays: dict[str, Any] = getattr(module, function)(path)
-        return arrays
-
-    return read
-
-
-READERS = {
-    "vtk": vtk_arrays,
-    "rhino": rhino_arrays,
-    "ifc": ifc_arrays,
-    "dxf drawing": from_file("reading_drawings", "dxf_entities"),
-    "3dm drawing": from_file("reading_drawings", "rhino_entities"),
-    "meshlab": from_file("reading_meshes", "meshlab_arrays"),
-    "repair": from_file("reading_meshes", "repaired_arrays"),
-}
-
-
-def main() -> None:
-    """Answer requests until the other side closes."""
-    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    nothing = os.open(os.devnull, os.O_RDWR)
-    for stream in range(3):  # what a library prints must not get between the answers
-        os.dup2(nothing, stream)
-    with suppress(EOFError, BrokenPipeError):
-        sys.path[:] = pickle.load(requests)
-        while True:
-            kind, path, size = pickle.load(requests)
-            answer: tuple[str, Any]
-            try:
-                limit_memory(size)
-                answer = ("read", READERS[kind](path))
-            except Exception as error:
-                text = "more memory than there is" if isinstance(error, MemoryError) else str(error)
-                answer = ("failed", text)
-            pickle.dump(answer, answers, pickle.HIGHEST_PROTOCOL)
-            answers.flush()
-
-
-if __name__ == "__main__":
-    main()

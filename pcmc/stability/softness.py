@@ -1,0 +1,67 @@
+"""How many motions lower the energy, and how many nearly: counted by inertia, no eigenvalue computed.
+
+A motion v is soft if |v·A v| ≤ band · Σ α |v|² dA: beside the tension α of what it moves. The counts are
+those of the pencil A s = λ N s, N the lumped area times each triangle's tension: the negative eigenvalues of
+A - band·N and of A + band·N are those below ±band. With σ = band · max α and M the lumped area, A - σM is not
+above A - band·N: where it has no negative eigenvalue, none is negative nor soft.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..base.arrays import Floats
+from .factorisation import SingularMatrix
+from .modes import SecondVariation, Stiffness
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Counts of eigenvalues.
+
+    Attributes
+    ----------
+    index : of the negative ones; None where rounding hides it.
+    below : of those that are negative and not soft; None where rounding hides it.
+    soft : of the soft ones.
+    hidden : what else of it could not be computed, as a sentence.
+    """
+
+    index: int | None = None
+    below: int | None = None
+    soft: int = 0
+    hidden: str = ""
+
+    @property
+    def unknown(self) -> bool:
+        """Whether something is missing that decides about stability."""
+        return self.below is None or bool(self.hidden)
+
+
+def count_soft(variation: SecondVariation, band: float) -> tuple[Spectrum, Stiffness | None]:
+    """The counts for a band in units of α, 1/length², and a factor for the modes; None if there is none.
+
+    One factorisation where nothing is soft or negative, two where nothing is soft, else up to five.
+    """
+    wide = band * variation.surface.tensions.max(initial=0.0) * variation.mass
+    above = _at(variation, wide)
+    if above is not None and above.negative == 0:
+        return Spectrum(0, 0), above
+    below = _at(variation, -wide)
+    if above is not None and below is not None and above.negative == below.negative:
+        return Spectrum(below.negative, below.negative), below
+    narrow = band * variation.tension_mass
+    up, down, here = (_at(variation, shift) for shift in (narrow, -narrow, 0.0))
+    index = None if here is None else here.negative
+    if up is None or down is None:
+        return Spectrum(index), here
+    if up.negative == down.negative:
+        index = down.negative
+    return Spectrum(index, down.negative, up.negative - down.negative), here or _at(variation, wide)
+
+
+def _at(variation: SecondVariation, shift: Floats | float) -> Stiffness | None:
+    try:
+        return variation.at(shift)
+    except SingularMatrix:
+        return None

@@ -1,0 +1,234 @@
+"""The curves that held lines were drawn as, with the vertices that are held on them.
+
+A finer mesh is a mesh of the drawing as long as its new vertices lie on these curves, and not on the edges
+or on curves fitted to them.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..base import validate
+from ..base.arrays import Bools, Floats, Ints, read_only
+from ..base.errors import CurveWarning, SurfaceError
+from ..curves.curve_data import exact_curve, exact_data
+from ..curves.curves import Curve
+from .topology import Topology
+
+NEAR = 1e-8  # of the size: a vertex this near to its curve is on it
+SPAN = 1e-9  # of the size of a curve: points this near to a plane or line span no more than it
+
+
+@dataclass(frozen=True, eq=False)
+class HeldCurve:
+    """A drawn curve in space, and the vertices that are held on it.
+
+    Attributes
+    ----------
+    curve : with points (x, y, z).
+    vertices : (k,) int, k ≥ 2, in order along the curve; an edge of the mesh leads from each to the next. On
+        a closed curve the last is the first again.
+    at : (k,) ascending, the parameter of each vertex on the curve.
+
+    >>> from ..curves import polyline
+    >>> ridge = HeldCurve(polyline([[0, 0, 1], [4, 0, 1]]), np.array([7, 3, 9]), np.array([0.0, 0.5, 1.0]))
+    >>> ridge.edges.tolist()
+    [[7, 3], [3, 9]]
+    """
+
+    curve: Curve
+    vertices: Ints
+    at: Floats
+
+    @property
+    def edges(self) -> Ints:
+        """(k-1,2) from vertex to vertex."""
+        return np.stack([self.vertices[:-1], self.vertices[1:]], axis=1)
+
+    @property
+    def points(self) -> Floats:
+        """(k,3) the places of the vertices on the curve."""
+        return self.curve.at(self.at)
+
+    def plain(self) -> list[Any]:
+        """As JSON holds it: the pieces of the curve to the last digit, the vertices, their parameters."""
+        return [exact_data(self.curve), self.vertices.tolist(), self.at.tolist()]
+
+    @classmethod
+    def from_plain(cls, row: Any) -> HeldCurve:
+        """That of such data, which may come from any file; TypeError or ValueError for others."""
+        pieces, vertices, at = row
+        return cls(exact_curve(pieces), np.array(vertices), np.array(at, dtype=np.float64))
+
+    def mapped(self, matrix: Floats, shift: Floats) -> HeldCurve:
+        """With its curve where x → M x + b takes it."""
+        return replace(self, curve=self.curve.mapped(matrix, shift))
+
+
+@dataclass(frozen=True, eq=False)
+class EdgesOnCurves:
+    """Edges, and where their ends are on curves.
+
+    Attributes
+    ----------
+    curves : the curves.
+    own : (e,) the number of each edge's curve, -1 for an edge of no curve.
+    at : (e,2) the parameters of its ends there.
+    """
+
+    curves: Sequence[Curve]
+    own: Ints
+    at: Floats
+
+    @classmethod
+    def of(cls, held: Sequence[HeldCurve], topo: Topology) -> EdgesOnCurves:
+        """Of all edges of a mesh."""
+        own, at = np.full(len(topo.edges), -1), np.zeros((len(topo.edges), 2))
+        for number, one in enumerate(held):
+            edge, (start, end) = topo.edge_numbers(one.edges), one.edges.T
+            span = np.stack([one.at[:-1], one.at[1:]], axis=1)
+            own[edge], at[edge] = number, np.where((start < end)[:, None], span, span[:, ::-1])
+        return cls([one.curve for one in held], own, at)
+
+    def __getitem__(self, chosen: Bools | Ints) -> EdgesOnCurves:
+        """The chosen edges."""
+        return replace(self, own=self.own[chosen], at=self.at[chosen])
+
+    @property
+    def drawn(self) -> Bools:
+        """(e,) the edges of a curve."""
+        return self.own >= 0
+
+    def between(self, share: Floats | float = 0.5) -> tuple[Floats, Floats]:
+        """(e,) parameters, and (e,3) points, a share of the length of its curve along each edge."""
+        share = np.broadcast_to(share, self.own.shape)
+        t, points = np.zeros(len(self.own)), np.full((len(self.own), 3), np.nan)
+        for number in np.unique(self.own[self.drawn]):
+            mine = self.own == number
+            t[mine] = self.curves[number].middle(*self.at[mine].T, share[mine])
+            points[mine] = self.curves[number].at(t[mine])
+        return t, points
+
+    def cut(self, chosen: Bools, t: Floats) -> EdgesOnCurves:
+        """The edges that are not chosen, the first halves of those that are, cut at t (k,), their second."""
+        (start, end), own = self.at[chosen].T, self.own[chosen]
+        halves = np.stack([start, t], axis=1), np.stack([t, end], axis=1)
+        at = np.concatenate([self.at[~chosen], *halves])
+        return replace(self, own=np.concatenate([self.own[~chosen], own, own]), at=at)
+
+    def joined(self, ends: Ints) -> tuple[HeldCurve, ...]:
+        """The edges (e,2) joined along each curve; a gap ends one part and begins another."""
+        parts = []
+        for number in np.unique(self.own[self.drawn]):
+            mine = self.own == number
+            falls = (self.at[mine, 0] > self.at[mine, 1])[:, None]
+            at = np.where(falls, self.at[mine][:, ::-1], self.at[mine])
+            edges = np.where(falls, ends[mine][:, ::-1], ends[mine])
+            order = np.argsort(at[:, 0])
+            at, edges = at[order], edges[order]
+            gaps = 1 + np.flatnonzero((edges[1:, 0] != edges[:-1, 1]) | (at[1:, 0] != at[:-1, 1]))
+            for e, t in zip(np.split(edges, gaps), np.split(at, gaps), strict=True):
+                vertices, places = np.append(e[:, 0], e[-1, 1]), np.append(t[:, 0], t[-1, 1])
+                parts.append(HeldCurve(self.curves[number], vertices, places))
+        return tuple(parts)
+
+
+def checked_curves(given: Any, X: Floats, topo: Topology, fixed: Bools, size: float) -> tuple[HeldCurve, ...]:
+    """Curves with fixed vertices (n,3) on them and edges of the mesh between these, no edge on two of them.
+
+    Raises
+    ------
+    SurfaceError
+        With the number of the first curve that is wrong.
+    """
+    parts = tuple(given) if isinstance(given, Iterable) else (None,)
+    if not all(isinstance(part, HeldCurve) for part in parts):
+        validate.refuse("curves", given, "a sequence of HeldCurve", error=SurfaceError)
+    taken = np.zeros(len(topo.edges), dtype=bool)
+    for number, part in enumerate(parts):
+        V, t = np.asarray(part.vertices), np.asarray(part.at)
+        shaped = (
+            V.ndim == 1 and len(V) > 1 and V.dtype.kind in "iu" and t.shape == V.shape and t.dtype.kind == "f"
+        )
+        if not shaped or not isinstance(part.curve, Curve) or part.curve.pieces[0].points.shape[1] != 3:
+            _refuse(number, "needs a curve in space, and two or more vertices with a parameter each")
+        if V.min() < 0 or V.max() >= len(X):
+            _refuse(number, f"has vertices outside 0..{len(X) - 1}")
+        if not (t[0] >= 0.0 and t[-1] <= len(part.curve.pieces) and (np.diff(t) > 0.0).all()):
+            _refuse(number, f"needs ascending parameters in 0..{len(part.curve.pieces)}")
+        edges = topo.edge_numbers(part.edges)
+        if (edges < 0).any():
+            ends = part.edges[np.argmax(edges < 0)].tolist()
+            _refuse(number, f"joins the vertices {ends}, which no edge of the mesh joins")
+        if taken[edges].any() or len(np.unique(edges)) < len(edges):
+            _refuse(number, "runs along an edge that is on a curve already")
+        taken[edges] = True
+        if not fixed[V].all():
+            _refuse(number, f"has the vertex {V[np.argmin(fixed[V])]}, which is not fixed")
+        away = np.linalg.norm(part.points - X[V], axis=1)
+        if not away.max() <= NEAR * size:
+            vertex = V[np.argmax(away)]
+            _refuse(number, f"does not pass through vertex {vertex}, which is {away.max():.3g} away from it")
+        read_only(V)
+        read_only(t)
+    return parts
+
+
+def _refuse(number: int, fault: str) -> None:
+    raise SurfaceError(f"curves: curve {number} {fault}", what="curves", where=number)
+
+
+def followed(held: Sequence[HeldCurve], X: Floats, size: float) -> tuple[HeldCurve, ...]:
+    """The curves where their vertices are now, X (n,3), for an affine motion of these.
+
+    All kinds of curves are mapped by an affine map x → M x + b exactly. It is found from the vertices of the
+    curve alone or, where these do not determine it, of all curves together; so rings may move apart.
+
+    Warns
+    -----
+    CurveWarning
+        Where the motion is no such map: then the curve is left out.
+    """
+    if not held:
+        return ()
+    kept, everywhere = list[HeldCurve](), np.concatenate([one.vertices for one in held])
+    before = np.concatenate([one.points for one in held])
+    for one in held:
+        P, Q = one.points, X[one.vertices]
+        if np.linalg.norm(P - Q, axis=1).max() <= NEAR * size:
+            kept.append(one)
+            continue
+        for start, end in ((P, Q), (before, X[everywhere])):
+            matrix, shift = _affine(start, end)
+            if (
+                _spanned(one.curve.controls, start)
+                and np.linalg.norm(start @ matrix.T + shift - end, axis=1).max() <= NEAR * size
+            ):
+                kept.append(one.mapped(matrix, shift))
+                break
+    if len(kept) < len(held):
+        text = f"{len(held) - len(kept)} of {len(held)} curves that held vertices were drawn on are left out,"
+        text += " as these vertices were moved off them: a finer mesh has to guess the boundary between them"
+        warnings.warn(text, CurveWarning, stacklevel=3)
+    return tuple(kept)
+
+
+def _affine(P: Floats, Q: Floats) -> tuple[Floats, Floats]:
+    """(3,3) M and (3,) b with M p + b nearest to q for points P, Q (k,3); M = 1 across what P spans."""
+    middle, there = P.mean(axis=0), Q.mean(axis=0)
+    change = np.linalg.lstsq(P - middle, (Q - there) - (P - middle), rcond=SPAN)[0]
+    matrix = np.eye(3) + change.T
+    return matrix, there - matrix @ middle
+
+
+def _spanned(points: Floats, P: Floats) -> bool:
+    """Whether points (k,3) lie in the line, plane or space that points P span."""
+    _, sizes, axes = np.linalg.svd(P - P.mean(axis=0), full_matrices=False)
+    within = axes[sizes > SPAN * sizes[0]]
+    away = points - P.mean(axis=0)
+    return bool(np.abs(away - away @ within.T @ within).max() <= NEAR * (sizes[0] + np.abs(away).max()))

@@ -1,0 +1,84 @@
+"""Whether motions are soft is counted: it depends neither on the modes asked for nor on an iteration."""
+
+import numpy as np
+import pytest
+
+import pcmc
+from generators import four_fans, spherical_cap
+from pcmc import Patch, Surface, Verdict, certify, solve
+from pcmc.stability import modes as stability_modes
+from pcmc.stability.factorisation import SingularMatrix
+from pcmc.stability.modes import ArpackError, SecondVariation, lowest, second_variation
+from pcmc.stability.softness import count_soft
+
+
+def needle(height):
+    """A pyramid over a square, of one unknown, at rest: E'' falls as the cube of its height."""
+    corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, height]]
+    faces = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    tension = (1.0 + height**2) ** 0.5 / (3.0 * height)
+    return Surface(corners, faces, [0] * 4, [Patch("roof", tension)], fixed=range(4))
+
+
+@pytest.mark.parametrize("modes", [0, 1, 3])
+def test_neutral_at_the_hemisphere_whatever_modes_are_asked_for(modes):
+    surface = solve(spherical_cap(0.1, alpha=0.501)).surface
+    branch = pcmc.follow(surface, "cap", step=-0.02, folds=1)
+    (row,) = np.flatnonzero(branch.events.kind == "fold")
+    found = certify(branch.event_surfaces[row], modes=modes)
+    assert found.verdict is Verdict.NEUTRAL
+    assert "at a fold or a branching" in found.detail
+    assert len(found.eigenvalues) == modes
+
+
+@pytest.mark.parametrize("alpha_aux", [1.0, 2.0, 3.0, 4.0])
+def test_the_counts_are_those_of_the_computed_eigenvalues(alpha_aux):
+    surface = solve(four_fans(4, alpha_aux=alpha_aux), target="stationary").surface
+    part = pcmc.stability.modes.standing_part(surface)
+    space = stability_modes.motion_space(part.surface, part.classes, part.surface.vertices)
+    variation = SecondVariation.of(part.surface, part.classes, space, np.zeros((space.size, 0)))
+    system = variation.at()
+    weighted = system.matrix.toarray() / np.sqrt(np.outer(variation.tension_mass, variation.tension_mass))
+    values = np.linalg.eigvalsh(weighted)
+    for band in (0.01, 0.3, 3.0):
+        counts = count_soft(variation, band)[0]
+        assert counts.index == (values < 0.0).sum()
+        assert counts.below == (values < -band).sum() or counts.soft == 0
+        assert counts.soft == (np.abs(values) < band).sum()
+
+
+@pytest.mark.parametrize("modes", [0, 1])
+def test_a_surface_of_one_unknown_can_be_neutral(modes):
+    assert certify(needle(1.0), modes=modes).verdict is Verdict.STABLE
+    found = certify(needle(300.0), modes=modes)
+    assert (found.verdict, found.index) == (Verdict.NEUTRAL, 0)
+    assert len(found.eigenvalues) == modes
+
+
+def test_without_convergence_the_verdict_is_undecided(monkeypatch, small_cap):
+    def fails(*_, **__):
+        raise ArpackError(-9999)
+
+    finer = solve(spherical_cap(0.2)).surface
+    assert certify(finer).verdict is Verdict.STABLE
+    monkeypatch.setattr(stability_modes, "eigsh", fails)
+    found = certify(finer)
+    assert found.verdict is Verdict.UNDECIDED
+    assert "the eigenvalues did not converge" in found.detail
+    assert "modes=0" in found.detail
+    assert certify(finer, modes=0).verdict is Verdict.STABLE
+    with pytest.raises(SingularMatrix, match="did not converge"):
+        lowest(second_variation(finer), 1)
+
+
+def test_a_stable_roof_is_factorised_once(monkeypatch):
+    cap = solve(spherical_cap(0.25)).surface
+    shifts, at = [], SecondVariation.at
+
+    def counted(self, shift=0.0):
+        shifts.append(shift)
+        return at(self, shift)
+
+    monkeypatch.setattr(SecondVariation, "at", counted)
+    assert certify(cap).verdict is Verdict.STABLE
+    assert len(shifts) == 1
