@@ -1,10 +1,9 @@
 // The page: it sends one request at a time to the server and shows the answers.
 
-import { capital } from "./elements.js";
+import { capital, element } from "./elements.js";
 import {
   arrowsOf, COLOURS, fieldOf, showCheck, showFindings, showLegend, showParts, showSupports, showVerdict,
 } from "./findings.js";
-import { capital, element } from "./elements.js";
 import { digits, Panel } from "./panel.js";
 import { addSaving } from "./saving.js";
 import { ask, fetchFile } from "./server.js";
